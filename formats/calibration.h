@@ -1,0 +1,35 @@
+// A saved calibration (JSON): which sensor, what was found, how good it is.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/geometry.h"
+#include "formats/result.h"
+
+namespace sonocase {
+
+// kind "probe":      sensor_from_tool = probe_sensor_from_probe (origin and axes of the probe frame)
+// kind "needle":     sensor_from_tool = needle_sensor_from_needle (origin at the tip, z hub to tip)
+// kind "mannequin":  sensor_from_tool = world_from_mannequin, scale applied to the mannequin first
+struct Calibration {
+    std::string kind;
+    std::string sensor;        // serial or name; empty: unknown
+    Rigid sensor_from_tool;
+    double scale = 1;
+    double rms_mm = -1;        // negative: not measured
+    Vector3 sigma_mm{-1, -1, -1};  // one standard deviation of the translation
+    double condition = -1;
+    int poses = 0;
+    std::string date;          // ISO 8601, UTC; given by the caller
+    std::string data_digest;   // of the readings
+    std::vector<std::string> warnings;
+};
+
+Result<Calibration> parse_calibration(std::string_view json, const std::string& where);
+std::string format_calibration(const Calibration& calibration);
+Result<Calibration> load_calibration(const std::string& path);
+Status save_calibration(const Calibration& calibration, const std::string& path);
+
+}  // namespace sonocase

@@ -1,0 +1,68 @@
+// A case bundle in memory: everything that the player needs, and how it was made.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/brick_volume.h"
+#include "formats/label_volume.h"
+#include "formats/result.h"
+#include "formats/solid_texture.h"
+#include "formats/stage_report.h"
+#include "formats/surface.h"
+#include "formats/tissue.h"
+
+namespace sonocase {
+
+struct InputHash {
+    std::string path;    // as the recipe names it
+    std::string digest;  // hex
+};
+
+struct EmbeddedExercise {
+    std::string name;  // "liver-biopsy"
+    std::string toml;  // the exercise file as given; formats/exercise.h parses it
+};
+
+struct CaseManifest {
+    std::string case_name;
+    std::string producer;  // program and version
+    std::string recipe;    // the TOML text as given
+    std::vector<InputHash> inputs;
+    std::vector<StageReport> stages;
+};
+
+struct CaseBundle {
+    CaseManifest manifest;
+    Grid grid;  // cubic voxels in the `mannequin` frame; direction is the identity
+    std::vector<Label> labels;    // palette of label_bricks; [0] is outside
+    std::vector<Tissue> tissues;  // Label::tissue names one of these
+    std::vector<EmbeddedExercise> exercises;
+
+    BrickVolume<std::uint8_t> label_bricks;
+    BrickVolume<std::int8_t> echo_offset;      // quarter dB, mid-scale structure; may be empty
+    BrickVolume<std::uint32_t> boundary;       // formats/boundary_record.h; may be empty
+    std::vector<SolidTexture> textures;
+    SpeckleVolume speckle;
+
+    Surface patient_skin;       // `mannequin` frame, after the warp
+    Surface mannequin_skin;     // `mannequin` frame, as digitised
+    std::vector<std::uint8_t> preview_png;  // may be empty
+};
+
+// Tissue table index of every palette entry; # labels.
+std::vector<int> tissue_of_label(const CaseBundle& bundle);
+
+// Reads a bundle from bytes. Trusts nothing: every size is checked before allocation, every offset
+// against the file, every checksum before use; docs/format.md says what is done in each malformed case.
+Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes, const std::string& where);
+// Same bytes for the same bundle on any machine with any number of threads.
+std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle);
+
+// Files. Saving writes a temporary name beside `path` and renames.
+Result<CaseBundle> load_bundle(const std::string& path);
+Status save_bundle(const CaseBundle& bundle, const std::string& path);
+
+}  // namespace sonocase

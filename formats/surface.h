@@ -1,0 +1,18 @@
+// Surfaces as triangle meshes or as clouds of readings. Millimetres; the frame is the holder's.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "formats/geometry.h"
+
+namespace sonocase {
+
+struct Surface {
+    std::vector<Point3> points;
+    std::vector<Vector3> normals;  // outward unit normals; empty, or # points
+    std::vector<std::array<std::uint32_t, 3>> triangles;  // empty for a cloud; outside counter-clockwise
+};
+
+}  // namespace sonocase

@@ -1,0 +1,48 @@
+# What every target of ours shares: warnings, sanitizers, reproducible floating point, and the
+# include rule that keeps the dependency law.
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
+  set(CMAKE_C_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
+endif()
+find_program(MOLD_PROGRAM mold)
+if(MOLD_PROGRAM AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  add_link_options(-fuse-ld=mold)
+endif()
+add_link_options(-Wl,--as-needed)
+set(CMAKE_CXX_FLAGS_RELEASE "-O2")
+set(CMAKE_CXX_FLAGS_DEBUG "-O1 -g1")
+
+# Interface target that our own code links, and nothing of a third party's.
+add_library(sonocase_options INTERFACE)
+target_compile_options(sonocase_options INTERFACE
+  -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
+  # One rounding per operation on every machine: the same inputs give the same bytes.
+  -ffp-contract=off)
+if(SONOCASE_SANITIZE)
+  add_compile_options(-fsanitize=${SONOCASE_SANITIZE} -fno-omit-frame-pointer
+                      -fno-sanitize-recover=undefined)
+  add_link_options(-fsanitize=${SONOCASE_SANITIZE})
+endif()
+
+# sonocase_library(NAME FOLDER): one of the three libraries. Its headers are reached as
+# "<folder>/..." through a directory that holds a link to that folder alone, so that a target sees
+# exactly the libraries it links: the runtime cannot include a pipeline header.
+function(sonocase_library name folder)
+  add_library(${name} STATIC)
+  set(root "${CMAKE_BINARY_DIR}/include/${folder}")
+  file(MAKE_DIRECTORY "${root}")
+  file(CREATE_LINK "${CMAKE_SOURCE_DIR}/${folder}" "${root}/${folder}" SYMBOLIC)
+  target_include_directories(${name} PUBLIC "${root}")
+  target_link_libraries(${name} PRIVATE sonocase_options)
+endfunction()
+
+# sonocase_test(NAME SOURCES ... LIBRARIES ...): one GoogleTest program, one ctest entry.
+function(sonocase_test name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE sonocase_options sonocase_test_support ${arg_LIBRARIES}
+                        GTest::gtest_main)
+  add_test(NAME ${name} COMMAND ${name})
+endfunction()
