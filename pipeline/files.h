@@ -1,0 +1,39 @@
+// Whole files in, whole files out. An output appears under its name complete or not at all.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/result.h"
+
+namespace sonocase::pipeline {
+
+Result<std::vector<std::uint8_t>> read_file(const std::string& path);
+Result<std::string> read_text_file(const std::string& path);
+
+// Writes a temporary name in the same folder and renames it; makes missing folders.
+Status write_file(const std::string& path, std::span<const std::uint8_t> bytes);
+Status write_text_file(const std::string& path, std::string_view text);
+
+// For libraries that write files themselves: they write temporary(), which lies in the same folder
+// with the same ending, and commit() renames it. Without commit() the temporary is removed.
+class OutputFile {
+  public:
+    explicit OutputFile(std::string path);
+    ~OutputFile();
+    OutputFile(const OutputFile&) = delete;
+    OutputFile& operator=(const OutputFile&) = delete;
+
+    const std::string& temporary() const { return temporary_; }
+    Status commit();
+
+  private:
+    std::string path_;
+    std::string temporary_;
+    bool committed_ = false;
+};
+
+}  // namespace sonocase::pipeline

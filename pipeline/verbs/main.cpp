@@ -1,0 +1,88 @@
+// sonocase: turns a segmented CT and a digitised mannequin into a case bundle.
+#include <cstdio>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/nearest_name.h"
+#include "pipeline/verbs/build_facts.h"
+#include "pipeline/verbs/command_line.h"
+#include "pipeline/verbs/verbs.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+struct Verb {
+    const char* group;
+    const char* name;
+    const char* summary;
+    int (*run)(int argc, char** argv);
+};
+
+// The one table of verbs, in the order in which help shows them.
+[[maybe_unused]] constexpr const char* kCase = "Make and look at a case";
+[[maybe_unused]] constexpr const char* kStage = "One stage, files in and files out";
+[[maybe_unused]] constexpr const char* kSession = "Trackers and sessions";
+
+const std::vector<Verb>& verbs() {
+    static const std::vector<Verb> table{};
+    return table;
+}
+
+void print_help(std::FILE* out) {
+    std::fputs(
+        "sonocase: case bundles for ultrasound-guided needle placement\n\n"
+        "Usage: sonocase VERB [options]\n",
+        out);
+    const char* group = "";
+    for (const Verb& verb : verbs()) {
+        if (std::string_view(group) != verb.group) {
+            group = verb.group;
+            std::fprintf(out, "\n%s:\n", group);
+        }
+        std::fprintf(out, "  %-11s %s\n", verb.name, verb.summary);
+    }
+    std::fputs(
+        "\nsonocase VERB --help    options of a verb, with defaults and ranges\n"
+        "sonocase --version      version and build facts\n"
+        "\nExit status: 0 done, 1 failed with one line on standard error, 2 wrong usage.\n",
+        out);
+}
+
+int run(int argc, char** argv) {
+    if (argc < 2) {
+        print_help(stderr);
+        return kWrongUsage;
+    }
+    const std::string_view name = argv[1];
+    if (name == "--help" || name == "-h" || name == "help") {
+        print_help(stdout);
+        return kDone;
+    }
+    if (name == "--version") {
+        std::fputs(build_facts("sonocase").c_str(), stdout);
+        return kDone;
+    }
+    std::vector<std::string> names;
+    for (const Verb& verb : verbs()) {
+        if (name == verb.name) return verb.run(argc - 1, argv + 1);
+        names.emplace_back(verb.name);
+    }
+    std::fprintf(stderr, "sonocase: no verb '%s'; %s (sonocase --help lists all)\n", argv[1],
+                 suggest_name(name, names).c_str());
+    return kWrongUsage;
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
+
+int main(int argc, char** argv) {
+    try {
+        return sonocase::pipeline::run(argc, argv);
+    } catch (const std::exception& exception) {
+        // The stages catch what their libraries throw; what is left is exhaustion of memory or
+        // disk.
+        const std::string verb = argc > 1 ? argv[1] : "";
+        return sonocase::pipeline::fail(verb.c_str(), {exception.what(), "", ""});
+    }
+}
