@@ -25,12 +25,17 @@ struct Stencil {
     std::size_t xm, xp, ym, yp, zm, zp;
 };
 
-Stencil stencil(const VoxelBox& box, std::size_t at, int i, int j, int k) {
+Stencil stencil(const VoxelBox& box, Int3 v) {
     const std::size_t sy = static_cast<std::size_t>(box.size.x);
     const std::size_t sz = sy * static_cast<std::size_t>(box.size.y);
-    return {i > 0 ? std::size_t{1} : 0, i + 1 < box.size.x ? std::size_t{1} : 0,
-            j > 0 ? sy : 0,             j + 1 < box.size.y ? sy : 0,
-            k > 0 ? sz : 0,             (void(at), k + 1 < box.size.z) ? sz : 0};
+    Stencil s;
+    s.xm = v.x > 0 ? 1 : 0;
+    s.xp = v.x + 1 < box.size.x ? 1 : 0;
+    s.ym = v.y > 0 ? sy : 0;
+    s.yp = v.y + 1 < box.size.y ? sy : 0;
+    s.zm = v.z > 0 ? sz : 0;
+    s.zp = v.z + 1 < box.size.z ? sz : 0;
+    return s;
 }
 
 float curvature(const float* p, const Stencil& s, float h) {
@@ -97,8 +102,7 @@ void evolve(Layer* layer, const LevelSetOptions& options, float dt) {
             parallel_for(layer->band.size(), kGrain, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t b = begin; b < end; ++b) {
                     const std::size_t at = layer->band[b];
-                    const Int3 v = unravel(box, at);
-                    curve[at] = curvature(phi + at, stencil(box, at, v.x, v.y, v.z), h);
+                    curve[at] = curvature(phi + at, stencil(box, unravel(box, at)), h);
                 }
             });
         }
@@ -106,7 +110,7 @@ void evolve(Layer* layer, const LevelSetOptions& options, float dt) {
             for (std::size_t b = begin; b < end; ++b) {
                 const std::size_t at = layer->band[b];
                 const Int3 v = unravel(box, at);
-                const Stencil s = stencil(box, at, v.x, v.y, v.z);
+                const Stencil s = stencil(box, v);
                 const float* p = phi + at;
                 float c = 0;
                 if (options.closest_point) {

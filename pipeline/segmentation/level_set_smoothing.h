@@ -4,7 +4,7 @@
 // phi_0  signed distance to the label (negative inside), mm
 // C      sum of the principal curvatures, 1/mm (positive on a sphere), at the voxel, or with
 //        closest_point at x' = x - phi grad(phi): the point of the surface nearest to it
-// K0     1/mm^2... per unit of time: how closely the answer keeps to the input
+// K0     how closely the answer keeps to the input, 1/mm^2 (the time unit is mm^2)
 //
 // Source: [Magee] eq. (10). Departures: the printed equation lacks `phi_t +` and prints the time step
 // as a gradient; layers are recomposed by argmin of phi instead of thresholding each at 0, because

@@ -1,0 +1,22 @@
+// The grid of cubic voxels that a registered label map is resampled into.
+#pragma once
+
+#include "formats/label_volume.h"
+#include "formats/registration.h"
+#include "formats/result.h"
+
+namespace sonocase::pipeline {
+
+struct CookedGridOptions {
+    double voxel_mm = 1;   // edge of the cubic voxels, [0.2, 10]
+    double margin_mm = 4;  // air kept round the body, >= 0
+};
+
+// Axes of `mannequin` (direction is the identity), origin at a whole multiple of voxel_mm, just large
+// enough for the warped image of every voxel with a label other than outside, plus the margin.
+// An Error if the map holds no body, or if the grid would have more than 2^31 voxels.
+Result<Grid> cooked_grid(const LabelVolume& ct_labels,
+                         const Registration& registration,
+                         const CookedGridOptions& options = {});
+
+}  // namespace sonocase::pipeline
