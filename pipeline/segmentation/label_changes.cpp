@@ -28,7 +28,9 @@ std::vector<LabelChange> compare_volumes(const std::vector<Label>& labels,
     return out;
 }
 
-void report_changes(const std::vector<LabelChange>& changes, double warn_above, StageReport* report) {
+void report_changes(const std::vector<LabelChange>& changes,
+                    double warn_above,
+                    StageReport* report) {
     int lost = 0;
     double sum = 0, worst = 0;
     for (const LabelChange& c : changes) {
@@ -39,23 +41,17 @@ void report_changes(const std::vector<LabelChange>& changes, double warn_above, 
         const std::string why = c.note.empty() ? "" : ": " + c.note;
         if (c.lost()) {
             ++lost;
-            std::snprintf(line,
-                          sizeof line,
+            std::snprintf(line, sizeof line,
                           "label %s (%.3g ml) has no voxel left%s; choose a smaller voxel",
-                          c.name.c_str(),
-                          c.volume_before_ml,
-                          why.c_str());
+                          c.name.c_str(), c.volume_before_ml, why.c_str());
             report->warnings.emplace_back(line);
         } else if (change > warn_above) {
-            std::snprintf(line,
-                          sizeof line,
-                          "label %s went from %.3g to %.3g ml (%+.0f %%)%s; choose a smaller voxel or "
-                          "less smoothing",
-                          c.name.c_str(),
-                          c.volume_before_ml,
-                          c.volume_after_ml,
-                          100 * c.change(),
-                          why.c_str());
+            std::snprintf(
+                line, sizeof line,
+                "label %s went from %.3g to %.3g ml (%+.0f %%)%s; choose a smaller voxel or "
+                "less smoothing",
+                c.name.c_str(), c.volume_before_ml, c.volume_after_ml, 100 * c.change(),
+                why.c_str());
             report->warnings.emplace_back(line);
         }
     }

@@ -31,6 +31,8 @@ std::vector<LabelChange> compare_volumes(const std::vector<Label>& labels,
 
 // Adds labels, lost_labels, mean_abs_volume_change, max_abs_volume_change, and a warning for each
 // label that is lost or changed by more than `warn_above`.
-void report_changes(const std::vector<LabelChange>& changes, double warn_above, StageReport* report);
+void report_changes(const std::vector<LabelChange>& changes,
+                    double warn_above,
+                    StageReport* report);
 
 }  // namespace sonocase::pipeline

@@ -44,17 +44,18 @@ float curvature(const float* p, const Stencil& s, float h) {
                 zm = *(p - s.zm), zp = *(p + s.zp);
     const float dx = 0.5f * (xp - xm), dy = 0.5f * (yp - ym), dz = 0.5f * (zp - zm);
     const float dxx = xp - 2 * c + xm, dyy = yp - 2 * c + ym, dzz = zp - 2 * c + zm;
-    const float dxy = 0.25f * (*(p + s.xp + s.yp) - *(p - s.xm + s.yp) - *(p + s.xp - s.ym) +
-                               *(p - s.xm - s.ym));
-    const float dxz = 0.25f * (*(p + s.xp + s.zp) - *(p - s.xm + s.zp) - *(p + s.xp - s.zm) +
-                               *(p - s.xm - s.zm));
-    const float dyz = 0.25f * (*(p + s.yp + s.zp) - *(p - s.ym + s.zp) - *(p + s.yp - s.zm) +
-                               *(p - s.ym - s.zm));
+    const float dxy =
+        0.25f * (*(p + s.xp + s.yp) - *(p - s.xm + s.yp) - *(p + s.xp - s.ym) + *(p - s.xm - s.ym));
+    const float dxz =
+        0.25f * (*(p + s.xp + s.zp) - *(p - s.xm + s.zp) - *(p + s.xp - s.zm) + *(p - s.xm - s.zm));
+    const float dyz =
+        0.25f * (*(p + s.yp + s.zp) - *(p - s.ym + s.zp) - *(p + s.yp - s.zm) + *(p - s.ym - s.zm));
     const float g2 = dx * dx + dy * dy + dz * dz;
     // On a medial axis the gradient is zero and the quotient 0/0: nothing to smooth there.
     if (g2 < 1e-4f * h * h) return 0;
     const float top = dxx * (dy * dy + dz * dz) + dyy * (dx * dx + dz * dz) +
-                      dzz * (dx * dx + dy * dy) - 2 * (dxy * dx * dy + dxz * dx * dz + dyz * dy * dz);
+                      dzz * (dx * dx + dy * dy) -
+                      2 * (dxy * dx * dy + dxz * dx * dz + dyz * dy * dz);
     const float kappa = top / (g2 * std::sqrt(g2));
     // A stencil resolves no curvature above about 1/h in each direction.
     return std::clamp(kappa, -2.0f / h, 2.0f / h);
@@ -63,7 +64,8 @@ float curvature(const float* p, const Stencil& s, float h) {
 Int3 unravel(const VoxelBox& box, std::size_t at) {
     const std::size_t nx = static_cast<std::size_t>(box.size.x);
     const std::size_t ny = static_cast<std::size_t>(box.size.y);
-    return {static_cast<int>(at % nx), static_cast<int>(at / nx % ny), static_cast<int>(at / nx / ny)};
+    return {static_cast<int>(at % nx), static_cast<int>(at / nx % ny),
+            static_cast<int>(at / nx / ny)};
 }
 
 // Trilinear value at voxel coordinates (clamped to the box) of a field kept for every voxel.
@@ -80,9 +82,9 @@ float sample(const VoxelBox& box, const std::vector<float>& field, float x, floa
     cell(z, box.size.z, &k, &w);
     const std::size_t sx = box.size.x > 1 ? 1 : 0;
     const std::size_t sy = box.size.y > 1 ? static_cast<std::size_t>(box.size.x) : 0;
-    const std::size_t sz = box.size.z > 1 ? static_cast<std::size_t>(box.size.x) *
-                                                static_cast<std::size_t>(box.size.y)
-                                          : 0;
+    const std::size_t sz =
+        box.size.z > 1 ? static_cast<std::size_t>(box.size.x) * static_cast<std::size_t>(box.size.y)
+                       : 0;
     const float* p = field.data() + box.index(i, j, k);
     const auto line = [&](const float* q) { return q[0] + u * (q[sx] - q[0]); };
     const float a = line(p), b = line(p + sy), c = line(p + sz), d = line(p + sy + sz);
@@ -118,9 +120,7 @@ void evolve(Layer* layer, const LevelSetOptions& options, float dt) {
                                 dz = *(p + s.zp) - *(p - s.zm);
                     const float length = std::sqrt(dx * dx + dy * dy + dz * dz);
                     const float go = length > 0.02f * h ? *p / (h * length) : 0;
-                    c = sample(box,
-                               curve,
-                               static_cast<float>(v.x) - go * dx,
+                    c = sample(box, curve, static_cast<float>(v.x) - go * dx,
                                static_cast<float>(v.y) - go * dy,
                                static_cast<float>(v.z) - go * dz);
                 } else {
@@ -153,18 +153,14 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
     const double dt = options.time_step > 0 ? options.time_step : 0.8 * limit;
     if (!(options.k0 > 0) || options.iterations < 1 || !(dt <= limit)) {
         char found[128];
-        std::snprintf(found,
-                      sizeof found,
-                      "time step %g with K0 %g and %d iterations",
-                      dt,
-                      options.k0,
-                      options.iterations);
+        std::snprintf(found, sizeof found, "time step %g with K0 %g and %d iterations", dt,
+                      options.k0, options.iterations);
         char wanted[128];
-        std::snprintf(wanted,
-                      sizeof wanted,
-                      "K0 > 0, at least one iteration and a time step of at most %.4g, the limit of "
-                      "stability",
-                      limit);
+        std::snprintf(
+            wanted, sizeof wanted,
+            "K0 > 0, at least one iteration and a time step of at most %.4g, the limit of "
+            "stability",
+            limit);
         return Error{found, "level-set smoothing", wanted};
     }
 
@@ -182,12 +178,8 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
         Layer layer;
         layer.box = grow(boxes[l], {pad, pad, pad}, volume.grid.size);
         layer.h = static_cast<float>(h.x);
-        signed_distance(volume,
-                        static_cast<std::uint8_t>(l),
-                        layer.box,
-                        band_mm + h.x,
-                        {true, true, true},
-                        &layer.phi);
+        signed_distance(volume, static_cast<std::uint8_t>(l), layer.box, band_mm + h.x,
+                        {true, true, true}, &layer.phi);
         for (std::size_t at = 0; at < layer.phi.size(); ++at) {
             if (std::abs(layer.phi[at]) > static_cast<float>(band_mm)) continue;
             layer.band.push_back(static_cast<std::uint32_t>(at));
@@ -197,8 +189,8 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
         for (int k = 0; k < layer.box.size.z; ++k) {
             for (int j = 0; j < layer.box.size.y; ++j) {
                 const float* phi = layer.phi.data() + layer.box.index(0, j, k);
-                const std::size_t to = volume.grid.index(
-                    layer.box.first.x, layer.box.first.y + j, layer.box.first.z + k);
+                const std::size_t to = volume.grid.index(layer.box.first.x, layer.box.first.y + j,
+                                                         layer.box.first.z + k);
                 for (std::size_t i = 0; i < static_cast<std::size_t>(layer.box.size.x); ++i) {
                     if (phi[i] < best[to + i]) {
                         best[to + i] = phi[i];
@@ -208,10 +200,11 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
             }
         }
     }
-    result.changes = compare_volumes(
-        volume.labels, label_volumes_ml(volume), label_volumes_ml(result.volume));
+    result.changes =
+        compare_volumes(volume.labels, label_volumes_ml(volume), label_volumes_ml(result.volume));
     for (LabelChange& c : result.changes) {
-        if (c.change() < -0.2) c.note = "the curvature term removes what is thinner than 4 / sqrt(K0)";
+        if (c.change() < -0.2)
+            c.note = "the curvature term removes what is thinner than 4 / sqrt(K0)";
     }
     result.report.stage = "smooth";
     result.report.measures = {{"k0", options.k0},

@@ -6,13 +6,12 @@
 //        closest_point at x' = x - phi grad(phi): the point of the surface nearest to it
 // K0     how closely the answer keeps to the input, 1/mm^2 (the time unit is mm^2)
 //
-// Source: [Magee] eq. (10). Departures: the printed equation lacks `phi_t +` and prints the time step
-// as a gradient; layers are recomposed by argmin of phi instead of thresholding each at 0, because
-// independent thresholds leave gaps and overlaps.
-// Known harm: at convergence a tube of radius R survives only if R >= 2 / sqrt(K0), a sphere only if
-// R >= sqrt(8 / K0). smooth_labels.h keeps them; this stays for comparison.
-// Cost: 10-30 ns a voxel of the band, label and iteration; memory 3 floats a voxel of the largest
-// label's box and 5 bytes a voxel of the volume.
+// Source: [Magee] eq. (10). Departures: the printed equation lacks `phi_t +` and prints the time
+// step as a gradient; layers are recomposed by argmin of phi instead of thresholding each at 0,
+// because independent thresholds leave gaps and overlaps. Known harm: at convergence a tube of
+// radius R survives only if R >= 2 / sqrt(K0), a sphere only if R >= sqrt(8 / K0). smooth_labels.h
+// keeps them; this stays for comparison. Cost: 10-30 ns a voxel of the band, label and iteration;
+// memory 3 floats a voxel of the largest label's box and 5 bytes a voxel of the volume.
 #pragma once
 
 #include <vector>
@@ -43,8 +42,8 @@ struct LevelSetResult {
     StageReport report;
 };
 
-// Cubic voxels are required (spacings within 1e-6 of each other), as in the paper; else an Error that
-// says to resample first. A time step above the limit is an Error too.
+// Cubic voxels are required (spacings within 1e-6 of each other), as in the paper; else an Error
+// that says to resample first. A time step above the limit is an Error too.
 Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
                                            const LevelSetOptions& options = {},
                                            const Progress& progress = {});

@@ -4,6 +4,7 @@
 
 #include "pipeline/parallel.h"
 #include "pipeline/registration/inverse_map.h"
+#include "pipeline/segmentation/cooked_grid.h"
 
 namespace sonocase::pipeline {
 
@@ -16,7 +17,7 @@ LabelVolume nearest_labels(const LabelVolume& ct_labels,
     out.grid = grid;
     out.labels = ct_labels.labels;
     out.voxels.assign(grid.voxel_count(), 0);
-    const InverseMap inverse_map(registration);
+    const InverseMap inverse_map(with_voxel_rim(registration, ct_labels.grid));
     const Grid& from = ct_labels.grid;
     const std::size_t nx = static_cast<std::size_t>(grid.size.x);
     const std::size_t rows =
@@ -32,8 +33,8 @@ LabelVolume nearest_labels(const LabelVolume& ct_labels,
             const Point3 start =
                 grid.point_from_voxel({0, static_cast<double>(j), static_cast<double>(k)});
             const Vector3 step = grid.spacing_mm.x * grid.direction.column(0);
-            inverse_map.invert_row(
-                start, step, grid.size.x, x.data(), y.data(), z.data(), status.data());
+            inverse_map.invert_row(start, step, grid.size.x, x.data(), y.data(), z.data(),
+                                   status.data());
             std::uint8_t* to = out.voxels.data() + grid.index(0, j, k);
             for (std::size_t i = 0; i < nx; ++i) {
                 if (status[i] != MapStatus::ok) {

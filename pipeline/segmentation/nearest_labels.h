@@ -13,9 +13,9 @@ struct PreimageCounts {
     std::size_t no_preimage = 0;  // voxels that come from nowhere
 };
 
-// Labels of `grid` (in `mannequin`) from `ct_labels` through the inverse of the map. Voxels without a
-// preimage inside the CT are outside (0) and counted. One inversion a voxel; any number of threads
-// gives the same bytes.
+// Labels of `grid` (in `mannequin`) from `ct_labels` through the inverse of the map. Voxels without
+// a preimage inside the CT are outside (0) and counted. One inversion a voxel; any number of
+// threads gives the same bytes.
 LabelVolume nearest_labels(const LabelVolume& ct_labels,
                            const Registration& registration,
                            const Grid& grid,
@@ -23,6 +23,7 @@ LabelVolume nearest_labels(const LabelVolume& ct_labels,
                            const Progress& progress = {});
 
 // The volume in ml that each label should have after the map: its CT voxels times det J. # labels.
-std::vector<double> mapped_volumes_ml(const LabelVolume& ct_labels, const Registration& registration);
+std::vector<double> mapped_volumes_ml(const LabelVolume& ct_labels,
+                                      const Registration& registration);
 
 }  // namespace sonocase::pipeline

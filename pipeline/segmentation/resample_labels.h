@@ -26,9 +26,9 @@ struct ResampleOptions {
 };
 
 struct ResampleResult {
-    LabelVolume volume;                    // `mannequin`, direction the identity
-    BrickVolume<std::uint32_t> boundary;   // formats/boundary_record.h; empty: none made
-    std::vector<LabelChange> changes;      // against the CT's volumes times det J
+    LabelVolume volume;                   // `mannequin`, direction the identity
+    BrickVolume<std::uint32_t> boundary;  // formats/boundary_record.h; empty: none made
+    std::vector<LabelChange> changes;     // against the CT's volumes times det J
     StageReport report;
 };
 

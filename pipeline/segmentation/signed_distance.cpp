@@ -22,8 +22,8 @@ void row_distances(const std::uint8_t* is, int count, float spacing, float limit
     }
 }
 
-// One more axis: out[l] = min over lines m of (in[m] + (l - m)^2 spacing^2), lines of `width` values.
-// Few lines lie within the limit, so that the plain minimum beats an envelope of parabolas.
+// One more axis: out[l] = min over lines m of (in[m] + (l - m)^2 spacing^2), lines of `width`
+// values. Few lines lie within the limit, so that the plain minimum beats an envelope of parabolas.
 void line_distances(const float* in,
                     std::size_t width,
                     int lines,
@@ -113,7 +113,8 @@ void signed_distance(const LabelVolume& volume,
     phi->assign(count, 0.0f);
     std::vector<float> first(count), second(count);
     std::vector<std::uint8_t> mark(nx);
-    for (const bool outside : {false, true}) {  // distance to the label, then to what is not the label
+    for (const bool outside :
+         {false, true}) {  // distance to the label, then to what is not the label
         for (int k = 0; k < box.size.z; ++k) {
             for (int j = 0; j < box.size.y; ++j) {
                 const std::uint8_t* row =
@@ -122,8 +123,7 @@ void signed_distance(const LabelVolume& volume,
                 for (std::size_t i = 0; i < nx; ++i) mark[i] = (row[i] == label) != outside;
                 float* to = first.data() + box.index(0, j, k);
                 if (axes[0]) {
-                    row_distances(
-                        mark.data(), box.size.x, static_cast<float>(h.x), limit_sq, to);
+                    row_distances(mark.data(), box.size.x, static_cast<float>(h.x), limit_sq, to);
                 } else {
                     for (std::size_t i = 0; i < nx; ++i) to[i] = mark[i] ? 0.0f : limit_sq;
                 }
@@ -132,26 +132,16 @@ void signed_distance(const LabelVolume& volume,
         if (axes[1]) {
             for (int k = 0; k < box.size.z; ++k) {
                 const std::size_t at = static_cast<std::size_t>(k) * plane;
-                line_distances(first.data() + at,
-                               nx,
-                               box.size.y,
-                               nx,
-                               static_cast<float>(h.y),
-                               limit_sq,
-                               second.data() + at);
+                line_distances(first.data() + at, nx, box.size.y, nx, static_cast<float>(h.y),
+                               limit_sq, second.data() + at);
             }
             first.swap(second);
         }
         if (axes[2]) {
             for (int j = 0; j < box.size.y; ++j) {  // row by row, so that the lines stay in cache
                 const std::size_t at = static_cast<std::size_t>(j) * nx;
-                line_distances(first.data() + at,
-                               nx,
-                               box.size.z,
-                               plane,
-                               static_cast<float>(h.z),
-                               limit_sq,
-                               second.data() + at);
+                line_distances(first.data() + at, nx, box.size.z, plane, static_cast<float>(h.z),
+                               limit_sq, second.data() + at);
             }
             first.swap(second);
         }

@@ -1,11 +1,11 @@
 // Signed distance to one label of a label volume, in a box of voxels and up to a limit.
 //
-// phi < 0 inside the label, > 0 outside, in mm. The surface is taken to run half-way between a voxel
-// of the label and its neighbour outside. Exact Euclidean distance between voxel centres less half a
-// voxel, clamped to +-limit_mm. With `axes` false along the slices of a thick stack, each slice is
-// measured on its own (shape interpolation needs that). A label that reaches the border of the volume
-// is taken to go on beyond it: no surface runs along the border.
-// Cost: O(limit / spacing) a voxel and axis, vectorised; deterministic.
+// phi < 0 inside the label, > 0 outside, in mm. The surface is taken to run half-way between a
+// voxel of the label and its neighbour outside. Exact Euclidean distance between voxel centres less
+// half a voxel, clamped to +-limit_mm. With `axes` false along the slices of a thick stack, each
+// slice is measured on its own (shape interpolation needs that). A label that reaches the border of
+// the volume is taken to go on beyond it: no surface runs along the border. Cost: O(limit /
+// spacing) a voxel and axis, vectorised; deterministic.
 #pragma once
 
 #include <array>

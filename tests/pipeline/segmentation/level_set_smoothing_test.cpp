@@ -16,13 +16,13 @@ using sonocase::testing::norm_of;
 using sonocase::testing::sample_labels;
 
 LabelVolume sphere(double radius, int edge = 32) {
-    return sample_labels(
-        cubic_grid(edge), 2, [&](Point3 p) { return norm_of(p) <= radius ? 1 : 0; });
+    return sample_labels(cubic_grid(edge), 2,
+                         [&](Point3 p) { return norm_of(p) <= radius ? 1 : 0; });
 }
 
 LabelVolume tube(double radius) {
-    return sample_labels(
-        cubic_grid(32), 2, [&](Point3 p) { return std::hypot(p.x, p.y) <= radius ? 1 : 0; });
+    return sample_labels(cubic_grid(32), 2,
+                         [&](Point3 p) { return std::hypot(p.x, p.y) <= radius ? 1 : 0; });
 }
 
 // At rest K0 (R - r) = 2 / r on a sphere and K0 (R - r) = 1 / r on a tube.

@@ -31,8 +31,8 @@ TEST(CookedGrid, HoldsTheWarpedBodyAndNotMuchMore) {
     const std::uint64_t seed = 3;
     SCOPED_TRACE(seed);
     Random random(seed);
-    const LabelVolume volume = sample_labels(
-        cubic_grid(40), 2, [](Point3 p) { return norm_of(p) <= 15 ? 1 : 0; });
+    const LabelVolume volume =
+        sample_labels(cubic_grid(40), 2, [](Point3 p) { return norm_of(p) <= 15 ? 1 : 0; });
     const Rigid motion = random.rigid(100);
     const auto grid = cooked_grid(volume, rigid_registration(motion, volume.grid), {0.5, 3});
     ASSERT_TRUE(grid);
@@ -55,8 +55,9 @@ TEST(CookedGrid, RefusesAMapWithoutABody) {
 }
 
 TEST(NearestLabels, IdentityCopiesTheVoxels) {
-    const LabelVolume volume = sample_labels(
-        cubic_grid(16), 3, [](Point3 p) { return norm_of(p) > 6 ? 0 : p.x < p.y ? 1 : 2; });
+    const LabelVolume volume = sample_labels(cubic_grid(16), 3, [](Point3 p) {
+        return norm_of(p) > 6 ? 0 : p.x < p.y ? 1 : 2;
+    });
     PreimageCounts counts;
     const LabelVolume out =
         nearest_labels(volume, rigid_registration({}, volume.grid), volume.grid, &counts);
@@ -68,14 +69,15 @@ TEST(NearestLabels, VoxelsBeyondTheCtAreBackgroundAndCounted) {
     const LabelVolume volume = sample_labels(cubic_grid(10), 2, [](Point3) { return 1; });
     Grid wide = cubic_grid(20);
     PreimageCounts counts;
-    const LabelVolume out = nearest_labels(volume, rigid_registration({}, volume.grid), wide, &counts);
+    const LabelVolume out =
+        nearest_labels(volume, rigid_registration({}, volume.grid), wide, &counts);
     EXPECT_EQ(count_label(out, 1), 1000u);
     EXPECT_EQ(counts.outside, 8000u - 1000u);
 }
 
 TEST(MappedVolumes, ScaleWithTheMap) {
-    const LabelVolume volume = sample_labels(
-        cubic_grid(20), 2, [](Point3 p) { return norm_of(p) <= 8 ? 1 : 0; });
+    const LabelVolume volume =
+        sample_labels(cubic_grid(20), 2, [](Point3 p) { return norm_of(p) <= 8 ? 1 : 0; });
     Registration registration = rigid_registration({}, volume.grid);
     for (auto& row : registration.quadratic.coefficients) {
         for (double& c : row) c *= 2;

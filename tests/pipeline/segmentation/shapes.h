@@ -37,7 +37,9 @@ inline LabelVolume sample_labels(const Grid& grid,
     return volume;
 }
 
-inline double norm_of(Point3 p) { return norm(p - Point3{}); }
+inline double norm_of(Point3 p) {
+    return norm(p - Point3{});
+}
 
 inline std::size_t count_label(const LabelVolume& volume, int label) {
     std::size_t count = 0;

@@ -66,7 +66,8 @@ TEST(SignedDistance, SliceModeNeverLooksAtAnotherSlice) {
         signed_distance(slice, 1, {{0, 0, 0}, slice.grid.size}, 4.0, {true, true, true}, &alone);
         for (std::size_t v = 0; v < 144; ++v) {
             // Half a voxel is the mean spacing of the axes measured: 7/3 against 1.
-            const float shift = volume.voxels[static_cast<std::size_t>(k) * 144 + v] == 1 ? -1.f : 1.f;
+            const float shift =
+                volume.voxels[static_cast<std::size_t>(k) * 144 + v] == 1 ? -1.f : 1.f;
             const float a = phi[static_cast<std::size_t>(k) * 144 + v] * shift;
             const float b = alone[v] * shift + static_cast<float>(0.5 * (7.0 / 3 - 1));
             ASSERT_NEAR(a, std::min(b, 4.0f), 1e-5) << k << " " << v;
@@ -75,9 +76,8 @@ TEST(SignedDistance, SliceModeNeverLooksAtAnotherSlice) {
 }
 
 TEST(SignedDistance, BoxesOfLabelsAreTight) {
-    const LabelVolume volume = sample_labels(cubic_grid(9), 4, [](Point3 p) {
-        return p.x == 1 && p.y >= -2 && p.z <= 0 ? 2 : 0;
-    });
+    const LabelVolume volume = sample_labels(
+        cubic_grid(9), 4, [](Point3 p) { return p.x == 1 && p.y >= -2 && p.z <= 0 ? 2 : 0; });
     const auto boxes = label_boxes(volume);
     EXPECT_TRUE(boxes[1].empty());
     EXPECT_EQ(boxes[2].first, (Int3{5, 2, 0}));
