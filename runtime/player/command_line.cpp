@@ -1,0 +1,90 @@
+#include "runtime/player/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <sstream>
+
+namespace sonocase::runtime {
+namespace {
+
+std::vector<std::string> split(const std::string& list) {
+    std::vector<std::string> names;
+    std::istringstream in(list);
+    for (std::string name; std::getline(in, name, ',');) {
+        if (!name.empty()) names.push_back(name);
+    }
+    return names;
+}
+
+}  // namespace
+
+int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exit_now) {
+    CLI::App app{"Scan a case bundle with a tracked probe, the mouse or a script.", "sonoplay"};
+    app.set_version_flag("--version", "sonoplay " SONOCASE_VERSION);
+    std::string size, effects;
+    app.add_option("bundle", arguments.bundle,
+                   "Case bundle (*.sonocase); none: choose from a list");
+    app.add_option("--exercise", arguments.exercise, "Exercise of the bundle; default: its first");
+    app.add_option("--tracker", arguments.tracker,
+                   "mouse | sweep:NAME | replay:FILE[,NEEDLE_FILE] | igtl:HOST:PORT | "
+                   "igtl:listen:PORT | viper | 3dg | liberty | null");
+    app.add_option("--calibration", arguments.calibrations, "Calibration file; may be repeated")
+        ->allow_extra_args(false);
+    app.add_flag("--headless", arguments.headless, "No window: render frames and stop")
+        ->group("Headless");
+    app.add_option("--frames", arguments.frames,
+                   "Frames to render, spread over the sweep or taken from the recording in order")
+        ->check(CLI::Range(1, 100000000))
+        ->group("Headless");
+    app.add_option("--size", size, "Picture size WxH, or the window's")->group("Headless");
+    app.add_option("--out", arguments.out, "Folder for PNG frames")->group("Headless");
+    app.add_option("--stats", arguments.stats,
+                   "Write times and costs as JSON; - for standard output");
+    app.add_option("--record", arguments.record, "Record the session to FILE.igs.mha");
+    app.add_option("--model", arguments.model, "Image model; default: the exercise's")
+        ->check(CLI::IsMember({"physical", "paper"}))
+        ->group("Picture");
+    app.add_option("--effects", effects, "auto | all | comma-separated names")->group("Picture");
+    app.add_option("--renderer", arguments.renderer, "fast | reference")
+        ->check(CLI::IsMember({"fast", "reference"}))
+        ->group("Picture");
+    app.add_option("--threads", arguments.threads, "Rendering threads")
+        ->check(CLI::Range(1, 256))
+        ->group("Picture");
+    app.add_option(
+        "--serve", arguments.serve,
+        "OpenIGTLink server [ADDRESS:]PORT that sends IMAGE and TRANSFORM; loopback unless "
+        "an address is given");
+    app.add_option("--screenshot", arguments.screenshot, "Save the window's last picture as PNG")
+        ->group("Testing");
+    app.add_option("--script", arguments.script, "Play input events from a file into the window")
+        ->group("Testing");
+    exit_now = false;
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& e) {
+        exit_now = true;
+        if (e.get_exit_code() == 0) return app.exit(e);
+        std::fprintf(stderr, "sonoplay: %s; sonoplay --help lists the options\n", e.what());
+        return 2;
+    }
+    if (!size.empty()) {
+        int w = 0, h = 0;
+        char extra = 0;
+        if (std::sscanf(size.c_str(), "%dx%d%c", &w, &h, &extra) != 2 || w < 16 || h < 16 ||
+            w > 8192 || h > 8192) {
+            std::fprintf(stderr,
+                         "sonoplay: --size %s is not WxH with sides from 16 to 8192; use e.g. "
+                         "512x512\n",
+                         size.c_str());
+            exit_now = true;
+            return 2;
+        }
+        arguments.width_px = w;
+        arguments.height_px = h;
+    }
+    arguments.effects = split(effects);
+    return 0;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,103 @@
+#include "runtime/player/frame_stats.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#ifdef __linux__
+#include <unistd.h>
+#endif
+
+namespace sonocase::runtime {
+namespace {
+
+constexpr double kSmallest = 1e-3, kRatio = 1.01;
+
+// Four significant digits: a JSON that people read, and no false precision.
+double rounded(double value) {
+    if (value == 0 || !std::isfinite(value)) return 0;
+    const double scale = std::pow(10.0, 3 - std::floor(std::log10(std::abs(value))));
+    return std::round(value * scale) / scale;
+}
+
+}  // namespace
+
+void TimeHistogram::add(double ms) {
+    if (!std::isfinite(ms)) return;
+    const double bin = std::log(std::max(ms, kSmallest) / kSmallest) / std::log(kRatio);
+    ++bins_[static_cast<std::size_t>(std::clamp(bin, 0.0, kBins - 1.0))];
+    ++count_;
+    largest_ = std::max(largest_, ms);
+}
+
+double TimeHistogram::quantile(double q) const {
+    if (count_ == 0) return 0;
+    const auto rank = static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(count_)));
+    std::uint64_t seen = 0;
+    for (int i = 0; i < kBins; ++i) {
+        seen += bins_[static_cast<std::size_t>(i)];
+        if (seen >= std::max<std::uint64_t>(rank, 1)) {
+            return std::min(kSmallest * std::pow(kRatio, i + 0.5), largest_);
+        }
+    }
+    return largest_;
+}
+
+void FrameStats::set_effects(std::span<const EffectCost> costs) {
+    effects_.assign(costs.size(), {});
+    for (std::size_t i = 0; i < costs.size(); ++i) effects_[i].name = costs[i].name;
+}
+
+void FrameStats::add(double frame_ms, std::span<const EffectCost> costs) {
+    frame_ms_.add(frame_ms);
+    if (effects_.size() != costs.size()) set_effects(costs);
+    for (std::size_t i = 0; i < costs.size(); ++i) {
+        effects_[i].total_ms += costs[i].ran ? costs[i].ms : 0;
+        effects_[i].skipped += costs[i].ran ? 0 : 1;
+        if (!costs[i].ran) effects_[i].last_reason = costs[i].skipped_because;
+    }
+}
+
+std::string FrameStats::json(const std::string& metrics_json,
+                             const TimeHistogram* pose_to_pixel_ms) const {
+    nlohmann::ordered_json out;
+    out["frames"] = frame_ms_.count();
+    out["frame_ms"]["median"] = rounded(frame_ms_.quantile(0.5));
+    out["frame_ms"]["p99"] = rounded(frame_ms_.quantile(0.99));
+    out["first_frame_ms"] = rounded(first_frame_ms_);
+    out["resident_mb"] = rounded(resident_mb());
+    out["effects"] = nlohmann::ordered_json::array();
+    for (const Effect& effect : effects_) {
+        nlohmann::ordered_json entry;
+        entry["name"] = effect.name;
+        entry["ms"] = rounded(effect.total_ms / std::max<double>(1, double(frame_ms_.count())));
+        entry["skipped_frames"] = effect.skipped;
+        if (effect.last_reason && *effect.last_reason)
+            entry["skipped_because"] = effect.last_reason;
+        out["effects"].push_back(entry);
+    }
+    if (pose_to_pixel_ms && pose_to_pixel_ms->count() > 0) {
+        out["pose_to_pixel_ms"]["median"] = rounded(pose_to_pixel_ms->quantile(0.5));
+        out["pose_to_pixel_ms"]["p99"] = rounded(pose_to_pixel_ms->quantile(0.99));
+    }
+    if (!metrics_json.empty()) {
+        auto metrics = nlohmann::ordered_json::parse(metrics_json, nullptr, false);
+        if (!metrics.is_discarded()) out["metrics"] = std::move(metrics);
+    }
+    return out.dump(2) + "\n";
+}
+
+double resident_mb() {
+#ifdef __linux__
+    if (std::FILE* file = std::fopen("/proc/self/statm", "r")) {
+        unsigned long pages = 0, resident = 0;
+        const int got = std::fscanf(file, "%lu %lu", &pages, &resident);
+        std::fclose(file);
+        if (got == 2) return static_cast<double>(resident) * double(sysconf(_SC_PAGESIZE)) / 1e6;
+    }
+#endif
+    return 0;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,188 @@
+#include "runtime/player/headless.h"
+
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "runtime/player/frame_stats.h"
+#include "runtime/player/open_case.h"
+#include "runtime/player/png_file.h"
+#include "runtime/player/scan_engine.h"
+#include "runtime/tracking/make_tracker.h"
+
+namespace sonocase::runtime {
+namespace {
+
+constexpr double kFrameRate = 30;   // of scripted runs, when --frames does not spread them
+constexpr double kDeviceWait = 10;  // seconds for the first reading of a device
+
+// When frame i of n is rendered, on the session's clock.
+double frame_time_s(const Tracker& tracker, int i, int n) {
+    const int recorded = tracker.recorded_readings();
+    if (recorded > 0) {
+        const int lap = i / recorded;
+        return lap * (tracker.duration_s() + 1 / kFrameRate) +
+               tracker.recorded_time_s(i % recorded);
+    }
+    const double duration = tracker.duration_s();
+    if (duration > 0 && n > 1) return duration * i / (n - 1);
+    return i / kFrameRate;
+}
+
+int frame_count(const PlayerArguments& arguments, const Tracker& tracker) {
+    if (arguments.frames > 0) return arguments.frames;
+    if (tracker.recorded_readings() > 0) return tracker.recorded_readings();
+    if (tracker.duration_s() > 0) return static_cast<int>(tracker.duration_s() * kFrameRate) + 1;
+    return tracker.is_device() ? 300 : 1;
+}
+
+Status write_text(const std::string& path, const std::string& text) {
+    if (path == "-") {
+        std::fwrite(text.data(), 1, text.size(), stdout);
+        return Done{};
+    }
+    const std::string temporary = path + ".part";
+    std::FILE* file = std::fopen(temporary.c_str(), "wb");
+    bool ok = file && std::fwrite(text.data(), 1, text.size(), file) == text.size();
+    if (file) ok = std::fclose(file) == 0 && ok;
+    if (ok) ok = std::rename(temporary.c_str(), path.c_str()) == 0;
+    if (ok) return Done{};
+    const std::string reason = std::strerror(errno);
+    std::remove(temporary.c_str());
+    return Error{"cannot write: " + reason, path, "check that the folder exists and is writable"};
+}
+
+}  // namespace
+
+double steady_seconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+Result<Calibrations> load_calibrations(const std::vector<std::string>& files) {
+    Calibrations calibrations;
+    for (const std::string& file : files) {
+        Result<Calibration> calibration = load_calibration(file);
+        if (!calibration) return calibration.error();
+        std::optional<Calibration>* place = nullptr;
+        if (calibration->kind == "probe") place = &calibrations.probe;
+        if (calibration->kind == "needle") place = &calibrations.needle;
+        if (calibration->kind == "mannequin") place = &calibrations.mannequin;
+        if (!place) {
+            return Error{"kind is \"" + calibration->kind + "\"", file,
+                         "expected probe, needle or mannequin; make one with sonocase calibrate"};
+        }
+        if (*place) {
+            return Error{"second calibration of the " + calibration->kind, file,
+                         "give one --calibration of each kind"};
+        }
+        *place = std::move(*calibration);
+    }
+    return calibrations;
+}
+
+Status run_headless(const PlayerArguments& arguments, double start_s) {
+    if (arguments.bundle.empty()) {
+        return Error{"no bundle given", "", "sonoplay BUNDLE --headless needs one"};
+    }
+    Result<std::unique_ptr<OpenCase>> opened = open_case(arguments.bundle);
+    if (!opened) return opened.error();
+    const OpenCase& open = **opened;
+    for (const std::string& warning : open.warnings) {
+        std::fprintf(stderr, "sonoplay: %s\n", warning.c_str());
+    }
+    const Result<int> index = find_exercise(open, arguments.exercise);
+    if (!index) return index.error();
+    const Exercise& exercise = open.exercises[static_cast<std::size_t>(*index)];
+    const Result<Calibrations> calibrations = load_calibrations(arguments.calibrations);
+    if (!calibrations) return calibrations.error();
+
+    EngineOptions options;
+    RenderOptions& render = options.render;
+    if (arguments.width_px > 0) {
+        render.width_px = arguments.width_px;
+        render.height_px = arguments.height_px;
+    }
+    const std::string model = arguments.model.empty() ? exercise.model : arguments.model;
+    render.model = model == "paper" ? ImageModel::paper : ImageModel::physical;
+    render.kind = arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
+    render.threads = arguments.threads;
+    render.effects = arguments.effects.empty() ? exercise.effects : arguments.effects;
+    Result<ScanEngine> engine = ScanEngine::create(open.bundle, exercise, options);
+    if (!engine) return engine.error();
+    engine->set_calibrations(*calibrations);
+
+    const Skin skin(open.bundle);
+    TrackerContext context;
+    context.skin = &skin;
+    context.exercise = &exercise;
+    const double clock_start_s = steady_seconds();
+    context.clock = [clock_start_s] { return steady_seconds() - clock_start_s; };
+    context.loop = true;
+    std::string spec = arguments.tracker;
+    if (spec.empty()) spec = exercise.sweeps.empty() ? "null" : "sweep";
+    Result<std::unique_ptr<Tracker>> made = make_tracker(spec, context);
+    if (!made) return made.error();
+    Tracker& tracker = **made;
+
+    if (!arguments.out.empty()) {
+        std::error_code failed;
+        std::filesystem::create_directories(arguments.out, failed);
+        if (failed) {
+            return Error{"cannot make the folder: " + failed.message(), arguments.out,
+                         "check the path and its permissions"};
+        }
+    }
+    std::vector<std::uint8_t> pixels(static_cast<std::size_t>(render.width_px) * render.height_px);
+    FrameStats stats;
+    TimeHistogram pose_to_pixel;
+    stats.set_effects(engine->renderer().costs());
+    const ImageSettings settings;
+    const int frames = frame_count(arguments, tracker);
+    for (int i = 0; i < frames; ++i) {
+        double now_s = frame_time_s(tracker, i, frames);
+        TrackerReading reading;
+        bool fresh = false;
+        if (tracker.is_device()) {
+            // Live input has its own clock: wait for what comes.
+            const double give_up_s = context.clock() + kDeviceWait;
+            while (!(fresh = tracker.poll(context.clock(), reading)) &&
+                   context.clock() < give_up_s && tracker.health().phase != TrackerPhase::failed) {
+                std::this_thread::sleep_for(std::chrono::microseconds(200));
+            }
+            now_s = context.clock();
+            if (!fresh) {
+                const TrackerHealth health = tracker.health();
+                return Error{health.message.empty() ? "no reading came" : health.message,
+                             "tracker " + spec, "check the device, or use --tracker mouse"};
+            }
+        } else {
+            fresh = tracker.poll(now_s, reading);
+        }
+        if (fresh) engine->observe(reading, tracker.is_device());
+        const double before_s = steady_seconds();
+        engine->frame(now_s, settings, pixels);
+        const double after_s = steady_seconds();
+        stats.add((after_s - before_s) * 1e3, engine->renderer().costs());
+        if (tracker.is_device()) pose_to_pixel.add((context.clock() - reading.time_s) * 1e3);
+        if (i == 0) stats.set_first_frame_ms((after_s - start_s) * 1e3);
+        if (!arguments.out.empty()) {
+            char name[32];
+            std::snprintf(name, sizeof name, "/frame_%05d.png", i);
+            const Status written =
+                write_png(arguments.out + name, render.width_px, render.height_px, 1, pixels);
+            if (!written) return written.error();
+        }
+    }
+    if (!arguments.stats.empty()) {
+        const Status written = write_text(arguments.stats, stats.json("", &pose_to_pixel));
+        if (!written) return written.error();
+    }
+    return Done{};
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,25 @@
+#include <cstdio>
+#include <exception>
+
+#include "runtime/player/command_line.h"
+#include "runtime/player/headless.h"
+
+using namespace sonocase;
+using namespace sonocase::runtime;
+
+int main(int argc, char** argv) {
+    const double start_s = steady_seconds();
+    try {
+        PlayerArguments arguments;
+        bool exit_now = false;
+        const int status = parse_arguments(argc, argv, arguments, exit_now);
+        if (exit_now) return status;
+        const Status done = run_headless(arguments, start_s);
+        if (done) return 0;
+        std::fprintf(stderr, "sonoplay: %s\n", done.error().message().c_str());
+    } catch (const std::exception& e) {
+        // Only memory can run out here; everything else is a Result.
+        std::fprintf(stderr, "sonoplay: %s; close other programs and try again\n", e.what());
+    }
+    return 1;
+}

@@ -1,0 +1,104 @@
+#include "runtime/player/scan_engine.h"
+
+#include <utility>
+
+namespace sonocase::runtime {
+namespace {
+
+const SensorReading* sensor(const TrackerReading& reading, int index) {
+    if (index < 0 || index >= reading.sensor_count || index >= kMaxSensors) return nullptr;
+    const SensorReading& s = reading.sensors[static_cast<std::size_t>(index)];
+    return s.state == SensorState::ok || s.state == SensorState::poor ? &s : nullptr;
+}
+
+}  // namespace
+
+ToolPoses tool_poses(const TrackerReading& reading,
+                     const Calibrations& calibrations,
+                     const SensorAssignment& assignment) {
+    // A script and the mouse hand over tools, always in their own places.
+    const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment;
+    const auto place = [&](const SensorReading& s, const std::optional<Calibration>& tool) {
+        if (reading.in_mannequin) return s.world_from_sensor;
+        Rigid world_from_tool = s.world_from_sensor;
+        if (tool) world_from_tool = world_from_tool * tool->sensor_from_tool;
+        if (!calibrations.mannequin) return world_from_tool;
+        Rigid pose = inverse(calibrations.mannequin->sensor_from_tool) * world_from_tool;
+        if (calibrations.mannequin->scale > 0) {
+            pose.translation = pose.translation / calibrations.mannequin->scale;
+        }
+        return pose;
+    };
+    ToolPoses tools;
+    if (const SensorReading* s = sensor(reading, places.probe)) {
+        tools.has_probe = true;
+        tools.mannequin_from_probe = place(*s, calibrations.probe);
+    }
+    if (const SensorReading* s = sensor(reading, places.needle)) {
+        tools.has_needle = true;
+        tools.mannequin_from_needle = place(*s, calibrations.needle);
+    }
+    return tools;
+}
+
+Result<ScanEngine> ScanEngine::create(const CaseBundle& bundle,
+                                      const Exercise& exercise,
+                                      const EngineOptions& options) {
+    Exercise adjusted = exercise;
+    if (options.depth_mm > 0) adjusted.probe.depth_mm = options.depth_mm;
+    if (options.focus_mm > 0) adjusted.probe.focus_mm = options.focus_mm;
+    Result<Renderer> renderer = Renderer::create(bundle, adjusted, options.render);
+    if (!renderer) return renderer.error();
+    return ScanEngine(bundle, std::move(adjusted), options, std::move(*renderer));
+}
+
+void ScanEngine::observe(const TrackerReading& reading, bool is_device) {
+    const auto watch = [&](SensorWatch& of, int index) {
+        const bool there = index >= 0 && index < reading.sensor_count && index < kMaxSensors;
+        const SensorReading none;
+        of.observe(there ? reading.sensors[static_cast<std::size_t>(index)] : none, reading.time_s,
+                   is_device);
+    };
+    const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment_;
+    watch(probe_watch_, places.probe);
+    watch(needle_watch_, places.needle);
+    reading_ = reading;
+    ToolPoses tools = tool_poses(reading, calibrations_, assignment_);
+    // A lost probe keeps its last place, so that the picture freezes rather than flickers.
+    if (!tools.has_probe || probe_watch_.hold()) {
+        tools.has_probe = tools_.has_probe;
+        tools.mannequin_from_probe = tools_.mannequin_from_probe;
+    }
+    if (needle_watch_.hold()) {
+        tools.has_needle = tools_.has_needle;
+        tools.mannequin_from_needle = tools_.mannequin_from_needle;
+    }
+    tools_ = tools;
+}
+
+FrameStatus ScanEngine::frame(double now_s,
+                              const ImageSettings& settings,
+                              std::span<std::uint8_t> pixels) {
+    FrameRecord record;
+    record.tools = tools_;
+    record.reading_time_s = reading_.time_s;
+    FrameInput& input = record.input;
+    input.mannequin_from_probe = tools_.mannequin_from_probe;
+    input.has_needle = tools_.has_needle;
+    if (tools_.has_needle) {
+        const Rigid& needle = tools_.mannequin_from_needle;
+        input.needle.tip = needle * Point3{0, 0, 0};
+        input.needle.direction = needle.rotation.column(2);
+    }
+    input.time_s = now_s;
+    input.frame = frame_++;
+    input.settings = settings;
+    last_ = record;
+    return renderer_.render(input, pixels);
+}
+
+FrameStatus ScanEngine::frame_again(const FrameRecord& record, std::span<std::uint8_t> pixels) {
+    return renderer_.render(record.input, pixels);
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,191 @@
+#include "runtime/tracking/mouse_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/tracking/scripted_sweep.h"
+
+namespace sonocase::runtime {
+namespace {
+
+constexpr double kMaxTilt = 1.2;      // rad; beyond it the edge of a real face leaves the skin
+constexpr double kMaxPress = 12;      // mm
+constexpr double kLiftedHeight = 25;  // mm above the skin
+constexpr double kReach = 80;         // mm searched for skin
+constexpr double kNeedleHover = 60;   // mm that a needle can be held back from the skin
+
+}  // namespace
+
+MouseTracker::MouseTracker(const Skin& skin, const Exercise& exercise)
+    : skin_(skin),
+      start_probe_(exercise.start_probe),
+      start_beam_(normalized(exercise.start_beam)),
+      needle_length_mm_(exercise.needle.length_mm) {
+    if (norm(start_beam_) == 0) start_beam_ = {0, 0, -1};
+    reset();
+}
+
+void MouseTracker::reset() {
+    rock_rad_ = fan_rad_ = 0;
+    press_mm_ = 1;
+    has_needle_ = false;
+    contact_ = start_probe_;
+    changed_ = true;
+    normal_ = -start_beam_;
+    lateral_ = frame_along(start_probe_, start_beam_, {1, 0, 0}).rotation.column(0);
+    // A start outside the body or deep inside it is put on the skin, farther and farther along the
+    // beam until the skin is met.
+    if (put_probe(start_probe_, start_beam_)) return;
+    for (double reach : {2 * kReach, 5 * kReach}) {
+        if (const auto touch = skin_.project(start_probe_, start_beam_, reach)) {
+            settle(*touch);
+            break;
+        }
+    }
+}
+
+void MouseTracker::settle(Point3 near) {
+    const Vector3 normal = skin_.normal(near);
+    contact_ = near;
+    if (norm(normal) > 0.5) {
+        // Half way to the new normal: a ridge of one voxel must not throw the probe about.
+        normal_ = normalized(normal_ + normal);
+        if (norm(normal_) < 0.5) normal_ = normal;
+    }
+    const Vector3 tangent = lateral_ - dot(lateral_, normal_) * normal_;
+    lateral_ = norm(tangent) > 1e-6 ? normalized(tangent) : any_perpendicular(normal_);
+    changed_ = true;
+}
+
+bool MouseTracker::put_probe(Point3 near, Vector3 towards) {
+    const auto touch = skin_.project(near, normalized(towards), kReach);
+    if (!touch) return false;
+    const Vector3 normal = skin_.normal(*touch);
+    if (norm(normal) > 0.5) normal_ = normal;
+    settle(*touch);
+    return true;
+}
+
+void MouseTracker::slide(double lateral_mm, double elevation_mm) {
+    // In steps shorter than a rib is wide, so that a fast mouse does not jump over a fold.
+    const double length = std::hypot(lateral_mm, elevation_mm);
+    const int steps = std::clamp(static_cast<int>(std::ceil(length / 3)), 1, 200);
+    for (int i = 0; i < steps; ++i) {
+        const Vector3 elevation = cross(-normal_, lateral_);
+        const Point3 next =
+            contact_ + (1.0 / steps) * (lateral_mm * lateral_ + elevation_mm * elevation);
+        const auto touch = skin_.project(next, -normal_, 12);
+        // The edge of the body, or of the volume: stay.
+        if (!touch || (skin_.at_border(*touch) && !skin_.at_border(contact_))) return;
+        settle(*touch);
+    }
+}
+
+void MouseTracker::rock(double angle_rad) {
+    rock_rad_ = std::clamp(rock_rad_ + angle_rad, -kMaxTilt, kMaxTilt);
+    changed_ = true;
+}
+
+void MouseTracker::fan(double angle_rad) {
+    fan_rad_ = std::clamp(fan_rad_ + angle_rad, -kMaxTilt, kMaxTilt);
+    changed_ = true;
+}
+
+void MouseTracker::rotate(double angle_rad) {
+    lateral_ = normalized(rotation_about(-normal_, angle_rad) * lateral_);
+    changed_ = true;
+}
+
+void MouseTracker::press(double mm) {
+    press_mm_ = std::clamp(press_mm_ + mm, -kLiftedHeight, kMaxPress);
+    changed_ = true;
+}
+
+Rigid MouseTracker::mannequin_from_probe() const {
+    // Rock and fan turn the probe about the point where its face meets the skin.
+    const Matrix3 upright = Matrix3::from_columns(lateral_, cross(-normal_, lateral_), -normal_);
+    const Matrix3 tilt = rotation_about({0, 1, 0}, rock_rad_) * rotation_about({1, 0, 0}, fan_rad_);
+    const Point3 face = contact_ - press_mm_ * normal_;
+    return {upright * tilt, {face.x, face.y, face.z}};
+}
+
+bool MouseTracker::place_needle(Point3 near, Vector3 towards) {
+    const auto touch = skin_.project(near, normalized(towards), kReach);
+    if (!touch) return false;
+    const Vector3 normal = skin_.normal(*touch);
+    entry_ = *touch;
+    shaft_ = norm(normal) > 0.5 ? -normal : normalized(towards);
+    depth_mm_ = -5;
+    has_needle_ = true;
+    changed_ = true;
+    return true;
+}
+
+bool MouseTracker::place_needle_beside_probe(double offset_mm, bool in_plane) {
+    const Rigid probe = mannequin_from_probe();
+    const Vector3 side = probe.rotation.column(in_plane ? 0 : 1);
+    const Vector3 beam = probe.rotation.column(2);
+    if (!place_needle(contact_ + offset_mm * side, -normal_)) return false;
+    // Towards the middle of the picture at a depth of one and a half offsets: where a hand would
+    // aim.
+    shaft_ = normalized(1.5 * std::abs(offset_mm) * beam - offset_mm * side);
+    return true;
+}
+
+void MouseTracker::aim_needle(double in_plane_rad, double out_of_plane_rad) {
+    if (!has_needle_) return;
+    const Rigid probe = mannequin_from_probe();
+    const Matrix3 turn = rotation_about(probe.rotation.column(1), in_plane_rad) *
+                         rotation_about(probe.rotation.column(0), out_of_plane_rad);
+    shaft_ = normalized(turn * shaft_);
+    changed_ = true;
+}
+
+void MouseTracker::advance_needle(double mm) {
+    if (!has_needle_) return;
+    depth_mm_ = std::clamp(depth_mm_ + mm, -kNeedleHover, needle_length_mm_);
+    changed_ = true;
+}
+
+void MouseTracker::slide_needle(double lateral_mm, double elevation_mm) {
+    if (!has_needle_ || depth_mm_ > 0) return;
+    const Rigid probe = mannequin_from_probe();
+    const Point3 next =
+        entry_ + lateral_mm * probe.rotation.column(0) + elevation_mm * probe.rotation.column(1);
+    if (const auto touch = skin_.project(next, -normal_, kReach)) entry_ = *touch;
+    changed_ = true;
+}
+
+void MouseTracker::withdraw_needle() {
+    has_needle_ = false;
+    changed_ = true;
+}
+
+Rigid MouseTracker::mannequin_from_needle() const {
+    return frame_along(entry_ + depth_mm_ * shaft_, shaft_, any_perpendicular(shaft_));
+}
+
+bool MouseTracker::poll(double now_s, TrackerReading& reading) {
+    if (!changed_) return false;
+    changed_ = false;
+    reading = {};
+    reading.sequence = ++sequence_;
+    reading.time_s = now_s;
+    reading.in_mannequin = true;
+    reading.sensor_count = 2;
+    reading.sensors[kProbeSensor] = {SensorState::ok, mannequin_from_probe(), 1.0f, 0};
+    if (has_needle_) {
+        reading.sensors[kNeedleSensor] = {SensorState::ok, mannequin_from_needle(), 1.0f, 0};
+    }
+    return true;
+}
+
+TrackerHealth MouseTracker::health() const {
+    TrackerHealth health;
+    health.phase = TrackerPhase::streaming;
+    health.device = "Mouse and keyboard";
+    health.readings = sequence_;
+    return health;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,69 @@
+// Mouse and keyboard as a full tracker: a probe that lives on the skin and a needle in the other
+// hand.
+//
+// The window turns input into the small movements below; nothing here knows of a window, so a
+// script or a test drives it as well. Distances in mm and angles in radians; all in `mannequin`.
+#pragma once
+
+#include "formats/exercise.h"
+#include "runtime/tracking/skin.h"
+#include "runtime/tracking/tracker.h"
+
+namespace sonocase::runtime {
+
+class MouseTracker final : public Tracker {
+  public:
+    // The probe starts at the exercise's place, put on the skin, or, where that misses the body, at
+    // the point of the skin nearest above the middle of the bundle.
+    MouseTracker(const Skin& skin, const Exercise& exercise);
+
+    bool poll(double now_s, TrackerReading& reading) override;
+    TrackerHealth health() const override;
+
+    // Probe. Slides keep the face on the skin and carry the probe's turn along without twisting it.
+    void slide(double lateral_mm, double elevation_mm);
+    void rock(double angle_rad);    // in the scan plane, about the elevation axis
+    void fan(double angle_rad);     // out of the scan plane, about the lateral axis
+    void rotate(double angle_rad);  // about the beam
+    void press(double mm);          // > 0 into the skin; from lifted it first comes down
+    bool put_probe(Point3 near,
+                   Vector3 towards);  // onto the skin on that line; false: no skin there
+    void reset();
+
+    // Needle. Placed on the skin at a point, it keeps its entry while it is aimed and advanced.
+    bool place_needle(Point3 near, Vector3 towards);
+    // At the probe's side, `offset_mm` from the middle of the face along x (in plane) or along y.
+    bool place_needle_beside_probe(double offset_mm, bool in_plane);
+    void aim_needle(double in_plane_rad, double out_of_plane_rad);  // about the probe's y and x
+    void advance_needle(double mm);  // > 0 deeper; limited to [-60 mm, the needle's length]
+    void slide_needle(double lateral_mm, double elevation_mm);  // only while it is outside
+    void withdraw_needle();                                     // takes it away
+
+    bool in_contact() const { return press_mm_ >= 0; }
+    double press_mm() const { return press_mm_; }
+    bool has_needle() const { return has_needle_; }
+    double needle_depth_mm() const { return depth_mm_; }
+    Point3 needle_entry() const { return entry_; }
+    Rigid mannequin_from_probe() const;
+    Rigid mannequin_from_needle() const;
+
+  private:
+    void settle(Point3 near);  // new contact point and normal from a place near the skin
+
+    Skin skin_;
+    Point3 start_probe_;
+    Vector3 start_beam_;
+    double needle_length_mm_;
+    Point3 contact_;
+    Vector3 normal_{0, 0, 1};   // outward
+    Vector3 lateral_{1, 0, 0};  // in the skin's tangent plane, before rock and fan
+    double rock_rad_ = 0, fan_rad_ = 0, press_mm_ = 1;
+    bool has_needle_ = false;
+    Point3 entry_;
+    Vector3 shaft_{0, 0, -1};
+    double depth_mm_ = 0;
+    bool changed_ = true;
+    std::uint64_t sequence_ = 0;
+};
+
+}  // namespace sonocase::runtime

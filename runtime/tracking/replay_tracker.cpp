@@ -1,0 +1,122 @@
+#include "runtime/tracking/replay_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonocase::runtime {
+namespace {
+
+SensorReading reading_of(const Pose& pose) {
+    SensorReading reading;
+    reading.state = pose.ok ? SensorState::ok : SensorState::lost;
+    reading.world_from_sensor = pose.tracker_from_tool;
+    return reading;
+}
+
+Status check_times(const std::vector<Pose>& poses, const std::string& where) {
+    if (poses.empty()) {
+        return Error{"holds no pose", where, "a recording needs at least one row below its header"};
+    }
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+        if (!std::isfinite(poses[i].timestamp_s) ||
+            (i > 0 && poses[i].timestamp_s < poses[i - 1].timestamp_s)) {
+            return Error{"time stamps do not rise at row " + std::to_string(i + 1), where,
+                         "sort the rows by timestamp_s"};
+        }
+    }
+    return Done{};
+}
+
+}  // namespace
+
+ReplayTracker::ReplayTracker(Recording recording, bool loop)
+    : recording_(std::move(recording)), loop_(loop) {
+    const auto& needle = recording_.needle;
+    std::size_t j = 0;
+    for (const Pose& pose : recording_.probe) {
+        while (j + 1 < needle.size() && std::abs(needle[j + 1].timestamp_s - pose.timestamp_s) <=
+                                            std::abs(needle[j].timestamp_s - pose.timestamp_s)) {
+            ++j;
+        }
+        needle_of_probe_.push_back(j);
+    }
+}
+
+double ReplayTracker::duration_s() const {
+    return recording_.probe.back().timestamp_s - recording_.probe.front().timestamp_s;
+}
+
+double ReplayTracker::recorded_time_s(int i) const {
+    return recording_.probe[static_cast<std::size_t>(i)].timestamp_s -
+           recording_.probe.front().timestamp_s;
+}
+
+bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
+    if (!started_) start_s_ = now_s, started_ = true;
+    double t = now_s - start_s_;
+    const double duration = duration_s();
+    over_ = !loop_ && t > duration;
+    std::uint64_t lap = 0;
+    if (loop_ && duration > 0 && t > duration) {
+        lap = static_cast<std::uint64_t>(t / duration);
+        t = std::fmod(t, duration);
+    }
+    const auto& probe = recording_.probe;
+    // Half a microsecond of slack: a caller that steps to recorded_time_s(i) must meet row i,
+    // whatever the rounding of its sums.
+    const double when = probe.front().timestamp_s + t + 5e-7;
+    const auto later =
+        std::upper_bound(probe.begin(), probe.end(), when,
+                         [](double time, const Pose& pose) { return time < pose.timestamp_s; });
+    const std::size_t i =
+        later == probe.begin() ? 0 : static_cast<std::size_t>(later - probe.begin()) - 1;
+    if (i == last_ && lap == laps_) return false;
+    last_ = i;
+    laps_ = lap;
+    reading = {};
+    reading.sequence = ++sequence_;
+    reading.time_s = now_s;
+    reading.device_time_s = probe[i].timestamp_s;
+    reading.in_mannequin = recording_.in_mannequin;
+    reading.sensor_count = recording_.needle.empty() ? 1 : 2;
+    reading.sensors[kProbeSensor] = reading_of(probe[i]);
+    if (!probe[i].ok) ++not_ok_;
+    if (!recording_.needle.empty()) {
+        reading.sensors[kNeedleSensor] = reading_of(recording_.needle[needle_of_probe_[i]]);
+    }
+    return true;
+}
+
+TrackerHealth ReplayTracker::health() const {
+    TrackerHealth health;
+    health.phase = over_ ? TrackerPhase::ended : TrackerPhase::streaming;
+    health.device = "Replay of " + recording_.name;
+    health.readings = sequence_;
+    health.bad_frames = not_ok_;
+    const double duration = duration_s();
+    if (duration > 0) {
+        health.rate_hz = static_cast<double>(recording_.probe.size() - 1) / duration;
+    }
+    return health;
+}
+
+Result<Recording> load_recording(const std::string& files) {
+    Recording recording;
+    const std::size_t comma = files.find(',');
+    const std::string probe_file = files.substr(0, comma);
+    recording.name = probe_file.substr(probe_file.find_last_of('/') + 1);
+    Result<std::vector<Pose>> probe = load_poses(probe_file);
+    if (!probe) return probe.error();
+    recording.probe = std::move(*probe);
+    if (Status ok = check_times(recording.probe, probe_file); !ok) return ok.error();
+    if (comma != std::string::npos) {
+        const std::string needle_file = files.substr(comma + 1);
+        Result<std::vector<Pose>> needle = load_poses(needle_file);
+        if (!needle) return needle.error();
+        recording.needle = std::move(*needle);
+        if (Status ok = check_times(recording.needle, needle_file); !ok) return ok.error();
+    }
+    return recording;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,46 @@
+// A scripted path of probe and needle, from an exercise.
+#pragma once
+
+#include "formats/exercise.h"
+#include "runtime/tracking/skin.h"
+#include "runtime/tracking/tracker.h"
+
+namespace sonocase::runtime {
+
+struct SweepPose {
+    Rigid mannequin_from_probe;
+    bool has_needle = false;
+    Rigid mannequin_from_needle;  // origin at the tip, z from hub to tip
+};
+
+// Pose of a sweep at a time; before the first key and after the last the path stands still.
+// Positions follow a cubic Hermite curve with finite-difference tangents through the keys (smooth,
+// and a constant-speed script stays at constant speed); directions are blended the same way and
+// orthonormalised. The needle shows between two keys that both have one. `skin` may be null; with
+// it, a sweep that asks to be snapped has its probe moved along its beam to the skin.
+// Cost: constant but for the skin search; no allocation.
+SweepPose sweep_pose(const Sweep& sweep, double time_s, const Skin* skin);
+
+// Frame with origin at `origin`, z along `z` and x as near to `x_hint` as can be.
+Rigid frame_along(Point3 origin, Vector3 z, Vector3 x_hint);
+
+class ScriptedSweep final : public Tracker {
+  public:
+    // loop: begins again when it is over. The bundle behind the skin must outlive the tracker.
+    ScriptedSweep(Sweep sweep, const Skin& skin, bool loop)
+        : sweep_(std::move(sweep)), skin_(skin), loop_(loop) {}
+    bool poll(double now_s, TrackerReading& reading) override;
+    TrackerHealth health() const override;
+    double duration_s() const override;
+
+  private:
+    Sweep sweep_;
+    Skin skin_;
+    bool loop_;
+    bool started_ = false;
+    double start_s_ = 0;
+    bool over_ = false;
+    std::uint64_t sequence_ = 0;
+};
+
+}  // namespace sonocase::runtime

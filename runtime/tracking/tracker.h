@@ -1,0 +1,87 @@
+// The one interface to whatever says where probe and needle are: a device, a recording, a script,
+// the mouse. Time is injected: seconds on the session's clock.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "formats/geometry.h"
+
+namespace sonocase::runtime {
+
+inline constexpr int kMaxSensors = 16;
+inline constexpr int kProbeSensor = 0;  // unless the sensors are assigned otherwise
+inline constexpr int kNeedleSensor = 1;
+
+enum class SensorState : std::uint8_t {
+    absent,  // no such sensor
+    ok,
+    poor,  // a pose, of doubtful quality: distorted field, near the edge of the range
+    lost,  // the device sees no pose; the one given is the last good one
+};
+
+struct SensorReading {
+    SensorState state = SensorState::absent;
+    Rigid world_from_sensor;
+    float quality = -1;        // [0, 1], 1 is best; negative: the device does not say
+    std::uint8_t buttons = 0;  // bit 0: the first
+};
+
+// All sensors at one moment.
+struct TrackerReading {
+    std::uint64_t sequence = 0;  // rises with every reading of this tracker
+    double time_s = 0;           // arrival on the session's clock
+    double device_time_s = -1;   // on the device's own clock; negative: it has none
+    // The sensors are the tools themselves and `world` is the mannequin: no calibration applies.
+    bool in_mannequin = false;
+    int sensor_count = 0;
+    std::array<SensorReading, kMaxSensors> sensors{};
+};
+
+enum class TrackerPhase : std::uint8_t {
+    searching,  // no device yet
+    starting,   // found, being set up
+    streaming,
+    ended,   // a recording or a script that is over
+    failed,  // will not come right by itself; `message` says what to do
+};
+
+struct TrackerHealth {
+    TrackerPhase phase = TrackerPhase::searching;
+    std::string device;   // "Polhemus Viper", with its serial where it has one
+    std::string message;  // a whole sentence for the user; empty when all is well
+    double rate_hz = 0;   // measured
+    std::uint64_t readings = 0;
+    std::uint64_t bad_frames = 0;  // discarded: checksum, length, not a number
+    std::uint64_t connects = 0;
+};
+
+class Tracker {
+  public:
+    virtual ~Tracker() = default;
+    // Writes the newest reading and returns true, or returns false if there is none newer than the
+    // last one. Never blocks, allocates nothing; for the frame loop.
+    virtual bool poll(double now_s, TrackerReading& reading) = 0;
+    virtual TrackerHealth health() const = 0;
+    // Called from the tracker's own thread as soon as poll() has something new. Set before the
+    // first poll; a tracker that is a function of time has no thread and ignores it.
+    virtual void set_wake(std::function<void()>) {}
+    // Length of a recording or script; negative: unbounded.
+    virtual double duration_s() const { return -1; }
+    // Number of readings of a recording; 0: not a recording.
+    virtual int recorded_readings() const { return 0; }
+    // Time of recorded reading i, from 0 at the first.
+    virtual double recorded_time_s(int) const { return 0; }
+    // True for hardware and networks, whose readings carry noise, so that a pose that stays equal
+    // to the last bit means a frozen sensor.
+    virtual bool is_device() const { return false; }
+};
+
+// A clock for trackers with a thread of their own: seconds on the session's clock.
+using SessionClock = std::function<double()>;
+
+const char* phase_name(TrackerPhase phase);
+
+}  // namespace sonocase::runtime

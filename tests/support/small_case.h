@@ -1,0 +1,92 @@
+// A small bundle made in memory: a round body of soft tissue with a vessel in it.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "formats/case_bundle.h"
+#include "formats/exercise.h"
+
+namespace sonocase::testing {
+
+// A cylinder along y of radius 60 mm about (0, *, 0), 160 mm long, in a box of 140 x 160 x 140 mm
+// with voxels of 2 mm; a vessel of radius 6 mm along y through (0, *, 25). Outside is label 0.
+inline CaseBundle small_case() {
+    CaseBundle bundle;
+    bundle.manifest.case_name = "cylinder";
+    bundle.manifest.producer = "test";
+    bundle.grid.size = {70, 80, 70};
+    bundle.grid.spacing_mm = {2, 2, 2};
+    bundle.grid.origin_mm = {-69, -79, -69};
+    bundle.labels = {{"outside", "outside", 0, {0, 0, 0}},
+                     {"muscle", "muscle", 1, {180, 90, 80}},
+                     {"vessel", "blood", 2, {200, 30, 30}}};
+    Tissue outside, muscle, blood;
+    outside.name = "outside";
+    outside.kind = TissueKind::outside;
+    muscle.name = "muscle";
+    muscle.grey_mean = 110;
+    muscle.grey_sd = 20;
+    muscle.attenuation_db_cm_mhz = 0.5;
+    blood.name = "blood";
+    blood.kind = TissueKind::fluid;
+    blood.grey_mean = 15;
+    blood.echo_db = -30;
+    bundle.tissues = {outside, muscle, blood};
+    std::vector<std::uint8_t> dense(bundle.grid.voxel_count());
+    for (int k = 0; k < bundle.grid.size.z; ++k) {
+        for (int j = 0; j < bundle.grid.size.y; ++j) {
+            for (int i = 0; i < bundle.grid.size.x; ++i) {
+                const Point3 p = bundle.grid.point_from_voxel({double(i), double(j), double(k)});
+                std::uint8_t label = std::hypot(p.x, p.z) <= 60 ? 1 : 0;
+                if (std::hypot(p.x, p.z - 25) <= 6) label = 2;
+                dense[bundle.grid.index(i, j, k)] = label;
+            }
+        }
+    }
+    bundle.label_bricks = bricks_from_dense<std::uint8_t>(dense, bundle.grid.size);
+    bundle.speckle.edge = 32;
+    bundle.speckle.voxels.resize(2 * 32 * 32 * 32);
+    std::uint32_t state = 1;
+    for (std::int8_t& value : bundle.speckle.voxels) {
+        int sum = 0;
+        for (int n = 0; n < 4; ++n) {
+            state = state * 1664525u + 1013904223u;
+            sum += static_cast<int>(state >> 24) - 128;
+        }
+        value = static_cast<std::int8_t>(sum / 5);
+    }
+    return bundle;
+}
+
+// A curvilinear probe above the middle, looking down -z, with a sweep along y and a needle in it.
+inline Exercise small_exercise() {
+    Exercise exercise;
+    exercise.name = "scan";
+    exercise.title = "Find the vessel";
+    exercise.start_probe = {0, 0, 70};
+    exercise.start_beam = {0, 0, -1};
+    exercise.probe.depth_mm = 100;
+    Target target;
+    target.name = "vessel";
+    target.centre = {0, 0, 25};
+    exercise.targets = {target};
+    Sweep sweep;
+    sweep.name = "along";
+    sweep.snap_to_skin = true;
+    for (int i = 0; i < 3; ++i) {
+        SweepKey key;
+        key.time_s = i;
+        key.probe = {0, -30.0 + 30 * i, 62};
+        key.beam = {0, 0, -1};
+        key.lateral = {1, 0, 0};
+        key.has_needle = true;
+        key.needle_tip = {20.0 - 8 * i, 0, 50.0 - 10 * i};
+        key.needle_direction = normalized(Vector3{-8, 0, -10});
+        sweep.keys.push_back(key);
+    }
+    exercise.sweeps = {sweep};
+    return exercise;
+}
+
+}  // namespace sonocase::testing
