@@ -204,23 +204,23 @@ Anatomy make_anatomy() {
     t.ellipsoid(psoas_left, {-40, -42, -90}, {18, 18, 90});
     t.ellipsoid(psoas_right, {40, -42, -90}, {18, 18, 90});
 
-    const int bowel = t.add_label("small_bowel", "small_bowel", {206, 140, 120});
+    const int bowel = t.add_label("small_bowel", "bowel", {206, 140, 120});
     t.ellipsoid(bowel, {0, 30, -82}, {80, 44, 46});
     const int spleen = t.add_label("spleen", "spleen", {140, 74, 96});
     t.ellipsoid(spleen, {-96, -22, 72}, {28, 40, 50}, rotation_about({0, 1, 0}, 0.25));
     const int liver = t.add_label("liver", "liver", {150, 70, 48});
     t.ellipsoid(liver, {62, 12, 68}, {92, 66, 58}, rotation_about({0, 1, 0}, 0.35));
-    const int kidney_left = t.add_label("kidney_left", "kidney", {186, 92, 74});
-    const int kidney_right = t.add_label("kidney_right", "kidney", {186, 92, 74});
+    const int kidney_left = t.add_label("kidney_left", "kidney_cortex", {186, 92, 74});
+    const int kidney_right = t.add_label("kidney_right", "kidney_cortex", {186, 92, 74});
     t.ellipsoid(kidney_left, {-68, -40, 12}, {27, 23, 52}, rotation_about({0, 1, 0}, 0.18));
     t.ellipsoid(kidney_right, {70, -40, 0}, {27, 23, 52}, rotation_about({0, 1, 0}, -0.18));
-    const int stomach = t.add_label("stomach", "stomach", {214, 150, 140});
+    const int stomach = t.add_label("stomach", "bowel", {214, 150, 140});
     t.ellipsoid(stomach, {-60, 28, 62}, {44, 34, 46}, rotation_about({0, 1, 0}, 0.5));
     const int pancreas = t.add_label("pancreas", "pancreas", {218, 176, 110});
     t.tube(pancreas, smooth_path({{38, 0, 12}, {10, 12, 22}, {-25, 4, 30}, {-66, -16, 44}}), 10);
     const int gallbladder = t.add_label("gallbladder", "bile", {96, 150, 74});
     t.ellipsoid(gallbladder, {52, 50, 22}, {14, 13, 30}, rotation_about({1, 0, 0}, 0.4));
-    const int colon = t.add_label("colon", "colon", {190, 128, 104});
+    const int colon = t.add_label("colon", "bowel", {190, 128, 104});
     const auto colon_path =
         smooth_path({{98, -6, -125}, {104, 2, -70}, {92, 20, -28}, {40, 58, -34}, {-30, 60, -30},
                      {-90, 24, -16}, {-104, 0, -70}, {-98, -8, -125}});

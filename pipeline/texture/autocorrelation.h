@@ -1,0 +1,45 @@
+// Autocorrelation of grey: estimated from masked images, measured in volumes, and its widths.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pipeline/texture/example_image.h"
+
+namespace sonocase::pipeline {
+
+// Correlation at whole-pixel lags -reach..reach in both directions, 1 at lag 0, x fastest.
+// Point-symmetric: at(-x, -y) = at(x, y).
+struct Autocorrelation {
+    int reach = 0;
+    std::vector<double> value;  // # (2 reach + 1)^2
+
+    double at(int x, int y) const {
+        return value[static_cast<std::size_t>((y + reach) * (2 * reach + 1) + x + reach)];
+    }
+    double& at(int x, int y) {
+        return value[static_cast<std::size_t>((y + reach) * (2 * reach + 1) + x + reach)];
+    }
+    // Bilinear; 0 beyond the reach.
+    double between(double x, double y) const;
+};
+
+// Of the used pixels of all examples together, each about its own mean and deviation. Every lag is
+// divided by the number of pixel pairs that it has; lags with fewer than a twentieth of the pixels
+// as pairs are given 0.
+Autocorrelation autocorrelation(std::span<const ExampleImage> examples, int reach);
+
+// Of the planes z = const of a cube that wraps, averaged over all of them; reach <= edge / 2.
+Autocorrelation plane_autocorrelation(std::span<const float> cube, int edge, int reach);
+
+// Full widths at half height, in pixels, along the direction in which the correlation reaches
+// furthest and at right angles to it.
+struct CorrelationWidths {
+    double along = 0;
+    double across = 0;
+    double angle_rad = 0;  // of `along` against +x, towards +y (down), in [0, pi)
+    double ratio() const { return across > 0 ? along / across : 0; }
+};
+CorrelationWidths correlation_widths(const Autocorrelation& autocorrelation);
+
+}  // namespace sonocase::pipeline

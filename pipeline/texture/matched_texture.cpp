@@ -1,0 +1,253 @@
+#include "pipeline/texture/matched_texture.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <complex>
+
+#include "pipeline/texture/counter_random.h"
+#include "pipeline/texture/fourier.h"
+#include "pipeline/texture/periodic_volume.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr double kPi = 3.141592653589793238463;
+
+// Standard normal quantile by Newton's method on erfc from a logistic start: 1e-12 in five steps.
+double normal_quantile(double p) {
+    double z = std::log(p / (1 - p)) / 1.702;
+    for (int i = 0; i < 8; ++i) {
+        const double density = std::exp(-0.5 * z * z) / std::sqrt(2 * kPi);
+        const double step = (0.5 * std::erfc(-z / std::sqrt(2.0)) - p) / std::max(density, 1e-12);
+        z -= std::clamp(step, -0.5, 0.5);
+    }
+    return z;
+}
+
+// R -> rho: inverts the correlation that grey has for a given correlation of the Gaussian field.
+class GreyToGaussian {
+  public:
+    explicit GreyToGaussian(const std::vector<float>& sorted) {
+        constexpr int kNodes = 1024, kTerms = 16;
+        std::array<double, kTerms + 1> c{};
+        double mean = 0, square = 0;
+        for (int i = 0; i < kNodes; ++i) {
+            const double p = (i + 0.5) / kNodes;
+            const double q =
+                sorted[static_cast<std::size_t>(p * static_cast<double>(sorted.size()))];
+            mean += q / kNodes;
+            square += q * q / kNodes;
+            // normalised Hermite polynomials h_k = He_k / sqrt(k!)
+            const double z = normal_quantile(p);
+            double older = 0, old = 1;
+            for (int k = 1; k <= kTerms; ++k) {
+                const double h =
+                    (z * old - std::sqrt(k - 1.0) * older) / std::sqrt(static_cast<double>(k));
+                c[static_cast<std::size_t>(k)] += q * h / kNodes;
+                older = old;
+                old = h;
+            }
+        }
+        const double variance = std::max(square - mean * mean, 1e-12);
+        double carried = 0;
+        for (int k = 1; k <= kTerms; ++k) carried += c[k] * c[k] / variance;
+        for (int i = 0; i <= kSteps; ++i) {
+            const double rho = 2.0 * i / kSteps - 1;
+            double power = 1, sum = 0;
+            for (int k = 1; k <= kTerms; ++k) {
+                power *= rho;
+                sum += c[k] * c[k] / variance * power;
+            }
+            // What the terms left out carry is correlated only at lag 0; spread it over the rest.
+            table_[static_cast<std::size_t>(i)] = sum / carried;
+        }
+    }
+    double operator()(double r) const {
+        // rising from the middle; downwards it may flatten, where -1 is the best there is
+        if (r >= 0) {
+            int i = kSteps / 2;
+            while (i < kSteps && at(i + 1) < r) ++i;
+            if (i >= kSteps) return 1;
+            const double t = (r - at(i)) / std::max(at(i + 1) - at(i), 1e-12);
+            return 2.0 * (i + std::clamp(t, 0.0, 1.0)) / kSteps - 1;
+        }
+        int i = kSteps / 2;
+        while (i > 0 && at(i - 1) > r && at(i - 1) < at(i)) --i;
+        if (i == 0) return -1;
+        const double t = (at(i) - r) / std::max(at(i) - at(i - 1), 1e-12);
+        return 2.0 * (i - std::clamp(t, 0.0, 1.0)) / kSteps - 1;
+    }
+
+  private:
+    static constexpr int kSteps = 400;
+    double at(int i) const { return table_[static_cast<std::size_t>(i)]; }
+    std::array<double, kSteps + 1> table_{};
+};
+
+// Power spectrum of a square that wraps, non-negative, with mean 1, whose correlation is near the
+// wanted one: negative power is cut, the short lags are put back, and so on (projection onto convex
+// sets). Short lags are what the eye sees; the long ones are mostly noise of the estimate.
+std::vector<double> spectrum_of(const Autocorrelation& wanted, int edge, double keep_radius) {
+    const auto n = static_cast<std::size_t>(edge);
+    const int half = edge / 2;
+    std::vector<double> target(n * n), keep(n * n);
+    for (int y = -half; y < half; ++y) {
+        for (int x = -half; x < half; ++x) {
+            const std::size_t i = static_cast<std::size_t>((x + edge) % edge) +
+                                  n * static_cast<std::size_t>((y + edge) % edge);
+            double value = wanted.at(x, y);
+            // the lag half an edge away is reached from both sides
+            if (x == -half) value = 0.5 * (wanted.at(-half, y) + wanted.at(half, y));
+            target[i] = value;
+            const double r = std::hypot(x, y) / keep_radius;
+            keep[i] = r < 1 ? 1 : std::exp(-2 * (r - 1) * (r - 1));
+        }
+    }
+    std::vector<double> rho = target;
+    for (std::size_t i = 0; i < rho.size(); ++i) rho[i] *= keep[i];
+    std::vector<double> power(n * n);
+    std::vector<std::complex<double>> plane(n * n);
+    for (int round = 0; round < 24; ++round) {
+        for (std::size_t i = 0; i < plane.size(); ++i) plane[i] = rho[i];
+        fourier_plane(plane, edge, edge, false);
+        double sum = 0;
+        for (std::size_t i = 0; i < plane.size(); ++i) {
+            power[i] = std::max(plane[i].real(), 0.0);
+            sum += power[i];
+        }
+        for (double& p : power) p *= static_cast<double>(n * n) / sum;
+        for (std::size_t i = 0; i < plane.size(); ++i) plane[i] = power[i];
+        fourier_plane(plane, edge, edge, true);
+        for (std::size_t i = 0; i < plane.size(); ++i) {
+            const double now = plane[i].real();
+            rho[i] = now + keep[i] * (target[i] - now);
+        }
+    }
+    return power;
+}
+
+std::vector<double> line_spectrum(const std::vector<double>& rho) {  // # edge, wrapped
+    const int edge = static_cast<int>(rho.size());
+    std::vector<std::complex<double>> line(rho.begin(), rho.end());
+    fourier_plane(line, edge, 1, false);
+    std::vector<double> power(rho.size());
+    double sum = 0;
+    for (std::size_t i = 0; i < rho.size(); ++i) sum += power[i] = std::max(line[i].real(), 0.0);
+    for (double& p : power) p *= static_cast<double>(edge) / sum;
+    return power;
+}
+
+// Moves the cube round so that its outer faces lie where neighbouring planes differ as they do on
+// average. It tessellates, so it may be cut anywhere.
+void cut_at_ordinary_planes(std::vector<float>& cube, int edge) {
+    const auto n = static_cast<std::size_t>(edge);
+    std::array<std::size_t, 3> first{};
+    const std::size_t stride[3] = {1, n, n * n};
+    for (int axis = 0; axis < 3; ++axis) {
+        std::vector<double> step(n, 0);
+        for (std::size_t i = 0; i < cube.size(); ++i) {
+            const std::size_t p = i / stride[axis] % n;
+            const std::size_t next = p + 1 < n ? i + stride[axis] : i - p * stride[axis];
+            step[p] += std::abs(cube[i] - cube[next]);
+        }
+        double mean = 0;
+        for (const double s : step) mean += s / static_cast<double>(n);
+        std::size_t best = n - 1;
+        for (std::size_t p = 0; p < n; ++p) {
+            if (std::abs(step[p] - mean) < std::abs(step[best] - mean)) best = p;
+        }
+        first[static_cast<std::size_t>(axis)] = (best + 1) % n;
+    }
+    std::vector<float> moved(cube.size());
+    for (std::size_t z = 0; z < n; ++z) {
+        for (std::size_t y = 0; y < n; ++y) {
+            const float* row = cube.data() + n * ((y + first[1]) % n + n * ((z + first[2]) % n));
+            float* to = moved.data() + n * (y + n * z);
+            std::copy(row + first[0], row + n, to);
+            std::copy(row, row + first[0], to + (n - first[0]));
+        }
+    }
+    cube.swap(moved);
+}
+
+}  // namespace
+
+std::vector<float> synthesise_matched(std::span<const ExampleImage> examples,
+                                      int edge,
+                                      std::uint64_t seed,
+                                      const MatchedOptions& options) {
+    assert(!examples.empty() && edge >= 8 && edge <= 128 && (edge & (edge - 1)) == 0);
+    const auto n = static_cast<std::size_t>(edge);
+    const int half = edge / 2;
+    std::vector<float> sorted;
+    for (const ExampleImage& image : examples) {
+        for (std::size_t i = 0; i < image.count(); ++i) {
+            if (image.used(i)) sorted.push_back(image.grey[i]);
+        }
+    }
+    std::sort(sorted.begin(), sorted.end());
+
+    const Autocorrelation grey = autocorrelation(examples, half);
+    const CorrelationWidths widths = correlation_widths(grey);
+    const GreyToGaussian to_gaussian(sorted);
+    Autocorrelation wanted = grey;
+    for (double& v : wanted.value) v = to_gaussian(v);
+    const double keep_radius = std::clamp(1.2 * widths.along, 3.0, 0.9 * half);
+
+    // the profile out of the picture
+    const double angle =
+        widths.angle_rad + (options.third_axis == ThirdAxis::across ? kPi / 2 : 0.0);
+    std::vector<double> depth(n);
+    for (int z = -half; z < half; ++z) {
+        const double value = wanted.between(z * std::cos(angle), z * std::sin(angle));
+        const double r = std::abs(z) / keep_radius;
+        depth[static_cast<std::size_t>((z + edge) % edge)] =
+            value * (r < 1 ? 1 : std::exp(-2 * (r - 1) * (r - 1)));
+    }
+    const std::vector<double> power_z = line_spectrum(depth);
+
+    // the phases of white noise
+    const std::size_t count = n * n * n;
+    std::vector<std::complex<float>> noise(count);
+    const std::uint64_t stream = derive_seed(seed, 0x3A7C);
+    for (std::size_t i = 0; i < count; i += 2) {
+        const GaussianPair z = gaussian_pair_at(stream, i / 2);
+        noise[i] = static_cast<float>(z.a);
+        noise[i + 1] = static_cast<float>(z.b);
+    }
+    fourier_cube(noise, edge, false);
+    for (std::complex<float>& f : noise) {
+        const float size = std::sqrt(std::norm(f));
+        f = size > 0 ? f / size : 1.f;
+    }
+
+    std::vector<float> cube(count);
+    std::vector<std::complex<float>> field(count);
+    for (int round = 0;; ++round) {
+        const std::vector<double> power = spectrum_of(wanted, edge, keep_radius);
+        for (std::size_t z = 0; z < n; ++z) {
+            for (std::size_t i = 0; i < n * n; ++i) {
+                field[z * n * n + i] =
+                    noise[z * n * n + i] * static_cast<float>(std::sqrt(power[i] * power_z[z]));
+            }
+        }
+        field[0] = 0;  // a mean has no place in a histogram that is matched by rank
+        fourier_cube(field, edge, true);
+        for (std::size_t i = 0; i < count; ++i) cube[i] = field[i].real();
+        match_distribution(cube, sorted);
+        if (round >= options.corrections) break;
+        const Autocorrelation got = plane_autocorrelation(cube, edge, half);
+        for (std::size_t i = 0; i < wanted.value.size(); ++i) {
+            wanted.value[i] =
+                std::clamp(wanted.value[i] + to_gaussian(grey.value[i]) - to_gaussian(got.value[i]),
+                           -0.999, 0.9999);
+        }
+        wanted.at(0, 0) = 1;
+    }
+    cut_at_ordinary_planes(cube, edge);
+    return cube;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,230 @@
+#include "pipeline/texture/texture_bank.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cassert>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <sstream>
+
+#include "pipeline/parallel.h"
+#include "pipeline/texture/counter_random.h"
+#include "pipeline/texture/matched_texture.h"
+#include "pipeline/texture/prepare_example.h"
+#include "pipeline/texture/pyramid_texture.h"
+#include "pipeline/texture/read_example.h"
+#include "pipeline/texture/synthetic_examples.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+// Which class of patches.csv stands in for a built-in texture, and which patch of the class
+// (counted round): organs share the phantom patches, so that neighbours do not look alike.
+struct StandIn {
+    const char* texture;
+    const char* patch_class;
+    std::size_t which;
+    ThirdAxis third_axis;
+};
+constexpr StandIn kStandIns[] = {
+    {"liver", "organ_parenchyma", 0, ThirdAxis::along},
+    {"spleen", "organ_parenchyma", 2, ThirdAxis::along},
+    {"kidney_cortex", "organ_parenchyma", 1, ThirdAxis::along},
+    {"pancreas", "organ_parenchyma", 3, ThirdAxis::along},
+    {"gland", "organ_parenchyma", 1, ThirdAxis::along},
+    {"soft_tissue", "organ_parenchyma", 0, ThirdAxis::along},
+    {"bowel", "organ_parenchyma", 3, ThirdAxis::along},
+    {"cartilage", "organ_parenchyma", 2, ThirdAxis::along},
+    {"muscle", "muscle", 0, ThirdAxis::across},
+    {"fat", "fat", 0, ThirdAxis::along},
+    {"skin", "fat", 1, ThirdAxis::along},
+    {"kidney_sinus", "fat", 0, ThirdAxis::across},
+    {"fascia", "fascia", 0, ThirdAxis::along},
+    {"fluid", "fluid", 0, ThirdAxis::along},
+    {"gas", "bone_shadow", 0, ThirdAxis::along},
+    {"bone", "organ_parenchyma", 3, ThirdAxis::along},
+};
+
+const StandIn* stand_in_for(const std::string& texture) {
+    for (const StandIn& s : kStandIns) {
+        if (texture == s.texture) return &s;
+    }
+    return nullptr;
+}
+
+// class -> files of patches.csv
+Result<std::map<std::string, std::vector<std::string>>> read_patch_table(
+    const std::string& folder) {
+    const std::filesystem::path path = std::filesystem::path(folder) / "patches.csv";
+    std::ifstream in(path);
+    if (!in) {
+        return Error{"no patches.csv", folder,
+                     "expected a table with the columns file and class beside the patches"};
+    }
+    const auto cells = [](std::string line) {
+        if (!line.empty() && line.back() == '\r') line.pop_back();
+        std::vector<std::string> out;
+        std::stringstream stream(line);
+        for (std::string cell; std::getline(stream, cell, ',');) out.push_back(cell);
+        return out;
+    };
+    std::string line;
+    std::getline(in, line);
+    const std::vector<std::string> header = cells(line);
+    const auto file = std::find(header.begin(), header.end(), "file") - header.begin();
+    const auto kind = std::find(header.begin(), header.end(), "class") - header.begin();
+    const auto columns = static_cast<std::ptrdiff_t>(header.size());
+    if (file >= columns || kind >= columns) {
+        return Error{"no column named file and class", path.string(),
+                     "expected both in its first line"};
+    }
+    std::map<std::string, std::vector<std::string>> out;
+    while (std::getline(in, line)) {
+        const std::vector<std::string> row = cells(line);
+        if (static_cast<std::ptrdiff_t>(row.size()) <= std::max(file, kind)) continue;
+        out[row[static_cast<std::size_t>(kind)]].push_back(
+            (std::filesystem::path(folder) / row[static_cast<std::size_t>(file)]).string());
+    }
+    return out;
+}
+
+std::uint64_t name_seed(const std::string& name, std::uint64_t seed) {
+    std::uint64_t hash = seed;
+    for (const char c : name) hash = derive_seed(hash, static_cast<unsigned char>(c));
+    return hash;
+}
+
+}  // namespace
+
+Result<SolidTextureResult> make_solid_texture(const TextureSpec& spec) {
+    assert(!spec.examples.empty());
+    SolidTextureResult out;
+    std::vector<ExampleImage> prepared;
+    double count = 0, sum = 0, square = 0;
+    for (const ExampleImage& example : spec.examples) {
+        auto p = prepare_example(example);
+        if (!p) return p.error();
+        out.warnings.insert(out.warnings.end(), p->warnings.begin(), p->warnings.end());
+        for (std::size_t i = 0; i < p->image.count(); ++i) {
+            if (!p->image.used(i)) continue;
+            count += 1;
+            sum += p->image.grey[i];
+            square += static_cast<double>(p->image.grey[i]) * p->image.grey[i];
+        }
+        prepared.push_back(std::move(p->image));
+    }
+    out.grey_mean = sum / count;
+    out.grey_sd = std::sqrt(std::max(square / count - out.grey_mean * out.grey_mean, 1e-12));
+    std::vector<float> grey;
+    if (spec.mode == TextureMode::pyramid) {
+        const PyramidStatistics statistics = learn_pyramid(prepared);
+        out.warnings.insert(out.warnings.end(), statistics.warnings.begin(),
+                            statistics.warnings.end());
+        grey = synthesise_pyramid(statistics, spec.edge, spec.seed);
+    } else {
+        MatchedOptions options;
+        options.third_axis = spec.third_axis;
+        grey = synthesise_matched(prepared, spec.edge, spec.seed, options);
+    }
+    out.texture.name = spec.name;
+    out.texture.edge = spec.edge;
+    out.texture.voxel_mm = spec.voxel_mm;
+    out.texture.voxels.resize(grey.size());
+    for (std::size_t i = 0; i < grey.size(); ++i) {
+        const double v = 128 + 32 * (grey[i] - out.grey_mean) / out.grey_sd;
+        out.texture.voxels[i] = static_cast<std::uint8_t>(std::clamp(std::lround(v), 0l, 255l));
+    }
+    return out;
+}
+
+Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
+                                             const TextureBankOptions& options,
+                                             const Progress& progress) {
+    const auto start = std::chrono::steady_clock::now();
+    TextureBankResult out;
+    out.report.stage = "texture";
+    std::map<std::string, std::vector<std::string>> patches;
+    if (!options.example_folder.empty()) {
+        auto table = read_patch_table(options.example_folder);
+        if (!table) return table.error();
+        patches = std::move(*table);
+    }
+    std::vector<TextureSpec> specs;
+    int from_files = 0;
+    for (const Tissue& tissue : tissues) {
+        if (tissue.texture.empty()) continue;
+        if (std::any_of(specs.begin(), specs.end(),
+                        [&](const TextureSpec& s) { return s.name == tissue.texture; }))
+            continue;
+        TextureSpec spec;
+        spec.name = tissue.texture;
+        spec.mode = options.mode;
+        spec.edge = options.edge;
+        spec.voxel_mm = options.voxel_mm;
+        spec.seed = name_seed(tissue.texture, options.seed);
+        std::vector<std::string> files;
+        for (const TextureExample& example : options.examples) {
+            if (example.texture == tissue.texture) files.push_back(example.path);
+        }
+        const StandIn* stand_in = stand_in_for(tissue.texture);
+        if (stand_in) spec.third_axis = stand_in->third_axis;
+        if (files.empty()) {
+            if (const auto own = patches.find(tissue.texture);
+                own != patches.end() && !(stand_in && own->first == stand_in->patch_class)) {
+                files = own->second;
+            } else if (stand_in) {
+                const auto shared = patches.find(stand_in->patch_class);
+                if (shared != patches.end()) {
+                    files.push_back(shared->second[stand_in->which % shared->second.size()]);
+                }
+            }
+        }
+        for (const std::string& file : files) {
+            auto example = read_example(file, {}, &out.report.warnings);
+            if (!example) return example.error();
+            spec.examples.push_back(std::move(*example));
+        }
+        if (spec.examples.empty()) {
+            spec.examples.push_back(synthetic_example(spec.name, 160, 128, options.seed));
+            if (!options.example_folder.empty()) {
+                out.report.warnings.push_back("Texture " + spec.name +
+                                              " has no example image; a synthetic one is used.");
+            }
+        } else {
+            ++from_files;
+        }
+        specs.push_back(std::move(spec));
+    }
+    for (const TextureExample& example : options.examples) {
+        if (std::none_of(specs.begin(), specs.end(),
+                         [&](const TextureSpec& s) { return s.name == example.texture; })) {
+            out.report.warnings.push_back("No tissue uses the texture " + example.texture +
+                                          "; its example was not read.");
+        }
+    }
+    std::vector<std::optional<Result<SolidTextureResult>>> made(specs.size());
+    tell(progress, 0.1, "learning textures");
+    parallel_for(specs.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) made[i].emplace(make_solid_texture(specs[i]));
+    });
+    for (std::size_t i = 0; i < specs.size(); ++i) {
+        if (!*made[i]) return made[i]->error();
+        SolidTextureResult& result = **made[i];
+        out.textures.push_back(std::move(result.texture));
+        out.report.warnings.insert(out.report.warnings.end(), result.warnings.begin(),
+                                   result.warnings.end());
+    }
+    tell(progress, 1, "learning textures");
+    out.report.measures = {{"textures", static_cast<double>(specs.size())},
+                           {"from_example_images", static_cast<double>(from_files)},
+                           {"edge_voxels", static_cast<double>(options.edge)}};
+    out.report.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return out;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,178 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/parallel.h"
+#include "pipeline/texture/autocorrelation.h"
+#include "pipeline/texture/counter_random.h"
+#include "pipeline/texture/fourier.h"
+#include "pipeline/texture/matched_texture.h"
+#include "pipeline/texture/periodic_volume.h"
+#include "pipeline/texture/pyramid_texture.h"
+#include "pipeline/texture/synthetic_examples.h"
+#include "pipeline/texture/texture_bank.h"
+#include "pipeline/texture/tissue_table.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+TEST(Fourier, CubeReturnsAndFindsASingleWave) {
+    const int n = 16;
+    std::vector<std::complex<float>> cube(static_cast<std::size_t>(n * n * n));
+    for (int z = 0; z < n; ++z)
+        for (int y = 0; y < n; ++y)
+            for (int x = 0; x < n; ++x)
+                cube[static_cast<std::size_t>(x + n * (y + n * z))] =
+                    static_cast<float>(std::cos(2 * M_PI * (2 * x + 3 * y + 5 * z) / n));
+    const auto before = cube;
+    fourier_cube(cube, n, false);
+    for (int z = 0; z < n; ++z)
+        for (int y = 0; y < n; ++y)
+            for (int x = 0; x < n; ++x) {
+                const bool peak = (x == 2 && y == 3 && z == 5) || (x == 14 && y == 13 && z == 11);
+                EXPECT_NEAR(std::abs(cube[static_cast<std::size_t>(x + n * (y + n * z))]),
+                            peak ? n * n * n / 2 : 0,
+                            2e-3);  // 4096 terms of 1e-7
+            }
+    fourier_cube(cube, n, true);
+    for (std::size_t i = 0; i < cube.size(); ++i)
+        EXPECT_NEAR(std::abs(cube[i] - before[i]), 0, 1e-5);
+}
+
+TEST(PeriodicVolume, MatchingGivesExactlyTheDistributionAndKeepsTheOrder) {
+    std::vector<float> values(1000), sorted(1000);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] = static_cast<float>(uniform_at(1, i) - 0.5);
+        sorted[i] = static_cast<float>(i * i);
+    }
+    const std::vector<float> before = values;
+    match_distribution(values, sorted);
+    for (std::size_t i = 1; i < values.size(); ++i) {
+        EXPECT_EQ(values[i] < values[i - 1], before[i] < before[i - 1]);
+    }
+    std::sort(values.begin(), values.end());
+    EXPECT_EQ(values, sorted);
+}
+
+TEST(Autocorrelation, OfAMaskedImageIsThatOfItsPixelPairs) {
+    ExampleImage image{"test", 23, 17, {}, {}};
+    image.grey.resize(image.count());
+    image.use.resize(image.count());
+    for (std::size_t i = 0; i < image.count(); ++i) {
+        image.grey[i] = static_cast<float>(255 * uniform_at(9, i));
+        image.use[i] = uniform_at(10, i) < 0.8;
+    }
+    const ExampleImage one[] = {image};
+    const Autocorrelation fast = autocorrelation(one, 5);
+    double mean = 0, count = 0;
+    for (std::size_t i = 0; i < image.count(); ++i) {
+        if (image.used(i)) mean += image.grey[i], count += 1;
+    }
+    mean /= count;
+    const auto pairs = [&](int dx, int dy) {
+        double sum = 0, n = 0;
+        for (int y = 0; y < image.height; ++y)
+            for (int x = 0; x < image.width; ++x) {
+                const int u = x + dx, v = y + dy;
+                if (u < 0 || v < 0 || u >= image.width || v >= image.height) continue;
+                if (!image.used(image.index(x, y)) || !image.used(image.index(u, v))) continue;
+                sum +=
+                    (image.grey[image.index(x, y)] - mean) * (image.grey[image.index(u, v)] - mean);
+                n += 1;
+            }
+        return sum / n;
+    };
+    for (int y = -5; y <= 5; ++y)
+        for (int x = -5; x <= 5; ++x) EXPECT_NEAR(fast.at(x, y), pairs(x, y) / pairs(0, 0), 1e-9);
+}
+
+TEST(Pyramid, SamplesOfTheJointHistogramFollowTheParent) {
+    // two stripes: where the coarse band is high the fine band is always positive noise
+    const ExampleImage example[] = {synthetic_example("liver")};
+    const PyramidStatistics s = learn_pyramid(example, {.levels = 3});
+    ASSERT_EQ(s.bands.size(), 3u);
+    for (std::size_t l = 0; l + 1 < s.bands.size(); ++l) {
+        EXPECT_EQ(s.bands[l].children.size(), example[0].count());
+        EXPECT_EQ(s.bands[l].row_begin[256], example[0].count());
+    }
+    // bands sum to the image, so the sum of their means is the image's mean
+    double sum = 0, mean = 0;
+    for (const PyramidBand& band : s.bands) {
+        for (const float v : band.sorted) sum += v;
+    }
+    for (const float v : example[0].grey) mean += v;
+    EXPECT_NEAR(sum / mean, 1, 1e-4);
+}
+
+TEST(Pyramid, TooFewPixelsForALevelIsSaid) {
+    const ExampleImage example[] = {synthetic_example("liver", 8, 8)};
+    const PyramidStatistics s = learn_pyramid(example, {.levels = 4});
+    EXPECT_LT(s.bands.size(), 4u);
+    ASSERT_FALSE(s.warnings.empty());
+    EXPECT_NE(s.warnings[0].find("too few"), std::string::npos) << s.warnings[0];
+}
+
+class BothModes : public ::testing::TestWithParam<TextureMode> {};
+
+TEST_P(BothModes, SameBytesForSeedAndAnyNumberOfThreads) {
+    const Tissue* liver = find_tissue("liver");
+    const Tissue* muscle = find_tissue("muscle");
+    const Tissue tissues[] = {*liver, *muscle};
+    TextureBankOptions options;
+    options.mode = GetParam();
+    options.edge = 32;
+    std::vector<std::vector<std::uint8_t>> made;
+    for (const int threads : {1, 0}) {
+        const ThreadLimit limit(threads);
+        auto bank = build_texture_bank(tissues, options);
+        ASSERT_TRUE(bank);
+        ASSERT_EQ(bank->textures.size(), 2u);
+        EXPECT_EQ(bank->textures[0].name, "liver");
+        EXPECT_EQ(bank->textures[0].voxels.size(), 32u * 32 * 32);
+        made.push_back(bank->textures[0].voxels);
+    }
+    EXPECT_EQ(made[0], made[1]);
+    options.seed = 2;
+    EXPECT_NE(made[0], build_texture_bank(tissues, options)->textures[0].voxels);
+}
+
+TEST_P(BothModes, MeanAndSpreadAreTheCodedOnes) {
+    TextureSpec spec;
+    spec.name = "liver";
+    spec.mode = GetParam();
+    spec.edge = 32;
+    spec.examples = {synthetic_example("liver")};
+    auto made = make_solid_texture(spec);
+    ASSERT_TRUE(made);
+    double mean = 0, square = 0;
+    const auto n = static_cast<double>(made->texture.voxels.size());
+    for (const std::uint8_t v : made->texture.voxels) mean += v / n, square += v * v / n;
+    // The pyramid draws its coarsest band from 32^3 / 8^3 independent values: 1 / sqrt(64) of 32.
+    const double tolerance = GetParam() == TextureMode::pyramid ? 4 : 0.5;
+    EXPECT_NEAR(mean, 128, tolerance);
+    EXPECT_NEAR(std::sqrt(square - mean * mean), 32, tolerance);
+    EXPECT_NEAR(made->grey_mean, 110, 3);
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes,
+                         BothModes,
+                         ::testing::Values(TextureMode::pyramid, TextureMode::matched),
+                         [](const auto& mode) {
+                             return mode.param == TextureMode::pyramid ? "pyramid" : "matched";
+                         });
+
+TEST(MatchedTexture, KeepsGrainAndDirectionOfTheExample) {
+    for (const char* name : {"liver", "muscle"}) {
+        const ExampleImage example[] = {synthetic_example(name)};
+        const std::vector<float> cube = synthesise_matched(example, 64, 1);
+        const CorrelationWidths wanted = correlation_widths(autocorrelation(example, 32));
+        const CorrelationWidths got = correlation_widths(plane_autocorrelation(cube, 64, 32));
+        EXPECT_NEAR(got.along / wanted.along, 1, 0.1) << name;
+        EXPECT_NEAR(got.across / wanted.across, 1, 0.1) << name;
+        EXPECT_NEAR(std::remainder(got.angle_rad - wanted.angle_rad, M_PI), 0, 0.1) << name;
+    }
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
