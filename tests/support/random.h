@@ -24,8 +24,7 @@ class Random {
         return rotation_from_quaternion({gaussian(), gaussian(), gaussian(), gaussian()});
     }
     Point3 point(double half_width) {
-        return {uniform(-half_width, half_width),
-                uniform(-half_width, half_width),
+        return {uniform(-half_width, half_width), uniform(-half_width, half_width),
                 uniform(-half_width, half_width)};
     }
     Rigid rigid(double half_width) {
