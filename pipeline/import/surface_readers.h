@@ -1,0 +1,17 @@
+// The two kinds of surface files. Internal to import; no checks but of the file itself.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/result.h"
+#include "formats/surface.h"
+
+namespace sonocase::pipeline {
+
+// PLY, STL, OBJ, VTP; triangles agree with their neighbours, outside is not yet decided.
+Result<Surface> read_mesh_file(const std::string& path);
+// CSV, TXT, XYZ, PTS, ASC.
+Result<Surface> read_point_file(const std::string& path, std::vector<std::string>* warnings);
+
+}  // namespace sonocase::pipeline
