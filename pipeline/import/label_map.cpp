@@ -128,16 +128,20 @@ Result<ImportedLabels> import_label_map(const std::string& path,
         for (int axis = 0; axis < 3; ++axis) labels.grid.origin_mm[axis] *= options.scale;
     }
     labels.labels.push_back({"outside", "outside", 0, {0, 0, 0}});
+    std::string strangers;
+    int stranger_count = 0;
     for (const Structure& structure : structures) {
         const LabelTableEntry& entry = structure.entry;
-        labels.labels.push_back({entry.name, entry.tissue_class, entry.value,
+        const TissueChoice choice = tissue_of(entry);
+        if (!choice.known && !entry.name.starts_with("label_"))
+            strangers += (stranger_count++ > 0 ? ", " : "") + entry.name;
+        labels.labels.push_back({entry.name, std::string(choice.tissue), entry.value,
                                  entry.colour.value_or(colour_of(entry.name))});
     }
     if (stranger_count > 0)
         report.warnings.push_back(
-            "no rule knows what tissue these are, and they are taken as soft "
-            "tissue: " +
-            strangers + "; say so in the recipe's [labels]");
+            "no rule knows what tissue these are, and they are taken as soft tissue: " + strangers +
+            "; say so in the recipe's [labels]");
     // Large structures first, so that small ones end on top.
     std::vector<std::size_t> order(structures.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
