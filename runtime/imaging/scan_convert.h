@@ -1,0 +1,22 @@
+// Beams x depth to pixels, bilinearly, in integers: the same pixels on every instruction set.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "runtime/imaging/scan_geometry.h"
+
+namespace sonocase::runtime {
+
+// Converts the picture's rows [row_begin, row_end) and blackens what lies outside the scanned area.
+// pairs   samples x stride values: grey of a sample (low byte) and of the next deeper one (high byte)
+// pixels  # width * height, row by row
+void scan_convert(const ScanConversionTable& table,
+                  std::span<const std::uint16_t> pairs,
+                  int width_px,
+                  int row_begin,
+                  int row_end,
+                  bool flip_left_right,
+                  std::span<std::uint8_t> pixels);
+
+}  // namespace sonocase::runtime
