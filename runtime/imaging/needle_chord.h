@@ -1,8 +1,9 @@
 // How much of the scan plane's thickness the needle fills at a point of the plane.
 //
 // The needle is a cylinder of radius rho that ends at the tip; the plane is a slab |y| <= t / 2. At
-// (x, 0, z) the share is the length of the segment {(x, y, z), |y| <= t / 2} inside the cylinder, over
-// t: the partial volume of [Magee], "Needle Rendering". With w(y) = (x, y, z) - tip and axis a,
+// (x, 0, z) the share is the length of the segment {(x, y, z), |y| <= t / 2} inside the cylinder,
+// over t: the partial volume of [Magee], "Needle Rendering". With w(y) = (x, y, z) - tip and axis
+// a,
 //     |w - (w.a) a|^2 <= rho^2   is a quadratic in y,   -length <= w.a <= 0   an interval.
 // All in the probe frame, mm. Constant time.
 #pragma once
@@ -16,8 +17,8 @@
 namespace sonocase::runtime {
 
 struct NeedleShape {
-    Point3 tip;         // probe frame
-    Vector3 axis;       // unit, hub to tip
+    Point3 tip;    // probe frame
+    Vector3 axis;  // unit, hub to tip
     double radius_mm = 0.5;
     double length_mm = 150;
     double slab_mm = 1;  // t; 0 is treated as a thin slab of kThinnestSlabMm

@@ -1,4 +1,5 @@
-// The needle prepared for a block of beams: where it can show, and its constants in single precision.
+// The needle prepared for a block of beams: where it can show, and its constants in single
+// precision.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +27,8 @@ struct NeedleRow {
 class NeedleStrip {
   public:
     NeedleStrip() = default;
-    explicit NeedleStrip(const NeedleShape& n, double extra_mm = 0) : radius_(n.radius_mm + extra_mm) {
+    explicit NeedleStrip(const NeedleShape& n, double extra_mm = 0)
+        : radius_(n.radius_mm + extra_mm) {
         const double reach = 0.5 * n.slab_mm + n.radius_mm;
         double u0 = -n.length_mm, u1 = 0;  // along the axis, 0 at the tip
         if (std::abs(n.axis.y) > 1e-9) {
@@ -61,15 +63,23 @@ class NeedleStrip {
             r0 = std::max(r0, std::min(a, b));
             r1 = std::min(r1, std::max(a, b));
         };
-        clip(oz * direction_.x - ox * direction_.z, d.z * direction_.x - d.x * direction_.z, -radius_, radius_);
-        clip(ox * direction_.x + oz * direction_.z, d.x * direction_.x + d.z * direction_.z, -radius_, length_ + radius_);
+        clip(oz * direction_.x - ox * direction_.z, d.z * direction_.x - d.x * direction_.z,
+             -radius_, radius_);
+        clip(ox * direction_.x + oz * direction_.z, d.x * direction_.x + d.z * direction_.z,
+             -radius_, length_ + radius_);
         if (r1 < r0) return false;
         k0 = std::max(0, static_cast<int>(r0 / g.step_mm - 0.5) - 1);
         k1 = std::min(g.samples, static_cast<int>(r1 / g.step_mm - 0.5) + 3);
         return k0 < k1;
     }
 
-    bool prepare_block(const NeedleShape& n, const ScanGeometry& g, int line, bool whole, NeedleRow& row, int& k0, int& k1) const {
+    bool prepare_block(const NeedleShape& n,
+                       const ScanGeometry& g,
+                       int line,
+                       bool whole,
+                       NeedleRow& row,
+                       int& k0,
+                       int& k1) const {
         k0 = g.samples;
         k1 = 0;
         for (int v = 0; v < kBeamBlock; ++v) {

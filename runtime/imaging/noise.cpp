@@ -18,8 +18,8 @@ double inverse_normal(double p) {
 }
 
 std::vector<std::int8_t> make_noise_tile(double sigma, std::uint32_t seed, int overhang) {
-    // Each of the equally likely values once, in an order drawn by the seed: the tile's own mean and
-    // deviation are then exact.
+    // Each of the equally likely values once, in an order drawn by the seed: the tile's own mean
+    // and deviation are then exact.
     std::vector<std::int8_t> tile(kNoiseTile + static_cast<std::size_t>(overhang));
     constexpr std::uint32_t kLevels = 4096;
     for (std::uint32_t i = 0; i < kLevels; ++i) {
@@ -32,7 +32,8 @@ std::vector<std::int8_t> make_noise_tile(double sigma, std::uint32_t seed, int o
             (static_cast<std::uint64_t>(hash32(seed + i * 0x85EBCA6Bu)) * (i + 1)) >> 32);
         std::swap(tile[i], tile[j]);
     }
-    for (int i = 0; i < overhang; ++i) tile[kNoiseTile + i] = tile[static_cast<std::size_t>(i) % kNoiseTile];
+    for (int i = 0; i < overhang; ++i)
+        tile[kNoiseTile + i] = tile[static_cast<std::size_t>(i) % kNoiseTile];
     return tile;
 }
 

@@ -1,4 +1,5 @@
-// Repeatable noise: a hash, and a tile of Gaussian values that rows of samples read from random starts.
+// Repeatable noise: a hash, and a tile of Gaussian values that rows of samples read from random
+// starts.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +25,8 @@ inline std::uint32_t noise_row_start(std::uint32_t seed, std::uint32_t frame, st
     return hash32(hash32(seed ^ 0x9E3779B9u * frame) + row) & (kNoiseTile - 1);
 }
 
-// # kNoiseTile + overhang values, Gaussian with the given deviation, rounded; the overhang repeats the
-// beginning so that a row may be read in one piece from any start.
+// # kNoiseTile + overhang values, Gaussian with the given deviation, rounded; the overhang repeats
+// the beginning so that a row may be read in one piece from any start.
 std::vector<std::int8_t> make_noise_tile(double sigma, std::uint32_t seed, int overhang);
 
 }  // namespace sonocase::runtime

@@ -36,9 +36,8 @@ std::uint32_t sample_block_as(const PaperBlock& b) {
     const int e = b.edge_log2;
     auto met = hn::Zero(d);
     for (int v = 0; v < kPaperBlock; v += lanes) {
-        const auto load = [&](const std::int32_t* p, int axis) HWY_ATTR {
-            return hn::LoadU(d, p + axis * b.lines + v);
-        };
+        const auto load = [&](const std::int32_t* p, int axis)
+                              HWY_ATTR { return hn::LoadU(d, p + axis * b.lines + v); };
         auto x = load(b.start, 0), y = load(b.start, 1), z = load(b.start, 2);
         const auto dx = load(b.step, 0), dy = load(b.step, 1), dz = load(b.step, 2);
         auto tx = hn::BitCast(du, load(b.start, 3)), ty = hn::BitCast(du, load(b.start, 4)),
@@ -47,20 +46,24 @@ std::uint32_t sample_block_as(const PaperBlock& b) {
                    dtz = hn::BitCast(du, load(b.step, 5));
         std::uint16_t* out = b.stage + v;
         for (int k = 0; k < b.samples; ++k, out += kPaperBlock) {
-            const auto i = hn::ShiftRight<16>(x), j = hn::ShiftRight<16>(y), l = hn::ShiftRight<16>(z);
-            auto brick = hn::Add(hn::ShiftRight<2>(i),
-                                 hn::Add(hn::Mul(hn::ShiftRight<2>(j), bx), hn::Mul(hn::ShiftRight<2>(l), bxy)));
-            const auto inside = hn::And(hn::Lt(hn::BitCast(du, i), sx),
-                                        hn::And(hn::Lt(hn::BitCast(du, j), sy), hn::Lt(hn::BitCast(du, l), sz)));
+            const auto i = hn::ShiftRight<16>(x), j = hn::ShiftRight<16>(y),
+                       l = hn::ShiftRight<16>(z);
+            auto brick = hn::Add(hn::ShiftRight<2>(i), hn::Add(hn::Mul(hn::ShiftRight<2>(j), bx),
+                                                               hn::Mul(hn::ShiftRight<2>(l), bxy)));
+            const auto inside =
+                hn::And(hn::Lt(hn::BitCast(du, i), sx),
+                        hn::And(hn::Lt(hn::BitCast(du, j), sy), hn::Lt(hn::BitCast(du, l), sz)));
             const auto valid = hn::RebindMask(d, inside);
             if constexpr (!kInside) brick = hn::IfThenElseZero(valid, brick);
             const auto entry = hn::GatherIndex(d, b.table, brick);
             const auto uniform = hn::Lt(entry, hn::Zero(d));
             auto material = entry;
             if (!hn::AllTrue(d, uniform)) {
-                const auto cell = hn::Or(hn::And(i, three),
-                                         hn::Or(hn::ShiftLeft<2>(hn::And(j, three)), hn::ShiftLeft<4>(hn::And(l, three))));
-                const auto address = hn::IfThenZeroElse(uniform, hn::Or(hn::ShiftLeft<6>(entry), cell));
+                const auto cell =
+                    hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
+                                                     hn::ShiftLeft<4>(hn::And(l, three))));
+                const auto address =
+                    hn::IfThenZeroElse(uniform, hn::Or(hn::ShiftLeft<6>(entry), cell));
                 const auto voxel = hn::GatherOffset(d, b.pool, address);
                 material = hn::IfThenElse(uniform, entry, voxel);
             }
@@ -71,7 +74,8 @@ std::uint32_t sample_block_as(const PaperBlock& b) {
             if constexpr (kTexture) {
                 const auto cx = hn::ShiftRightSame(tx, 32 - e), cy = hn::ShiftRightSame(ty, 32 - e),
                            cz = hn::ShiftRightSame(tz, 32 - e);
-                const auto cell = hn::Or(cx, hn::Or(hn::ShiftLeftSame(cy, e), hn::ShiftLeftSame(cz, 2 * e)));
+                const auto cell =
+                    hn::Or(cx, hn::Or(hn::ShiftLeftSame(cy, e), hn::ShiftLeftSame(cz, 2 * e)));
                 const auto address = hn::Or(hn::BitCast(d, cell), hn::ShiftLeftSame(look, 3 * e));
                 grey = hn::And(hn::GatherOffset(d, b.atlas, address), byte);
                 tx = hn::Add(tx, dtx);
@@ -96,7 +100,8 @@ std::uint32_t sample_block_as(const PaperBlock& b) {
 }
 
 std::uint32_t sample_block(const PaperBlock& b) {
-    if (b.texture) return b.inside ? sample_block_as<true, true>(b) : sample_block_as<true, false>(b);
+    if (b.texture)
+        return b.inside ? sample_block_as<true, true>(b) : sample_block_as<true, false>(b);
     return b.inside ? sample_block_as<false, true>(b) : sample_block_as<false, false>(b);
 }
 
@@ -118,11 +123,13 @@ void draw_needle(const PaperBlock& b, const NeedleRow& n, int row_begin, int row
                                     hn::Mul(wz, hn::Set(d, n.az)));
             auto low = hn::Set(d, -0.5f * n.slab), high = hn::Set(d, 0.5f * n.slab);
             const auto bb = hn::Sub(wy, hn::Mul(u0, hn::Set(d, n.ay)));
-            // Perpendicular part first: the difference of two large squares would lose the needle's radius.
+            // Perpendicular part first: the difference of two large squares would lose the needle's
+            // radius.
             const auto px = hn::Sub(wx, hn::Mul(u0, hn::Set(d, n.ax)));
             const auto pz = hn::Sub(wz, hn::Mul(u0, hn::Set(d, n.az)));
-            const auto c = hn::Sub(hn::Add(hn::Add(hn::Mul(px, px), hn::Mul(bb, bb)), hn::Mul(pz, pz)),
-                                   hn::Set(d, n.radius * n.radius));
+            const auto c =
+                hn::Sub(hn::Add(hn::Add(hn::Mul(px, px), hn::Mul(bb, bb)), hn::Mul(pz, pz)),
+                        hn::Set(d, n.radius * n.radius));
             auto hit = hn::Lt(c, hn::Set(d, 1e30f));
             if (n.a > 1e-6f) {
                 const auto disc = hn::Sub(hn::Mul(bb, bb), hn::Mul(hn::Set(d, n.a), c));
@@ -147,13 +154,17 @@ void draw_needle(const PaperBlock& b, const NeedleRow& n, int row_begin, int row
                 hit, hn::Div(hn::Max(hn::Sub(high, low), zero), hn::Set(d, n.slab)));
             const auto along = hn::Max(hn::Neg(u0), zero);
             const auto near_tip = hn::Min(
-                hn::Max(hn::Sub(hn::Set(d, 1.0f), hn::Mul(along, hn::Set(d, n.inverse_reach))), zero), hn::Set(d, 1.0f));
-            const auto opacity = hn::Add(hn::Set(d, n.shaft_opacity),
-                                         hn::Mul(hn::Set(d, n.tip_opacity - n.shaft_opacity), near_tip));
+                hn::Max(hn::Sub(hn::Set(d, 1.0f), hn::Mul(along, hn::Set(d, n.inverse_reach))),
+                        zero),
+                hn::Set(d, 1.0f));
+            const auto opacity =
+                hn::Add(hn::Set(d, n.shaft_opacity),
+                        hn::Mul(hn::Set(d, n.tip_opacity - n.shaft_opacity), near_tip));
             std::uint16_t* stage = b.stage + k * kPaperBlock + v;
             const auto value = hn::PromoteTo(di, hn::LoadU(d16, stage));
             const auto grey = hn::ConvertTo(d, hn::And(value, hn::Set(di, 0xFF)));
-            const auto lit = hn::Add(grey, hn::Mul(hn::Sub(hn::Set(d, 255.0f), grey), hn::Mul(share, opacity)));
+            const auto lit =
+                hn::Add(grey, hn::Mul(hn::Sub(hn::Set(d, 255.0f), grey), hn::Mul(share, opacity)));
             const auto out = hn::Or(hn::NearestInt(lit), hn::And(value, hn::Set(di, 0x100)));
             hn::StoreU(hn::DemoteTo(d16, out), d16, stage);
         }
@@ -184,7 +195,9 @@ void finish_block_as(const PaperBlock& b) {
             if constexpr (kShadow) {
                 const auto blocked = hn::TestBit(value, hn::Set(d, 0x100));
                 light = hn::IfThenElse(blocked, hn::MulHigh(light, dim), light);
-                fixed = hn::MulHigh(fixed, light);
+                // Full light is exactly 1, so that skipping the shadow changes nothing.
+                fixed = hn::IfThenElse(hn::Eq(light, hn::Set(d, 0xFFFF)), fixed,
+                                       hn::MulHigh(fixed, light));
             }
             fixed = hn::MulHigh(fixed, hn::Set(d, b.row_scale[k]));
             const auto rounded = hn::ShiftRight<3>(hn::Add(fixed, hn::Set(d, 4)));
@@ -202,7 +215,8 @@ void finish_block(const PaperBlock& b) {
 }
 
 // One row: taps across beams. `in` has a margin of `reach` values before and behind.
-void blur_row(const std::uint8_t* in, int count, const std::uint16_t* taps, int reach, std::uint8_t* out) {
+void blur_row(
+    const std::uint8_t* in, int count, const std::uint16_t* taps, int reach, std::uint8_t* out) {
     const hn::ScalableTag<std::uint16_t> d;
     const hn::RebindToSigned<decltype(d)> di;
     const hn::Rebind<std::uint8_t, decltype(d)> d8;
@@ -217,7 +231,10 @@ void blur_row(const std::uint8_t* in, int count, const std::uint16_t* taps, int 
     }
 }
 
-void pair_rows(const std::uint8_t* upper, const std::uint8_t* lower, int count, std::uint16_t* out) {
+void pair_rows(const std::uint8_t* upper,
+               const std::uint8_t* lower,
+               int count,
+               std::uint16_t* out) {
     const hn::ScalableTag<std::uint16_t> d;
     const hn::Rebind<std::uint8_t, decltype(d)> d8;
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -246,7 +263,8 @@ namespace {
 constexpr int kSlack = 64;
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+        .count();
 }
 
 // 16.16 fixed point; beyond its range the point is far outside any volume.
@@ -276,13 +294,17 @@ std::vector<std::uint16_t> make_blur_taps(const ScanGeometry& g) {
         fixed[i] = static_cast<std::uint16_t>(std::lround(taps[i] * 256));
         sum += fixed[i];
     }
-    fixed[static_cast<std::size_t>(reach)] = static_cast<std::uint16_t>(fixed[static_cast<std::size_t>(reach)] + 256 - sum);
+    fixed[static_cast<std::size_t>(reach)] =
+        static_cast<std::uint16_t>(fixed[static_cast<std::size_t>(reach)] + 256 - sum);
     return fixed;
 }
 
 }  // namespace
 
-PaperFast::PaperFast(const PaperScene& scene, const ScanGeometry& geometry, std::uint32_t seed, WorkerPool& workers)
+PaperFast::PaperFast(const PaperScene& scene,
+                     const ScanGeometry& geometry,
+                     std::uint32_t seed,
+                     WorkerPool& workers)
     : scene_(scene), geometry_(geometry), workers_(workers) {
     const auto samples = static_cast<std::size_t>(geometry.samples);
     lines_ = (geometry.scanlines + kPaperBlock - 1) / kPaperBlock * kPaperBlock;
@@ -305,11 +327,15 @@ PaperFast::PaperFast(const PaperScene& scene, const ScanGeometry& geometry, std:
     stage_.resize(threads * samples * kPaperBlock + kSlack);
     image_.resize(samples * static_cast<std::size_t>(stride_) + kSlack);
     blurred_.resize(threads * 2 * static_cast<std::size_t>(lines_ + kSlack));
-    pair_stride_ = (lines_ + kSlack - 1) / kSlack * kSlack;  // rows of two parts never share a vector
+    pair_stride_ =
+        (lines_ + kSlack - 1) / kSlack * kSlack;  // rows of two parts never share a vector
     pairs_.resize(samples * static_cast<std::size_t>(pair_stride_) + kSlack);
 }
 
-void PaperFast::render(const PaperFrame& frame, bool flip, bool keep_all, std::span<std::uint8_t> pixels) {
+void PaperFast::render(const PaperFrame& frame,
+                       bool flip,
+                       bool keep_all,
+                       std::span<std::uint8_t> pixels) {
     const ScanGeometry& g = geometry_;
     auto clock = std::chrono::steady_clock::now();
     passes_ = {};
@@ -322,7 +348,8 @@ void PaperFast::render(const PaperFrame& frame, bool flip, bool keep_all, std::s
         const PlanePoint o = g.point(line, 0), e = g.point(line, g.samples - 1);
         const Point3 first = frame.volume_from_probe * Point3{o.x, 0, o.z};
         const Point3 last = frame.volume_from_probe * Point3{e.x, 0, e.z};
-        const Point3 a = scene_.grid.voxel_from_point(first), b = scene_.grid.voxel_from_point(last);
+        const Point3 a = scene_.grid.voxel_from_point(first),
+                     b = scene_.grid.voxel_from_point(last);
         const Vector3 from_origin = first - scene_.grid.origin_mm;
         bool inside = true;
         for (int axis = 0; axis < 3; ++axis) {
@@ -332,9 +359,11 @@ void PaperFast::render(const PaperFrame& frame, bool flip, bool keep_all, std::s
             start_[i] = fixed_voxel(a[axis] + 0.5);
             step_[i] = fixed_voxel((b[axis] - a[axis]) / steps);
             start_[t] = static_cast<std::int32_t>(fixed_phase(from_origin[axis] / edge_mm));
-            step_[t] = static_cast<std::int32_t>(fixed_phase((last[axis] - first[axis]) / steps / edge_mm));
+            step_[t] = static_cast<std::int32_t>(
+                fixed_phase((last[axis] - first[axis]) / steps / edge_mm));
             // A step rounds by less than 2^-16 voxel, so one voxel of margin is plenty.
-            for (const double v : {a[axis], b[axis]}) inside = inside && v > 1 && v < scene_.grid.size[axis] - 2;
+            for (const double v : {a[axis], b[axis]})
+                inside = inside && v > 1 && v < scene_.grid.size[axis] - 2;
         }
         bool& whole = block_inside[static_cast<std::size_t>(l / kPaperBlock)];
         whole = l % kPaperBlock == 0 ? inside : whole && inside;
@@ -342,8 +371,10 @@ void PaperFast::render(const PaperFrame& frame, bool flip, bool keep_all, std::s
     for (int k = 0; k < g.samples; ++k) {
         const auto i = static_cast<std::size_t>(k);
         noise_start_[i] = noise_row_start(frame.seed, frame.frame, static_cast<std::uint32_t>(k));
-        const double scale = (frame.effects.attenuation ? brightness_[i] : 1.0) * static_cast<double>(frame.row_gain[i]);
-        row_scale_[i] = static_cast<std::uint16_t>(std::lround(std::clamp(scale * 4096, 0.0, 65535.0)));
+        const double scale = (frame.effects.attenuation ? brightness_[i] : 1.0) *
+                             static_cast<double>(frame.row_gain[i]);
+        row_scale_[i] =
+            static_cast<std::uint16_t>(std::lround(std::clamp(scale * 4096, 0.0, 65535.0)));
     }
 
     PaperBlock base;
@@ -369,12 +400,13 @@ void PaperFast::render(const PaperFrame& frame, bool flip, bool keep_all, std::s
 
     const bool needle = frame.effects.needle && frame.needle != nullptr;
     const NeedleStrip strip = needle ? NeedleStrip(*frame.needle) : NeedleStrip();
-    const auto sample = HWY_DYNAMIC_POINTER(sample_block);
-    const auto draw = HWY_DYNAMIC_POINTER(draw_needle);
-    const auto finish = HWY_DYNAMIC_POINTER(finish_block);
+    const auto sample = HWY_DYNAMIC_DISPATCH(sample_block);
+    const auto draw = HWY_DYNAMIC_DISPATCH(draw_needle);
+    const auto finish = HWY_DYNAMIC_DISPATCH(finish_block);
     // Beyond the outermost beams their values repeat, for the blur.
     const auto repeat_edge = [&](std::uint8_t* row, int to, int count, int from) {
-        for (int k = 0; k < g.samples; ++k, row += stride_) std::memset(row + to, row[from], static_cast<std::size_t>(count));
+        for (int k = 0; k < g.samples; ++k, row += stride_)
+            std::memset(row + to, row[from], static_cast<std::size_t>(count));
     };
     std::atomic<bool> shadow_met{false}, needle_met{false};
     const int blocks = lines_ / kPaperBlock;
@@ -385,7 +417,8 @@ void PaperFast::render(const PaperFrame& frame, bool flip, bool keep_all, std::s
             const int line = block * kPaperBlock;
             b.start = start_.data() + line;
             b.step = step_.data() + line;
-            b.stage = stage_.data() + static_cast<std::size_t>(part) * static_cast<std::size_t>(g.samples) * kPaperBlock;
+            b.stage = stage_.data() + static_cast<std::size_t>(part) *
+                                          static_cast<std::size_t>(g.samples) * kPaperBlock;
             b.image = image_.data() + margin_ + line;
             b.noise = noise_.data() + line;
             b.inside = block_inside[static_cast<std::size_t>(block)];
@@ -413,15 +446,18 @@ void PaperFast::render(const PaperFrame& frame, bool flip, bool keep_all, std::s
     passes_.beams_ms = milliseconds_since(clock);
     clock = std::chrono::steady_clock::now();
 
-    const auto blur = HWY_DYNAMIC_POINTER(blur_row);
-    const auto pair = HWY_DYNAMIC_POINTER(pair_rows);
+    const auto blur = HWY_DYNAMIC_DISPATCH(blur_row);
+    const auto pair = HWY_DYNAMIC_DISPATCH(pair_rows);
     workers_.run([&](int part, int parts) {
         const int begin = g.samples * part / parts, end = g.samples * (part + 1) / parts;
         std::uint8_t* rows[2];
-        rows[0] = blurred_.data() + static_cast<std::size_t>(part) * 2 * static_cast<std::size_t>(lines_ + kSlack);
+        rows[0] = blurred_.data() +
+                  static_cast<std::size_t>(part) * 2 * static_cast<std::size_t>(lines_ + kSlack);
         rows[1] = rows[0] + lines_ + kSlack;
         const auto filtered = [&](int k) -> const std::uint8_t* {
-            const std::uint8_t* in = image_.data() + static_cast<std::size_t>(k) * static_cast<std::size_t>(stride_) + margin_;
+            const std::uint8_t* in =
+                image_.data() + static_cast<std::size_t>(k) * static_cast<std::size_t>(stride_) +
+                margin_;
             if (!frame.effects.blur) return in;
             std::uint8_t* out = rows[k & 1];
             blur(in, lines_, blur_taps_.data(), margin_, out);
@@ -431,7 +467,9 @@ void PaperFast::render(const PaperFrame& frame, bool flip, bool keep_all, std::s
         const std::uint8_t* upper = filtered(begin);
         for (int k = begin; k < end; ++k) {
             const std::uint8_t* lower = k + 1 < g.samples ? filtered(k + 1) : upper;
-            pair(upper, lower, lines_, pairs_.data() + static_cast<std::size_t>(k) * static_cast<std::size_t>(pair_stride_));
+            pair(upper, lower, lines_,
+                 pairs_.data() +
+                     static_cast<std::size_t>(k) * static_cast<std::size_t>(pair_stride_));
             upper = lower;
         }
     });
@@ -439,7 +477,8 @@ void PaperFast::render(const PaperFrame& frame, bool flip, bool keep_all, std::s
     clock = std::chrono::steady_clock::now();
 
     workers_.run([&](int part, int parts) {
-        scan_convert(table_, pairs_, g.width_px, g.height_px * part / parts, g.height_px * (part + 1) / parts, flip, pixels);
+        scan_convert(table_, pairs_, g.width_px, g.height_px * part / parts,
+                     g.height_px * (part + 1) / parts, flip, pixels);
     });
     passes_.convert_ms = milliseconds_since(clock);
 }

@@ -1,6 +1,7 @@
-// Model `paper` in beam space: beams x depth first, then one scan conversion. The shadow is a running
-// product down the beam and the blur a filter across beams, so that no pixel marches and no copy is
-// turned. Integer arithmetic of fixed order: every instruction set and thread count gives the same pixels.
+// Model `paper` in beam space: beams x depth first, then one scan conversion. The shadow is a
+// running product down the beam and the blur a filter across beams, so that no pixel marches and no
+// copy is turned. Integer arithmetic of fixed order: every instruction set and thread count gives
+// the same pixels.
 #pragma once
 
 #include <array>
@@ -22,7 +23,10 @@ struct PaperPasses {
 
 class PaperFast {
   public:
-    PaperFast(const PaperScene& scene, const ScanGeometry& geometry, std::uint32_t seed, WorkerPool& workers);
+    PaperFast(const PaperScene& scene,
+              const ScanGeometry& geometry,
+              std::uint32_t seed,
+              WorkerPool& workers);
 
     // keep_all: also run what cannot show; the pixels are the same.
     void render(const PaperFrame& frame, bool flip, bool keep_all, std::span<std::uint8_t> pixels);
@@ -36,18 +40,18 @@ class PaperFast {
     ScanConversionTable table_;
     std::vector<std::int8_t> noise_;
     std::vector<std::uint16_t> blur_taps_;  // # 2 * reach + 1, sum 256
-    int lines_ = 0;   // padded to whole blocks
-    int stride_ = 0;  // of a row: margin, lines, margin
+    int lines_ = 0;                         // padded to whole blocks
+    int stride_ = 0;                        // of a row: margin, lines, margin
     int margin_ = 0;
-    std::vector<std::int32_t> start_, step_;     // # 6 * lines: voxel x, y, z (16.16), texture x, y, z
-    std::vector<std::uint32_t> noise_start_;     // # samples
-    std::vector<std::uint16_t> row_scale_;       // # samples, 12 fractional bits
-    std::vector<double> brightness_;             // # samples
-    std::vector<std::uint16_t> stage_;           // per thread: one block of beams
-    std::vector<std::uint8_t> image_;            // samples x stride
-    std::vector<std::uint8_t> blurred_;          // per thread: two rows
+    std::vector<std::int32_t> start_, step_;  // # 6 * lines: voxel x, y, z (16.16), texture x, y, z
+    std::vector<std::uint32_t> noise_start_;  // # samples
+    std::vector<std::uint16_t> row_scale_;    // # samples, 12 fractional bits
+    std::vector<double> brightness_;          // # samples
+    std::vector<std::uint16_t> stage_;        // per thread: one block of beams
+    std::vector<std::uint8_t> image_;         // samples x stride
+    std::vector<std::uint8_t> blurred_;       // per thread: two rows
     int pair_stride_ = 0;
-    std::vector<std::uint16_t> pairs_;           // samples x pair_stride
+    std::vector<std::uint16_t> pairs_;  // samples x pair_stride
     PaperPasses passes_;
 };
 

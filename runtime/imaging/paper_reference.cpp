@@ -9,7 +9,9 @@
 namespace sonocase::runtime {
 namespace {
 
-int nearest(double x) { return static_cast<int>(std::floor(std::clamp(x, -1e6, 1e6) + 0.5)); }
+int nearest(double x) {
+    return static_cast<int>(std::floor(std::clamp(x, -1e6, 1e6) + 0.5));
+}
 
 std::uint32_t material_of_point(const PaperScene& scene, Point3 p) {
     const Point3 v = scene.grid.voxel_from_point(p);
@@ -55,14 +57,16 @@ void render_paper_reference(const PaperScene& scene,
                 double along = 0;
                 const double share = needle_share(*frame.needle, p.x, p.z, along);
                 const double near_tip = std::clamp(1 - along / paper::kTipReachMm, 0.0, 1.0);
-                const double opacity = frame.needle->shaft_opacity +
-                                       (frame.needle->tip_opacity - frame.needle->shaft_opacity) * near_tip;
+                const double opacity =
+                    frame.needle->shaft_opacity +
+                    (frame.needle->tip_opacity - frame.needle->shaft_opacity) * near_tip;
                 grey += (255 - grey) * share * opacity;
             }
             if (frame.effects.noise) {
                 const int l = std::clamp(nearest(line), 0, g.scanlines - 1);
                 const int k = std::clamp(nearest(sample), 0, g.samples - 1);
-                grey += noise_tile[noise_row_start(frame.seed, frame.frame, static_cast<std::uint32_t>(k)) +
+                grey += noise_tile[noise_row_start(frame.seed, frame.frame,
+                                                   static_cast<std::uint32_t>(k)) +
                                    static_cast<std::uint32_t>(l)];
                 grey = std::clamp(grey, 0.0, 255.0);
             }
@@ -70,7 +74,8 @@ void render_paper_reference(const PaperScene& scene,
                 double in_shadow_mm = 0;
                 for (int k = 0; k <= sample; ++k) {
                     const PlanePoint q = g.point(line, k);
-                    if (material_of_point(scene, frame.volume_from_probe * Point3{q.x, 0, q.z}) & PaperScene::kShadowBit) {
+                    if (material_of_point(scene, frame.volume_from_probe * Point3{q.x, 0, q.z}) &
+                        PaperScene::kShadowBit) {
                         in_shadow_mm += g.step_mm;
                     }
                 }
@@ -84,7 +89,8 @@ void render_paper_reference(const PaperScene& scene,
     if (frame.effects.blur) {
         std::fill(blurred.begin(), blurred.end(), 0.0);
         for (int copy = -paper::kBlurReach; copy <= paper::kBlurReach; ++copy) {
-            const double weight = paper::kBlurWeights[static_cast<std::size_t>(copy + paper::kBlurReach)];
+            const double weight =
+                paper::kBlurWeights[static_cast<std::size_t>(copy + paper::kBlurReach)];
             for (int row = 0; row < g.height_px; ++row) {
                 for (int column = 0; column < g.width_px; ++column) {
                     double line = 0, sample = 0;
@@ -92,10 +98,14 @@ void render_paper_reference(const PaperScene& scene,
                     // The copy's pixel that lands here; beyond the sector its edge is repeated.
                     line += copy * (g.fan ? paper::kBlurStepRad : paper::kBlurStepMm) / g.line_step;
                     const PlanePoint q = g.point(std::clamp(line, 0.0, g.scanlines - 1.0), sample);
-                    const double cx = std::clamp(q.x / g.mm_per_px + g.origin_x_px, 0.0, g.width_px - 1.0);
-                    const double cy = std::clamp(q.z / g.mm_per_px + g.origin_y_px, 0.0, g.height_px - 1.0);
-                    blurred[static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column)] +=
-                        weight * raw[static_cast<std::size_t>(nearest(cy)) * width + static_cast<std::size_t>(nearest(cx))];
+                    const double cx =
+                        std::clamp(q.x / g.mm_per_px + g.origin_x_px, 0.0, g.width_px - 1.0);
+                    const double cy =
+                        std::clamp(q.z / g.mm_per_px + g.origin_y_px, 0.0, g.height_px - 1.0);
+                    blurred[static_cast<std::size_t>(row) * width +
+                            static_cast<std::size_t>(column)] +=
+                        weight * raw[static_cast<std::size_t>(nearest(cy)) * width +
+                                     static_cast<std::size_t>(nearest(cx))];
                 }
             }
         }
@@ -103,12 +113,15 @@ void render_paper_reference(const PaperScene& scene,
 
     for (int row = 0; row < g.height_px; ++row) {
         for (int column = 0; column < g.width_px; ++column) {
-            const std::size_t i = static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
+            const std::size_t i =
+                static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
             double line = 0, sample = 0;
             double grey = 0;
             if (g.locate(g.pixel_centre(column, row), line, sample)) {
-                const auto k = static_cast<std::size_t>(std::clamp(nearest(sample), 0, g.samples - 1));
-                grey = blurred[i] * paper_brightness((sample + 0.5) * g.step_mm, frame.effects.attenuation) *
+                const auto k =
+                    static_cast<std::size_t>(std::clamp(nearest(sample), 0, g.samples - 1));
+                grey = blurred[i] *
+                       paper_brightness((sample + 0.5) * g.step_mm, frame.effects.attenuation) *
                        static_cast<double>(frame.row_gain[k]);
             }
             pixels[i] = static_cast<std::uint8_t>(std::lround(std::clamp(grey, 0.0, 255.0)));

@@ -13,23 +13,30 @@ const SolidTexture* find_texture(const CaseBundle& bundle, const std::string& na
     return nullptr;
 }
 
-// A tissue's cube of grey. A texture of another voxel size is resampled to the scene's; one that does
-// not fill the cube repeats, and both keep its period a divisor of the cube's.
-void bake(const Tissue& tissue, const SolidTexture* texture, int edge, double voxel_mm, std::uint8_t* out) {
+// A tissue's cube of grey. A texture of another voxel size is resampled to the scene's; one that
+// does not fill the cube repeats, and both keep its period a divisor of the cube's.
+void bake(const Tissue& tissue,
+          const SolidTexture* texture,
+          int edge,
+          double voxel_mm,
+          std::uint8_t* out) {
     std::array<std::uint8_t, 256> grey{};
     for (int v = 0; v < 256; ++v) {
         const double g = tissue.grey_mean + (v - 128) / 32.0 * tissue.grey_sd;
-        grey[static_cast<std::size_t>(v)] = static_cast<std::uint8_t>(std::lround(std::clamp(g, 0.0, 255.0)));
+        grey[static_cast<std::size_t>(v)] =
+            static_cast<std::uint8_t>(std::lround(std::clamp(g, 0.0, 255.0)));
     }
     if (texture == nullptr) {
         std::fill_n(out, static_cast<std::size_t>(edge) * edge * edge, grey[128]);
         return;
     }
     int period = 1;
-    while (period < edge && period * 1.4142 * voxel_mm < texture->edge * texture->voxel_mm) period *= 2;
+    while (period < edge && period * 1.4142 * voxel_mm < texture->edge * texture->voxel_mm)
+        period *= 2;
     std::vector<std::size_t> source(static_cast<std::size_t>(edge));
     for (int i = 0; i < edge; ++i) {
-        source[static_cast<std::size_t>(i)] = static_cast<std::size_t>((i % period) * texture->edge / period);
+        source[static_cast<std::size_t>(i)] =
+            static_cast<std::size_t>((i % period) * texture->edge / period);
     }
     const auto n = static_cast<std::size_t>(texture->edge);
     for (const std::size_t k : source) {
@@ -59,7 +66,8 @@ Result<PaperScene> make_paper_scene(const CaseBundle& bundle) {
     int edge = 0;
     double voxel_mm = 0;
     for (std::size_t t = 0; t < bundle.tissues.size(); ++t) {
-        const SolidTexture* texture = used[t] ? find_texture(bundle, bundle.tissues[t].texture) : nullptr;
+        const SolidTexture* texture =
+            used[t] ? find_texture(bundle, bundle.tissues[t].texture) : nullptr;
         if (texture == nullptr) continue;
         edge = std::max(edge, texture->edge);
         voxel_mm = voxel_mm > 0 ? std::min(voxel_mm, texture->voxel_mm) : texture->voxel_mm;
@@ -80,13 +88,17 @@ Result<PaperScene> make_paper_scene(const CaseBundle& bundle) {
     for (std::size_t t = 0; t < bundle.tissues.size(); ++t) {
         if (!used[t] || bundle.tissues[t].kind == TissueKind::outside) continue;
         const std::size_t index = scene.flat_grey.size();
-        if (index > 127) return Error{"the bundle uses more than 127 tissues", "", "merge tissues in the recipe"};
+        if (index > 127)
+            return Error{"the bundle uses more than 127 tissues", "",
+                         "merge tissues in the recipe"};
         const Tissue& tissue = bundle.tissues[t];
         scene.atlas.resize(cube * (index + 1));
-        bake(tissue, find_texture(bundle, tissue.texture), edge, voxel_mm, scene.atlas.data() + cube * index);
+        bake(tissue, find_texture(bundle, tissue.texture), edge, voxel_mm,
+             scene.atlas.data() + cube * index);
         scene.flat_grey.push_back(
             static_cast<std::uint8_t>(std::lround(std::clamp(tissue.grey_mean, 0.0, 255.0))));
-        material_of_tissue[t] = static_cast<std::uint8_t>(index | (tissue.casts_shadow ? PaperScene::kShadowBit : 0u));
+        material_of_tissue[t] =
+            static_cast<std::uint8_t>(index | (tissue.casts_shadow ? PaperScene::kShadowBit : 0u));
         scene.has_shadow = scene.has_shadow || tissue.casts_shadow;
     }
     scene.materials = static_cast<int>(scene.flat_grey.size());
@@ -94,7 +106,8 @@ Result<PaperScene> make_paper_scene(const CaseBundle& bundle) {
 
     std::array<std::uint8_t, 256> material{};
     for (std::size_t l = 1; l < tissue_of.size() && l < material.size(); ++l) {
-        if (tissue_of[l] >= 0) material[l] = material_of_tissue[static_cast<std::size_t>(tissue_of[l])];
+        if (tissue_of[l] >= 0)
+            material[l] = material_of_tissue[static_cast<std::size_t>(tissue_of[l])];
     }
     const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
     scene.table.resize(labels.table.size());
@@ -110,11 +123,13 @@ Result<PaperScene> make_paper_scene(const CaseBundle& bundle) {
 }
 
 std::uint32_t material_at(const PaperScene& s, int i, int j, int k) {
-    if (i < 0 || j < 0 || k < 0 || i >= s.grid.size.x || j >= s.grid.size.y || k >= s.grid.size.z) return 0;
-    const std::size_t brick = static_cast<std::size_t>(i / kBrickEdge) +
-                              static_cast<std::size_t>(s.bricks.x) *
-                                  (static_cast<std::size_t>(j / kBrickEdge) +
-                                   static_cast<std::size_t>(s.bricks.y) * static_cast<std::size_t>(k / kBrickEdge));
+    if (i < 0 || j < 0 || k < 0 || i >= s.grid.size.x || j >= s.grid.size.y || k >= s.grid.size.z)
+        return 0;
+    const std::size_t brick =
+        static_cast<std::size_t>(i / kBrickEdge) +
+        static_cast<std::size_t>(s.bricks.x) *
+            (static_cast<std::size_t>(j / kBrickEdge) +
+             static_cast<std::size_t>(s.bricks.y) * static_cast<std::size_t>(k / kBrickEdge));
     const std::uint32_t entry = s.table[brick];
     if (entry & kUniformBrick) return entry & 0xFFu;
     return s.pool[static_cast<std::size_t>(entry) * kBrickVoxels +

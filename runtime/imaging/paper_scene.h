@@ -16,14 +16,16 @@ inline constexpr std::size_t kGatherSlack = 4;
 struct PaperScene {
     Grid grid;
     Int3 bricks{0, 0, 0};
-    // Brick table as formats/brick_volume.h, except that a uniform entry carries the material itself.
+    // Brick table as formats/brick_volume.h, except that a uniform entry carries the material
+    // itself.
     std::vector<std::uint32_t> table;
     std::vector<std::uint8_t> pool;  // material of each voxel
     // Materials: tissue look, bit 7 set where it casts a shadow. 0 is the outside, black.
     static constexpr std::uint32_t kShadowBit = 0x80;
     int materials = 0;
     bool has_shadow = false;
-    // One cube of grey per material, edge^3, x fastest, at the same voxel size; mean and spread applied.
+    // One cube of grey per material, edge^3, x fastest, at the same voxel size; mean and spread
+    // applied.
     int edge_log2 = 5;
     double texture_voxel_mm = 0.5;
     std::vector<std::uint8_t> atlas;

@@ -1,7 +1,7 @@
 // The image that the probe sees: bundle + pose in, grey pixels out.
 //
-// Part of the portable core: no files, no clock, no blocking, memory owned by the caller, and neither
-// exceptions nor allocation in render().
+// Part of the portable core: no files, no clock, no blocking, memory owned by the caller, and
+// neither exceptions nor allocation in render().
 #pragma once
 
 #include <array>
@@ -33,7 +33,7 @@ struct RenderOptions {
     RendererKind kind = RendererKind::fast;
     int width_px = 512;
     int height_px = 512;
-    int threads = 1;  // >= 1; idle workers sleep
+    int threads = 1;                           // >= 1; idle workers sleep
     std::vector<std::string> effects{"auto"};  // "auto", "all", or names
     std::uint32_t seed = 1;
     // Sampling; 0 takes the model's default (paper 512 x 512, physical 192 x 512).
@@ -51,20 +51,20 @@ struct FrameInput {
     Rigid mannequin_from_probe;
     bool has_needle = false;
     NeedlePose needle;
-    double time_s = 0;         // injected; drives breathing, pulsation and noise
-    std::uint32_t frame = 0;   // seeds the noise
+    double time_s = 0;        // injected; drives breathing, pulsation and noise
+    std::uint32_t frame = 0;  // seeds the noise
     ImageSettings settings;
 };
 
 enum class FrameStatus : std::uint8_t {
     rendered,
-    held_bad_pose,   // NaN, infinite, mirrored or not orthonormal: the pixels are left as they were
-    no_contact,      // rendered, and the probe touches no skin
+    held_bad_pose,  // NaN, infinite, mirrored or not orthonormal: the pixels are left as they were
+    no_contact,     // rendered, and the probe touches no skin
 };
 
 struct EffectCost {
     const char* name = "";
-    double ms = 0;        // in the last frame
+    double ms = 0;  // in the last frame
     bool ran = false;
     const char* skipped_because = "";  // "" where it ran
 };

@@ -65,11 +65,12 @@ void scan_convert(const ScanConversionTable& table,
                   int row_end,
                   bool flip_left_right,
                   std::span<std::uint8_t> pixels) {
-    const auto kernel = HWY_DYNAMIC_POINTER(convert_run);
+    const auto kernel = HWY_DYNAMIC_DISPATCH(convert_run);
     auto run = std::lower_bound(table.runs.begin(), table.runs.end(), row_begin,
                                 [](const PixelRun& r, int row) { return r.row < row; });
     for (int row = row_begin; row < row_end; ++row) {
-        std::uint8_t* out = pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width_px);
+        std::uint8_t* out =
+            pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width_px);
         int done = 0;
         for (; run != table.runs.end() && run->row == row; ++run) {
             std::memset(out + done, 0, static_cast<std::size_t>(run->begin - done));

@@ -9,8 +9,8 @@
 namespace sonocase::runtime {
 
 // Converts the picture's rows [row_begin, row_end) and blackens what lies outside the scanned area.
-// pairs   samples x stride values: grey of a sample (low byte) and of the next deeper one (high byte)
-// pixels  # width * height, row by row
+// pairs   samples x stride values: grey of a sample (low byte) and of the next deeper one (high
+// byte) pixels  # width * height, row by row
 void scan_convert(const ScanConversionTable& table,
                   std::span<const std::uint16_t> pairs,
                   int width_px,

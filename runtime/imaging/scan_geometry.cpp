@@ -38,7 +38,8 @@ bool ScanGeometry::locate(PlanePoint p, double& line, double& sample) const {
     return line >= -0.5 && line <= scanlines - 0.5 && sample >= -0.5 && sample <= samples - 0.5;
 }
 
-ScanGeometry make_scan_geometry(const Probe& probe, int scanlines, int samples, int width_px, int height_px) {
+ScanGeometry make_scan_geometry(
+    const Probe& probe, int scanlines, int samples, int width_px, int height_px) {
     ScanGeometry g;
     g.fan = probe.shape != ProbeShape::linear;
     g.radius_mm = probe.shape == ProbeShape::curvilinear ? probe.radius_mm : 0;
@@ -56,7 +57,8 @@ ScanGeometry make_scan_geometry(const Probe& probe, int scanlines, int samples, 
         const double reach = g.radius_mm + g.depth_mm;
         const double quarter = std::acos(0.0);
         half_width = g.half_extent < quarter ? reach * std::sin(g.half_extent) : reach;
-        const double low = std::min(g.radius_mm * std::cos(g.half_extent), reach * std::cos(g.half_extent));
+        const double low =
+            std::min(g.radius_mm * std::cos(g.half_extent), reach * std::cos(g.half_extent));
         top = low - g.radius_mm;
     }
     constexpr double kMargin = 1.04;  // 2 % on each side
@@ -77,17 +79,21 @@ ScanConversionTable make_scan_conversion_table(const ScanGeometry& g, int stride
                 continue;
             }
             if (!open) {
-                table.runs.push_back({row, column, column, static_cast<std::uint32_t>(table.offset.size())});
+                table.runs.push_back(
+                    {row, column, column, static_cast<std::uint32_t>(table.offset.size())});
                 open = true;
             }
             table.runs.back().end = column + 1;
             line = std::clamp(line, 0.0, g.scanlines - 1.0);
             sample = std::clamp(sample, 0.0, g.samples - 1.0);
             int l = static_cast<int>(line), k = static_cast<int>(sample);
-            int wl = static_cast<int>(std::lround((line - l) * 256)), wk = static_cast<int>(std::lround((sample - k) * 256));
+            int wl = static_cast<int>(std::lround((line - l) * 256)),
+                wk = static_cast<int>(std::lround((sample - k) * 256));
             wl = std::min(wl, 255);  // a byte: at most 1/256 of the step between neighbours is lost
             wk = std::min(wk, 255);
-            table.offset.push_back(static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(stride) + static_cast<std::uint32_t>(l));
+            table.offset.push_back(static_cast<std::uint32_t>(k) *
+                                       static_cast<std::uint32_t>(stride) +
+                                   static_cast<std::uint32_t>(l));
             table.weight.push_back(static_cast<std::uint16_t>(wl | wk << 8));
         }
     }

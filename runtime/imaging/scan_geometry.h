@@ -1,7 +1,7 @@
 // Where the beams of a probe run in the scan plane, and which beam sample each pixel shows.
 //
-// Scan plane: the probe frame's x (lateral) and z (depth), mm, origin at the middle of the probe face.
-// Beam l of L, l in [0, L), leaves origin(l) along direction(l); sample k of S lies at depth
+// Scan plane: the probe frame's x (lateral) and z (depth), mm, origin at the middle of the probe
+// face. Beam l of L, l in [0, L), leaves origin(l) along direction(l); sample k of S lies at depth
 // (k + 1/2) * step_mm along it. Fractional beams and samples are allowed everywhere.
 // Linear: parallel beams over the face. Curvilinear: beams fan out from the centre of the face's
 // curvature. Phased: the same with radius 0, so that the sector's tip is the origin.
@@ -21,12 +21,12 @@ struct PlanePoint {
 
 struct ScanGeometry {
     bool fan = true;
-    double radius_mm = 0;      // fan: of the face
-    double half_extent = 0;    // fan: half the opening angle, rad; linear: half the face, mm
+    double radius_mm = 0;    // fan: of the face
+    double half_extent = 0;  // fan: half the opening angle, rad; linear: half the face, mm
     double depth_mm = 0;
     int scanlines = 0, samples = 0;
-    double step_mm = 0;        // along a beam
-    double line_step = 0;      // between beams: rad (fan) or mm (linear)
+    double step_mm = 0;    // along a beam
+    double line_step = 0;  // between beams: rad (fan) or mm (linear)
     int width_px = 0, height_px = 0;
     double mm_per_px = 0, origin_x_px = 0, origin_y_px = 0;  // pixel of the plane's origin
 
@@ -39,7 +39,8 @@ struct ScanGeometry {
 };
 
 // Fits the scanned area into the picture with a margin of 2 %.
-ScanGeometry make_scan_geometry(const Probe& probe, int scanlines, int samples, int width_px, int height_px);
+ScanGeometry make_scan_geometry(
+    const Probe& probe, int scanlines, int samples, int width_px, int height_px);
 
 // One horizontal run of pixels inside the scanned area; their table entries follow one another.
 struct PixelRun {
@@ -49,7 +50,7 @@ struct PixelRun {
 
 // Per pixel inside the scanned area: the beam sample at its upper left, and bilinear weights / 256.
 struct ScanConversionTable {
-    std::vector<PixelRun> runs;        // by row, then from the left
+    std::vector<PixelRun> runs;         // by row, then from the left
     std::vector<std::uint32_t> offset;  // sample * stride + line
     std::vector<std::uint16_t> weight;  // low byte across beams, high byte along them
 };

@@ -7,7 +7,9 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
-std::int64_t this_target() { return HWY_TARGET; }
+std::int64_t this_target() {
+    return HWY_TARGET;
+}
 }  // namespace sonocase::runtime::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -18,8 +20,14 @@ HWY_EXPORT(this_target);
 
 std::vector<SimdTarget> available_simd_targets() {
     std::vector<SimdTarget> out;
-    for (const std::int64_t id : hwy::SupportedAndGeneratedTargets()) out.push_back({hwy::TargetName(id), id});
+    for (const std::int64_t id : hwy::SupportedAndGeneratedTargets())
+        out.push_back({hwy::TargetName(id), id});
     return out;
+}
+
+void choose_simd_target() {
+    if (!hwy::GetChosenTarget().IsInitialized())
+        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 void force_simd_target(std::int64_t id) {

@@ -1,5 +1,5 @@
-// Which instruction set the vectorised kernels run on. Chosen at run time; tests force each in turn,
-// because every one must give the same pixels.
+// Which instruction set the vectorised kernels run on. Chosen at run time; tests force each in
+// turn, because every one must give the same pixels.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +14,7 @@ struct SimdTarget {
 };
 
 std::vector<SimdTarget> available_simd_targets();  // of this machine and this build, best first
-void force_simd_target(std::int64_t id);           // 0: back to the best. Not thread-safe: tests only.
+void choose_simd_target();                         // before the first kernel runs
+void force_simd_target(std::int64_t id);  // 0: back to the best. Not thread-safe: tests only.
 
 }  // namespace sonocase::runtime

@@ -2,8 +2,8 @@
 
 namespace sonocase::runtime {
 namespace {
-// Passes of one frame follow within microseconds: worth a short wait before sleeping. A machine that
-// is short of cores gets its core back at once.
+// Passes of one frame follow within microseconds: worth a short wait before sleeping. A machine
+// that is short of cores gets its core back at once.
 constexpr int kSpins = 2000;
 }  // namespace
 

@@ -19,14 +19,15 @@ class WorkerPool {
 
     int threads() const { return parts_; }
 
-    // Calls job(context, part, parts) for part 0 .. threads() - 1, part 0 on the calling thread, and
-    // returns when all are done. Allocates nothing.
+    // Calls job(context, part, parts) for part 0 .. threads() - 1, part 0 on the calling thread,
+    // and returns when all are done. Allocates nothing.
     using Job = void (*)(void* context, int part, int parts);
     void run(Job job, void* context);
 
     template <class F>
     void run(F&& function) {
-        run([](void* f, int part, int parts) { (*static_cast<std::remove_reference_t<F>*>(f))(part, parts); },
+        run([](void* f, int part,
+               int parts) { (*static_cast<std::remove_reference_t<F>*>(f))(part, parts); },
             &function);
     }
 
