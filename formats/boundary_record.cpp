@@ -41,8 +41,7 @@ BoundaryRecord unpack_boundary(std::uint32_t packed) {
         v = (1 - std::abs(u0)) * (v < 0 ? -1 : 1);
     }
     return {static_cast<std::uint8_t>(packed & 0xFFu),
-            from_signed_byte(packed >> 8) / kBoundaryStepsPerVoxel,
-            normalized({u, v, z})};
+            from_signed_byte(packed >> 8) / kBoundaryStepsPerVoxel, normalized({u, v, z})};
 }
 
 }  // namespace sonocase

@@ -57,7 +57,10 @@ std::vector<int> tissue_of_label(const CaseBundle& bundle);
 
 // Reads a bundle from bytes. Trusts nothing: every size is checked before allocation, every offset
 // against the file, every checksum before use; docs/format.md says what is done in each malformed case.
-Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes, const std::string& where);
+// where: names the bytes in errors. threads: 0 takes as many as the machine has; 1 starts none.
+Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,
+                               const std::string& where,
+                               int threads = 0);
 // Same bytes for the same bundle on any machine with any number of threads.
 std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle);
 

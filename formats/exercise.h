@@ -2,6 +2,7 @@
 // Read from TOML (scenarios/<name>/<exercise>.toml). A typo names file, line, key and nearest valid key.
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -96,10 +97,11 @@ struct Exercise {
     std::vector<Sweep> sweeps;
     BreathingMotion breathing;
     Pulsation pulsation;
-    // Pass marks: metric name and limit; see docs/metrics.md.
+    // Pass marks: metric name and limits, both inclusive; see docs/metrics.md.
     struct PassMark {
         std::string metric;
-        double at_most = 0;
+        double at_most = INFINITY;
+        double at_least = -INFINITY;
     };
     std::vector<PassMark> pass_marks;
 };

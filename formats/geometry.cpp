@@ -5,7 +5,8 @@
 namespace sonocase {
 
 Vector3 normalized(Vector3 a) {
-    // Scale by the largest component first, so that tiny and huge vectors neither under- nor overflow.
+    // Scale by the largest component first, so that tiny and huge vectors neither under- nor
+    // overflow.
     const double largest = std::max({std::abs(a.x), std::abs(a.y), std::abs(a.z)});
     if (!(largest > 0)) return {0, 0, 0};
     const Vector3 s = a / largest;
@@ -21,7 +22,9 @@ Matrix3 Matrix3::from_columns(Vector3 a, Vector3 b, Vector3 c) {
     return {{a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z}};
 }
 
-Matrix3 Matrix3::diagonal(Vector3 d) { return {{d.x, 0, 0, 0, d.y, 0, 0, 0, d.z}}; }
+Matrix3 Matrix3::diagonal(Vector3 d) {
+    return {{d.x, 0, 0, 0, d.y, 0, 0, 0, d.z}};
+}
 
 Matrix3 operator*(const Matrix3& a, const Matrix3& b) {
     Matrix3 out;
@@ -40,12 +43,13 @@ Vector3 operator*(const Matrix3& a, Vector3 v) {
 }
 
 Matrix3 transpose(const Matrix3& a) {
-    return Matrix3::from_columns({a(0, 0), a(0, 1), a(0, 2)},
-                                 {a(1, 0), a(1, 1), a(1, 2)},
+    return Matrix3::from_columns({a(0, 0), a(0, 1), a(0, 2)}, {a(1, 0), a(1, 1), a(1, 2)},
                                  {a(2, 0), a(2, 1), a(2, 2)});
 }
 
-double determinant(const Matrix3& a) { return dot(a.column(0), cross(a.column(1), a.column(2))); }
+double determinant(const Matrix3& a) {
+    return dot(a.column(0), cross(a.column(1), a.column(2)));
+}
 
 Matrix3 inverse(const Matrix3& a) {
     const Vector3 c0 = a.column(0), c1 = a.column(1), c2 = a.column(2);
@@ -100,9 +104,9 @@ double rotation_angle(const Matrix3& r) {
 Matrix3 rotation_from_quaternion(Quaternion q) {
     const double n = std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
     const double w = q.w / n, x = q.x / n, y = q.y / n, z = q.z / n;
-    return {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-             2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-             2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+    return {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z),
+             1 - 2 * (x * x + z * z), 2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x),
+             1 - 2 * (x * x + y * y)}};
 }
 
 Quaternion quaternion_from_rotation(const Matrix3& r) {
@@ -128,7 +132,9 @@ Point3 operator*(const Rigid& t, Point3 p) {
     return {v.x, v.y, v.z};
 }
 
-Vector3 operator*(const Rigid& t, Vector3 v) { return t.rotation * v; }
+Vector3 operator*(const Rigid& t, Vector3 v) {
+    return t.rotation * v;
+}
 
 Rigid operator*(const Rigid& a, const Rigid& b) {
     return {a.rotation * b.rotation, a.rotation * b.translation + a.translation};
@@ -155,8 +161,8 @@ void Box3::include(Point3 p) {
 }
 
 bool Box3::contains(Point3 p) const {
-    return p.x >= lower.x && p.x <= upper.x && p.y >= lower.y && p.y <= upper.y &&
-           p.z >= lower.z && p.z <= upper.z;
+    return p.x >= lower.x && p.x <= upper.x && p.y >= lower.y && p.y <= upper.y && p.z >= lower.z &&
+           p.z <= upper.z;
 }
 
 }  // namespace sonocase

@@ -3,8 +3,8 @@
 namespace sonocase {
 
 Point3 Grid::point_from_voxel(Point3 voxel) const {
-    return origin_mm +
-           direction * Vector3{voxel.x * spacing_mm.x, voxel.y * spacing_mm.y, voxel.z * spacing_mm.z};
+    return origin_mm + direction * Vector3{voxel.x * spacing_mm.x, voxel.y * spacing_mm.y,
+                                           voxel.z * spacing_mm.z};
 }
 
 Point3 Grid::voxel_from_point(Point3 point) const {
@@ -15,9 +15,9 @@ Point3 Grid::voxel_from_point(Point3 point) const {
 Box3 Grid::bounds() const {
     Box3 box;
     for (int corner = 0; corner < 8; ++corner) {
-        box.include(point_from_voxel({(corner & 1) ? size.x - 1.0 : 0.0,
-                                      (corner & 2) ? size.y - 1.0 : 0.0,
-                                      (corner & 4) ? size.z - 1.0 : 0.0}));
+        box.include(
+            point_from_voxel({(corner & 1) ? size.x - 1.0 : 0.0, (corner & 2) ? size.y - 1.0 : 0.0,
+                              (corner & 4) ? size.z - 1.0 : 0.0}));
     }
     return box;
 }

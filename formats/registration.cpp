@@ -14,8 +14,8 @@ struct SplineWeights {
 
 SplineWeights spline_weights(double t) {
     const double s = 1 - t;
-    return {{s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6,
-             t * t * t / 6},
+    return {{s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6,
+             (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6},
             {-s * s / 2, (3 * t * t - 4 * t) / 2, -(3 * s * s - 4 * s) / 2, t * t / 2}};
 }
 
@@ -47,11 +47,11 @@ Vector3 combine(const DisplacementGrid& grid,
     Vector3 sum;
     for (std::size_t c = 0; c < 4; ++c) {
         for (std::size_t b = 0; b < 4; ++b) {
-            const std::size_t row =
-                static_cast<std::size_t>(cell.first[0]) +
-                static_cast<std::size_t>(grid.size.x) *
-                    ((static_cast<std::size_t>(cell.first[1]) + b) +
-                     static_cast<std::size_t>(grid.size.y) * (static_cast<std::size_t>(cell.first[2]) + c));
+            const std::size_t row = static_cast<std::size_t>(cell.first[0]) +
+                                    static_cast<std::size_t>(grid.size.x) *
+                                        ((static_cast<std::size_t>(cell.first[1]) + b) +
+                                         static_cast<std::size_t>(grid.size.y) *
+                                             (static_cast<std::size_t>(cell.first[2]) + c));
             Vector3 line;
             for (std::size_t a = 0; a < 4; ++a) line = line + wx[a] * grid.control_mm[row + a];
             sum = sum + (wy[b] * wz[c]) * line;
@@ -70,7 +70,8 @@ QuadraticMap QuadraticMap::from_rigid(const Rigid& to_from, Point3 centre_mm, do
     for (int r = 0; r < 3; ++r) {
         auto& row = map.coefficients[static_cast<std::size_t>(r)];
         row[0] = centre_to[r];
-        for (int c = 0; c < 3; ++c) row[static_cast<std::size_t>(1 + c)] = scale_mm * to_from.rotation(r, c);
+        for (int c = 0; c < 3; ++c)
+            row[static_cast<std::size_t>(1 + c)] = scale_mm * to_from.rotation(r, c);
     }
     return map;
 }
@@ -82,8 +83,8 @@ Point3 map_point(const QuadraticMap& map, Point3 p) {
     Point3 out;
     for (int r = 0; r < 3; ++r) {
         const auto& k = map.coefficients[static_cast<std::size_t>(r)];
-        out[r] = k[0] + k[1] * u + k[2] * v + k[3] * w + k[4] * u * u + k[5] * v * v + k[6] * w * w +
-                 k[7] * u * v + k[8] * u * w + k[9] * v * w;
+        out[r] = k[0] + k[1] * u + k[2] * v + k[3] * w + k[4] * u * u + k[5] * v * v +
+                 k[6] * w * w + k[7] * u * v + k[8] * u * w + k[9] * v * w;
     }
     return out;
 }

@@ -11,7 +11,8 @@ TEST(BoundaryRecord, RoundTripWithinTheStatedRounding) {
     testing::Random random(8);
     double worst_angle = 0;
     for (int i = 0; i < 20000; ++i) {
-        const BoundaryRecord in{static_cast<std::uint8_t>(i % 255), random.uniform(-2.6, 2.6), random.direction()};
+        const BoundaryRecord in{static_cast<std::uint8_t>(i % 255), random.uniform(-2.6, 2.6),
+                                random.direction()};
         const std::uint32_t packed = pack_boundary(in);
         ASSERT_NE(packed, kNoBoundary);
         const BoundaryRecord out = unpack_boundary(packed);
@@ -28,8 +29,8 @@ TEST(BoundaryRecord, DistanceIsClampedNotWrapped) {
 }
 
 TEST(BoundaryRecord, AxesAreExact) {
-    for (const Vector3 n : {Vector3{1, 0, 0}, Vector3{-1, 0, 0}, Vector3{0, 1, 0}, Vector3{0, -1, 0},
-                            Vector3{0, 0, 1}, Vector3{0, 0, -1}}) {
+    for (const Vector3 n : {Vector3{1, 0, 0}, Vector3{-1, 0, 0}, Vector3{0, 1, 0},
+                            Vector3{0, -1, 0}, Vector3{0, 0, 1}, Vector3{0, 0, -1}}) {
         const Vector3 out = unpack_boundary(pack_boundary({0, 0, n})).normal;
         EXPECT_NEAR(dot(out, n), 1, 1e-12);
     }

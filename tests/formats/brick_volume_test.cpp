@@ -9,7 +9,8 @@ namespace {
 
 TEST(BrickVolume, DenseRoundTripAtSizesAroundABrick) {
     testing::Random random(7);
-    for (const Int3 size : {Int3{1, 1, 1}, Int3{4, 4, 4}, Int3{5, 3, 9}, Int3{8, 1, 4}, Int3{13, 17, 6}}) {
+    for (const Int3 size :
+         {Int3{1, 1, 1}, Int3{4, 4, 4}, Int3{5, 3, 9}, Int3{8, 1, 4}, Int3{13, 17, 6}}) {
         std::vector<std::uint8_t> dense(static_cast<std::size_t>(size.x * size.y * size.z));
         for (auto& v : dense) v = static_cast<std::uint8_t>(random.uniform(0, 1.3));
         const auto bricks = bricks_from_dense<std::uint8_t>(dense, size);

@@ -1,0 +1,217 @@
+#include "formats/case_bundle.h"
+
+#include <new>
+
+#include "formats/atomic_file.h"
+#include "formats/boundary_record.h"
+#include "formats/detail/bundle_parts.h"
+
+namespace sonocase {
+namespace {
+
+using detail::Json;
+using detail::JsonFault;
+using detail::JsonObject;
+
+constexpr std::string_view kKnownChunks[] = {
+    "manifest", "lab.t", "lab.u",    "lab.p",   "echo.t",   "echo.u",   "echo.p", "bnd.t",
+    "bnd.u",    "bnd.p", "textures", "speckle", "skin.pat", "skin.man", "preview"};
+constexpr std::size_t kMaxPreviewBytes = std::size_t{64} << 20;
+
+Json manifest_of(const CaseBundle& bundle) {
+    Json out = Json::object();
+    out["format"] = "sonocase case";
+    out["case_name"] = bundle.manifest.case_name;
+    out["producer"] = bundle.manifest.producer;
+    out["frame"] = "mannequin";
+    out["grid"] = detail::json_of(bundle.grid);
+    out["labels"] = detail::json_of(bundle.labels);
+    out["tissues"] = detail::json_of(bundle.tissues);
+    out["textures"] = detail::json_of_textures(bundle.textures);
+    out["speckle_edge"] = bundle.speckle.edge;
+    out["echo_offset"] = !bundle.echo_offset.table.empty();
+    out["boundary"] = !bundle.boundary.table.empty();
+    Json exercises = Json::array();
+    for (const EmbeddedExercise& exercise : bundle.exercises) {
+        Json item = Json::object();
+        item["name"] = exercise.name;
+        item["toml"] = exercise.toml;
+        exercises.push_back(std::move(item));
+    }
+    out["exercises"] = std::move(exercises);
+    out["recipe"] = bundle.manifest.recipe;
+    Json inputs = Json::array();
+    for (const InputHash& input : bundle.manifest.inputs) {
+        Json item = Json::object();
+        item["path"] = input.path;
+        item["digest"] = input.digest;
+        inputs.push_back(std::move(item));
+    }
+    out["inputs"] = std::move(inputs);
+    out["stages"] = detail::json_of(bundle.manifest.stages);
+    return out;
+}
+
+void read_manifest_into(CaseBundle& bundle, JsonObject& manifest) {
+    bundle.manifest.case_name = manifest.text_or("case_name", "");
+    bundle.manifest.producer = manifest.text_or("producer", "");
+    bundle.manifest.recipe = manifest.text_or("recipe", "");
+    if (manifest.has("inputs")) {
+        for (JsonObject& item : manifest.objects("inputs")) {
+            bundle.manifest.inputs.push_back({item.text("path"), item.text("digest")});
+        }
+    }
+    bundle.manifest.stages = detail::reports_from(manifest, "stages");
+    bundle.grid = detail::grid_from(manifest.object("grid"));
+    bundle.labels = detail::labels_from(manifest, "labels");
+    bundle.tissues = detail::tissues_from(manifest, "tissues");
+    if (manifest.has("exercises")) {
+        for (JsonObject& item : manifest.objects("exercises")) {
+            bundle.exercises.push_back({item.text("name"), item.text("toml")});
+        }
+    }
+    const Grid& grid = bundle.grid;
+    if (!manifest.ok()) return;
+    if (grid.spacing_mm.x != grid.spacing_mm.y || grid.spacing_mm.x != grid.spacing_mm.z) {
+        manifest.complain("grid", "has voxels that are no cubes", "cook the case again");
+    }
+    if (grid.direction != Matrix3{}) {
+        manifest.complain("grid", "is turned against its frame", "cook the case again");
+    }
+    for (const Label& label : bundle.labels) {
+        bool found = false;
+        for (const Tissue& tissue : bundle.tissues) found |= tissue.name == label.tissue;
+        if (!found) {
+            manifest.complain("labels",
+                              "name the tissue '" + label.tissue + "', which is not in the table");
+        }
+    }
+}
+
+template <class T, class Good>
+bool all_values(const BrickVolume<T>& bricks, Good good) {
+    bool fine = true;
+    for (const T v : bricks.uniform) fine &= good(v);
+    for (const T v : bricks.pool) fine &= good(v);
+    return fine;
+}
+
+Status read_volumes(CaseBundle& bundle,
+                    const ChunkReader& reader,
+                    JsonObject& manifest,
+                    int threads) {
+    auto labels = detail::read_bricks<std::uint8_t>(reader, "lab", bundle.grid.size, threads);
+    if (!labels) return labels.error();
+    bundle.label_bricks = std::move(*labels);
+    const std::size_t palette = bundle.labels.size();
+    if (!all_values(bundle.label_bricks, [&](std::uint8_t v) { return v < palette; })) {
+        return reader.fault("a voxel has a label beyond the palette", "make the file again");
+    }
+    if (manifest.flag_or("echo_offset", false)) {
+        auto echo = detail::read_bricks<std::int8_t>(reader, "echo", bundle.grid.size, threads);
+        if (!echo) return echo.error();
+        bundle.echo_offset = std::move(*echo);
+    }
+    if (manifest.flag_or("boundary", false)) {
+        auto boundary =
+            detail::read_bricks<std::uint32_t>(reader, "bnd", bundle.grid.size, threads);
+        if (!boundary) return boundary.error();
+        bundle.boundary = std::move(*boundary);
+        const auto good = [&](std::uint32_t v) {
+            return (v & 0xFFu) < palette || v == kNoBoundary;
+        };
+        if (!all_values(bundle.boundary, good)) {
+            return reader.fault("a boundary record has a label beyond the palette",
+                                "make the file again");
+        }
+    }
+    return Done{};
+}
+
+Result<CaseBundle> read_checked(std::span<const std::uint8_t> bytes,
+                                const std::string& where,
+                                int threads) {
+    const auto reader = ChunkReader::open(bytes, "CASE", kKnownChunks, where);
+    if (!reader) return reader.error();
+    const auto json = detail::read_manifest(*reader);
+    if (!json) return json.error();
+    CaseBundle bundle;
+    JsonFault fault{where + ": manifest", {}};
+    JsonObject manifest(*json, "", fault);
+    read_manifest_into(bundle, manifest);
+    if (fault.error) return *fault.error;
+    if (Status volumes = read_volumes(bundle, *reader, manifest, threads); !volumes)
+        return volumes.error();
+    auto textures = detail::read_textures(*reader, manifest, threads);
+    if (!textures) return textures.error();
+    bundle.textures = std::move(*textures);
+    auto speckle = detail::read_speckle(*reader, manifest, threads);
+    if (!speckle) return speckle.error();
+    bundle.speckle = std::move(*speckle);
+    if (fault.error) return *fault.error;
+    auto patient = detail::read_surface(*reader, "skin.pat", threads);
+    if (!patient) return patient.error();
+    bundle.patient_skin = std::move(*patient);
+    auto mannequin = detail::read_surface(*reader, "skin.man", threads);
+    if (!mannequin) return mannequin.error();
+    bundle.mannequin_skin = std::move(*mannequin);
+    if (reader->has("preview")) {
+        auto preview = reader->read("preview", kMaxPreviewBytes, threads);
+        if (!preview) return preview.error();
+        bundle.preview_png = std::move(*preview);
+    }
+    return bundle;
+}
+
+}  // namespace
+
+std::vector<int> tissue_of_label(const CaseBundle& bundle) {
+    std::vector<int> out;
+    for (const Label& label : bundle.labels) {
+        int index = 0;
+        for (std::size_t t = 0; t < bundle.tissues.size(); ++t) {
+            if (bundle.tissues[t].name == label.tissue) index = static_cast<int>(t);
+        }
+        out.push_back(index);
+    }
+    return out;
+}
+
+Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,
+                               const std::string& where,
+                               int threads) {
+    try {
+        return read_checked(bytes, where, threads);
+    } catch (const std::bad_alloc&) {
+        return Error{"needs more memory than there is", where, "use a case with larger voxels"};
+    }
+}
+
+std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle) {
+    ChunkWriter writer("CASE");
+    detail::add_manifest(writer, manifest_of(bundle));
+    detail::add_bricks(writer, "lab", true, bundle.label_bricks);
+    if (!bundle.echo_offset.table.empty())
+        detail::add_bricks(writer, "echo", false, bundle.echo_offset);
+    if (!bundle.boundary.table.empty()) detail::add_bricks(writer, "bnd", false, bundle.boundary);
+    if (!bundle.textures.empty()) detail::add_textures(writer, bundle.textures);
+    if (bundle.speckle.edge != 0) writer.add_array("speckle", false, bundle.speckle.voxels);
+    if (!bundle.patient_skin.points.empty())
+        detail::add_surface(writer, "skin.pat", bundle.patient_skin);
+    if (!bundle.mannequin_skin.points.empty())
+        detail::add_surface(writer, "skin.man", bundle.mannequin_skin);
+    if (!bundle.preview_png.empty()) writer.add_array("preview", false, bundle.preview_png);
+    return writer.write();
+}
+
+Result<CaseBundle> load_bundle(const std::string& path) {
+    const auto bytes = read_file(path);
+    if (!bytes) return bytes.error();
+    return read_bundle(*bytes, path);
+}
+
+Status save_bundle(const CaseBundle& bundle, const std::string& path) {
+    return write_file(path, write_bundle(bundle));
+}
+
+}  // namespace sonocase

@@ -1,0 +1,87 @@
+#include "formats/atomic_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "formats/digest.h"
+
+namespace sonocase {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Folder {
+  public:
+    Folder() {
+        std::string name = (fs::temp_directory_path() / "sonocase-test-XXXXXX").string();
+        path_ = ::mkdtemp(name.data());
+    }
+    ~Folder() { fs::remove_all(path_); }
+    std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+    std::size_t count() const {
+        return static_cast<std::size_t>(
+            std::distance(fs::directory_iterator(path_), fs::directory_iterator()));
+    }
+
+  private:
+    std::string path_;
+};
+
+TEST(AtomicFile, WritesAndReadsBack) {
+    const Folder folder;
+    ASSERT_TRUE(write_file(folder / "a", std::string_view("first")));
+    ASSERT_TRUE(write_file(folder / "a", std::string_view("second")));
+    EXPECT_EQ(*read_text_file(folder / "a"), "second");
+    EXPECT_EQ(folder.count(), 1u);
+    ASSERT_TRUE(write_file(folder / "empty", std::string_view()));
+    EXPECT_TRUE(read_file(folder / "empty")->empty());
+}
+
+TEST(AtomicFile, AFullDiskLeavesTheOldFileAndNothingElse) {
+    const Folder folder;
+    ASSERT_TRUE(write_file(folder / "a", std::string_view("first")));
+    // A limit on file size fails a write in its middle as a full disk does.
+    rlimit before{};
+    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit small{1000, before.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const Status status = write_file(folder / "a", std::string(5000, 'x'));
+    setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
+    ASSERT_FALSE(status);
+    EXPECT_NE(status.error().message().find("nothing was written"), std::string::npos);
+    EXPECT_EQ(*read_text_file(folder / "a"), "first");
+    EXPECT_EQ(folder.count(), 1u);
+}
+
+TEST(AtomicFile, ErrorsNameThePath) {
+    const Folder folder;
+    const auto missing = read_file(folder / "none");
+    ASSERT_FALSE(missing);
+    EXPECT_NE(missing.error().message().find("none: cannot open"), std::string::npos);
+    EXPECT_FALSE(read_file(folder / ""));
+    EXPECT_FALSE(write_file(folder / "no/such/folder", std::string_view("x")));
+}
+
+TEST(Digest, IsTheOneOfXxh3AndTellsPartsApart) {
+    // The published 128-bit XXH3 value of the empty input with seed 0.
+    EXPECT_EQ(digest_of(std::string_view()), "99aa06d3014798d86001c324468d497f");
+    EXPECT_NE(Digest().add(std::string_view("ab")).add(std::string_view("c")).hex(),
+              Digest().add(std::string_view("a")).add(std::string_view("bc")).hex());
+    EXPECT_EQ(Digest().add(0.0).hex(), Digest().add(-0.0).hex());
+    EXPECT_NE(Digest().add(std::int64_t{1}).hex(), Digest().add(std::int64_t{2}).hex());
+}
+
+TEST(Digest, OfAFileIsThatOfItsBytes) {
+    const Folder folder;
+    ASSERT_TRUE(write_file(folder / "a", std::string_view("content")));
+    EXPECT_EQ(*digest_of_file(folder / "a"), digest_of(std::string_view("content")));
+    EXPECT_FALSE(digest_of_file(folder / "b"));
+}
+
+}  // namespace
+}  // namespace sonocase

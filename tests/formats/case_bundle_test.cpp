@@ -1,0 +1,223 @@
+#include "formats/case_bundle.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "formats/atomic_file.h"
+#include "formats/chunk_file.h"
+#include "formats/stage_files.h"
+#include "support/random.h"
+#include "support/tiny_case.h"
+
+namespace sonocase {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+using testing::tiny_case;
+
+template <class T>
+void expect_same(const BrickVolume<T>& a, const BrickVolume<T>& b) {
+    EXPECT_EQ(a.size, b.size);
+    EXPECT_EQ(a.table, b.table);
+    EXPECT_EQ(a.uniform, b.uniform);
+    EXPECT_EQ(a.pool, b.pool);
+}
+
+void expect_same(const Surface& a, const Surface& b) {
+    EXPECT_EQ(a.points, b.points);
+    EXPECT_EQ(a.normals, b.normals);
+    EXPECT_EQ(a.triangles, b.triangles);
+}
+
+void expect_same(const CaseBundle& a, const CaseBundle& b) {
+    EXPECT_EQ(a.manifest.case_name, b.manifest.case_name);
+    EXPECT_EQ(a.manifest.producer, b.manifest.producer);
+    EXPECT_EQ(a.manifest.recipe, b.manifest.recipe);
+    EXPECT_EQ(a.manifest.stages, b.manifest.stages);
+    ASSERT_EQ(a.manifest.inputs.size(), b.manifest.inputs.size());
+    for (std::size_t i = 0; i < a.manifest.inputs.size(); ++i) {
+        EXPECT_EQ(a.manifest.inputs[i].path, b.manifest.inputs[i].path);
+        EXPECT_EQ(a.manifest.inputs[i].digest, b.manifest.inputs[i].digest);
+    }
+    EXPECT_EQ(a.grid, b.grid);
+    EXPECT_EQ(a.labels, b.labels);
+    ASSERT_EQ(a.tissues.size(), b.tissues.size());
+    for (std::size_t i = 0; i < a.tissues.size(); ++i) {
+        const Tissue &s = a.tissues[i], &t = b.tissues[i];
+        EXPECT_EQ(s.name, t.name);
+        EXPECT_EQ(s.kind, t.kind);
+        EXPECT_EQ(s.casts_shadow, t.casts_shadow);
+        EXPECT_EQ(s.texture, t.texture);
+        EXPECT_EQ(s.source, t.source);
+        EXPECT_EQ(std::tie(s.grey_mean, s.grey_sd, s.echo_db, s.structure_db,
+                           s.attenuation_db_cm_mhz, s.impedance_mrayl, s.sound_speed_m_s),
+                  std::tie(t.grey_mean, t.grey_sd, t.echo_db, t.structure_db,
+                           t.attenuation_db_cm_mhz, t.impedance_mrayl, t.sound_speed_m_s));
+    }
+    ASSERT_EQ(a.exercises.size(), b.exercises.size());
+    for (std::size_t i = 0; i < a.exercises.size(); ++i) {
+        EXPECT_EQ(a.exercises[i].name, b.exercises[i].name);
+        EXPECT_EQ(a.exercises[i].toml, b.exercises[i].toml);
+    }
+    expect_same(a.label_bricks, b.label_bricks);
+    expect_same(a.echo_offset, b.echo_offset);
+    expect_same(a.boundary, b.boundary);
+    ASSERT_EQ(a.textures.size(), b.textures.size());
+    for (std::size_t i = 0; i < a.textures.size(); ++i) {
+        EXPECT_EQ(a.textures[i].name, b.textures[i].name);
+        EXPECT_EQ(a.textures[i].edge, b.textures[i].edge);
+        EXPECT_EQ(a.textures[i].voxel_mm, b.textures[i].voxel_mm);
+        EXPECT_EQ(a.textures[i].voxels, b.textures[i].voxels);
+    }
+    EXPECT_EQ(a.speckle.edge, b.speckle.edge);
+    EXPECT_EQ(a.speckle.voxels, b.speckle.voxels);
+    expect_same(a.patient_skin, b.patient_skin);
+    expect_same(a.mannequin_skin, b.mannequin_skin);
+    EXPECT_EQ(a.preview_png, b.preview_png);
+}
+
+TEST(CaseBundle, ComesBackAsItWas) {
+    const CaseBundle bundle = tiny_case();
+    const Bytes bytes = write_bundle(bundle);
+    const auto back = read_bundle(bytes, "tiny");
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(*back, bundle);
+    EXPECT_EQ(write_bundle(*back), bytes);
+    EXPECT_EQ(container_kind(bytes), "CASE");
+}
+
+TEST(CaseBundle, AnEmptyOneComesBackToo) {
+    CaseBundle bundle;
+    bundle.labels = {{"outside", "outside", 0, {0, 0, 0}}};
+    Tissue outside;
+    outside.name = "outside";
+    bundle.tissues = {outside};
+    const auto back = read_bundle(write_bundle(bundle), "empty");
+    ASSERT_TRUE(back) << back.error().message();
+    EXPECT_TRUE(back->textures.empty());
+    EXPECT_TRUE(back->label_bricks.table.empty());
+}
+
+TEST(CaseBundle, EveryTruncationIsAnError) {
+    const Bytes file = write_bundle(tiny_case());
+    for (std::size_t n = 0; n < file.size(); ++n) {
+        EXPECT_FALSE(read_bundle(std::span(file).first(n), "cut")) << n;
+    }
+}
+
+TEST(CaseBundle, EveryDamagedByteIsAnError) {
+    Bytes file = write_bundle(tiny_case());
+    for (std::size_t i = 0; i < file.size(); ++i) {
+        for (const int change : {0x01, 0x80}) {
+            file[i] = static_cast<std::uint8_t>(file[i] ^ change);
+            EXPECT_FALSE(read_bundle(file, "damaged", 1)) << "byte " << i;
+            file[i] = static_cast<std::uint8_t>(file[i] ^ change);
+        }
+    }
+}
+
+// Written by our own writer with right checksums, so that only the checks of the contents can see
+// it.
+void expect_refused(const CaseBundle& bundle, const std::string& says) {
+    const auto back = read_bundle(write_bundle(bundle), "forged");
+    ASSERT_FALSE(back) << says;
+    EXPECT_NE(back.error().message().find(says), std::string::npos) << back.error().message();
+}
+
+TEST(CaseBundle, ContentsThatWouldBreakTheRendererAreRefused) {
+    CaseBundle b = tiny_case();
+    b.label_bricks.pool[5] = 3;
+    expect_refused(b, "label beyond the palette");
+    b = tiny_case();
+    b.label_bricks.table[1] = 100000;
+    expect_refused(b, "names a brick");
+    b = tiny_case();
+    b.label_bricks.table[0] = kUniformBrick | 77;
+    expect_refused(b, "names a brick");
+    b = tiny_case();
+    b.boundary.pool[3] = 200;
+    expect_refused(b, "boundary record");
+    b = tiny_case();
+    b.patient_skin.triangles[0][2] = 4;
+    expect_refused(b, "triangle");
+    b = tiny_case();
+    b.patient_skin.points[0].x = NAN;
+    expect_refused(b, "not finite");
+    b = tiny_case();
+    b.grid.spacing_mm.y = 3;
+    expect_refused(b, "no cubes");
+    b = tiny_case();
+    b.grid.size.x = 1000;
+    expect_refused(b, "calls for");
+    b = tiny_case();
+    b.grid.size = {60000, 60000, 60000};
+    expect_refused(b, "out of range");
+    b = tiny_case();
+    b.labels[1].name = "liver";
+    expect_refused(b, "twice");
+    b = tiny_case();
+    b.labels[1].tissue = "cheese";
+    expect_refused(b, "cheese");
+    b = tiny_case();
+    b.textures[0].edge = 16;
+    expect_refused(b, "calls for");
+    b = tiny_case();
+    b.labels.clear();
+    expect_refused(b, "1 to 255");
+}
+
+TEST(CaseBundle, RandomBytesInAManifestNeverCrash) {
+    testing::Random random(5);
+    const std::string text =
+        R"({"grid":{"size":[1,1,1],"spacing_mm":[1,1,1],"origin_mm":[0,0,0],)"
+        R"("direction":[1,0,0,0,1,0,0,0,1]},"labels":[{"name":"o","tissue":"t"}],)"
+        R"("tissues":[{"name":"t","kind":"soft"}],"textures":[],"speckle_edge":0})";
+    for (int i = 0; i < 3000; ++i) {
+        std::string changed = text;
+        for (int k = 0; k < 1 + i % 3; ++k) {
+            changed[static_cast<std::size_t>(random.uniform(0, static_cast<double>(text.size())))] =
+                static_cast<char>(random.uniform(0, 256));
+        }
+        ChunkWriter writer("CASE");
+        writer.add("manifest", true, Bytes(changed.begin(), changed.end()));
+        (void)read_bundle(writer.write(1), "fuzz", 1);
+    }
+}
+
+TEST(CaseBundle, DeeplyNestedManifestIsAnErrorNotAnOverflow) {
+    const std::string text = "{\"a\":" + std::string(200000, '[');
+    ChunkWriter writer("CASE");
+    writer.add("manifest", true, Bytes(text.begin(), text.end()));
+    EXPECT_FALSE(read_bundle(writer.write(1), "deep", 1));
+}
+
+TEST(CaseBundle, TissueOfLabelFollowsTheNames) {
+    EXPECT_EQ(tissue_of_label(tiny_case()), (std::vector<int>{0, 1, 2}));
+}
+
+// One bundle of every released format version stays readable. Written anew only by
+//     SONOCASE_WRITE_GOLDEN=1 formats_container_test
+TEST(CaseBundle, GoldenFileOfVersion1StaysReadable) {
+    const std::string path = std::string(SONOCASE_SOURCE) + "/tests/data/versions/case-1.sonocase";
+    if (std::getenv("SONOCASE_WRITE_GOLDEN")) {
+        ASSERT_TRUE(save_bundle(tiny_case(), path));
+    }
+    const auto back = load_bundle(path);
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(*back, tiny_case());
+}
+
+TEST(CaseBundle, AFutureVersionSaysSo) {
+    const std::string path =
+        std::string(SONOCASE_SOURCE) + "/tests/data/versions/case-future.sonocase";
+    const auto back = load_bundle(path);
+    ASSERT_FALSE(back);
+    EXPECT_NE(back.error().message().find("format version 9"), std::string::npos)
+        << back.error().message();
+    EXPECT_NE(back.error().message().find("up to version 1"), std::string::npos)
+        << back.error().message();
+}
+
+}  // namespace
+}  // namespace sonocase
