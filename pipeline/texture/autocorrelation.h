@@ -32,14 +32,25 @@ Autocorrelation autocorrelation(std::span<const ExampleImage> examples, int reac
 // Of the planes z = const of a cube that wraps, averaged over all of them; reach <= edge / 2.
 Autocorrelation plane_autocorrelation(std::span<const float> cube, int edge, int reach);
 
+// What is left of an image, or of each plane z = const of a wrapping cube, when its Gaussian mean
+// of deviation sigma_px is taken off; the overall mean stays. Correlation widths of real patches
+// are only comparable after this: shading across the patch would otherwise count as grain.
+ExampleImage without_local_trend(const ExampleImage& image, double sigma_px);
+std::vector<float> without_local_trend(std::span<const float> cube, int edge, double sigma_px);
+inline constexpr double kGrainTrendPx = 12;  // as in the published table of the real patches
+
 // Full widths at half height, in pixels, along the direction in which the correlation reaches
 // furthest and at right angles to it.
+// A correlation that never falls to a half within the reach has twice the reach for its width.
 struct CorrelationWidths {
     double along = 0;
     double across = 0;
     double angle_rad = 0;  // of `along` against +x, towards +y (down), in [0, pi)
     double ratio() const { return across > 0 ? along / across : 0; }
 };
+// At every stride-th lag.
+Autocorrelation at_stride(const Autocorrelation& autocorrelation, int stride);
+
 CorrelationWidths correlation_widths(const Autocorrelation& autocorrelation);
 
 }  // namespace sonocase::pipeline

@@ -9,6 +9,7 @@
 #include "pipeline/texture/counter_random.h"
 #include "pipeline/texture/fourier.h"
 #include "pipeline/texture/periodic_volume.h"
+#include "pipeline/texture/torus_spectrum.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -86,46 +87,19 @@ class GreyToGaussian {
     std::array<double, kSteps + 1> table_{};
 };
 
-// Power spectrum of a square that wraps, non-negative, with mean 1, whose correlation is near the
-// wanted one: negative power is cut, the short lags are put back, and so on (projection onto convex
-// sets). Short lags are what the eye sees; the long ones are mostly noise of the estimate.
-std::vector<double> spectrum_of(const Autocorrelation& wanted, int edge, double keep_radius) {
-    const auto n = static_cast<std::size_t>(edge);
-    const int half = edge / 2;
-    std::vector<double> target(n * n), keep(n * n);
-    for (int y = -half; y < half; ++y) {
-        for (int x = -half; x < half; ++x) {
-            const std::size_t i = static_cast<std::size_t>((x + edge) % edge) +
-                                  n * static_cast<std::size_t>((y + edge) % edge);
-            double value = wanted.at(x, y);
-            // the lag half an edge away is reached from both sides
-            if (x == -half) value = 0.5 * (wanted.at(-half, y) + wanted.at(half, y));
-            target[i] = value;
-            const double r = std::hypot(x, y) / keep_radius;
-            keep[i] = r < 1 ? 1 : std::exp(-2 * (r - 1) * (r - 1));
-        }
-    }
-    std::vector<double> rho = target;
-    for (std::size_t i = 0; i < rho.size(); ++i) rho[i] *= keep[i];
-    std::vector<double> power(n * n);
-    std::vector<std::complex<double>> plane(n * n);
-    for (int round = 0; round < 24; ++round) {
-        for (std::size_t i = 0; i < plane.size(); ++i) plane[i] = rho[i];
-        fourier_plane(plane, edge, edge, false);
-        double sum = 0;
-        for (std::size_t i = 0; i < plane.size(); ++i) {
-            power[i] = std::max(plane[i].real(), 0.0);
-            sum += power[i];
-        }
-        for (double& p : power) p *= static_cast<double>(n * n) / sum;
-        for (std::size_t i = 0; i < plane.size(); ++i) plane[i] = power[i];
-        fourier_plane(plane, edge, edge, true);
-        for (std::size_t i = 0; i < plane.size(); ++i) {
-            const double now = plane[i].real();
-            rho[i] = now + keep[i] * (target[i] - now);
-        }
-    }
-    return power;
+// Between autocorrelation and power spectrum on the torus, both real and even, # edge^2.
+std::vector<double> torus_transform(const std::vector<double>& in, int edge, bool inverse) {
+    std::vector<std::complex<double>> plane(in.begin(), in.end());
+    fourier_plane(plane, edge, edge, inverse);
+    std::vector<double> out(in.size());
+    for (std::size_t i = 0; i < in.size(); ++i) out[i] = plane[i].real();
+    return out;
+}
+
+void cut_negative(std::vector<double>& power) {  // and mean 1
+    double sum = 0;
+    for (double& p : power) sum += p = std::max(p, 0.0);
+    for (double& p : power) p *= static_cast<double>(power.size()) / sum;
 }
 
 std::vector<double> line_spectrum(const std::vector<double>& rho) {  // # edge, wrapped
@@ -172,12 +146,24 @@ void cut_at_ordinary_planes(std::vector<float>& cube, int edge) {
     cube.swap(moved);
 }
 
+double power_of(const ExampleImage& image) {
+    double count = 0, mean = 0, power = 0;
+    for (std::size_t i = 0; i < image.count(); ++i) {
+        if (image.used(i)) count += 1, mean += image.grey[i];
+    }
+    mean /= std::max(count, 1.0);
+    for (std::size_t i = 0; i < image.count(); ++i) {
+        if (image.used(i)) power += (image.grey[i] - mean) * (image.grey[i] - mean);
+    }
+    return power;
+}
+
 }  // namespace
 
-std::vector<float> synthesise_matched(std::span<const ExampleImage> examples,
-                                      int edge,
-                                      std::uint64_t seed,
-                                      const MatchedOptions& options) {
+MatchedTexture synthesise_matched(std::span<const ExampleImage> examples,
+                                  int edge,
+                                  std::uint64_t seed,
+                                  const MatchedOptions& options) {
     assert(!examples.empty() && edge >= 8 && edge <= 128 && (edge & (edge - 1)) == 0);
     const auto n = static_cast<std::size_t>(edge);
     const int half = edge / 2;
@@ -189,22 +175,46 @@ std::vector<float> synthesise_matched(std::span<const ExampleImage> examples,
     }
     std::sort(sorted.begin(), sorted.end());
 
-    const Autocorrelation grey = autocorrelation(examples, half);
-    const CorrelationWidths widths = correlation_widths(grey);
+    // How many pixels a voxel must stand for.
+    std::vector<ExampleImage> whole, local;
+    for (const ExampleImage& image : examples) {
+        local.push_back(without_local_trend(image, kGrainTrendPx));
+    }
+    constexpr int kMostPixels = 4;
+    Autocorrelation grain = autocorrelation(local, kMostPixels * half);
+    MatchedTexture out;
+    // ... so that the grain fits along its length, and is still two voxels thick.
+    const CorrelationWidths full = correlation_widths(grain);
+    while (out.pixels_per_voxel < kMostPixels && full.along > 0.42 * edge * out.pixels_per_voxel &&
+           full.across >= 2 * (out.pixels_per_voxel + 1)) {
+        ++out.pixels_per_voxel;
+    }
+    const int stride = out.pixels_per_voxel;
+
+    // Shading longer than the period cannot be in a texture that repeats.
+    double whole_power = 0, local_power = 0;
+    for (std::size_t i = 0; i < examples.size(); ++i) {
+        whole.push_back(without_local_trend(examples[i], half * stride));
+        whole_power += power_of(whole.back());
+        local_power += power_of(local[i]);
+    }
+    grain = at_stride(grain, stride);
+    const Autocorrelation grey = at_stride(autocorrelation(whole, half * stride), stride);
+    const CorrelationWidths widths = correlation_widths(grain);
     const GreyToGaussian to_gaussian(sorted);
-    Autocorrelation wanted = grey;
-    for (double& v : wanted.value) v = to_gaussian(v);
-    const double keep_radius = std::clamp(1.2 * widths.along, 3.0, 0.9 * half);
+    const double share = whole_power > 0 ? local_power / whole_power : 0;
+    const std::vector<double> wanted = torus_transform(
+        fit_torus_spectrum(grey, grain, share, kGrainTrendPx / stride, edge), edge, true);
+    std::vector<double> rho(wanted.size());
+    for (std::size_t i = 0; i < rho.size(); ++i) rho[i] = to_gaussian(wanted[i]);
 
     // the profile out of the picture
     const double angle =
         widths.angle_rad + (options.third_axis == ThirdAxis::across ? kPi / 2 : 0.0);
     std::vector<double> depth(n);
     for (int z = -half; z < half; ++z) {
-        const double value = wanted.between(z * std::cos(angle), z * std::sin(angle));
-        const double r = std::abs(z) / keep_radius;
         depth[static_cast<std::size_t>((z + edge) % edge)] =
-            value * (r < 1 ? 1 : std::exp(-2 * (r - 1) * (r - 1)));
+            to_gaussian(grey.between(z * std::cos(angle), z * std::sin(angle)));
     }
     const std::vector<double> power_z = line_spectrum(depth);
 
@@ -223,10 +233,12 @@ std::vector<float> synthesise_matched(std::span<const ExampleImage> examples,
         f = size > 0 ? f / size : 1.f;
     }
 
-    std::vector<float> cube(count);
+    std::vector<float>& cube = out.grey;
+    cube.resize(count);
     std::vector<std::complex<float>> field(count);
     for (int round = 0;; ++round) {
-        const std::vector<double> power = spectrum_of(wanted, edge, keep_radius);
+        std::vector<double> power = torus_transform(rho, edge, false);
+        cut_negative(power);
         for (std::size_t z = 0; z < n; ++z) {
             for (std::size_t i = 0; i < n * n; ++i) {
                 field[z * n * n + i] =
@@ -239,15 +251,18 @@ std::vector<float> synthesise_matched(std::span<const ExampleImage> examples,
         match_distribution(cube, sorted);
         if (round >= options.corrections) break;
         const Autocorrelation got = plane_autocorrelation(cube, edge, half);
-        for (std::size_t i = 0; i < wanted.value.size(); ++i) {
-            wanted.value[i] =
-                std::clamp(wanted.value[i] + to_gaussian(grey.value[i]) - to_gaussian(got.value[i]),
-                           -0.999, 0.9999);
+        for (int y = -half; y < half; ++y) {
+            for (int x = -half; x < half; ++x) {
+                const std::size_t i = static_cast<std::size_t>((x + edge) % edge) +
+                                      n * static_cast<std::size_t>((y + edge) % edge);
+                rho[i] = std::clamp(rho[i] + to_gaussian(wanted[i]) - to_gaussian(got.at(x, y)),
+                                    -0.999, 0.9999);
+            }
         }
-        wanted.at(0, 0) = 1;
+        rho[0] = 1;
     }
     cut_at_ordinary_planes(cube, edge);
-    return cube;
+    return out;
 }
 
 }  // namespace sonocase::pipeline

@@ -9,7 +9,8 @@
 // exact rather than right on average, and it wraps at its faces. Direction survives: fibres stay
 // fibres.
 //
-// The period cuts what is longer: correlation is followed to half an edge.
+// Correlation is followed to half an edge. Where the example's grain is too long for that, a voxel
+// takes the place of several pixels: the field is sampled more coarsely, not smoothed.
 // Source: heightmap-free relative of translation of marginals in Gaussian fields (M. Grigoriu,
 // Applied Non-Gaussian Processes, 1995); measured against the paper's pyramid in docs/accuracy.md.
 #pragma once
@@ -30,12 +31,17 @@ struct MatchedOptions {
     int corrections = 2;  // rounds of measuring the cube's autocorrelation and mending the spectrum
 };
 
+struct MatchedTexture {
+    std::vector<float> grey;   // # edge^3, x fastest, tessellating
+    int pixels_per_voxel = 1;  // 1 unless the grain is longer than 0.42 of the edge
+};
+
 // examples: prepared (prepare_example.h), >= 1. edge: power of two in 8..128.
-// Grey values of edge^3 voxels, x fastest, tessellating. Cost: 64^3 0.1 s, a round 0.06 s, one
+// Same bytes for any number of threads. Cost: 64^3 0.1 s on one core.
 // core.
-std::vector<float> synthesise_matched(std::span<const ExampleImage> examples,
-                                      int edge,
-                                      std::uint64_t seed,
-                                      const MatchedOptions& options = {});
+MatchedTexture synthesise_matched(std::span<const ExampleImage> examples,
+                                  int edge,
+                                  std::uint64_t seed,
+                                  const MatchedOptions& options = {});
 
 }  // namespace sonocase::pipeline

@@ -226,20 +226,24 @@ void remove_trend(PreparedExample& prepared) {
     }
     prepared.trend_grey = 2 * slope;
 
-    rows = row_statistics(image);
-    const auto [level, change] = fit_line(rows, &Row::deviation);
-    const double top = level - change, bottom = level + change;
-    if (level > 0 && std::max(top, bottom) > 1.5 * std::max(std::min(top, bottom), 0.0)) {
-        for (int y = 0; y < image.height; ++y) {
-            const double t = image.height > 1 ? 2.0 * y / (image.height - 1) - 1 : 0;
-            const double factor = level / std::max(level + change * t, 0.2 * level);
-            for (int x = 0; x < image.width; ++x) {
-                float& grey = image.grey[image.index(x, y)];
-                grey = static_cast<float>(before.mean + (grey - before.mean) * factor);
-            }
+    // A gain on a linear display multiplies: mean and spread then rise together.
+    const double mean_top = offset - slope, mean_bottom = offset + slope;
+    const double rise = std::max(mean_bottom, 1.0) / std::max(mean_top, 1.0);
+    const auto [level, change] = fit_line(row_statistics(image), &Row::deviation);
+    const double spread =
+        std::max(level + change, 0.05 * level) / std::max(level - change, 0.05 * level);
+    const bool together =
+        std::abs(std::log(rise)) > std::log(1.5) && std::log(spread) / std::log(rise) > 0.5;
+    if (!together) return;
+    for (int y = 0; y < image.height; ++y) {
+        const double t = image.height > 1 ? 2.0 * y / (image.height - 1) - 1 : 0;
+        const double factor = offset / std::max(offset + slope * t, 0.2 * offset);
+        for (int x = 0; x < image.width; ++x) {
+            float& grey = image.grey[image.index(x, y)];
+            grey = static_cast<float>(before.mean + (grey - before.mean) * factor);
         }
-        prepared.spread_ratio = std::max(bottom, 0.2 * level) / std::max(top, 0.2 * level);
     }
+    prepared.spread_ratio = rise;
 }
 
 std::string percent(double share) {

@@ -128,11 +128,13 @@ Result<SolidTextureResult> make_solid_texture(const TextureSpec& spec) {
     } else {
         MatchedOptions options;
         options.third_axis = spec.third_axis;
-        grey = synthesise_matched(prepared, spec.edge, spec.seed, options);
+        MatchedTexture made = synthesise_matched(prepared, spec.edge, spec.seed, options);
+        grey = std::move(made.grey);
+        out.pixels_per_voxel = made.pixels_per_voxel;
     }
     out.texture.name = spec.name;
     out.texture.edge = spec.edge;
-    out.texture.voxel_mm = spec.voxel_mm;
+    out.texture.voxel_mm = spec.pixel_mm * out.pixels_per_voxel;
     out.texture.voxels.resize(grey.size());
     for (std::size_t i = 0; i < grey.size(); ++i) {
         const double v = 128 + 32 * (grey[i] - out.grey_mean) / out.grey_sd;
@@ -164,7 +166,7 @@ Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
         spec.name = tissue.texture;
         spec.mode = options.mode;
         spec.edge = options.edge;
-        spec.voxel_mm = options.voxel_mm;
+        spec.pixel_mm = options.pixel_mm;
         spec.seed = name_seed(tissue.texture, options.seed);
         std::vector<std::string> files;
         for (const TextureExample& example : options.examples) {

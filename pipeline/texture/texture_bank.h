@@ -33,13 +33,14 @@ struct TextureSpec {
     TextureMode mode = TextureMode::matched;
     ThirdAxis third_axis = ThirdAxis::across;
     int edge = 64;          // power of two in 8..128
-    double voxel_mm = 0.5;  // one pixel of the example becomes one voxel of this size
+    double pixel_mm = 0.5;  // size that a pixel of the example has in tissue
     std::uint64_t seed = 1;
 };
 
 struct SolidTextureResult {
-    SolidTexture texture;
-    double grey_mean = 0;  // of the example after its depth trend is taken off
+    SolidTexture texture;      // voxel_mm = pixel_mm * pixels_per_voxel
+    int pixels_per_voxel = 1;  // of the example; matched_texture.h
+    double grey_mean = 0;      // of the example after its depth trend is taken off
     double grey_sd = 0;
     std::vector<std::string> warnings;
 };
@@ -61,7 +62,7 @@ struct TextureBankOptions {
     std::vector<TextureExample> examples;  // these win over the folder
     TextureMode mode = TextureMode::matched;
     int edge = 64;
-    double voxel_mm = 0.5;
+    double pixel_mm = 0.5;  // size that a pixel of the examples has in tissue
     std::uint64_t seed = 1;
 };
 

@@ -1,0 +1,173 @@
+#include "pipeline/texture/texture_quality.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace sonocase::pipeline {
+namespace {
+
+std::vector<float> used_grey(const ExampleImage& image) {
+    std::vector<float> out;
+    for (std::size_t i = 0; i < image.count(); ++i) {
+        if (image.used(i)) out.push_back(image.grey[i]);
+    }
+    return out;
+}
+
+// rms difference over the lags within the wider of the two grains, at most the shared reach
+double grain_distance(const Autocorrelation& a, const Autocorrelation& b) {
+    const double radius = std::max(correlation_widths(a).along, correlation_widths(b).along);
+    const int reach = std::min({a.reach, b.reach, static_cast<int>(std::ceil(radius))});
+    double sum = 0, count = 0;
+    for (int y = -reach; y <= reach; ++y) {
+        for (int x = -reach; x <= reach; ++x) {
+            if (x * x + y * y > radius * radius) continue;
+            sum += (a.at(x, y) - b.at(x, y)) * (a.at(x, y) - b.at(x, y));
+            count += 1;
+        }
+    }
+    return std::sqrt(sum / count);
+}
+
+constexpr int kReach = 32;       // px, of the grain distance
+constexpr int kWidthReach = 96;  // px, of the correlation widths
+
+Autocorrelation grain_of(const ExampleImage& image, int reach) {
+    const ExampleImage local = without_local_trend(image, kGrainTrendPx);
+    return autocorrelation({&local, 1}, reach);
+}
+
+Autocorrelation grain_of(std::span<const float> grey, const SolidTextureResult& made) {
+    const int edge = made.texture.edge;
+    return plane_autocorrelation(
+        without_local_trend(grey, edge, kGrainTrendPx / made.pixels_per_voxel), edge, edge / 2);
+}
+
+}  // namespace
+
+double kolmogorov_smirnov(std::span<const float> a, std::span<const float> b) {
+    std::vector<float> x(a.begin(), a.end()), y(b.begin(), b.end());
+    std::sort(x.begin(), x.end());
+    std::sort(y.begin(), y.end());
+    double worst = 0;
+    for (std::size_t i = 0, j = 0; i < x.size() && j < y.size();) {
+        const float v = std::min(x[i], y[j]);
+        while (i < x.size() && x[i] <= v) ++i;
+        while (j < y.size() && y[j] <= v) ++j;
+        worst = std::max(worst, std::abs(static_cast<double>(i) / static_cast<double>(x.size()) -
+                                         static_cast<double>(j) / static_cast<double>(y.size())));
+    }
+    return worst;
+}
+
+double earth_mover(std::span<const float> a, std::span<const float> b) {
+    std::vector<float> x(a.begin(), a.end()), y(b.begin(), b.end());
+    std::sort(x.begin(), x.end());
+    std::sort(y.begin(), y.end());
+    // area between the two distribution functions
+    double area = 0, before = std::min(x[0], y[0]);
+    std::size_t i = 0, j = 0;
+    while (i < x.size() || j < y.size()) {
+        const double v = i == x.size() ? y[j] : j == y.size() ? x[i] : std::min(x[i], y[j]);
+        const double gap = std::abs(static_cast<double>(i) / static_cast<double>(x.size()) -
+                                    static_cast<double>(j) / static_cast<double>(y.size()));
+        area += gap * (v - before);
+        before = v;
+        while (i < x.size() && x[i] <= v) ++i;
+        while (j < y.size() && y[j] <= v) ++j;
+    }
+    return area;
+}
+
+std::array<double, 3> seam_scores(const SolidTexture& texture) {
+    const auto n = static_cast<std::size_t>(texture.edge);
+    const std::size_t stride[3] = {1, n, n * n};
+    std::array<double, 3> scores{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        std::vector<double> step(n, 0);
+        for (std::size_t i = 0; i < texture.voxels.size(); ++i) {
+            const std::size_t p = i / stride[axis] % n;
+            const std::size_t next = p + 1 < n ? i + stride[axis] : i - p * stride[axis];
+            step[p] += std::abs(static_cast<int>(texture.voxels[i]) - texture.voxels[next]);
+        }
+        double mean = 0, square = 0;
+        const auto inner = static_cast<double>(n - 1);
+        for (std::size_t p = 0; p + 1 < n; ++p) mean += step[p] / inner;
+        for (std::size_t p = 0; p + 1 < n; ++p)
+            square += (step[p] - mean) * (step[p] - mean) / inner;
+        scores[axis] = square > 0 ? (step[n - 1] - mean) / std::sqrt(square) : 0;
+    }
+    return scores;
+}
+
+std::vector<float> texture_grey(const SolidTexture& texture, double mean, double sd) {
+    std::vector<float> out(texture.voxels.size());
+    for (std::size_t i = 0; i < out.size(); ++i) {
+        out[i] = static_cast<float>(
+            std::clamp(mean + (texture.voxels[i] - 128) / 32.0 * sd, 0.0, 255.0));
+    }
+    return out;
+}
+
+std::array<ExampleImage, 2> split_example(const ExampleImage& example) {
+    const bool across_x = example.width >= example.height;
+    std::array<ExampleImage, 2> halves;
+    for (int h = 0; h < 2; ++h) {
+        ExampleImage& half = halves[static_cast<std::size_t>(h)];
+        half.name = example.name + (h == 0 ? ", first half" : ", second half");
+        half.width = across_x ? example.width / 2 : example.width;
+        half.height = across_x ? example.height : example.height / 2;
+        const int x0 = across_x ? h * half.width : 0, y0 = across_x ? 0 : h * half.height;
+        half.grey.resize(half.count());
+        half.use.resize(half.count());
+        for (int y = 0; y < half.height; ++y) {
+            for (int x = 0; x < half.width; ++x) {
+                const std::size_t from = example.index(x0 + x, y0 + y);
+                half.grey[half.index(x, y)] = example.grey[from];
+                half.use[half.index(x, y)] = example.used(from);
+            }
+        }
+    }
+    return halves;
+}
+
+TextureDistance distance_between(const ExampleImage& a, const ExampleImage& b) {
+    const std::vector<float> x = used_grey(a), y = used_grey(b);
+    if (x.empty() || y.empty()) return {1, 255, 1};
+    return {kolmogorov_smirnov(x, y), earth_mover(x, y),
+            grain_distance(grain_of(a, kReach), grain_of(b, kReach))};
+}
+
+TextureDistance distance_between(const SolidTextureResult& made, const ExampleImage& example) {
+    const std::vector<float> x = texture_grey(made.texture, made.grey_mean, made.grey_sd);
+    const std::vector<float> y = used_grey(example);
+    if (y.empty()) return {1, 255, 1};
+    return {kolmogorov_smirnov(x, y), earth_mover(x, y),
+            grain_distance(grain_of(x, made),
+                           at_stride(grain_of(example, kReach), made.pixels_per_voxel))};
+}
+
+TextureQuality measure_texture(const SolidTextureResult& made, const ExampleImage& example) {
+    TextureQuality q;
+    q.distance = distance_between(made, example);
+    const std::array<ExampleImage, 2> halves = split_example(example);
+    q.floor = distance_between(halves[0], halves[1]);
+    const std::vector<float> grey = texture_grey(made.texture, made.grey_mean, made.grey_sd);
+    q.example = correlation_widths(grain_of(example, kWidthReach));
+    q.texture = correlation_widths(grain_of(grey, made));
+    q.texture.along *= made.pixels_per_voxel;
+    q.texture.across *= made.pixels_per_voxel;
+    double sum = 0, square = 0;
+    for (const float g : grey) sum += g, square += static_cast<double>(g) * g;
+    sum /= static_cast<double>(grey.size());
+    square /= static_cast<double>(grey.size());
+    q.texture_contrast = sum > 0 ? std::sqrt(std::max(square - sum * sum, 0.0)) / sum : 0;
+    q.example_contrast = made.grey_mean > 0 ? made.grey_sd / made.grey_mean : 0;
+    for (const double z : seam_scores(made.texture)) {
+        q.seam_score = std::max(q.seam_score, std::abs(z));
+    }
+    return q;
+}
+
+}  // namespace sonocase::pipeline
