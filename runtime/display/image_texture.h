@@ -1,0 +1,28 @@
+// A grey picture on the graphics card.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace sonocase::runtime {
+
+class ImageTexture {
+  public:
+    ImageTexture() = default;
+    ~ImageTexture();
+    ImageTexture(const ImageTexture&) = delete;
+    ImageTexture& operator=(const ImageTexture&) = delete;
+    // pixels: # width * height, rows from the top.
+    void upload(std::span<const std::uint8_t> pixels, int width_px, int height_px);
+    void* id() const { return reinterpret_cast<void*>(static_cast<std::uintptr_t>(texture_)); }
+    unsigned name() const { return texture_; }
+    bool empty() const { return texture_ == 0; }
+
+  private:
+    unsigned texture_ = 0;
+    int width_px_ = 0, height_px_ = 0;
+    std::vector<std::uint32_t> rgba_;  // OpenGL ES 3 has no swizzle that WebGL keeps: expanded here
+};
+
+}  // namespace sonocase::runtime

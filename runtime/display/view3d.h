@@ -1,0 +1,60 @@
+// The small 3-D view: translucent skin, probe, scan plane with the live picture on it, needle, targets.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "formats/case_bundle.h"
+#include "formats/exercise.h"
+#include "runtime/imaging/renderer.h"
+
+namespace sonocase::runtime {
+
+// Turned about a point of interest; angles in radians, lengths in mm.
+struct Orbit {
+    double yaw_rad = 0.6, pitch_rad = 0.62;
+    double distance_mm = 620;
+};
+
+struct View3dInput {
+    bool has_probe = false, has_needle = false, in_contact = true;
+    Rigid mannequin_from_probe;
+    Rigid mannequin_from_needle;
+    Renderer::Layout layout;
+    int image_width_px = 0, image_height_px = 0;
+    unsigned image_texture = 0;  // OpenGL name; 0: a plain plane
+    bool show_targets = true;
+    std::vector<bool> hit;       // # targets
+};
+
+struct ViewRay {
+    Point3 start;
+    Vector3 direction;
+};
+
+class View3d {
+  public:
+    View3d();
+    ~View3d();
+    View3d(const View3d&) = delete;
+    View3d& operator=(const View3d&) = delete;
+
+    // New skin and new home view: from above the probe's start, its lateral axis to the right.
+    void set_case(const CaseBundle& bundle);
+    void set_exercise(const Exercise& exercise);
+    Orbit& orbit() { return orbit_; }
+    void home() { orbit_ = {}; }
+
+    // Draws at width x height pixels and returns the texture, for ImGui::Image with v upside down.
+    void* draw(int width_px, int height_px, const View3dInput& input);
+    // Through the pixel (x, y) from the top left of the last picture; `mannequin` frame.
+    ViewRay ray(double x_px, double y_px) const;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+    Orbit orbit_;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,214 @@
+#include "runtime/display/window.h"
+
+#include <epoxy/gl.h>
+// GLFW after the OpenGL loader.
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+
+#include "runtime/display/theme.h"
+
+namespace sonocase::runtime {
+namespace {
+
+std::string g_glfw_error;  // GLFW reports through a plain function
+
+void on_glfw_error(int, const char* text) { g_glfw_error = text ? text : ""; }
+
+}  // namespace
+
+struct Window::Impl {
+    GLFWwindow* window = nullptr;
+    bool imgui = false, imgui_glfw = false, imgui_gl = false;
+    float wanted_scale = 1;
+    bool rebuild = false;
+    int windowed[4] = {0, 0, 0, 0};
+};
+
+Result<std::unique_ptr<Window>> Window::open(const WindowOptions& options) {
+    glfwSetErrorCallback(on_glfw_error);
+    if (!glfwInit()) {
+        return Error{"no display can be opened (" + g_glfw_error + ")",
+                     "window",
+                     "start it in a desktop session, or use --headless, which needs no display"};
+    }
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+    glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
+    glfwWindowHint(GLFW_VISIBLE, options.visible ? GLFW_TRUE : GLFW_FALSE);
+    glfwWindowHint(GLFW_SCALE_TO_MONITOR, options.ui_scale > 0 ? GLFW_FALSE : GLFW_TRUE);
+    auto window = std::unique_ptr<Window>(new Window);
+    window->impl_ = std::make_unique<Impl>();
+    Impl& impl = *window->impl_;
+    impl.window = glfwCreateWindow(
+        options.width_px, options.height_px, options.title.c_str(), nullptr, nullptr);
+    if (!impl.window) {
+        return Error{"no window with OpenGL 3.3 can be made (" + g_glfw_error + ")",
+                     "window",
+                     "install or update the graphics driver (Mesa's software one will do), or use "
+                     "--headless"};
+    }
+    glfwMakeContextCurrent(impl.window);
+    if (epoxy_gl_version() < 33) {
+        return Error{"the graphics driver offers OpenGL " +
+                         std::to_string(epoxy_gl_version() / 10) + "." +
+                         std::to_string(epoxy_gl_version() % 10),
+                     "window",
+                     "the window needs 3.3: update the driver, set LIBGL_ALWAYS_SOFTWARE=1, or use "
+                     "--headless"};
+    }
+    glfwSwapInterval(1);
+    glfwSetWindowSizeLimits(impl.window, 960, 600, GLFW_DONT_CARE, GLFW_DONT_CARE);
+    float scale = static_cast<float>(options.ui_scale);
+    if (!(scale > 0)) {
+        float y = 1;
+        glfwGetWindowContentScale(impl.window, &scale, &y);
+    }
+    window->scale_ = impl.wanted_scale = std::clamp(scale, 0.75f, 4.0f);
+    IMGUI_CHECKVERSION();
+    ImGui::CreateContext();
+    impl.imgui = true;
+    ImGui::GetIO().IniFilename = nullptr;  // the layout is ours; settings are in the XDG folder
+    ImGui::GetIO().ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
+    ImGui::GetIO().ConfigWindowsMoveFromTitleBarOnly = true;
+    impl.imgui_glfw = ImGui_ImplGlfw_InitForOpenGL(impl.window, true);
+    impl.imgui_gl = ImGui_ImplOpenGL3_Init("#version 330 core");
+    if (!impl.imgui_glfw || !impl.imgui_gl) {
+        return Error{"the OpenGL functions of the window cannot be loaded",
+                     "window",
+                     "update the graphics driver, or use --headless"};
+    }
+    apply_theme(window->scale_);
+    return window;
+}
+
+Window::~Window() {
+    if (!impl_) return;
+    if (impl_->imgui_gl) ImGui_ImplOpenGL3_Shutdown();
+    if (impl_->imgui_glfw) ImGui_ImplGlfw_Shutdown();
+    if (impl_->imgui) ImGui::DestroyContext();
+    if (impl_->window) glfwDestroyWindow(impl_->window);
+    glfwTerminate();
+}
+
+bool Window::should_close() const { return glfwWindowShouldClose(impl_->window); }
+void Window::request_close() { glfwSetWindowShouldClose(impl_->window, GLFW_TRUE); }
+void Window::set_title(const std::string& title) {
+    glfwSetWindowTitle(impl_->window, title.c_str());
+}
+
+void Window::wait_events(double seconds) {
+    if (seconds > 0) {
+        glfwWaitEventsTimeout(seconds);
+    } else {
+        glfwPollEvents();
+    }
+}
+
+void Window::set_scale(float scale) {
+    impl_->wanted_scale = std::clamp(scale, 0.75f, 4.0f);
+    impl_->rebuild = impl_->rebuild || std::abs(impl_->wanted_scale - scale_) > 0.01f;
+}
+
+void Window::begin_frame(const InjectedInput& injected) {
+    if (impl_->rebuild) {
+        impl_->rebuild = false;
+        scale_ = impl_->wanted_scale;
+        ImGui_ImplOpenGL3_DestroyFontsTexture();
+        apply_theme(scale_);
+        ImGui_ImplOpenGL3_CreateFontsTexture();
+    }
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    if (injected.active) {
+        ImGuiIO& io = ImGui::GetIO();
+        io.MousePos = {injected.x, injected.y};
+        for (std::size_t i = 0; i < injected.buttons.size(); ++i) {
+            io.MouseDown[i] = injected.buttons[i];
+        }
+        io.MouseWheel = injected.wheel;
+        for (bool& down : io.KeysDown) down = false;
+        for (int key : injected.keys) {
+            if (key >= 0 && key < static_cast<int>(std::size(io.KeysDown))) io.KeysDown[key] = true;
+        }
+        io.KeyShift = injected.shift;
+        io.KeyCtrl = injected.control;
+        io.KeyAlt = injected.alt;
+    }
+    ImGui::NewFrame();
+}
+
+void Window::end_frame() {
+    ImGui::Render();
+    int width = 0, height = 0;
+    glfwGetFramebufferSize(impl_->window, &width, &height);
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glViewport(0, 0, width, height);
+    glClearColor(0.03f, 0.04f, 0.05f, 1);
+    glClear(GL_COLOR_BUFFER_BIT);
+    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+    glfwSwapBuffers(impl_->window);
+}
+
+std::vector<std::uint8_t> Window::read_pixels(int& width_px, int& height_px) const {
+    glfwGetFramebufferSize(impl_->window, &width_px, &height_px);
+    const std::size_t row = static_cast<std::size_t>(width_px) * 3;
+    std::vector<std::uint8_t> pixels(row * static_cast<std::size_t>(height_px));
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, 0);
+    glReadBuffer(GL_FRONT);
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    glReadPixels(0, 0, width_px, height_px, GL_RGB, GL_UNSIGNED_BYTE, pixels.data());
+    for (int y = 0; y < height_px / 2; ++y) {  // OpenGL counts rows from the bottom
+        std::swap_ranges(pixels.begin() + static_cast<std::ptrdiff_t>(row) * y,
+                         pixels.begin() + static_cast<std::ptrdiff_t>(row) * (y + 1),
+                         pixels.begin() + static_cast<std::ptrdiff_t>(row) * (height_px - 1 - y));
+    }
+    return pixels;
+}
+
+void Window::toggle_full_screen() {
+    GLFWmonitor* monitor = glfwGetPrimaryMonitor();
+    if (!monitor) return;
+    int* old = impl_->windowed;
+    if (glfwGetWindowMonitor(impl_->window)) {
+        glfwSetWindowMonitor(impl_->window, nullptr, old[0], old[1], old[2], old[3], 0);
+        return;
+    }
+    glfwGetWindowPos(impl_->window, &old[0], &old[1]);
+    glfwGetWindowSize(impl_->window, &old[2], &old[3]);
+    const GLFWvidmode* mode = glfwGetVideoMode(monitor);
+    glfwSetWindowMonitor(
+        impl_->window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
+}
+
+std::string Window::opengl_name() const {
+    const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+    return name ? name : "";
+}
+
+int key_code(const std::string& name) {
+    if (name.size() == 1) return std::toupper(static_cast<unsigned char>(name[0]));
+    if (name.size() >= 2 && name[0] == 'f' && std::isdigit(static_cast<unsigned char>(name[1]))) {
+        const int n = std::atoi(name.c_str() + 1);
+        return n >= 1 && n <= 12 ? GLFW_KEY_F1 + n - 1 : -1;
+    }
+    static const std::map<std::string, int> kNamed = {
+        {"left", GLFW_KEY_LEFT},         {"right", GLFW_KEY_RIGHT},
+        {"up", GLFW_KEY_UP},             {"down", GLFW_KEY_DOWN},
+        {"space", GLFW_KEY_SPACE},       {"enter", GLFW_KEY_ENTER},
+        {"escape", GLFW_KEY_ESCAPE},     {"tab", GLFW_KEY_TAB},
+        {"pageup", GLFW_KEY_PAGE_UP},    {"pagedown", GLFW_KEY_PAGE_DOWN},
+        {"home", GLFW_KEY_HOME},         {"end", GLFW_KEY_END},
+        {"backspace", GLFW_KEY_BACKSPACE}, {"delete", GLFW_KEY_DELETE}};
+    const auto found = kNamed.find(name);
+    return found == kNamed.end() ? -1 : found->second;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,213 @@
+#include "runtime/player/image_view.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "runtime/display/theme.h"
+
+namespace sonocase::runtime {
+namespace {
+
+ImVec2 screen(const ImagePlace& place, double x_mm, double z_mm) {
+    return {static_cast<float>(place.origin_x + x_mm / place.mm_per_screen_px),
+            static_cast<float>(place.origin_y + z_mm / place.mm_per_screen_px)};
+}
+
+void text_at(ImDrawList* draw, float x, float y, unsigned colour, const char* text) {
+    // A dark edge keeps words readable over bright tissue.
+    draw->AddText({x + 1, y + 1}, colour::rgba(0, 0, 0, 200), text);
+    draw->AddText({x, y}, colour, text);
+}
+
+void cross_mark(ImDrawList* draw, ImVec2 p, float r, unsigned colour, float thick) {
+    draw->AddLine({p.x - r, p.y}, {p.x + r, p.y}, colour, thick);
+    draw->AddLine({p.x, p.y - r}, {p.x, p.y + r}, colour, thick);
+}
+
+}  // namespace
+
+double Measurement::length_mm() const { return std::hypot(x1_mm - x0_mm, z1_mm - z0_mm); }
+
+void ImageView::click(double x_mm, double z_mm) {
+    if (!half_) {
+        open_ = {x_mm, z_mm, x_mm, z_mm};
+        half_ = true;
+        return;
+    }
+    open_.x1_mm = x_mm;
+    open_.z1_mm = z_mm;
+    half_ = false;
+    done_.push_back(open_);
+    if (done_.size() > 2) done_.erase(done_.begin());
+}
+
+void ImageView::clear_measurements() {
+    done_.clear();
+    half_ = false;
+}
+
+void ImageView::draw(float width, float height, const ImageViewInput& input) {
+    const ImVec2 corner = ImGui::GetCursorScreenPos();
+    ImDrawList* draw = ImGui::GetWindowDrawList();
+    draw->AddRectFilled(
+        corner, {corner.x + width, corner.y + height}, colour::rgba(0, 0, 0), 5 * input.scale);
+    ImGui::InvisibleButton("picture", {std::max(width, 1.0f), std::max(height, 1.0f)},
+                           ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight |
+                               ImGuiButtonFlags_MouseButtonMiddle);
+    hovered_ = ImGui::IsItemHovered() || ImGui::IsItemActive();
+    const ScanFrame& frame = *input.frame;
+    if (frame.width_px > 0 && input.texture) {
+        const float fit = std::min(width / static_cast<float>(frame.width_px),
+                                   height / static_cast<float>(frame.height_px));
+        place_.side_x = std::floor(fit * static_cast<float>(frame.width_px));
+        place_.side_y = std::floor(fit * static_cast<float>(frame.height_px));
+        place_.x = std::floor(corner.x + 0.5f * (width - place_.side_x));
+        place_.y = std::floor(corner.y + 0.5f * (height - place_.side_y));
+        place_.mm_per_screen_px = frame.layout.mm_per_px > 0 ? frame.layout.mm_per_px / fit : 1;
+        place_.origin_x = place_.x + fit * frame.layout.origin_x_px;
+        place_.origin_y = place_.y + fit * frame.layout.origin_y_px;
+        draw->PushClipRect(corner, {corner.x + width, corner.y + height}, true);
+        draw->AddImage(input.texture,
+                       {place_.x, place_.y},
+                       {place_.x + place_.side_x, place_.y + place_.side_y});
+        draw_scales(input);
+        draw_measurements(input);
+        draw->PopClipRect();
+    }
+    ImGui::PushFont(fonts().small);
+    const float line = ImGui::GetTextLineHeight() + 2 * input.scale, pad = 10 * input.scale;
+    float y = corner.y + pad;
+    for (const std::string& text : input.left_lines) {
+        text_at(draw, corner.x + pad, y, colour::kImageText, text.c_str());
+        y += line;
+    }
+    y = corner.y + pad;
+    for (const std::string& text : input.right_lines) {
+        text_at(draw,
+                corner.x + width - pad - ImGui::CalcTextSize(text.c_str()).x,
+                y,
+                colour::kImageText,
+                text.c_str());
+        y += line;
+    }
+    ImGui::PopFont();
+    if (frame.frozen) {
+        ImGui::PushFont(fonts().heading);
+        const char* word = frame.cine_age_s > 0.005 ? "CINE" : "FROZEN";
+        const ImVec2 size = ImGui::CalcTextSize(word);
+        const ImVec2 at{corner.x + 0.5f * (width - size.x), corner.y + pad};
+        draw->AddRectFilled({at.x - 9 * input.scale, at.y - 3 * input.scale},
+                            {at.x + size.x + 9 * input.scale, at.y + size.y + 3 * input.scale},
+                            colour::rgba(30, 90, 110, 230), 4 * input.scale);
+        draw->AddText(at, colour::kText, word);
+        ImGui::PopFont();
+    }
+}
+
+void ImageView::draw_scales(const ImageViewInput& input) {
+    ImDrawList* draw = ImGui::GetWindowDrawList();
+    const float s = input.scale;
+    const ScanFrame& frame = *input.frame;
+    ImGui::PushFont(fonts().small);
+    // Depth scale on the right, centimetres, as machines write it; finer marks where there is room.
+    const double px_per_mm = 1 / place_.mm_per_screen_px;
+    const float x = place_.x + place_.side_x - 30 * s;
+    const int label_step_mm = px_per_mm * 10 >= 16 * s ? 10 : px_per_mm * 20 >= 16 * s ? 20 : 50;
+    const bool fine = px_per_mm * 5 >= 7 * s;
+    for (int mm = 0; mm <= static_cast<int>(frame.depth_mm + 0.5); mm += 5) {
+        if (mm % 10 != 0 && !fine) continue;
+        const float y = static_cast<float>(place_.origin_y + mm * px_per_mm);
+        const bool labelled = mm % label_step_mm == 0;
+        const float length = (mm % 50 == 0 ? 11.0f : mm % 10 == 0 ? 7.0f : 4.0f) * s;
+        draw->AddLine({x - length, y}, {x, y}, colour::kDim, std::max(1.0f, s));
+        if (labelled && mm > 0) {
+            char label[16];
+            std::snprintf(label, sizeof label, "%d", mm / 10);
+            draw->AddText({x + 6 * s, y - 0.5f * ImGui::GetTextLineHeight()}, colour::kImageText, label);
+        }
+    }
+    draw->AddText({x + 3 * s, static_cast<float>(place_.origin_y) - 0.5f * ImGui::GetTextLineHeight()},
+                  colour::kDim,
+                  "cm");
+    // Focus mark: a triangle that points at the scale.
+    const float fy = static_cast<float>(place_.origin_y + frame.focus_mm * px_per_mm);
+    if (frame.focus_mm > 0 && frame.focus_mm <= frame.depth_mm) {
+        draw->AddTriangleFilled({x - 22 * s, fy - 5 * s}, {x - 22 * s, fy + 5 * s}, {x - 14 * s, fy},
+                                colour::kAccent);
+    }
+    // Orientation mark beside the face, on the side of the probe's x axis.
+    double half_mm = 0.5 * input.probe->width_mm;
+    if (input.probe->shape == ProbeShape::curvilinear) {
+        half_mm = input.probe->radius_mm * std::sin(0.5 * input.probe->field_of_view_rad);
+    }
+    const float side = input.flipped ? -1.0f : 1.0f;
+    const ImVec2 mark{static_cast<float>(place_.origin_x) +
+                          side * (static_cast<float>(half_mm * px_per_mm) + 20 * s),
+                      std::max(static_cast<float>(place_.origin_y) - 2 * s, place_.y + 14 * s)};
+    draw->AddCircleFilled(mark, 6.5f * s, colour::kAccent, 20);
+    const char* letter = "S";
+    const ImVec2 size = ImGui::CalcTextSize(letter);
+    draw->AddText({mark.x - 0.5f * size.x, mark.y - 0.5f * size.y}, colour::rgba(8, 12, 16), letter);
+    // Grey bar on the left.
+    const ImVec2 bar{place_.x + 12 * s, place_.y + 0.34f * place_.side_y};
+    draw->AddRectFilledMultiColor(bar, {bar.x + 7 * s, bar.y + 110 * s}, 0xFFFFFFFF, 0xFFFFFFFF,
+                                  0xFF000000, 0xFF000000);
+    draw->AddRect(bar, {bar.x + 7 * s, bar.y + 110 * s}, colour::kFaint);
+    if (frame.status == FrameStatus::no_contact) {
+        const char* words = "No contact: press the probe onto the skin";
+        const ImVec2 wide = ImGui::CalcTextSize(words);
+        text_at(draw,
+                place_.x + 0.5f * (place_.side_x - wide.x),
+                place_.y + 0.55f * place_.side_y,
+                colour::kDim,
+                words);
+    } else if (frame.status == FrameStatus::held_bad_pose) {
+        const char* words = "Pose is not usable: picture held";
+        const ImVec2 wide = ImGui::CalcTextSize(words);
+        text_at(draw, place_.x + 0.5f * (place_.side_x - wide.x), place_.y + 0.55f * place_.side_y,
+                colour::kWarn, words);
+    }
+    ImGui::PopFont();
+}
+
+void ImageView::draw_measurements(const ImageViewInput& input) {
+    ImDrawList* draw = ImGui::GetWindowDrawList();
+    const float s = input.scale;
+    std::vector<Measurement> shown = done_;
+    if (half_) {
+        Measurement live = open_;
+        const ImVec2 mouse = ImGui::GetIO().MousePos;
+        live.x1_mm = (mouse.x - place_.origin_x) * place_.mm_per_screen_px;
+        live.z1_mm = (mouse.y - place_.origin_y) * place_.mm_per_screen_px;
+        shown.push_back(live);
+    }
+    float y = place_.y + place_.side_y - 14 * s;
+    for (std::size_t i = shown.size(); i-- > 0;) {
+        const Measurement& m = shown[i];
+        const ImVec2 a = screen(place_, m.x0_mm, m.z0_mm), b = screen(place_, m.x1_mm, m.z1_mm);
+        cross_mark(draw, a, 6 * s, colour::kMeasure, 1.5f * s);
+        cross_mark(draw, b, 6 * s, colour::kMeasure, 1.5f * s);
+        const double dx = b.x - a.x, dy = b.y - a.y, length = std::hypot(dx, dy);
+        for (double t = 9 * s; t + 3 * s < length - 6 * s; t += 7 * s) {
+            const auto at = [&](double u) {
+                return ImVec2{static_cast<float>(a.x + dx * u / length),
+                              static_cast<float>(a.y + dy * u / length)};
+            };
+            draw->AddLine(at(t), at(t + 3 * s), colour::kMeasure, 1.2f * s);
+        }
+        char number[8], words[48];
+        std::snprintf(number, sizeof number, "%zu", i + 1);
+        draw->AddText({a.x + 7 * s, a.y - 16 * s}, colour::kMeasure, number);
+        std::snprintf(words, sizeof words, "%zu  %.1f mm", i + 1, m.length_mm());
+        y -= ImGui::GetTextLineHeight() + 3 * s;
+        text_at(draw, place_.x + 34 * s, y, colour::kMeasure, words);
+    }
+    if (input.measuring && hovered_) {
+        cross_mark(draw, ImGui::GetIO().MousePos, 9 * s, colour::kMeasure, 1.0f * s);
+    }
+}
+
+}  // namespace sonocase::runtime
