@@ -11,8 +11,10 @@ struct Samples {
     Int3 n;
     std::vector<std::uint8_t> body;
     std::size_t index(int i, int j, int k) const {
-        return static_cast<std::size_t>(i) + static_cast<std::size_t>(n.x) *
-               (static_cast<std::size_t>(j) + static_cast<std::size_t>(n.y) * static_cast<std::size_t>(k));
+        return static_cast<std::size_t>(i) +
+               static_cast<std::size_t>(n.x) *
+                   (static_cast<std::size_t>(j) +
+                    static_cast<std::size_t>(n.y) * static_cast<std::size_t>(k));
     }
 };
 
@@ -53,9 +55,9 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
     for (int k = 0; k < s.n.z; ++k) {
         for (int j = 0; j < s.n.y; ++j) {
             for (int i = 0; i < s.n.x; ++i) {
-                s.body[s.index(i, j, k)] = bundle.label_bricks.at(static_cast<int>(i * step),
-                                                                  static_cast<int>(j * step),
-                                                                  static_cast<int>(k * step)) != 0;
+                s.body[s.index(i, j, k)] =
+                    bundle.label_bricks.at(static_cast<int>(i * step), static_cast<int>(j * step),
+                                           static_cast<int>(k * step)) != 0;
             }
         }
     }
@@ -76,7 +78,8 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
                             s.body[s.index(i + q.x, j + q.y, k + q.z)]) {
                             continue;
                         }
-                        sum = sum + 0.5 * Vector3{double(p.x + q.x), double(p.y + q.y), double(p.z + q.z)};
+                        sum = sum + 0.5 * Vector3{double(p.x + q.x), double(p.y + q.y),
+                                                  double(p.z + q.z)};
                         ++crossings;
                     }
                 }
@@ -97,7 +100,8 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
                 for (int a = 0; a < 3; ++a) {
                     Int3 next = at;
                     ++next[a];
-                    if (here == static_cast<bool>(s.body[s.index(next.x, next.y, next.z)])) continue;
+                    if (here == static_cast<bool>(s.body[s.index(next.x, next.y, next.z)]))
+                        continue;
                     const int u = (a + 1) % 3, v = (a + 2) % 3;
                     std::uint32_t quad[4];
                     bool whole = true;
@@ -120,8 +124,8 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
     smooth(mesh, 6);
     mesh.normals.assign(mesh.points.size(), {});
     for (const auto& t : mesh.triangles) {
-        const Vector3 n = cross(mesh.points[t[1]] - mesh.points[t[0]],
-                                mesh.points[t[2]] - mesh.points[t[0]]);
+        const Vector3 n =
+            cross(mesh.points[t[1]] - mesh.points[t[0]], mesh.points[t[2]] - mesh.points[t[0]]);
         for (std::uint32_t p : t) mesh.normals[p] = mesh.normals[p] + n;
     }
     for (Vector3& n : mesh.normals) n = normalized(n);

@@ -6,8 +6,8 @@
 
 namespace sonocase::runtime {
 
-// Surface nets on samples `step_mm` apart, smoothed a little; outward normals, counter-clockwise from
-// outside. Open where the volume ends inside the body. Cost: one look-up a sample.
+// Surface nets on samples `step_mm` apart, smoothed a little; outward normals, counter-clockwise
+// from outside. Open where the volume ends inside the body. Cost: one look-up a sample.
 Surface skin_mesh(const CaseBundle& bundle, double step_mm);
 
 }  // namespace sonocase::runtime

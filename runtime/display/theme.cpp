@@ -47,12 +47,15 @@ ImVec4 colour_of(unsigned packed, float alpha = 1) {
 
 }  // namespace
 
-const Fonts& fonts() { return g_fonts; }
+const Fonts& fonts() {
+    return g_fonts;
+}
 
 void apply_theme(float scale) {
     ImGuiIO& io = ImGui::GetIO();
     io.Fonts->Clear();
-    static const ImWchar kRanges[] = {0x20, 0xFF, 0x2013, 0x2014, 0x2018, 0x2026, 0x2190, 0x2193, 0};
+    static const ImWchar kRanges[] = {0x20,   0xFF,   0x2013, 0x2014, 0x2018,
+                                      0x2026, 0x2190, 0x2193, 0};
     const std::string body = first_file(candidates(false)), bold = first_file(candidates(true));
     const auto load = [&](const std::string& file, float size) {
         if (file.empty()) {
@@ -62,7 +65,8 @@ void apply_theme(float scale) {
         }
         ImFontConfig config;
         config.OversampleH = 2;
-        return io.Fonts->AddFontFromFileTTF(file.c_str(), std::round(size * scale), &config, kRanges);
+        return io.Fonts->AddFontFromFileTTF(file.c_str(), std::round(size * scale), &config,
+                                            kRanges);
     };
     g_fonts.body = load(body, 14);
     g_fonts.heading = load(bold.empty() ? body : bold, 15);

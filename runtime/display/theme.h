@@ -1,4 +1,5 @@
-// Colours, spacing and fonts of the player: a dark console, so that the picture is the brightest thing.
+// Colours, spacing and fonts of the player: a dark console, so that the picture is the brightest
+// thing.
 #pragma once
 
 struct ImFont;

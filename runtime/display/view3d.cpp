@@ -108,15 +108,11 @@ void upload(Mesh& mesh, const std::vector<Vertex>& vertices, const std::vector<G
     }
     glBindVertexArray(mesh.vertex_array);
     glBindBuffer(GL_ARRAY_BUFFER, mesh.vertices);
-    glBufferData(GL_ARRAY_BUFFER,
-                 static_cast<GLsizeiptr>(vertices.size() * sizeof(Vertex)),
-                 vertices.data(),
-                 GL_STATIC_DRAW);
+    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(Vertex)),
+                 vertices.data(), GL_STATIC_DRAW);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, mesh.indices);
-    glBufferData(GL_ELEMENT_ARRAY_BUFFER,
-                 static_cast<GLsizeiptr>(indices.size() * sizeof(GLuint)),
-                 indices.data(),
-                 GL_STATIC_DRAW);
+    glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(indices.size() * sizeof(GLuint)),
+                 indices.data(), GL_STATIC_DRAW);
     const auto offset = [](std::size_t bytes) { return reinterpret_cast<const void*>(bytes); };
     glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(Vertex), offset(0));
     glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(Vertex), offset(12));
@@ -133,7 +129,8 @@ void free_mesh(Mesh& mesh) {
     mesh = {};
 }
 
-// A body lofted through rounded rings about z: (z, half width x, half width y), first and last closed.
+// A body lofted through rounded rings about z: (z, half width x, half width y), first and last
+// closed.
 struct Ring {
     double z, half_x, half_y;
 };
@@ -155,9 +152,10 @@ void loft(const std::vector<Ring>& rings,
                 0.5 * (after.half_x - before.half_x + after.half_y - before.half_y);
             const Vector3 n = normalized(Vector3{c, s * rings[r].half_x / rings[r].half_y,
                                                  -widening / std::max(after.z - before.z, 1e-3)});
-            vertices.push_back({{float(x * rings[r].half_x), float(y * rings[r].half_y), float(rings[r].z)},
-                                {float(n.x), float(n.y), float(n.z)},
-                                {0, 0}});
+            vertices.push_back(
+                {{float(x * rings[r].half_x), float(y * rings[r].half_y), float(rings[r].z)},
+                 {float(n.x), float(n.y), float(n.z)},
+                 {0, 0}});
         }
     }
     const auto at = [&](std::size_t ring, int i) {
@@ -165,7 +163,8 @@ void loft(const std::vector<Ring>& rings,
     };
     for (std::size_t r = 0; r + 1 < rings.size(); ++r) {
         for (int i = 0; i < kAround; ++i) {
-            for (GLuint v : {at(r, i), at(r, i + 1), at(r + 1, i + 1), at(r, i), at(r + 1, i + 1), at(r + 1, i)}) {
+            for (GLuint v : {at(r, i), at(r, i + 1), at(r + 1, i + 1), at(r, i), at(r + 1, i + 1),
+                             at(r + 1, i)}) {
                 indices.push_back(v);
             }
         }
@@ -219,8 +218,12 @@ struct View3d::Impl {
     void resize(int width, int height);
     void build_probe();
     void build_plane(const View3dInput& input);
-    void draw_mesh(const Mesh& mesh, const Rigid& mannequin_from_model, double scale, unsigned rgb,
-                   float alpha, int mode);
+    void draw_mesh(const Mesh& mesh,
+                   const Rigid& mannequin_from_model,
+                   double scale,
+                   unsigned rgb,
+                   float alpha,
+                   int mode);
 };
 
 View3d::View3d() : impl_(std::make_unique<Impl>()) {
@@ -271,19 +274,16 @@ void View3d::Impl::resize(int width, int height) {
     glBindTexture(GL_TEXTURE_2D, target_texture);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    glTexImage2D(
-        GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
     glGenFramebuffers(1, &resolved);
     glBindFramebuffer(GL_FRAMEBUFFER, resolved);
-    glFramebufferTexture2D(
-        GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, target_texture, 0);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, target_texture, 0);
     glGenFramebuffers(1, &target);
     glBindFramebuffer(GL_FRAMEBUFFER, target);
     glGenRenderbuffers(1, &colour_buffer);
     glBindRenderbuffer(GL_RENDERBUFFER, colour_buffer);
     glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, GL_RGBA8, width, height);
-    glFramebufferRenderbuffer(
-        GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour_buffer);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour_buffer);
     glGenRenderbuffers(1, &depth);
     glBindRenderbuffer(GL_RENDERBUFFER, depth);
     glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, GL_DEPTH_COMPONENT24, width, height);
@@ -301,7 +301,8 @@ void View3d::set_case(const CaseBundle& bundle) {
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
         const Point3 p = mesh.points[i];
         const Vector3 n = mesh.normals[i];
-        vertices.push_back({{float(p.x), float(p.y), float(p.z)}, {float(n.x), float(n.y), float(n.z)}, {0, 0}});
+        vertices.push_back(
+            {{float(p.x), float(p.y), float(p.z)}, {float(n.x), float(n.y), float(n.z)}, {0, 0}});
         d.box.include(p);
     }
     for (const auto& t : mesh.triangles) indices.insert(indices.end(), t.begin(), t.end());
@@ -312,8 +313,8 @@ void View3d::set_case(const CaseBundle& bundle) {
 void View3d::set_exercise(const Exercise& exercise) {
     Impl& d = *impl_;
     d.exercise = exercise;
-    // The probe looks down in the picture, whatever the mannequin's axes are called; the body's long
-    // axis runs across, as a patient lies before an operator.
+    // The probe looks down in the picture, whatever the mannequin's axes are called; the body's
+    // long axis runs across, as a patient lies before an operator.
     const Vector3 up = normalized(-exercise.start_beam);
     const Vector3 extent = d.box.extent();
     Vector3 along{1, 0, 0};
@@ -336,30 +337,35 @@ void View3d::set_exercise(const Exercise& exercise) {
     upload(d.needle, vertices, indices);
     vertices.clear();
     indices.clear();
-    loft({{-length - 32, 4, 4}, {-length - 30, 5.5, 5.5}, {-length - 6, 5, 5}, {-length, 2, 2}},
-         2,
-         vertices,
-         indices);
+    loft({{-length - 32, 4, 4}, {-length - 30, 5.5, 5.5}, {-length - 6, 5, 5}, {-length, 2, 2}}, 2,
+         vertices, indices);
     upload(d.hub, vertices, indices);
 }
 
 void View3d::Impl::build_probe() {
     const Probe& p = exercise.probe;
     double half = 0.5 * p.width_mm;
-    if (p.shape == ProbeShape::curvilinear) half = p.radius_mm * std::sin(0.5 * p.field_of_view_rad);
+    if (p.shape == ProbeShape::curvilinear)
+        half = p.radius_mm * std::sin(0.5 * p.field_of_view_rad);
     half = std::clamp(half, 8.0, 45.0) + 3;
     const double grip = std::clamp(0.55 * half, 9.0, 17.0);
     std::vector<Vertex> vertices;
     std::vector<GLuint> indices;
-    loft({{-158, 4, 4}, {-132, 5, 5}, {-128, grip - 4, 9}, {-120, grip, 12}, {-70, grip + 1, 13},
-          {-42, 0.5 * (grip + half), 13}, {-20, half, 12}, {-5, half, 11}, {-1, half - 2, 9}},
-         2.8,
-         vertices,
-         indices);
+    loft({{-158, 4, 4},
+          {-132, 5, 5},
+          {-128, grip - 4, 9},
+          {-120, grip, 12},
+          {-70, grip + 1, 13},
+          {-42, 0.5 * (grip + half), 13},
+          {-20, half, 12},
+          {-5, half, 11},
+          {-1, half - 2, 9}},
+         2.8, vertices, indices);
     upload(probe, vertices, indices);
     vertices.clear();
     indices.clear();
-    loft({{-46, 1.6, 2.4}, {-44, 2.4, 3.4}, {-30, 2.4, 3.4}, {-28, 1.6, 2.4}}, 2, vertices, indices);
+    loft({{-46, 1.6, 2.4}, {-44, 2.4, 3.4}, {-30, 2.4, 3.4}, {-28, 1.6, 2.4}}, 2, vertices,
+         indices);
     for (Vertex& v : vertices) v.position[0] += static_cast<float>(0.55 * (grip + half) + 1.5);
     upload(mark, vertices, indices);
 }
@@ -380,13 +386,16 @@ void View3d::Impl::build_plane(const View3dInput& input) {
                 x = (radius + z) * std::sin(angle);
                 z = (radius + z) * std::cos(angle) - radius;
             }
-            const double u = (input.layout.origin_x_px + x / mm) / std::max(input.image_width_px, 1);
-            const double v = (input.layout.origin_y_px + z / mm) / std::max(input.image_height_px, 1);
+            const double u =
+                (input.layout.origin_x_px + x / mm) / std::max(input.image_width_px, 1);
+            const double v =
+                (input.layout.origin_y_px + z / mm) / std::max(input.image_height_px, 1);
             vertices.push_back({{float(x), 0, float(z)}, {0, 1, 0}, {float(u), float(v)}});
         }
     }
     for (GLuint i = 0; i < kSteps; ++i) {
-        for (GLuint v : {2 * i, 2 * i + 1, 2 * i + 3, 2 * i, 2 * i + 3, 2 * i + 2}) indices.push_back(v);
+        for (GLuint v : {2 * i, 2 * i + 1, 2 * i + 3, 2 * i, 2 * i + 3, 2 * i + 2})
+            indices.push_back(v);
     }
     upload(plane, vertices, indices);
 }
@@ -403,11 +412,8 @@ void View3d::Impl::draw_mesh(const Mesh& mesh,
     const Matrix4 clip = multiply(clip_from_view, view);
     glUniformMatrix4fv(u_clip, 1, GL_FALSE, clip.data());
     glUniformMatrix4fv(u_view, 1, GL_FALSE, view.data());
-    glUniform4f(u_colour,
-                float((rgb >> 16) & 255) / 255,
-                float((rgb >> 8) & 255) / 255,
-                float(rgb & 255) / 255,
-                alpha);
+    glUniform4f(u_colour, float((rgb >> 16) & 255) / 255, float((rgb >> 8) & 255) / 255,
+                float(rgb & 255) / 255, alpha);
     glUniform1i(u_mode, mode);
     glBindVertexArray(mesh.vertex_array);
     glDrawElements(GL_TRIANGLES, mesh.count, GL_UNSIGNED_INT, nullptr);
@@ -430,7 +436,8 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
     const Vector3 right = normalized(cross(d.home.column(1), back));
     const Vector3 up = cross(back, right);
     const Point3 eye = d.interest + orbit_.distance_mm * back;
-    d.view_from_mannequin = inverse(Rigid{Matrix3::from_columns(right, up, back), {eye.x, eye.y, eye.z}});
+    d.view_from_mannequin =
+        inverse(Rigid{Matrix3::from_columns(right, up, back), {eye.x, eye.y, eye.z}});
     const double aspect = double(d.width_px) / d.height_px, near = 10, far = 5000;
     d.clip_from_view = {};
     d.clip_from_view[0] = static_cast<float>(1 / (d.tan_half * aspect));
@@ -458,12 +465,8 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
     if (input.has_probe) {
         d.draw_mesh(d.probe, input.mannequin_from_probe, 1, 0xD8DEE4, 1, 0);
         d.draw_mesh(d.mark, input.mannequin_from_probe, 1, 0x48BAD6, 1, 0);
-        d.draw_mesh(d.plane,
-                    input.mannequin_from_probe,
-                    1,
-                    input.in_contact ? 0x6FB7CC : 0x39444E,
-                    1,
-                    input.image_texture ? 2 : 3);
+        d.draw_mesh(d.plane, input.mannequin_from_probe, 1, input.in_contact ? 0x6FB7CC : 0x39444E,
+                    1, input.image_texture ? 2 : 3);
     }
     if (input.has_needle) {
         d.draw_mesh(d.needle, input.mannequin_from_needle, 1, 0xF2F4F6, 1, 0);
@@ -475,7 +478,8 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
             Rigid place;
             place.translation = {target.centre.x, target.centre.y, target.centre.z};
             const bool hit = i < input.hit.size() && input.hit[i];
-            d.draw_mesh(d.ball, place, std::max(target.radius_mm, 3.0), hit ? 0x60C882 : 0xFFC850, 1, 0);
+            d.draw_mesh(d.ball, place, std::max(target.radius_mm, 3.0), hit ? 0x60C882 : 0xFFC850,
+                        1, 0);
         }
     }
     // The skin's front only, then blended over what is inside.
@@ -503,10 +507,10 @@ ViewRay View3d::ray(double x_px, double y_px) const {
     const Impl& d = *impl_;
     const double aspect = double(d.width_px) / std::max(d.height_px, 1);
     const Vector3 direction_view{(2 * x_px / d.width_px - 1) * d.tan_half * aspect,
-                                 (1 - 2 * y_px / d.height_px) * d.tan_half,
-                                 -1};
+                                 (1 - 2 * y_px / d.height_px) * d.tan_half, -1};
     const Rigid mannequin_from_view = inverse(d.view_from_mannequin);
-    return {mannequin_from_view * Point3{0, 0, 0}, normalized(mannequin_from_view * direction_view)};
+    return {mannequin_from_view * Point3{0, 0, 0},
+            normalized(mannequin_from_view * direction_view)};
 }
 
 }  // namespace sonocase::runtime

@@ -1,4 +1,5 @@
-// The small 3-D view: translucent skin, probe, scan plane with the live picture on it, needle, targets.
+// The small 3-D view: translucent skin, probe, scan plane with the live picture on it, needle,
+// targets.
 #pragma once
 
 #include <memory>
@@ -25,7 +26,7 @@ struct View3dInput {
     int image_width_px = 0, image_height_px = 0;
     unsigned image_texture = 0;  // OpenGL name; 0: a plain plane
     bool show_targets = true;
-    std::vector<bool> hit;       // # targets
+    std::vector<bool> hit;  // # targets
 };
 
 struct ViewRay {

@@ -19,7 +19,9 @@ namespace {
 
 std::string g_glfw_error;  // GLFW reports through a plain function
 
-void on_glfw_error(int, const char* text) { g_glfw_error = text ? text : ""; }
+void on_glfw_error(int, const char* text) {
+    g_glfw_error = text ? text : "";
+}
 
 }  // namespace
 
@@ -34,8 +36,7 @@ struct Window::Impl {
 Result<std::unique_ptr<Window>> Window::open(const WindowOptions& options) {
     glfwSetErrorCallback(on_glfw_error);
     if (!glfwInit()) {
-        return Error{"no display can be opened (" + g_glfw_error + ")",
-                     "window",
+        return Error{"no display can be opened (" + g_glfw_error + ")", "window",
                      "start it in a desktop session, or use --headless, which needs no display"};
     }
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
@@ -47,11 +48,10 @@ Result<std::unique_ptr<Window>> Window::open(const WindowOptions& options) {
     auto window = std::unique_ptr<Window>(new Window);
     window->impl_ = std::make_unique<Impl>();
     Impl& impl = *window->impl_;
-    impl.window = glfwCreateWindow(
-        options.width_px, options.height_px, options.title.c_str(), nullptr, nullptr);
+    impl.window = glfwCreateWindow(options.width_px, options.height_px, options.title.c_str(),
+                                   nullptr, nullptr);
     if (!impl.window) {
-        return Error{"no window with OpenGL 3.3 can be made (" + g_glfw_error + ")",
-                     "window",
+        return Error{"no window with OpenGL 3.3 can be made (" + g_glfw_error + ")", "window",
                      "install or update the graphics driver (Mesa's software one will do), or use "
                      "--headless"};
     }
@@ -81,8 +81,7 @@ Result<std::unique_ptr<Window>> Window::open(const WindowOptions& options) {
     impl.imgui_glfw = ImGui_ImplGlfw_InitForOpenGL(impl.window, true);
     impl.imgui_gl = ImGui_ImplOpenGL3_Init("#version 330 core");
     if (!impl.imgui_glfw || !impl.imgui_gl) {
-        return Error{"the OpenGL functions of the window cannot be loaded",
-                     "window",
+        return Error{"the OpenGL functions of the window cannot be loaded", "window",
                      "update the graphics driver, or use --headless"};
     }
     apply_theme(window->scale_);
@@ -98,8 +97,12 @@ Window::~Window() {
     glfwTerminate();
 }
 
-bool Window::should_close() const { return glfwWindowShouldClose(impl_->window); }
-void Window::request_close() { glfwSetWindowShouldClose(impl_->window, GLFW_TRUE); }
+bool Window::should_close() const {
+    return glfwWindowShouldClose(impl_->window);
+}
+void Window::request_close() {
+    glfwSetWindowShouldClose(impl_->window, GLFW_TRUE);
+}
 void Window::set_title(const std::string& title) {
     glfwSetWindowTitle(impl_->window, title.c_str());
 }
@@ -184,8 +187,8 @@ void Window::toggle_full_screen() {
     glfwGetWindowPos(impl_->window, &old[0], &old[1]);
     glfwGetWindowSize(impl_->window, &old[2], &old[3]);
     const GLFWvidmode* mode = glfwGetVideoMode(monitor);
-    glfwSetWindowMonitor(
-        impl_->window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
+    glfwSetWindowMonitor(impl_->window, monitor, 0, 0, mode->width, mode->height,
+                         mode->refreshRate);
 }
 
 std::string Window::opengl_name() const {
@@ -200,12 +203,10 @@ int key_code(const std::string& name) {
         return n >= 1 && n <= 12 ? GLFW_KEY_F1 + n - 1 : -1;
     }
     static const std::map<std::string, int> kNamed = {
-        {"left", GLFW_KEY_LEFT},         {"right", GLFW_KEY_RIGHT},
-        {"up", GLFW_KEY_UP},             {"down", GLFW_KEY_DOWN},
-        {"space", GLFW_KEY_SPACE},       {"enter", GLFW_KEY_ENTER},
-        {"escape", GLFW_KEY_ESCAPE},     {"tab", GLFW_KEY_TAB},
-        {"pageup", GLFW_KEY_PAGE_UP},    {"pagedown", GLFW_KEY_PAGE_DOWN},
-        {"home", GLFW_KEY_HOME},         {"end", GLFW_KEY_END},
+        {"left", GLFW_KEY_LEFT},           {"right", GLFW_KEY_RIGHT},  {"up", GLFW_KEY_UP},
+        {"down", GLFW_KEY_DOWN},           {"space", GLFW_KEY_SPACE},  {"enter", GLFW_KEY_ENTER},
+        {"escape", GLFW_KEY_ESCAPE},       {"tab", GLFW_KEY_TAB},      {"pageup", GLFW_KEY_PAGE_UP},
+        {"pagedown", GLFW_KEY_PAGE_DOWN},  {"home", GLFW_KEY_HOME},    {"end", GLFW_KEY_END},
         {"backspace", GLFW_KEY_BACKSPACE}, {"delete", GLFW_KEY_DELETE}};
     const auto found = kNamed.find(name);
     return found == kNamed.end() ? -1 : found->second;

@@ -1,5 +1,5 @@
-// A window with an OpenGL 3.3 context and Dear ImGui in it. GLFW, OpenGL and ImGui's back ends stay in
-// the .cpp file. Window calls belong to the thread that opened it.
+// A window with an OpenGL 3.3 context and Dear ImGui in it. GLFW, OpenGL and ImGui's back ends stay
+// in the .cpp file. Window calls belong to the thread that opened it.
 #pragma once
 
 #include <array>
@@ -61,8 +61,8 @@ class Window {
     float scale_ = 1;
 };
 
-// Number of a key by its name as scripts and the help page write it ("left", "a", "f1", "space"); -1:
-// unknown.
+// Number of a key by its name as scripts and the help page write it ("left", "a", "f1", "space");
+// -1: unknown.
 int key_code(const std::string& name);
 
 }  // namespace sonocase::runtime

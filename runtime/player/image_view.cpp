@@ -29,7 +29,9 @@ void cross_mark(ImDrawList* draw, ImVec2 p, float r, unsigned colour, float thic
 
 }  // namespace
 
-double Measurement::length_mm() const { return std::hypot(x1_mm - x0_mm, z1_mm - z0_mm); }
+double Measurement::length_mm() const {
+    return std::hypot(x1_mm - x0_mm, z1_mm - z0_mm);
+}
 
 void ImageView::click(double x_mm, double z_mm) {
     if (!half_) {
@@ -52,8 +54,8 @@ void ImageView::clear_measurements() {
 void ImageView::draw(float width, float height, const ImageViewInput& input) {
     const ImVec2 corner = ImGui::GetCursorScreenPos();
     ImDrawList* draw = ImGui::GetWindowDrawList();
-    draw->AddRectFilled(
-        corner, {corner.x + width, corner.y + height}, colour::rgba(0, 0, 0), 5 * input.scale);
+    draw->AddRectFilled(corner, {corner.x + width, corner.y + height}, colour::rgba(0, 0, 0),
+                        5 * input.scale);
     ImGui::InvisibleButton("picture", {std::max(width, 1.0f), std::max(height, 1.0f)},
                            ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight |
                                ImGuiButtonFlags_MouseButtonMiddle);
@@ -70,8 +72,7 @@ void ImageView::draw(float width, float height, const ImageViewInput& input) {
         place_.origin_x = place_.x + fit * frame.layout.origin_x_px;
         place_.origin_y = place_.y + fit * frame.layout.origin_y_px;
         draw->PushClipRect(corner, {corner.x + width, corner.y + height}, true);
-        draw->AddImage(input.texture,
-                       {place_.x, place_.y},
+        draw->AddImage(input.texture, {place_.x, place_.y},
                        {place_.x + place_.side_x, place_.y + place_.side_y});
         draw_scales(input);
         draw_measurements(input);
@@ -86,11 +87,8 @@ void ImageView::draw(float width, float height, const ImageViewInput& input) {
     }
     y = corner.y + pad;
     for (const std::string& text : input.right_lines) {
-        text_at(draw,
-                corner.x + width - pad - ImGui::CalcTextSize(text.c_str()).x,
-                y,
-                colour::kImageText,
-                text.c_str());
+        text_at(draw, corner.x + width - pad - ImGui::CalcTextSize(text.c_str()).x, y,
+                colour::kImageText, text.c_str());
         y += line;
     }
     ImGui::PopFont();
@@ -126,17 +124,18 @@ void ImageView::draw_scales(const ImageViewInput& input) {
         if (labelled && mm > 0) {
             char label[16];
             std::snprintf(label, sizeof label, "%d", mm / 10);
-            draw->AddText({x + 6 * s, y - 0.5f * ImGui::GetTextLineHeight()}, colour::kImageText, label);
+            draw->AddText({x + 6 * s, y - 0.5f * ImGui::GetTextLineHeight()}, colour::kImageText,
+                          label);
         }
     }
-    draw->AddText({x + 3 * s, static_cast<float>(place_.origin_y) - 0.5f * ImGui::GetTextLineHeight()},
-                  colour::kDim,
-                  "cm");
+    draw->AddText(
+        {x + 3 * s, static_cast<float>(place_.origin_y) - 0.5f * ImGui::GetTextLineHeight()},
+        colour::kDim, "cm");
     // Focus mark: a triangle that points at the scale.
     const float fy = static_cast<float>(place_.origin_y + frame.focus_mm * px_per_mm);
     if (frame.focus_mm > 0 && frame.focus_mm <= frame.depth_mm) {
-        draw->AddTriangleFilled({x - 22 * s, fy - 5 * s}, {x - 22 * s, fy + 5 * s}, {x - 14 * s, fy},
-                                colour::kAccent);
+        draw->AddTriangleFilled({x - 22 * s, fy - 5 * s}, {x - 22 * s, fy + 5 * s},
+                                {x - 14 * s, fy}, colour::kAccent);
     }
     // Orientation mark beside the face, on the side of the probe's x axis.
     double half_mm = 0.5 * input.probe->width_mm;
@@ -150,7 +149,8 @@ void ImageView::draw_scales(const ImageViewInput& input) {
     draw->AddCircleFilled(mark, 6.5f * s, colour::kAccent, 20);
     const char* letter = "S";
     const ImVec2 size = ImGui::CalcTextSize(letter);
-    draw->AddText({mark.x - 0.5f * size.x, mark.y - 0.5f * size.y}, colour::rgba(8, 12, 16), letter);
+    draw->AddText({mark.x - 0.5f * size.x, mark.y - 0.5f * size.y}, colour::rgba(8, 12, 16),
+                  letter);
     // Grey bar on the left.
     const ImVec2 bar{place_.x + 12 * s, place_.y + 0.34f * place_.side_y};
     draw->AddRectFilledMultiColor(bar, {bar.x + 7 * s, bar.y + 110 * s}, 0xFFFFFFFF, 0xFFFFFFFF,
@@ -159,11 +159,8 @@ void ImageView::draw_scales(const ImageViewInput& input) {
     if (frame.status == FrameStatus::no_contact) {
         const char* words = "No contact: press the probe onto the skin";
         const ImVec2 wide = ImGui::CalcTextSize(words);
-        text_at(draw,
-                place_.x + 0.5f * (place_.side_x - wide.x),
-                place_.y + 0.55f * place_.side_y,
-                colour::kDim,
-                words);
+        text_at(draw, place_.x + 0.5f * (place_.side_x - wide.x), place_.y + 0.55f * place_.side_y,
+                colour::kDim, words);
     } else if (frame.status == FrameStatus::held_bad_pose) {
         const char* words = "Pose is not usable: picture held";
         const ImVec2 wide = ImGui::CalcTextSize(words);
@@ -198,7 +195,7 @@ void ImageView::draw_measurements(const ImageViewInput& input) {
             };
             draw->AddLine(at(t), at(t + 3 * s), colour::kMeasure, 1.2f * s);
         }
-        char number[8], words[48];
+        char number[24], words[48];
         std::snprintf(number, sizeof number, "%zu", i + 1);
         draw->AddText({a.x + 7 * s, a.y - 16 * s}, colour::kMeasure, number);
         std::snprintf(words, sizeof words, "%zu  %.1f mm", i + 1, m.length_mm());

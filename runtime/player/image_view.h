@@ -1,5 +1,5 @@
-// The ultrasound picture as on a machine: depth scale, focus mark, orientation mark, grey bar, distance
-// measurement, and the words in its corners.
+// The ultrasound picture as on a machine: depth scale, focus mark, orientation mark, grey bar,
+// distance measurement, and the words in its corners.
 #pragma once
 
 #include <string>
@@ -33,8 +33,8 @@ struct ImagePlace {
 
 class ImageView {
   public:
-    // Draws into the current ImGui window; width and height in screen pixels. The area takes the mouse:
-    // hovered() and active() tell whether the picture has it.
+    // Draws into the current ImGui window; width and height in screen pixels. The area takes the
+    // mouse: hovered() and active() tell whether the picture has it.
     void draw(float width, float height, const ImageViewInput& input);
     bool hovered() const { return hovered_; }
     const ImagePlace& place() const { return place_; }

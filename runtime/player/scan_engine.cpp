@@ -1,5 +1,7 @@
 #include "runtime/player/scan_engine.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace sonocase::runtime {
@@ -39,6 +41,23 @@ ToolPoses tool_poses(const TrackerReading& reading,
         tools.mannequin_from_needle = place(*s, calibrations.needle);
     }
     return tools;
+}
+
+bool probe_in_contact(const Skin& skin, const Probe& probe, const Rigid& mannequin_from_probe) {
+    constexpr double kGelMm = 4;
+    const Vector3 beam = mannequin_from_probe.rotation.column(2);
+    for (double part : {0.0, -0.25, 0.25, -0.5, 0.5}) {
+        Point3 face{part * probe.width_mm, 0, 0};
+        if (probe.shape == ProbeShape::curvilinear) {
+            const double angle = part * probe.field_of_view_rad;
+            face = {probe.radius_mm * std::sin(angle), 0, probe.radius_mm * (std::cos(angle) - 1)};
+        }
+        const Point3 p = mannequin_from_probe * face;
+        for (double depth = 0; depth <= kGelMm; depth += 1) {
+            if (skin.inside(p + depth * beam)) return true;
+        }
+    }
+    return false;
 }
 
 Result<ScanEngine> ScanEngine::create(const CaseBundle& bundle,
@@ -94,11 +113,25 @@ FrameStatus ScanEngine::frame(double now_s,
     input.frame = frame_++;
     input.settings = settings;
     last_ = record;
-    return renderer_.render(input, pixels);
+    return finish(input, renderer_.render(input, pixels), pixels);
 }
 
 FrameStatus ScanEngine::frame_again(const FrameRecord& record, std::span<std::uint8_t> pixels) {
-    return renderer_.render(record.input, pixels);
+    return finish(record.input, renderer_.render(record.input, pixels), pixels);
+}
+
+FrameStatus ScanEngine::finish(const FrameInput& input,
+                               FrameStatus status,
+                               std::span<std::uint8_t> pixels) {
+    if (status != FrameStatus::rendered ||
+        probe_in_contact(skin_, exercise_.probe, input.mannequin_from_probe)) {
+        return status;
+    }
+    // Model physical darkens by itself, beam by beam; the paper's image formation knows no air.
+    if (options_.render.model == ImageModel::paper) {
+        std::fill(pixels.begin(), pixels.end(), std::uint8_t{0});
+    }
+    return FrameStatus::no_contact;
 }
 
 }  // namespace sonocase::runtime

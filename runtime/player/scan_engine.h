@@ -56,6 +56,10 @@ struct EngineOptions {
     double focus_mm = 0;  // > 0 overrides the exercise's
 };
 
+// True if the face of the probe touches the skin somewhere: body within 4 mm, what gel bridges, of
+// one of five points across it. Constant time.
+bool probe_in_contact(const Skin& skin, const Probe& probe, const Rigid& mannequin_from_probe);
+
 class ScanEngine {
   public:
     // The bundle must outlive the engine.
@@ -86,12 +90,14 @@ class ScanEngine {
                Exercise exercise,
                EngineOptions options,
                Renderer renderer)
-        : bundle_(&bundle),
+        : skin_(bundle),
           exercise_(std::move(exercise)),
           options_(std::move(options)),
           renderer_(std::move(renderer)) {}
 
-    const CaseBundle* bundle_;
+    FrameStatus finish(const FrameInput& input, FrameStatus status, std::span<std::uint8_t> pixels);
+
+    Skin skin_;
     Exercise exercise_;
     EngineOptions options_;
     Renderer renderer_;

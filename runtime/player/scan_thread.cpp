@@ -98,8 +98,9 @@ void ScanThread::run() {
         if (stop_) return;
         // A script is a function of time: it has news at every look, so it is looked at at the idle
         // rate, like breathing and noise.
-        const double wait_s =
-            rendered ? 1 / kIdleRate : std::clamp(last_frame_s_ + 1 / kIdleRate - clock_(), 5e-4, 0.1);
+        const double wait_s = rendered
+                                  ? 1 / kIdleRate
+                                  : std::clamp(last_frame_s_ + 1 / kIdleRate - clock_(), 5e-4, 0.1);
         wake_condition_.wait_for(lock, duration<double>(wait_s), [this] { return work_ || stop_; });
         work_ = false;
         if (stop_) return;
@@ -145,9 +146,8 @@ bool ScanThread::step() {
     out.cine_age_s = 0;
     const bool again = controls_.frozen && cine_count_ > 0;
     if (again) {
-        const std::size_t back =
-            std::min<std::size_t>(static_cast<std::size_t>(std::max(controls_.cine_back, 0)),
-                                  cine_count_ - 1);
+        const std::size_t back = std::min<std::size_t>(
+            static_cast<std::size_t>(std::max(controls_.cine_back, 0)), cine_count_ - 1);
         const std::size_t size = cine_.size();
         const FrameRecord& newest = cine_[(cine_next_ + size - 1) % size];
         FrameRecord shown = cine_[(cine_next_ + 2 * size - 1 - back) % size];

@@ -1,5 +1,5 @@
-// The engine on a thread of its own: a frame is rendered as soon as a pose arrives, and at an idle rate
-// when none does, because tissue breathes and noise lives. The window takes the latest frame
+// The engine on a thread of its own: a frame is rendered as soon as a pose arrives, and at an idle
+// rate when none does, because tissue breathes and noise lives. The window takes the latest frame
 // when it draws and never waits for one.
 #pragma once
 
@@ -22,8 +22,8 @@
 namespace sonocase::runtime {
 
 inline constexpr double kCineSeconds = 20;
-inline constexpr double kCineRate = 60;    // frames a second kept
-inline constexpr double kIdleRate = 40;    // frames a second with no new pose
+inline constexpr double kCineRate = 60;  // frames a second kept
+inline constexpr double kIdleRate = 40;  // frames a second with no new pose
 inline constexpr int kMaxEffects = 32;
 
 // What the window wants; taken over between two frames.
@@ -46,11 +46,11 @@ struct ScanFrame {
     std::array<EffectCost, kMaxEffects> costs{};
     int cost_count = 0;
     SensorVerdict probe_verdict = SensorVerdict::absent, needle_verdict = SensorVerdict::absent;
-    double rendered_s = 0;       // when finished, session clock
+    double rendered_s = 0;  // when finished, session clock
     double frame_ms = 0;
     bool frozen = false;
-    int cine_frames = 0;         // kept
-    double cine_age_s = 0;       // of the frame shown, against the newest
+    int cine_frames = 0;    // kept
+    double cine_age_s = 0;  // of the frame shown, against the newest
     double pose_to_pixel_median_ms = 0, pose_to_pixel_p99_ms = 0;
     double frames_per_s = 0;
     std::uint64_t number = 0;
@@ -66,8 +66,8 @@ class ScanThread {
     ScanThread(const ScanThread&) = delete;
     ScanThread& operator=(const ScanThread&) = delete;
 
-    // Each takes effect between two frames. The bundle must outlive the engine's use: set_engine waits
-    // until the thread has let go of the engine before it.
+    // Each takes effect between two frames. The bundle must outlive the engine's use: set_engine
+    // waits until the thread has let go of the engine before it.
     void set_engine(std::unique_ptr<ScanEngine> engine);
     void set_tracker(std::shared_ptr<Tracker> tracker);
     void set_calibrations(const Calibrations& calibrations);

@@ -43,8 +43,12 @@ void limit(double& value, double low, double high) {
 
 }  // namespace
 
-std::string config_folder() { return folder_of("XDG_CONFIG_HOME", "/.config/sonocase"); }
-std::string data_folder() { return folder_of("XDG_DATA_HOME", "/.local/share/sonocase"); }
+std::string config_folder() {
+    return folder_of("XDG_CONFIG_HOME", "/.config/sonocase");
+}
+std::string data_folder() {
+    return folder_of("XDG_DATA_HOME", "/.local/share/sonocase");
+}
 
 Settings load_settings(const std::string& path, std::string& warning) {
     Settings s;

@@ -16,8 +16,8 @@ struct Settings {
     double dynamic_range_db = 60;
     std::vector<double> tgc_db = std::vector<double>(8, 0.0);
     bool show_3d = true, show_exercise = true, show_tracker = true, show_effects = true;
-    std::vector<std::string> recent;       // bundles, newest first
-    std::vector<std::string> calibrations; // files in use
+    std::vector<std::string> recent;        // bundles, newest first
+    std::vector<std::string> calibrations;  // files in use
     int probe_sensor = 0, needle_sensor = 1;
 };
 
@@ -32,13 +32,13 @@ Status save_settings(const Settings& settings, const std::string& path);
 
 struct BundleEntry {
     std::string path;
-    std::string name;    // file name without its ending
+    std::string name;  // file name without its ending
     std::string folder;
     double megabytes = 0;
     bool recent = false;
 };
-// Bundles that the start page offers: recent ones, then those in the data folders, beside the program
-// and in the current folder.
+// Bundles that the start page offers: recent ones, then those in the data folders, beside the
+// program and in the current folder.
 std::vector<BundleEntry> find_bundles(const Settings& settings);
 
 }  // namespace sonocase::runtime

@@ -1,5 +1,5 @@
-// A tracker whose readings are pushed in by whoever has them: the window's mouse, a browser, a test.
-// push() and poll() may be called from two threads, one each.
+// A tracker whose readings are pushed in by whoever has them: the window's mouse, a browser, a
+// test. push() and poll() may be called from two threads, one each.
 #pragma once
 
 #include <functional>

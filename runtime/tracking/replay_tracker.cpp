@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/sequence.h"
+
 namespace sonocase::runtime {
 namespace {
 
@@ -25,6 +27,66 @@ Status check_times(const std::vector<Pose>& poses, const std::string& where) {
         }
     }
     return Done{};
+}
+
+bool ends_with(const std::string& text, const char* ending) {
+    const std::string end = ending;
+    return text.size() >= end.size() &&
+           text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+// Index of the transform of a tool, by its name before "To"; -1: none. One to the mannequin is
+// preferred, then one to the tracker, then any.
+int transform_of(const Sequence& sequence,
+                 const std::vector<std::string>& tools,
+                 bool& in_mannequin) {
+    int best = -1, best_rank = 0;
+    for (std::size_t i = 0; i < sequence.transforms.size(); ++i) {
+        const std::string& name = sequence.transforms[i];
+        for (const std::string& tool : tools) {
+            if (name.compare(0, tool.size() + 2, tool + "To") != 0) continue;
+            const int rank = ends_with(name, "ToMannequin") ? 3
+                             : ends_with(name, "ToTracker") ? 2
+                                                            : 1;
+            if (rank > best_rank) best = static_cast<int>(i), best_rank = rank;
+        }
+    }
+    in_mannequin = best_rank == 3;
+    return best;
+}
+
+std::vector<Pose> poses_of(const Sequence& sequence, int transform) {
+    std::vector<Pose> poses;
+    for (const SequenceFrame& frame : sequence.frames) {
+        Pose pose;
+        pose.frame = frame.number;
+        pose.timestamp_s = frame.timestamp_s;
+        const SequencePose& read = frame.poses[static_cast<std::size_t>(transform)];
+        const std::optional<Rigid> rigid = rigid_from_matrix(read.to_from);
+        pose.ok = read.ok && rigid;
+        if (rigid) pose.tracker_from_tool = *rigid;
+        poses.push_back(pose);
+    }
+    return poses;
+}
+
+Result<Recording> recording_of_sequence(const std::string& path) {
+    Result<Sequence> sequence = load_sequence(path);
+    if (!sequence) return sequence.error();
+    Recording recording;
+    bool probe_home = false, needle_home = false;
+    const int probe = transform_of(*sequence, {"Probe", "Transducer", "Image"}, probe_home);
+    const int needle = transform_of(*sequence, {"Needle", "Stylus"}, needle_home);
+    if (probe < 0) {
+        std::string names;
+        for (const std::string& name : sequence->transforms) names += " " + name;
+        return Error{"no transform of a probe; found" + (names.empty() ? " none" : ":" + names),
+                     path, "expected ProbeToTracker or ProbeToMannequin"};
+    }
+    recording.probe = poses_of(*sequence, probe);
+    recording.in_mannequin = probe_home;
+    if (needle >= 0 && needle_home == probe_home) recording.needle = poses_of(*sequence, needle);
+    return recording;
 }
 
 }  // namespace
@@ -104,6 +166,13 @@ Result<Recording> load_recording(const std::string& files) {
     Recording recording;
     const std::size_t comma = files.find(',');
     const std::string probe_file = files.substr(0, comma);
+    if (ends_with(probe_file, ".mha") || ends_with(probe_file, ".nrrd")) {
+        Result<Recording> whole = recording_of_sequence(probe_file);
+        if (!whole) return whole.error();
+        if (Status ok = check_times(whole->probe, probe_file); !ok) return ok.error();
+        whole->name = probe_file.substr(probe_file.find_last_of('/') + 1);
+        return whole;
+    }
     recording.name = probe_file.substr(probe_file.find_last_of('/') + 1);
     Result<std::vector<Pose>> probe = load_poses(probe_file);
     if (!probe) return probe.error();

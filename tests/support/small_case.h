@@ -9,6 +9,49 @@
 
 namespace sonocase::testing {
 
+// An exercise on the body below, as a bundle carries it.
+inline const char* small_exercise_toml() {
+    return R"(name = "scan"
+title = "Find the vessel"
+description = "A vessel runs along the body. Show it in the middle of the picture, then bring the needle to it."
+kind = "vascular"
+model = "paper"
+start_probe = [0, 0, 70]
+start_beam = [0, 0, -1]
+[probe]
+shape = "curvilinear"
+radius_mm = 60
+field_of_view_deg = 65
+depth_mm = 100
+[needle]
+gauge = 18
+length_mm = 120
+[[targets]]
+name = "vessel"
+centre = [0, 0, 25]
+radius_mm = 5
+hit_radius_mm = 6
+[[sweeps]]
+name = "along"
+snap_to_skin = true
+[[sweeps.keys]]
+time_s = 0
+probe = [0, -30, 62]
+needle_tip = [35, -30, 60]
+needle_direction = [-8, 0, -9]
+[[sweeps.keys]]
+time_s = 1
+probe = [0, 0, 62]
+needle_tip = [20, 0, 43]
+needle_direction = [-8, 0, -9]
+[[sweeps.keys]]
+time_s = 2
+probe = [0, 30, 62]
+needle_tip = [6, 30, 28]
+needle_direction = [-8, 0, -9]
+)";
+}
+
 // A cylinder along y of radius 60 mm about (0, *, 0), 160 mm long, in a box of 140 x 160 x 140 mm
 // with voxels of 2 mm; a vessel of radius 6 mm along y through (0, *, 25). Outside is label 0.
 inline CaseBundle small_case() {
@@ -45,6 +88,7 @@ inline CaseBundle small_case() {
         }
     }
     bundle.label_bricks = bricks_from_dense<std::uint8_t>(dense, bundle.grid.size);
+    bundle.exercises = {{"scan", small_exercise_toml()}};
     bundle.speckle.edge = 32;
     bundle.speckle.voxels.resize(2 * 32 * 32 * 32);
     std::uint32_t state = 1;

@@ -1,0 +1,182 @@
+// The program sonoplay without a window, as a user starts it.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "formats/calibration.h"
+#include "formats/case_bundle.h"
+#include "formats/poses.h"
+#include "support/small_case.h"
+#include "support/temporary_folder.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using sonocase::testing::CommandResult;
+using sonocase::testing::read_text;
+using sonocase::testing::write_text;
+
+class Headless : public ::testing::Test {
+  protected:
+    void SetUp() override {
+        bundle_ = folder_ / "cylinder.sonocase";
+        const Status saved = save_bundle(sonocase::testing::small_case(), bundle_);
+        ASSERT_TRUE(saved) << saved.error().message();
+    }
+    CommandResult play(const std::string& arguments) {
+        // No display and no home: headless needs neither.
+        return sonocase::testing::run_command(
+            "env -u DISPLAY -u WAYLAND_DISPLAY HOME=/nonexistent " SONOCASE_BIN "/sonoplay " +
+                arguments,
+            folder_);
+    }
+    sonocase::testing::TemporaryFolder folder_;
+    std::string bundle_;
+};
+
+TEST_F(Headless, WritesFramesAndStatsOfASweep) {
+    const CommandResult run = play(bundle_ +
+                                   " --headless --tracker sweep:along --model paper --frames 12 "
+                                   "--size 128x96 --out " +
+                                   (folder_ / "frames") + " --stats " + (folder_ / "stats.json"));
+    ASSERT_EQ(run.status, 0) << run.error;
+    EXPECT_EQ(run.error, "");
+    int frames = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / "frames")) {
+        EXPECT_EQ(entry.path().extension(), ".png");
+        const std::string png = read_text(entry.path().string());
+        ASSERT_GT(png.size(), 100u);
+        EXPECT_EQ(static_cast<unsigned char>(png[19]), 128);  // IHDR width and height, big-endian
+        EXPECT_EQ(static_cast<unsigned char>(png[23]), 96);
+        ++frames;
+    }
+    EXPECT_EQ(frames, 12);
+    EXPECT_NE(read_text(folder_ / "frames/frame_00000.png"),
+              read_text(folder_ / "frames/frame_00011.png"));
+    const auto stats = nlohmann::json::parse(read_text(folder_ / "stats.json"));
+    EXPECT_EQ(stats["frames"], 12);
+    EXPECT_GT(stats["frame_ms"]["median"].get<double>(), 0);
+    EXPECT_GE(stats["frame_ms"]["p99"].get<double>(), stats["frame_ms"]["median"].get<double>());
+    EXPECT_GT(stats["first_frame_ms"].get<double>(), 0);
+    EXPECT_GT(stats["resident_mb"].get<double>(), 1);
+    ASSERT_FALSE(stats["effects"].empty());
+    for (const auto& effect : stats["effects"]) {
+        EXPECT_FALSE(effect["name"].get<std::string>().empty());
+        EXPECT_GE(effect["ms"].get<double>(), 0);
+        EXPECT_LE(effect["skipped_frames"].get<int>(), 12);
+    }
+}
+
+TEST_F(Headless, GivesTheSameBytesTwiceAndOnTwoThreads) {
+    for (const char* name : {"a", "b", "c"}) {
+        const std::string threads = name[0] == 'c' ? " --threads 2" : "";
+        const CommandResult run =
+            play(bundle_ + " --headless --model paper --frames 3 --size 96x96" + threads +
+                 " --out " + (folder_ / name));
+        ASSERT_EQ(run.status, 0) << run.error;
+    }
+    for (const char* frame : {"/frame_00000.png", "/frame_00002.png"}) {
+        EXPECT_EQ(read_text(folder_ / "a" + frame), read_text(folder_ / "b" + frame));
+        EXPECT_EQ(read_text(folder_ / "a" + frame), read_text(folder_ / "c" + frame));
+    }
+}
+
+TEST_F(Headless, ReplaysEveryRowInOrderAndAppliesCalibrations) {
+    // The same path twice: once as it is, once seen by a tracker elsewhere through a sensor that is
+    // mounted off the probe. Calibrated, the pictures are the same.
+    const Rigid world_from_mannequin{rotation_about({0, 0, 1}, 0.7), {100, 20, -30}};
+    const Rigid sensor_from_probe{rotation_about({1, 0, 0}, -0.4), {3, 8, 40}};
+    const double scale = 1.03;
+    std::vector<Pose> bare, seen;
+    for (int i = 0; i < 5; ++i) {
+        Pose pose;
+        pose.frame = i;
+        pose.timestamp_s = 100 + i / 20.0;
+        pose.ok = true;
+        pose.tracker_from_tool = {rotation_about({1, 0, 0}, 3.14159265358979),
+                                  {0, -20.0 + 10 * i, 59}};
+        bare.push_back(pose);
+        Rigid scaled = pose.tracker_from_tool;
+        scaled.translation = scale * scaled.translation;
+        pose.tracker_from_tool = world_from_mannequin * scaled * inverse(sensor_from_probe);
+        seen.push_back(pose);
+    }
+    write_text(folder_ / "bare.csv", format_poses(bare));
+    write_text(folder_ / "seen.csv", format_poses(seen));
+    Calibration probe, mannequin;
+    probe.kind = "probe";
+    probe.sensor_from_tool = sensor_from_probe;
+    mannequin.kind = "mannequin";
+    mannequin.sensor_from_tool = world_from_mannequin;
+    mannequin.scale = scale;
+    ASSERT_TRUE(save_calibration(probe, folder_ / "probe.json"));
+    ASSERT_TRUE(save_calibration(mannequin, folder_ / "mannequin.json"));
+    const std::string common = bundle_ + " --headless --model paper --size 96x96 --stats - ";
+    const CommandResult a =
+        play(common + "--tracker replay:" + (folder_ / "bare.csv") + " --out " + (folder_ / "a"));
+    const CommandResult b = play(common + "--tracker replay:" + (folder_ / "seen.csv") + " --out " +
+                                 (folder_ / "b") + " --calibration " + (folder_ / "probe.json") +
+                                 " --calibration " + (folder_ / "mannequin.json"));
+    ASSERT_EQ(a.status, 0) << a.error;
+    ASSERT_EQ(b.status, 0) << b.error;
+    EXPECT_EQ(nlohmann::json::parse(a.out)["frames"], 5);
+    EXPECT_NE(read_text(folder_ / "a/frame_00000.png"), read_text(folder_ / "a/frame_00004.png"));
+    // CSV keeps nine digits of rotation: a pixel here and there may fall on the other side of a
+    // voxel, so the files are compared by size and the first by most of its bytes.
+    for (const char* frame : {"/frame_00000.png", "/frame_00004.png"}) {
+        EXPECT_NEAR(double(read_text(folder_ / "a" + frame).size()),
+                    double(read_text(folder_ / "b" + frame).size()), 100);
+    }
+}
+
+TEST_F(Headless, SaysInOneLineWhatIsWrong) {
+    struct Case {
+        std::string arguments;
+        int status;
+        std::string says;
+    };
+    write_text(folder_ / "damaged.sonocase", read_text(bundle_).substr(0, 2000));
+    write_text(folder_ / "empty.csv", "");
+    const std::vector<Case> cases = {
+        {"--headless", 1, "no bundle"},
+        {(folder_ / "absent.sonocase") + " --headless", 1, "absent.sonocase"},
+        {(folder_ / "damaged.sonocase") + " --headless", 1, "damaged.sonocase"},
+        {bundle_ + " --headless --exercise liver", 1, "scan"},
+        {bundle_ + " --headless --tracker sweep:round", 1, "along"},
+        {bundle_ + " --headless --tracker magic", 1, "mouse"},
+        {bundle_ + " --headless --tracker replay:" + (folder_ / "empty.csv"), 1, "empty.csv"},
+        {bundle_ + " --headless --tracker replay:/nonexistent.csv", 1, "/nonexistent.csv"},
+        {bundle_ + " --headless --calibration /nonexistent.json", 1, "/nonexistent.json"},
+        {bundle_ + " --headless --model paper --effects glitter", 1, "glitter"},
+        {bundle_ + " --headless --model paper --out /proc/nothing", 1, "/proc/nothing"},
+        {bundle_ + " --headless --model paper --stats /proc/nothing.json", 1, "/proc/nothing.json"},
+        {bundle_ + " --headless --size huge", 2, "WxH"},
+        {bundle_ + " --headless --model cubist", 2, "physical"},
+        {bundle_ + " --headless --frames 0", 2, "frames"},
+        {bundle_ + " --headless --unknown", 2, "--unknown"},
+    };
+    for (const Case& c : cases) {
+        const CommandResult run = play(c.arguments);
+        EXPECT_EQ(run.status, c.status) << c.arguments << "\n" << run.error;
+        EXPECT_NE(run.error.find(c.says), std::string::npos) << c.arguments << "\n" << run.error;
+        EXPECT_EQ(std::count(run.error.begin(), run.error.end(), '\n'), 1) << c.arguments << "\n"
+                                                                           << run.error;
+    }
+}
+
+TEST(PlayerProgram, LinksNoLibraryOfThePipeline) {
+    const sonocase::testing::TemporaryFolder folder;
+    const CommandResult run =
+        sonocase::testing::run_command("ldd " SONOCASE_BIN "/sonoplay", folder);
+    ASSERT_EQ(run.status, 0) << run.error;
+    ASSERT_NE(run.out.find("libc.so"), std::string::npos);
+    for (const char* name :
+         {"ITK", "itk", "vtk", "openvdb", "ceres", "OpenImageIO", "tbb", "glog"}) {
+        EXPECT_EQ(run.out.find(std::string("lib") + name), std::string::npos) << name << "\n"
+                                                                              << run.out;
+    }
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
