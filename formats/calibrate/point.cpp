@@ -4,10 +4,10 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <cstdio>
 
 #include "formats/calibrate/pivot_system.h"
 #include "formats/calibrate/pose_screen.h"
+#include "formats/calibrate/words.h"
 
 namespace sonocase {
 namespace {
@@ -16,20 +16,11 @@ using calibrate::PivotSolution;
 using calibrate::PoseGroup;
 using calibrate::solve_pivots;
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
-// Median of the length of a 3-vector of unit normal components.
-constexpr double kMedianLength = 1.5381722544550522;
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-    std::array<char, 512> line{};
-    std::snprintf(line.data(), line.size(), format, args...);
-    return line.data();
-}
-
-std::string axis_text(Vector3 a) {
-    return text("(%.2f, %.2f, %.2f)", a.x, a.y, a.z);
-}
+using calibrate::axis_text;
+using calibrate::kDegree;
+using calibrate::median;
+using calibrate::text;
+constexpr double kMedianLength = calibrate::kMedianLength3;
 
 std::vector<double> residuals_of(std::span<const Pose> poses, Vector3 tip, Point3 pivot) {
     std::vector<double> out;
@@ -38,12 +29,6 @@ std::vector<double> residuals_of(std::span<const Pose> poses, Vector3 tip, Point
         out.push_back(distance(pose.tracker_from_tool * Point3{tip.x, tip.y, tip.z}, pivot));
     }
     return out;
-}
-
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 PoseGroup everything(std::size_t count) {
