@@ -1,0 +1,47 @@
+// Plots of the reports, drawn by VTK's charts without a window on screen.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "formats/result.h"
+
+namespace sonocase::pipeline {
+
+enum class SeriesLook { line, points, line_and_points, bars, dashed };
+
+struct Series {
+    std::string name;       // in the legend; empty: not shown there
+    std::vector<double> x;  // # y; pairs that are not finite are left out
+    std::vector<double> y;
+    SeriesLook look = SeriesLook::line;
+    std::array<std::uint8_t, 3> colour{0, 0, 0};  // all zero: the next of a palette
+    double width_px = 2;                          // of the line, or of the mark
+};
+
+struct Chart {
+    std::string title;
+    std::string x_label;  // with its unit: "seconds"
+    std::string y_label;
+    bool x_log = false;  // values <= 0 are left out
+    bool y_log = false;
+    std::vector<Series> series;
+};
+
+// Charts side by side, row by row, `columns` to a row; each cell is width_px x height_px.
+struct ChartSheet {
+    std::vector<Chart> charts;
+    int columns = 1;
+    int width_px = 720;
+    int height_px = 480;
+};
+
+// Written under a temporary name and renamed. Error: no display
+// (pipeline/pictures/offscreen_display.h), or the file cannot be written. Cost: about 0.3 s for the
+// first sheet of a process.
+Status write_chart_png(const ChartSheet& sheet, const std::string& path);
+Status write_chart_svg(const ChartSheet& sheet, const std::string& path);
+
+}  // namespace sonocase::pipeline

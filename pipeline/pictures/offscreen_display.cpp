@@ -1,0 +1,96 @@
+#include "pipeline/pictures/offscreen_display.h"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+namespace sonocase::pipeline {
+namespace {
+
+// Whether a local X server answers for $DISPLAY. Displays of other machines are taken on trust.
+bool display_answers() {
+    const char* display = std::getenv("DISPLAY");
+    if (display == nullptr || *display == '\0') return false;
+    if (*display != ':') return true;
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    const std::string number(display + 1, std::strcspn(display + 1, "."));
+    const std::string path = "/tmp/.X11-unix/X" + number;
+    if (path.size() >= sizeof(address.sun_path)) return false;
+    std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+    const int s = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (s < 0) return false;
+    const bool answers =
+        connect(s, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+    close(s);
+    return answers;
+}
+
+class Server {
+  public:
+    ~Server() {
+        if (child_ <= 0) return;
+        kill(child_, SIGTERM);
+        waitpid(child_, nullptr, 0);
+    }
+
+    Status start() {
+        int number_pipe[2];
+        if (pipe2(number_pipe, O_CLOEXEC) != 0) {
+            return Error{std::string("no pipe: ") + std::strerror(errno), "Xvfb", ""};
+        }
+        const pid_t parent = getpid();
+        child_ = fork();
+        if (child_ < 0)
+            return Error{std::string("no process: ") + std::strerror(errno), "Xvfb", ""};
+        if (child_ == 0) {
+            // Dies with us, also when we are killed.
+            prctl(PR_SET_PDEATHSIG, SIGTERM);
+            if (getppid() != parent) _exit(1);
+            dup2(number_pipe[1], 3);
+            const int nothing = open("/dev/null", O_RDWR);
+            dup2(nothing, 0);
+            dup2(nothing, 1);
+            dup2(nothing, 2);
+            execlp("Xvfb", "Xvfb", "-displayfd", "3", "-screen", "0", "1600x1200x24", "-nolisten",
+                   "tcp", static_cast<char*>(nullptr));
+            _exit(127);
+        }
+        close(number_pipe[1]);
+        std::string number;
+        char c;
+        pollfd wait{number_pipe[0], POLLIN, 0};
+        while (poll(&wait, 1, 20000) > 0 && read(number_pipe[0], &c, 1) == 1 && c != '\n')
+            number += c;
+        close(number_pipe[0]);
+        if (number.empty()) {
+            return Error{"there is no display, and Xvfb does not start", "pictures",
+                         "install the Debian package xvfb, or run under a display"};
+        }
+        setenv("DISPLAY", (":" + number).c_str(), 1);
+        return Done{};
+    }
+
+  private:
+    pid_t child_ = -1;
+};
+
+}  // namespace
+
+Status ensure_display() {
+    static Server server;
+    static const Status status = display_answers() ? Status(Done{}) : server.start();
+    return status;
+}
+
+}  // namespace sonocase::pipeline
