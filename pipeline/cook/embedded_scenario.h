@@ -1,0 +1,14 @@
+// scenarios/demo-torso, compiled in by CMake.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "formats/case_bundle.h"
+
+namespace sonocase::pipeline {
+
+std::string_view embedded_case_toml();
+std::vector<EmbeddedExercise> embedded_exercises();
+
+}  // namespace sonocase::pipeline

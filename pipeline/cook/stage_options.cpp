@@ -1,0 +1,147 @@
+#include "pipeline/cook/stage_options.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+#include "formats/nearest_name.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using Options = StageOptions;
+
+// The one table of keys. Sections are stages, in the order in which they run.
+const std::vector<OptionKey>& table() {
+    static const std::vector<OptionKey> keys{
+        {"surface", "working_mm", 0.5, 20, "mm", "voxel to which the body is averaged for its skin",
+         [](Options& o) -> OptionSlot { return &o.surface.working_mm; }},
+        {"surface", "smoothing_mm", 0, 20, "mm", "standard deviation of the skin's smoothing",
+         [](Options& o) -> OptionSlot { return &o.surface.smoothing_mm; }},
+        {"surface", "bridge_mm", 0, 100, "mm", "thinner sheets and bridges are not body",
+         [](Options& o) -> OptionSlot { return &o.surface.bridge_mm; }},
+        {"surface", "least_part", 0, 1, "", "of a slice's largest part: smaller ones are arms",
+         [](Options& o) -> OptionSlot { return &o.surface.least_part; }},
+        {"resample", "voxel_mm", 0.2, 10, "mm", "edge of the cooked voxels",
+         [](Options& o) -> OptionSlot { return &o.resample.voxel_mm; }},
+        {"resample", "margin_mm", 0, 50, "mm", "air kept round the body",
+         [](Options& o) -> OptionSlot { return &o.resample.margin_mm; }},
+        {"texture", "edge", 8, 128, "voxels", "of the solid textures; a power of two",
+         [](Options& o) -> OptionSlot { return &o.texture.bank.edge; }},
+        {"texture", "voxel_mm", 0.1, 4, "mm", "size of a texture voxel in tissue",
+         [](Options& o) -> OptionSlot { return &o.texture.bank.voxel_mm; }},
+        {"texture", "speckle_edge", 8, 256, "voxels", "of the speckle volume; a power of two",
+         [](Options& o) -> OptionSlot { return &o.texture.speckle_edge; }},
+        {"case", "seed", 0, 2e9, "", "of everything random in the case",
+         [](Options& o) -> OptionSlot { return &o.seed; }},
+    };
+    return keys;
+}
+
+constexpr PresetSetting kDraft[] = {{"resample.voxel_mm", "2"}, {"texture.edge", "32"}};
+constexpr PresetSetting kBalanced[] = {{"resample.voxel_mm", "1"}};
+constexpr PresetSetting kAccurate[] = {{"resample.voxel_mm", "0.75"}};
+
+std::string shortest(double value) {
+    char text[32];
+    const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+    return std::string(text, end);
+}
+
+}  // namespace
+
+std::span<const OptionKey> option_keys() { return table(); }
+
+const OptionKey* find_option_key(std::string_view section, std::string_view key) {
+    for (const OptionKey& entry : table())
+        if (section == entry.section && key == entry.key) return &entry;
+    return nullptr;
+}
+
+std::vector<std::string> option_sections() {
+    std::vector<std::string> sections;
+    for (const OptionKey& entry : table())
+        if (sections.empty() || sections.back() != entry.section) sections.push_back(entry.section);
+    return sections;
+}
+
+std::vector<std::string> option_names(std::string_view section) {
+    std::vector<std::string> names;
+    for (const OptionKey& entry : table())
+        if (section == entry.section) names.push_back(entry.key);
+    return names;
+}
+
+Status set_option(const OptionKey& key,
+                  const std::string& value,
+                  StageOptions& options,
+                  const std::string& where) {
+    const std::string name = std::string(key.section) + "." + key.key;
+    const auto bad = [&](const std::string& expected) {
+        return Error{"'" + value + "' for " + name, where, "expected " + expected};
+    };
+    return std::visit(
+        [&](auto* slot) -> Status {
+            using T = std::remove_pointer_t<decltype(slot)>;
+            if constexpr (std::is_same_v<T, bool>) {
+                if (value != "true" && value != "false") return bad("true or false");
+                *slot = value == "true";
+            } else if constexpr (std::is_same_v<T, std::string>) {
+                std::vector<std::string> choices;
+                for (std::string_view rest = key.choices; !rest.empty();) {
+                    const std::size_t bar = rest.find('|');
+                    choices.emplace_back(rest.substr(0, bar));
+                    rest = bar == std::string_view::npos ? std::string_view() : rest.substr(bar + 1);
+                }
+                bool known = choices.empty();
+                for (const std::string& choice : choices) known = known || choice == value;
+                if (!known) return bad(std::string(key.choices) + "; " + suggest_name(value, choices));
+                *slot = value;
+            } else {
+                double number = 0;
+                const auto [end, code] =
+                    std::from_chars(value.data(), value.data() + value.size(), number);
+                const bool whole = !std::is_same_v<T, double>;
+                if (code != std::errc() || end != value.data() + value.size() || !(number >= key.low) ||
+                    !(number <= key.high) || (whole && number != std::floor(number)))
+                    return bad(std::string(whole ? "a whole number" : "a number") + " from " +
+                               shortest(key.low) + " to " + shortest(key.high) +
+                               (*key.unit ? std::string(" ") + key.unit : std::string()));
+                *slot = static_cast<T>(number);
+            }
+            return Done{};
+        },
+        key.slot(options));
+}
+
+std::string option_value(const OptionKey& key, StageOptions& options) {
+    return std::visit(
+        [](auto* slot) -> std::string {
+            using T = std::remove_pointer_t<decltype(slot)>;
+            if constexpr (std::is_same_v<T, bool>) return *slot ? "true" : "false";
+            else if constexpr (std::is_same_v<T, std::string>) return *slot;
+            else if constexpr (std::is_same_v<T, double>) return shortest(*slot);
+            else return std::to_string(*slot);
+        },
+        key.slot(options));
+}
+
+std::string canonical_options(std::string_view section, const StageOptions& options) {
+    StageOptions copy = options;
+    std::string text;
+    for (const OptionKey& key : table())
+        if (section == key.section)
+            text += std::string(key.key) + "=" + option_value(key, copy) + "\n";
+    return text;
+}
+
+std::span<const PresetSetting> preset_settings(std::string_view preset) {
+    if (preset == "draft") return kDraft;
+    if (preset == "balanced") return kBalanced;
+    if (preset == "accurate") return kAccurate;
+    return {};
+}
+
+std::vector<std::string> preset_names() { return {"draft", "balanced", "accurate"}; }
+
+}  // namespace sonocase::pipeline
