@@ -29,11 +29,14 @@ std::string place(const std::string& path, const toml::source_region& source) {
 std::string text_of(const toml::node& node) {
     if (const auto text = node.value<std::string>(); node.is_string() && text) return *text;
     std::ostringstream out;
-    if (node.is_boolean()) out << (*node.value<bool>() ? "true" : "false");
-    else if (node.is_integer()) out << *node.value<std::int64_t>();
+    if (node.is_boolean())
+        out << (*node.value<bool>() ? "true" : "false");
+    else if (node.is_integer())
+        out << *node.value<std::int64_t>();
     else if (node.is_floating_point()) {
         char text[32];
-        out << std::string(text, std::to_chars(text, text + sizeof text, *node.value<double>()).ptr);
+        out << std::string(text,
+                           std::to_chars(text, text + sizeof text, *node.value<double>()).ptr);
     } else {
         out << "(a " << (node.is_array() ? "list" : "table") << ")";
     }
@@ -46,23 +49,29 @@ class RecipeParser {
     RecipeParser(Recipe& recipe, std::string path) : recipe_(recipe), path_(std::move(path)) {}
 
     Status parse(const toml::table& root, std::vector<std::string>* exercises) {
-        std::vector<std::string> known{"name", "title", "preset", "exercises", "inputs",
-                                       "analytic", "labels", "tissues"};
+        std::vector<std::string> known{"name",   "title",    "preset", "exercises",
+                                       "inputs", "analytic", "labels", "tissues"};
         for (const std::string& section : option_sections()) known.push_back(section);
         for (const auto& [key, node] : root) {
             const std::string name(key.str());
             Status status = Done{};
-            if (name == "name" || name == "title" || name == "preset") status = top_text(name, node);
-            else if (name == "exercises") status = texts(node, name, exercises);
+            if (name == "name" || name == "title" || name == "preset")
+                status = top_text(name, node);
+            else if (name == "exercises")
+                status = texts(node, name, exercises);
             else if (std::find(known.begin(), known.end(), name) == known.end())
                 status = unknown_key(name, key.source(), known);
             else if (!node.is_table())
                 status = Error{"'" + name + "' is no table", place(path_, node.source()),
                                "expected [" + name + "] with keys below it"};
-            else if (name == "inputs") status = inputs(*node.as_table());
-            else if (name == "analytic") status = analytic(*node.as_table());
-            else if (name == "labels") status = labels(*node.as_table());
-            else if (name == "tissues") status = tissues(*node.as_table());
+            else if (name == "inputs")
+                status = inputs(*node.as_table());
+            else if (name == "analytic")
+                status = analytic(*node.as_table());
+            else if (name == "labels")
+                status = labels(*node.as_table());
+            else if (name == "tissues")
+                status = tissues(*node.as_table());
             if (!status) return status;
         }
         return Done{};
@@ -103,7 +112,8 @@ class RecipeParser {
         *to = *node.value<std::string>();
         return Done{};
     }
-    Status number(const toml::node& node, const std::string& name, double low, double high, double* to) {
+    Status number(
+        const toml::node& node, const std::string& name, double low, double high, double* to) {
         const auto value = node.value<double>();
         if (!node.is_number() || !value || !(*value >= low) || !(*value <= high)) {
             std::ostringstream range;
@@ -113,7 +123,8 @@ class RecipeParser {
         *to = *value;
         return Done{};
     }
-    Status whole(const toml::node& node, const std::string& name, double low, double high, double* to) {
+    Status whole(
+        const toml::node& node, const std::string& name, double low, double high, double* to) {
         auto status = number(node, name, low, high, to);
         if (status && *to != std::floor(*to)) return wrong_type(name, node, "a whole number");
         return status;
@@ -148,20 +159,30 @@ class RecipeParser {
 
     Status inputs(const toml::table& table) {
         RecipeInputs& in = recipe_.inputs;
-        const std::vector<std::string> known{"labels",        "label_table", "labels_scale", "surface",
-                                             "surface_scale", "examples",    "landmarks",    "up"};
+        const std::vector<std::string> known{
+            "labels",        "label_table", "labels_scale", "surface",
+            "surface_scale", "examples",    "landmarks",    "up"};
         for (const auto& [key, node] : table) {
             const std::string name(key.str()), full = "inputs." + name;
             Status status = Done{};
-            if (name == "labels") status = text(node, full, &in.labels);
-            else if (name == "label_table") status = text(node, full, &in.label_table);
-            else if (name == "surface") status = text(node, full, &in.surface);
-            else if (name == "examples") status = text(node, full, &in.examples);
-            else if (name == "landmarks") status = text(node, full, &in.landmarks);
-            else if (name == "labels_scale") status = number(node, full, 1e-6, 1e6, &in.labels_scale);
-            else if (name == "surface_scale") status = number(node, full, 1e-6, 1e6, &in.surface_scale);
-            else if (name == "up") status = direction(node, full, &in.up);
-            else status = unknown_key(full, key.source(), known, name);
+            if (name == "labels")
+                status = text(node, full, &in.labels);
+            else if (name == "label_table")
+                status = text(node, full, &in.label_table);
+            else if (name == "surface")
+                status = text(node, full, &in.surface);
+            else if (name == "examples")
+                status = text(node, full, &in.examples);
+            else if (name == "landmarks")
+                status = text(node, full, &in.landmarks);
+            else if (name == "labels_scale")
+                status = number(node, full, 1e-6, 1e6, &in.labels_scale);
+            else if (name == "surface_scale")
+                status = number(node, full, 1e-6, 1e6, &in.surface_scale);
+            else if (name == "up")
+                status = direction(node, full, &in.up);
+            else
+                status = unknown_key(full, key.source(), known, name);
             if (!status) return status;
         }
         return Done{};
@@ -176,7 +197,8 @@ class RecipeParser {
             good = value.has_value() && std::isfinite(*value);
             if (good) v[axis] = *value;
         }
-        if (!good || !(norm(v) > 1e-9)) return wrong_type(name, node, "a direction of three numbers");
+        if (!good || !(norm(v) > 1e-9))
+            return wrong_type(name, node, "a direction of three numbers");
         *to = normalized(v);
         return Done{};
     }
@@ -184,23 +206,33 @@ class RecipeParser {
     Status analytic(const toml::table& table) {
         recipe_.inputs.analytic = true;
         AnalyticInput& in = recipe_.inputs.torso;
-        const std::vector<std::string> known{"voxel_mm", "slice_mm",    "points",      "noise_mm", "mesh",
-                                             "seed",     "front_only",  "strength",    "width_scale",
-                                             "depth_scale", "belly_mm", "examples"};
+        const std::vector<std::string> known{
+            "voxel_mm",   "slice_mm", "points",      "noise_mm",    "mesh",     "seed",
+            "front_only", "strength", "width_scale", "depth_scale", "belly_mm", "examples"};
         for (const auto& [key, node] : table) {
             const std::string name(key.str()), full = "analytic." + name;
             Status status = Done{};
             double value = 0;
-            if (name == "voxel_mm") status = number(node, full, 0.5, 10, &in.voxel_mm);
-            else if (name == "slice_mm") status = number(node, full, 0.5, 10, &in.slice_mm);
-            else if (name == "noise_mm") status = number(node, full, 0, 20, &in.mannequin.noise_mm);
-            else if (name == "strength") status = number(node, full, 0, 2, &in.mannequin.strength);
-            else if (name == "width_scale") status = number(node, full, 0.7, 1.4, &in.body.width_scale);
-            else if (name == "depth_scale") status = number(node, full, 0.7, 1.4, &in.body.depth_scale);
-            else if (name == "belly_mm") status = number(node, full, 0, 40, &in.body.belly_mm);
-            else if (name == "mesh") status = flag(node, full, &in.mannequin.mesh);
-            else if (name == "front_only") status = flag(node, full, &in.mannequin.front_only);
-            else if (name == "examples") status = text(node, full, &recipe_.inputs.examples);
+            if (name == "voxel_mm")
+                status = number(node, full, 0.5, 10, &in.voxel_mm);
+            else if (name == "slice_mm")
+                status = number(node, full, 0.5, 10, &in.slice_mm);
+            else if (name == "noise_mm")
+                status = number(node, full, 0, 20, &in.mannequin.noise_mm);
+            else if (name == "strength")
+                status = number(node, full, 0, 2, &in.mannequin.strength);
+            else if (name == "width_scale")
+                status = number(node, full, 0.7, 1.4, &in.body.width_scale);
+            else if (name == "depth_scale")
+                status = number(node, full, 0.7, 1.4, &in.body.depth_scale);
+            else if (name == "belly_mm")
+                status = number(node, full, 0, 40, &in.body.belly_mm);
+            else if (name == "mesh")
+                status = flag(node, full, &in.mannequin.mesh);
+            else if (name == "front_only")
+                status = flag(node, full, &in.mannequin.front_only);
+            else if (name == "examples")
+                status = text(node, full, &recipe_.inputs.examples);
             else if (name == "points") {
                 status = whole(node, full, 100, 1e6, &value);
                 in.mannequin.points = static_cast<int>(value);
@@ -217,8 +249,10 @@ class RecipeParser {
 
     Status labels(const toml::table& table) {
         for (const auto& [key, node] : table) {
-            LabelChoice choice{std::string(key.str()), "", static_cast<int>(key.source().begin.line)};
-            if (auto status = text(node, "labels." + choice.label, &choice.tissue); !status) return status;
+            LabelChoice choice{std::string(key.str()), "",
+                               static_cast<int>(key.source().begin.line)};
+            if (auto status = text(node, "labels." + choice.label, &choice.tissue); !status)
+                return status;
             recipe_.labels.push_back(std::move(choice));
         }
         std::sort(recipe_.labels.begin(), recipe_.labels.end(),
@@ -230,7 +264,10 @@ class RecipeParser {
         for (const auto& [key, node] : table) {
             const std::string name(key.str());
             const toml::table* fields = node.as_table();
-            if (fields == nullptr) return wrong_type("tissues." + name, node, "a table, [tissues." "x]");
+            if (fields == nullptr)
+                return wrong_type("tissues." + name, node,
+                                  "a table, [tissues."
+                                  "x]");
             if (auto status = tissue(name, *fields); !status) return status;
         }
         return Done{};
@@ -239,19 +276,31 @@ class RecipeParser {
     Status tissue(const std::string& name, const toml::table& fields) {
         std::vector<Tissue>& all = recipe_.tissues;
         const auto named = [&](const std::string& wanted) {
-            return std::find_if(all.begin(), all.end(), [&](const Tissue& t) { return t.name == wanted; });
+            return std::find_if(all.begin(), all.end(),
+                                [&](const Tissue& t) { return t.name == wanted; });
         };
-        const std::vector<std::string> known{
-            "like",         "kind",     "casts_shadow", "texture",      "grey_mean",
-            "grey_sd",      "echo_db",  "structure_db", "attenuation_db_cm_mhz",
-            "impedance_mrayl", "sound_speed_m_s", "source"};
+        const std::vector<std::string> known{"like",
+                                             "kind",
+                                             "casts_shadow",
+                                             "texture",
+                                             "grey_mean",
+                                             "grey_sd",
+                                             "echo_db",
+                                             "structure_db",
+                                             "attenuation_db_cm_mhz",
+                                             "impedance_mrayl",
+                                             "sound_speed_m_s",
+                                             "source"};
         Tissue tissue;
-        if (const auto found = named(name); found != all.end()) tissue = *found;
-        else tissue = *named("soft_tissue");
+        if (const auto found = named(name); found != all.end())
+            tissue = *found;
+        else
+            tissue = *named("soft_tissue");
         tissue.source = "recipe";
         if (const toml::node* like = fields.get("like")) {
             std::string other;
-            if (auto status = text(*like, "tissues." + name + ".like", &other); !status) return status;
+            if (auto status = text(*like, "tissues." + name + ".like", &other); !status)
+                return status;
             const auto found = named(other);
             if (found == all.end()) {
                 std::vector<std::string> names;
@@ -266,23 +315,36 @@ class RecipeParser {
             const std::string field(key.str()), full = "tissues." + name + "." + field;
             Status status = Done{};
             if (field == "like") continue;
-            if (field == "kind") status = kind(node, full, &tissue.kind);
-            else if (field == "casts_shadow") status = flag(node, full, &tissue.casts_shadow);
-            else if (field == "texture") status = text(node, full, &tissue.texture);
-            else if (field == "source") status = text(node, full, &tissue.source);
-            else if (field == "grey_mean") status = number(node, full, 0, 255, &tissue.grey_mean);
-            else if (field == "grey_sd") status = number(node, full, 0, 255, &tissue.grey_sd);
-            else if (field == "echo_db") status = number(node, full, -120, 60, &tissue.echo_db);
-            else if (field == "structure_db") status = number(node, full, 0, 30, &tissue.structure_db);
+            if (field == "kind")
+                status = kind(node, full, &tissue.kind);
+            else if (field == "casts_shadow")
+                status = flag(node, full, &tissue.casts_shadow);
+            else if (field == "texture")
+                status = text(node, full, &tissue.texture);
+            else if (field == "source")
+                status = text(node, full, &tissue.source);
+            else if (field == "grey_mean")
+                status = number(node, full, 0, 255, &tissue.grey_mean);
+            else if (field == "grey_sd")
+                status = number(node, full, 0, 255, &tissue.grey_sd);
+            else if (field == "echo_db")
+                status = number(node, full, -120, 60, &tissue.echo_db);
+            else if (field == "structure_db")
+                status = number(node, full, 0, 30, &tissue.structure_db);
             else if (field == "attenuation_db_cm_mhz")
                 status = number(node, full, 0, 100, &tissue.attenuation_db_cm_mhz);
-            else if (field == "impedance_mrayl") status = number(node, full, 0, 20, &tissue.impedance_mrayl);
-            else if (field == "sound_speed_m_s") status = number(node, full, 100, 6000, &tissue.sound_speed_m_s);
-            else status = unknown_key(full, key.source(), known, field);
+            else if (field == "impedance_mrayl")
+                status = number(node, full, 0, 20, &tissue.impedance_mrayl);
+            else if (field == "sound_speed_m_s")
+                status = number(node, full, 100, 6000, &tissue.sound_speed_m_s);
+            else
+                status = unknown_key(full, key.source(), known, field);
             if (!status) return status;
         }
-        if (const auto found = named(name); found != all.end()) *found = tissue;
-        else all.push_back(tissue);
+        if (const auto found = named(name); found != all.end())
+            *found = tissue;
+        else
+            all.push_back(tissue);
         return Done{};
     }
 
@@ -315,7 +377,8 @@ Status apply_sets(Recipe& recipe, const std::vector<std::string>& sets) {
         const OptionKey* key = dot == std::string::npos
                                    ? nullptr
                                    : find_option_key(name.substr(0, dot), name.substr(dot + 1));
-        if (key == nullptr) return Error{"unknown key '" + name + "'", "--set", suggest_name(name, known)};
+        if (key == nullptr)
+            return Error{"unknown key '" + name + "'", "--set", suggest_name(name, known)};
         if (auto status = set_option(*key, value, recipe.options, "--set"); !status) return status;
     }
     return Done{};
@@ -338,7 +401,8 @@ Status load_exercises(Recipe& recipe, const std::vector<std::string>& named) {
     std::vector<std::string> names = named;
     if (names.empty()) {
         std::error_code code;
-        for (const auto& entry : fs::directory_iterator(recipe.folder.empty() ? "." : recipe.folder, code))
+        for (const auto& entry :
+             fs::directory_iterator(recipe.folder.empty() ? "." : recipe.folder, code))
             if (entry.path().extension() == ".toml" && entry.path().filename() != "case.toml" &&
                 !fs::equivalent(entry.path(), recipe.path, code))
                 names.push_back(entry.path().stem().string());
@@ -381,8 +445,8 @@ Result<Recipe> parse_recipe(std::string_view text,
 
     const toml::parse_result parsed = toml::parse(text, path);
     if (!parsed)
-        return Error{std::string(parsed.error().description()), place(path, parsed.error().source()),
-                     "expected TOML"};
+        return Error{std::string(parsed.error().description()),
+                     place(path, parsed.error().source()), "expected TOML"};
     RecipeParser parser(recipe, path);
     std::vector<std::string> named;
     if (auto status = parser.parse(parsed.table(), &named); !status) return status.error();
@@ -404,8 +468,10 @@ Result<Recipe> parse_recipe(std::string_view text,
     if (recipe.name.empty()) recipe.name = fs::path(recipe.folder).filename().string();
     if (recipe.name.empty()) recipe.name = "case";
 
-    if (exercises != nullptr) recipe.exercises = *exercises;
-    else if (auto status = load_exercises(recipe, named); !status) return status.error();
+    if (exercises != nullptr)
+        recipe.exercises = *exercises;
+    else if (auto status = load_exercises(recipe, named); !status)
+        return status.error();
     for (const EmbeddedExercise& exercise : recipe.exercises) {
         const std::string where = (fs::path(recipe.folder) / (exercise.name + ".toml")).string();
         if (auto parsed_exercise = parse_exercise(exercise.toml, where); !parsed_exercise)
@@ -416,7 +482,8 @@ Result<Recipe> parse_recipe(std::string_view text,
 
 Result<Recipe> load_recipe(const std::string& path, const RecipeOverrides& overrides) {
     std::error_code code;
-    const std::string file = fs::is_directory(path, code) ? (fs::path(path) / "case.toml").string() : path;
+    const std::string file =
+        fs::is_directory(path, code) ? (fs::path(path) / "case.toml").string() : path;
     auto text = read_text_file(file);
     if (!text) return text.error();
     return parse_recipe(*text, file, overrides, nullptr);

@@ -31,12 +31,12 @@ namespace sonocase::pipeline {
 
 struct RecipeInputs {
     bool analytic = false;
-    AnalyticInput torso;        // where analytic
-    std::string labels;         // as the recipe names them; resolve() finds the file
+    AnalyticInput torso;  // where analytic
+    std::string labels;   // as the recipe names them; resolve() finds the file
     std::string label_table;
     std::string surface;
-    std::string examples;       // folder of ultrasound patches; empty: synthetic examples
-    std::string landmarks;      // CSV of name,ct_x,ct_y,ct_z,x,y,z
+    std::string examples;   // folder of ultrasound patches; empty: synthetic examples
+    std::string landmarks;  // CSV of name,ct_x,ct_y,ct_z,x,y,z
     double labels_scale = 1;
     double surface_scale = 1;
     std::optional<Vector3> up;  // the patient's head direction in the surface's frame
@@ -57,7 +57,8 @@ struct Recipe {
     std::string preset = "balanced";
     RecipeInputs inputs;
     std::vector<LabelChoice> labels;
-    std::vector<Tissue> tissues;  // built-in ones with the recipe's changes, and its own; [0] outside
+    std::vector<Tissue>
+        tissues;  // built-in ones with the recipe's changes, and its own; [0] outside
     StageOptions options;
     std::vector<EmbeddedExercise> exercises;  // parsed and found good
 

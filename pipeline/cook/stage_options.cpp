@@ -50,7 +50,9 @@ std::string shortest(double value) {
 
 }  // namespace
 
-std::span<const OptionKey> option_keys() { return table(); }
+std::span<const OptionKey> option_keys() {
+    return table();
+}
 
 const OptionKey* find_option_key(std::string_view section, std::string_view key) {
     for (const OptionKey& entry : table())
@@ -91,19 +93,22 @@ Status set_option(const OptionKey& key,
                 for (std::string_view rest = key.choices; !rest.empty();) {
                     const std::size_t bar = rest.find('|');
                     choices.emplace_back(rest.substr(0, bar));
-                    rest = bar == std::string_view::npos ? std::string_view() : rest.substr(bar + 1);
+                    rest =
+                        bar == std::string_view::npos ? std::string_view() : rest.substr(bar + 1);
                 }
                 bool known = choices.empty();
                 for (const std::string& choice : choices) known = known || choice == value;
-                if (!known) return bad(std::string(key.choices) + "; " + suggest_name(value, choices));
+                if (!known)
+                    return bad(std::string(key.choices) + "; " + suggest_name(value, choices));
                 *slot = value;
             } else {
                 double number = 0;
                 const auto [end, code] =
                     std::from_chars(value.data(), value.data() + value.size(), number);
                 const bool whole = !std::is_same_v<T, double>;
-                if (code != std::errc() || end != value.data() + value.size() || !(number >= key.low) ||
-                    !(number <= key.high) || (whole && number != std::floor(number)))
+                if (code != std::errc() || end != value.data() + value.size() ||
+                    !(number >= key.low) || !(number <= key.high) ||
+                    (whole && number != std::floor(number)))
                     return bad(std::string(whole ? "a whole number" : "a number") + " from " +
                                shortest(key.low) + " to " + shortest(key.high) +
                                (*key.unit ? std::string(" ") + key.unit : std::string()));
@@ -118,10 +123,14 @@ std::string option_value(const OptionKey& key, StageOptions& options) {
     return std::visit(
         [](auto* slot) -> std::string {
             using T = std::remove_pointer_t<decltype(slot)>;
-            if constexpr (std::is_same_v<T, bool>) return *slot ? "true" : "false";
-            else if constexpr (std::is_same_v<T, std::string>) return *slot;
-            else if constexpr (std::is_same_v<T, double>) return shortest(*slot);
-            else return std::to_string(*slot);
+            if constexpr (std::is_same_v<T, bool>)
+                return *slot ? "true" : "false";
+            else if constexpr (std::is_same_v<T, std::string>)
+                return *slot;
+            else if constexpr (std::is_same_v<T, double>)
+                return shortest(*slot);
+            else
+                return std::to_string(*slot);
         },
         key.slot(options));
 }
@@ -142,6 +151,8 @@ std::span<const PresetSetting> preset_settings(std::string_view preset) {
     return {};
 }
 
-std::vector<std::string> preset_names() { return {"draft", "balanced", "accurate"}; }
+std::vector<std::string> preset_names() {
+    return {"draft", "balanced", "accurate"};
+}
 
 }  // namespace sonocase::pipeline

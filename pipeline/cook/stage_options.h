@@ -44,8 +44,8 @@ using OptionSlot = std::variant<double*, int*, bool*, std::uint64_t*, std::strin
 struct OptionKey {
     const char* section;
     const char* key;
-    double low, high;      // of numbers
-    const char* unit;      // "mm", "" for none
+    double low, high;  // of numbers
+    const char* unit;  // "mm", "" for none
     const char* meaning;
     OptionSlot (*slot)(StageOptions& options);
     const char* choices = "";  // of strings: "a|b|c"
@@ -56,7 +56,8 @@ const OptionKey* find_option_key(std::string_view section, std::string_view key)
 std::vector<std::string> option_sections();
 std::vector<std::string> option_names(std::string_view section);
 
-// Sets one option from text ("1.5", "true", "matched"). An Error says what was expected, with `where`.
+// Sets one option from text ("1.5", "true", "matched"). An Error says what was expected, with
+// `where`.
 Status set_option(const OptionKey& key,
                   const std::string& value,
                   StageOptions& options,

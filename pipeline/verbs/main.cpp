@@ -25,7 +25,13 @@ struct Verb {
 [[maybe_unused]] constexpr const char* kSession = "Trackers and sessions";
 
 const std::vector<Verb>& verbs() {
-    static const std::vector<Verb> table{};
+    static const std::vector<Verb> table{
+        {kCase, "build", "cook a recipe into a case bundle", verb_build},
+        {kCase, "inspect", "show what a bundle holds", verb_inspect},
+        {kCase, "validate", "check a bundle", verb_validate},
+        {kStage, "import", "read a label map of any kind", verb_import},
+        {kStage, "pack", "put the stages' files into a bundle", verb_pack},
+    };
     return table;
 }
 

@@ -1,8 +1,8 @@
 // The verbs of the program sonocase. Each is a thin call to one stage or subject.
 //
-// argv[0] is the verb's own name. Returns the exit status: 0 done, 1 failed with one line on standard
-// error, 2 wrong usage. To add one: write verb_<name>.cpp, declare it here, list the file in
-// CMakeLists.txt and the verb in the table in main.cpp. The shape of all of them:
+// argv[0] is the verb's own name. Returns the exit status: 0 done, 1 failed with one line on
+// standard error, 2 wrong usage. To add one: write verb_<name>.cpp, declare it here, list the file
+// in CMakeLists.txt and the verb in the table in main.cpp. The shape of all of them:
 //
 //     int verb_align(int argc, char** argv) {
 //         CLI::App app("Find the rigid motion that lays the skin on the mannequin");
@@ -21,11 +21,17 @@
 //         return kDone;
 //     }
 //
-// Files between the stages: label volumes are .seg.nrrd (any label map is read), surfaces PLY,
-// registrations JSON; boundary records, echo offsets and textures travel in a part bundle: a
-// *.sonocase of which only the fields that the stage made are filled. pack merges the parts.
+// Files between the stages are those of formats/stage_files.h (.labels, .textures, .surface) and
+// formats/registration_file.h (JSON). A stage file holds no seconds, so that the same inputs give
+// the same bytes; they go to --report.
 #pragma once
 
 namespace sonocase::pipeline {
+
+int verb_build(int argc, char** argv);
+int verb_import(int argc, char** argv);
+int verb_inspect(int argc, char** argv);
+int verb_pack(int argc, char** argv);
+int verb_validate(int argc, char** argv);
 
 }  // namespace sonocase::pipeline

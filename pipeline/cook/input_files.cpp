@@ -1,0 +1,37 @@
+#include "pipeline/cook/input_files.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <vector>
+
+#include "formats/digest.h"
+
+namespace sonocase::pipeline {
+
+namespace fs = std::filesystem;
+
+Result<std::string> digest_of_input(const std::string& path) {
+    std::error_code code;
+    if (!fs::exists(path, code)) return Error{"no such file or folder", path, "check the path"};
+    if (!fs::is_directory(path, code)) return digest_of_file(path);
+    std::vector<std::string> files;
+    for (auto it = fs::recursive_directory_iterator(path, code);
+         !code && it != fs::recursive_directory_iterator(); it.increment(code)) {
+        std::error_code item_code;
+        if (it->is_regular_file(item_code))
+            files.push_back(fs::relative(it->path(), path, item_code).generic_string());
+    }
+    if (code)
+        return Error{"cannot list the folder: " + code.message(), path,
+                     "check that it may be read"};
+    std::sort(files.begin(), files.end());
+    Digest digest;
+    for (const std::string& file : files) {
+        auto one = digest_of_file((fs::path(path) / file).string());
+        if (!one) return one.error();
+        digest.add(std::string_view(file)).add(std::string_view(*one));
+    }
+    return digest.hex();
+}
+
+}  // namespace sonocase::pipeline

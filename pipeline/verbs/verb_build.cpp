@@ -1,0 +1,144 @@
+// sonocase build: a recipe becomes a case bundle.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "formats/atomic_file.h"
+#include "formats/digest.h"
+#include "pipeline/cook/cook_case.h"
+#include "pipeline/files.h"
+#include "pipeline/parallel.h"
+#include "pipeline/verbs/build_facts.h"
+#include "pipeline/verbs/command_line.h"
+#include "pipeline/verbs/verbs.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+struct BuildOptions {
+    std::string recipe;
+    std::string out;
+    std::string cache;
+    double cache_limit_mb = 0;
+    bool list_keys = false;
+    RecipeOverrides overrides;
+    CommonOptions common;
+};
+
+void print_keys() {
+    StageOptions defaults;
+    std::string section;
+    for (const OptionKey& key : option_keys()) {
+        if (section != key.section) {
+            section = key.section;
+            std::printf("[%s]\n", key.section);
+        }
+        const std::string value = option_value(key, defaults);
+        if (*key.choices)
+            std::printf("  %-22s %-10s %s; %s\n", key.key, value.c_str(), key.meaning, key.choices);
+        else
+            std::printf("  %-22s %-10s %s; %g to %g %s\n", key.key, value.c_str(), key.meaning,
+                        key.low, key.high, key.unit);
+    }
+}
+
+// What a build reports: the stages as they ran, and which of them came from the cache.
+std::string build_report(const CookResult& cooked,
+                         const std::string& out,
+                         const std::string& digest,
+                         std::size_t bytes,
+                         double seconds) {
+    nlohmann::ordered_json json;
+    json["bundle"] = out;
+    json["digest"] = digest;
+    json["bytes"] = bytes;
+    json["seconds"] = seconds;
+    json["stages"] = nlohmann::ordered_json::array();
+    json["warnings"] = nlohmann::ordered_json::array();
+    for (const StageRun& run : cooked.stages) {
+        auto stage = nlohmann::ordered_json::parse(report_json(run.report));
+        stage["from_cache"] = run.from_cache;
+        if (!run.key.empty()) stage["key"] = run.key;
+        json["stages"].push_back(stage);
+        for (const std::string& warning : run.report.warnings)
+            json["warnings"].push_back(run.report.stage + ": " + warning);
+    }
+    return json.dump(2) + "\n";
+}
+
+int build(const BuildOptions& options) {
+    const Stopwatch watch;
+    const ThreadLimit limit(options.common.threads);
+    auto recipe = options.recipe.empty() ? embedded_recipe(options.overrides)
+                                         : load_recipe(options.recipe, options.overrides);
+    if (!recipe) return fail("build", recipe.error());
+    const std::string out = options.out.empty() ? recipe->name + ".sonocase" : options.out;
+    CookOptions cook;
+    cook.cache_folder = options.cache;
+    cook.cache_bytes = static_cast<std::uint64_t>(options.cache_limit_mb * 1e6);
+    cook.producer = producer();
+    Result<CookResult> cooked = Error{};
+    {
+        ProgressBar bar(options.common);
+        cooked = cook_case(*recipe, cook, bar.progress());
+    }
+    if (!cooked) return fail("build", cooked.error());
+    const std::vector<std::uint8_t> bytes = write_bundle(cooked->bundle);
+    if (auto status = pipeline::write_file(out, bytes); !status)
+        return fail("build", status.error());
+    for (const StageRun& run : cooked->stages) print_warnings("build", run.report);
+    const std::string report =
+        build_report(*cooked, out, digest_of(bytes), bytes.size(), watch.seconds());
+    // Beside the bundle, for inspect: the seconds are no part of the bundle, whose bytes they would
+    // change from run to run.
+    for (const std::string& path : {out + ".report.json", options.common.report_path})
+        if (!path.empty())
+            if (auto status = write_text_file(path, report); !status)
+                return fail("build", status.error());
+    std::printf("%s  %.1f MB, %d x %d x %d voxels of %g mm, %zu labels, %.1f s\n", out.c_str(),
+                static_cast<double>(bytes.size()) / 1e6, cooked->bundle.grid.size.x,
+                cooked->bundle.grid.size.y, cooked->bundle.grid.size.z,
+                cooked->bundle.grid.spacing_mm.x, cooked->bundle.labels.size() - 1,
+                watch.seconds());
+    return kDone;
+}
+
+}  // namespace
+
+int verb_build(int argc, char** argv) {
+    CLI::App app("Cook a recipe into a case bundle");
+    BuildOptions options;
+    app.add_option(
+        "RECIPE", options.recipe,
+        "case.toml or its folder; without one the embedded demonstration torso is cooked");
+    app.add_option("-o,--output", options.out, "Bundle to write; NAME.sonocase by default")
+        ->type_name("OUT");
+    app.add_option("--data", options.overrides.data,
+                   "Folder that the recipe's input paths start from")
+        ->type_name("DIR");
+    app.add_option("--set", options.overrides.sets, "Set an option of a stage; may be repeated")
+        ->type_name("SECTION.KEY=VALUE")
+        ->expected(1)
+        ->take_all();
+    app.add_option("--preset", options.overrides.preset,
+                   "draft, balanced or accurate; the recipe's own by default")
+        ->type_name("NAME");
+    app.add_option("--cache", options.cache, "Folder of finished stage results; may be shared")
+        ->type_name("DIR");
+    app.add_option("--cache-limit-mb", options.cache_limit_mb,
+                   "Bound of the cache folder; 0 means none")
+        ->check(CLI::NonNegativeNumber)
+        ->type_name("MB");
+    app.add_flag("--list-options", options.list_keys,
+                 "Print every option key with default and range");
+    add_common_options(app, options.common);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    if (options.list_keys) {
+        print_keys();
+        return kDone;
+    }
+    return build(options);
+}
+
+}  // namespace sonocase::pipeline

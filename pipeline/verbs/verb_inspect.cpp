@@ -1,0 +1,81 @@
+// sonocase inspect and sonocase validate: what a bundle holds, and whether it is sound.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "formats/digest.h"
+#include "pipeline/cook/inspect_case.h"
+#include "pipeline/files.h"
+#include "pipeline/verbs/command_line.h"
+#include "pipeline/verbs/verbs.h"
+
+namespace sonocase::pipeline {
+
+int verb_inspect(int argc, char** argv) {
+    CLI::App app(
+        "Show what a bundle holds: grid, labels, tissues, errors and seconds of each stage");
+    std::string path;
+    bool json = false;
+    CommonOptions common;
+    app.add_option("BUNDLE", path, "The bundle")->required();
+    app.add_flag("--json", json, "As JSON, in the documented form");
+    add_common_options(app, common);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    auto bytes = read_file(path);
+    if (!bytes) return fail("inspect", bytes.error());
+    auto bundle = read_bundle(*bytes, path, common.threads);
+    if (!bundle) return fail("inspect", bundle.error());
+    Inspection inspection{path, digest_of(*bytes), bytes->size(), {}};
+    inspection.seconds = recorded_seconds(*bundle, path, inspection.digest);
+    const std::string text =
+        json ? inspection_json(*bundle, inspection) : inspection_text(*bundle, inspection);
+    std::fputs(text.c_str(), stdout);
+    if (!common.report_path.empty())
+        if (auto status = write_text_file(common.report_path, inspection_json(*bundle, inspection));
+            !status)
+            return fail("inspect", status.error());
+    return kDone;
+}
+
+int verb_validate(int argc, char** argv) {
+    CLI::App app("Check bundles from the first byte to the last exercise");
+    std::vector<std::string> paths;
+    bool json = false;
+    CommonOptions common;
+    app.add_option("BUNDLE", paths, "One or more bundles")->required();
+    app.add_flag("--json", json, "As JSON: [{bundle, valid, errors, remarks}]");
+    add_common_options(app, common);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    nlohmann::ordered_json all = nlohmann::ordered_json::array();
+    bool all_valid = true;
+    for (const std::string& path : paths) {
+        nlohmann::ordered_json errors = nlohmann::ordered_json::array();
+        nlohmann::ordered_json remarks = nlohmann::ordered_json::array();
+        auto bundle = load_bundle(path);
+        if (!bundle)
+            errors.push_back(bundle.error().message());
+        else
+            for (const Finding& finding : validate_case(*bundle))
+                (finding.error ? errors : remarks).push_back(finding.text);
+        const bool valid = errors.empty();
+        all_valid = all_valid && valid;
+        if (!json) {
+            std::printf("%s: %s\n", path.c_str(), valid ? "valid" : "not valid");
+            for (const auto& remark : remarks)
+                std::printf("  remark: %s\n", remark.get<std::string>().c_str());
+        }
+        for (const auto& error : errors)
+            std::fprintf(
+                stderr, "sonocase validate: %s\n",
+                (bundle ? path + ": " : std::string()).append(error.get<std::string>()).c_str());
+        all.push_back(
+            {{"bundle", path}, {"valid", valid}, {"errors", errors}, {"remarks", remarks}});
+    }
+    if (json) std::printf("%s\n", all.dump(2).c_str());
+    if (!common.report_path.empty())
+        if (auto status = write_text_file(common.report_path, all.dump(2) + "\n"); !status)
+            return fail("validate", status.error());
+    return all_valid ? kDone : kFailed;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,120 @@
+// sonocase pack: the files of the stages become one bundle.
+#include <CLI/CLI.hpp>
+
+#include "formats/atomic_file.h"
+#include "formats/registration_file.h"
+#include "formats/stage_files.h"
+#include "pipeline/cook/pack_case.h"
+#include "pipeline/import/surface_file.h"
+#include "pipeline/texture/tissue_table.h"
+#include "pipeline/verbs/build_facts.h"
+#include "pipeline/verbs/command_line.h"
+#include "pipeline/verbs/verbs.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+struct PackFiles {
+    std::string labels, textures, mannequin, skin, registration, out, name;
+    std::vector<std::string> exercises;
+};
+
+// A .surface of ours, or any surface file.
+Result<Surface> load_any_surface(const std::string& path) {
+    if (!path.ends_with(".surface")) return import_surface(path);
+    auto file = load_surface_file(path);
+    if (!file) return file.error();
+    return std::move(file->surface);
+}
+
+Result<PackResult> pack(const PackFiles& files) {
+    auto labels = load_label_file(files.labels);
+    if (!labels) return labels.error();
+    if (labels->frame != "mannequin")
+        return Error{"labels are in the frame '" + labels->frame + "'", files.labels,
+                     "expected resampled labels, in the frame 'mannequin'"};
+    auto textures = load_texture_file(files.textures);
+    if (!textures) return textures.error();
+    auto mannequin = load_any_surface(files.mannequin);
+    if (!mannequin) return mannequin.error();
+    std::vector<EmbeddedExercise> exercises;
+    for (const std::string& path : files.exercises) {
+        auto text = sonocase::read_text_file(path);
+        if (!text) return text.error();
+        std::string name = path.substr(path.rfind('/') + 1);
+        if (name.ends_with(".toml")) name.resize(name.size() - 5);
+        exercises.push_back({name, std::move(*text)});
+    }
+    Surface skin;
+    Registration registration;
+    const bool has_skin = !files.skin.empty();
+    if (has_skin) {
+        auto loaded = load_any_surface(files.skin);
+        if (!loaded) return loaded.error();
+        skin = std::move(*loaded);
+        auto fit = load_registration(files.registration);
+        if (!fit) return fit.error();
+        registration = std::move(*fit);
+    }
+    std::vector<Tissue> tissues = textures->tissues;
+    if (tissues.empty()) {
+        const auto built_in = built_in_tissues();
+        tissues.assign(built_in.begin(), built_in.end());
+    }
+    auto packed =
+        pack_case({files.name, "", exercises, has_skin ? &skin : nullptr,
+                   has_skin ? &registration : nullptr, *mannequin, *labels, *textures, tissues});
+    if (!packed) return packed;
+    auto& stages = packed->bundle.manifest.stages;
+    for (const auto* reports : {&labels->reports, &textures->reports})
+        stages.insert(stages.end(), reports->begin(), reports->end());
+    if (has_skin)
+        stages.insert(stages.begin(), registration.reports.begin(), registration.reports.end());
+    stages.push_back(packed->report);
+    for (StageReport& report : stages) report.seconds = 0;
+    packed->bundle.manifest.producer = producer();
+    return packed;
+}
+
+}  // namespace
+
+int verb_pack(int argc, char** argv) {
+    CLI::App app("Pack the files of the stages into a case bundle");
+    PackFiles files;
+    CommonOptions common;
+    app.add_option("--labels", files.labels,
+                   "Cooked labels, with boundary records and echo offsets")
+        ->type_name("FILE.labels")
+        ->required();
+    app.add_option("--textures", files.textures, "Texture bank")
+        ->type_name("FILE.textures")
+        ->required();
+    app.add_option("--surface", files.mannequin, "The mannequin, as digitised")
+        ->type_name("FILE")
+        ->required();
+    auto* skin =
+        app.add_option("--skin", files.skin, "The patient's skin, ct frame")->type_name("FILE");
+    auto* fit = app.add_option("--registration", files.registration, "The fit that maps it")
+                    ->type_name("REG.json");
+    skin->needs(fit);
+    fit->needs(skin);
+    app.add_option("--exercise", files.exercises, "Exercise to put in; may be repeated")
+        ->type_name("FILE.toml")
+        ->take_all();
+    app.add_option("--name", files.name, "Of the case")->default_val("case");
+    app.add_option("-o,--output", files.out, "Bundle to write")
+        ->type_name("OUT.sonocase")
+        ->required();
+    add_common_options(app, common);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    auto packed = pack(files);
+    if (!packed) return fail("pack", packed.error());
+    print_warnings("pack", packed->report);
+    if (auto status = save_bundle(packed->bundle, files.out); !status)
+        return fail("pack", status.error());
+    if (auto status = write_report(common, packed->report); !status)
+        return fail("pack", status.error());
+    return kDone;
+}
+
+}  // namespace sonocase::pipeline
