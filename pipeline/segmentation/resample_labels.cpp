@@ -1,11 +1,64 @@
 #include "pipeline/segmentation/resample_labels.h"
 
+#include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "pipeline/segmentation/cooked_grid.h"
+#include "pipeline/segmentation/label_field.h"
+#include "pipeline/segmentation/label_prices.h"
 #include "pipeline/segmentation/nearest_labels.h"
+#include "pipeline/segmentation/read_field.h"
 
 namespace sonocase::pipeline {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+FieldRead through_field(const ResampleInput& input,
+                        const ResampleOptions& options,
+                        const Grid& grid,
+                        const Progress& progress,
+                        StageReport* report) {
+    auto start = Clock::now();
+    const auto lap = [&](const char* name) {
+        report->measures.push_back({name, seconds_since(start)});
+        start = Clock::now();
+    };
+    LabelFieldOptions field_options;
+    field_options.distance = {.sigma_vx = options.sigma_vx,
+                              .sigma_slices = options.sigma_slices,
+                              .follow_shift = options.follow_shift};
+    LabelField field(input.ct_labels, field_options, progress);
+    lap("distance_seconds");
+    const Registration registration = with_voxel_rim(input.registration, input.ct_labels.grid);
+    LabelPriceOptions price_options;
+    price_options.iterations = options.volume_iterations;
+    const LabelPriceReport prices = set_label_prices(
+        &field, [&](Point3 ct) { return determinant(jacobian(registration, ct)); }, price_options);
+    lap("volume_seconds");
+    const InverseMap inverse_map(registration);
+    FieldMap map;
+    map.row = [&](int j, int k, float* x, float* y, float* z, MapStatus* status) {
+        inverse_map.invert_row(
+            grid.point_from_voxel({0, static_cast<double>(j), static_cast<double>(k)}),
+            grid.spacing_mm.x * grid.direction.column(0), grid.size.x, x, y, z, status);
+    };
+    map.jacobian = [&](Point3 ct) { return inverse(jacobian(registration, ct)); };
+    map.forward = [&](Point3 ct) { return mannequin_from_ct(registration, ct); };
+    FieldRead read = read_field(field, grid, map, {options.record_band_vx}, progress);
+    lap("voxel_seconds");
+    report->measures.push_back({"slice_factor", static_cast<double>(field.factor())});
+    report->measures.push_back({"volume_steps", static_cast<double>(prices.iterations)});
+    report->measures.push_back({"volume_miss", prices.largest_miss});
+    return read;
+}
+
+}  // namespace
 
 Result<ResampleResult> resample_labels(const ResampleInput& input,
                                        const ResampleOptions& options,
@@ -16,18 +69,37 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
     if (!grid) return grid.error();
     ResampleResult result;
     PreimageCounts counts;
-    result.volume = nearest_labels(input.ct_labels, input.registration, *grid, &counts, progress);
+    std::vector<int> rescued;
+    result.report.stage = "resample";
+    result.report.version = 2;
+    result.report.measures = {{"voxel_mm", options.voxel_mm},
+                              {"voxels", static_cast<double>(grid->voxel_count())}};
+    if (options.method == ResampleMethod::nearest) {
+        result.volume =
+            nearest_labels(input.ct_labels, input.registration, *grid, &counts, progress);
+    } else {
+        FieldRead read = through_field(input, options, *grid, progress, &result.report);
+        result.volume = std::move(read.volume);
+        result.boundary = std::move(read.boundary);
+        counts = read.counts;
+        rescued = std::move(read.rescued);
+    }
     result.changes = compare_volumes(input.ct_labels.labels,
                                      mapped_volumes_ml(input.ct_labels, input.registration),
                                      label_volumes_ml(result.volume));
-    result.report.stage = "resample";
-    result.report.measures = {{"voxel_mm", options.voxel_mm},
-                              {"voxels", static_cast<double>(grid->voxel_count())},
-                              {"outside_voxels", static_cast<double>(counts.outside)},
-                              {"no_preimage_voxels", static_cast<double>(counts.no_preimage)}};
+    for (LabelChange& c : result.changes) {
+        if (std::find(rescued.begin(), rescued.end(), c.label) != rescued.end()) {
+            c.note = "smaller than a voxel, kept as one";
+        } else if (c.lost()) {
+            c.note = options.method == ResampleMethod::nearest ? "no voxel centre falls on it"
+                                                               : "its place lies outside the grid";
+        }
+    }
+    result.report.measures.push_back({"outside_voxels", static_cast<double>(counts.outside)});
+    result.report.measures.push_back(
+        {"no_preimage_voxels", static_cast<double>(counts.no_preimage)});
     report_changes(result.changes, 0.2, &result.report);
-    result.report.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    result.report.seconds = seconds_since(started);
     return result;
 }
 

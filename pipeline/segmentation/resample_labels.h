@@ -1,5 +1,15 @@
 // From the patient to the mannequin: a label map on any grid in `ct`, through the inverse of the
 // fitted map, into cubic voxels in `mannequin`.
+//
+// shape    the labels become one smooth partition of space (label_field.h): thick slices
+// interpolated
+//          by shape, steps smoothed, every label at its own volume (label_prices.h). It is read at
+//          the preimage of each voxel, and near a surface a boundary record says where it runs
+//          inside the voxels.
+// nearest  the paper's: the label of the nearest CT voxel; no records.
+//
+// Labels whose anatomy is smaller than a voxel are kept as one voxel and named in the report.
+// Cost: real torso (1.4 M voxels of 3 mm, 63 labels) into 1 mm about 4 s of processor time.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +30,17 @@ struct ResampleInput {
     const Registration& registration;
 };
 
+enum class ResampleMethod { shape, nearest };
+
 struct ResampleOptions {
     double voxel_mm = 1;   // edge of the cubic voxels, [0.2, 10]
     double margin_mm = 4;  // air kept round the body
+    ResampleMethod method = ResampleMethod::shape;
+    double sigma_vx = 1;          // shape: smoothing, voxels of the map in the plane, [0, 4]
+    double sigma_slices = 0;      // shape: along thick slices, slices; 0: as in the plane, in mm
+    int volume_iterations = 8;    // shape: Newton steps of the volumes, [0, 50]; 0: not kept
+    bool follow_shift = true;     // shape: oblique vessels through thick slices
+    double record_band_vx = 1.5;  // shape: boundary records up to this distance, [0, 2.6]; 0: none
 };
 
 struct ResampleResult {

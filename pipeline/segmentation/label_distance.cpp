@@ -1,0 +1,302 @@
+#include "pipeline/segmentation/label_distance.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonocase::pipeline {
+namespace {
+
+// K of the header, in voxels, normalised; size odd. Empty for sigma = 0.
+std::vector<float> smoothing_kernel(double sigma) {
+    if (sigma <= 0) return {};
+    const double a = 2 + 1 / (3 * sigma * sigma);
+    const int reach = std::max(2, static_cast<int>(std::ceil(3.2 * sigma)));
+    std::vector<double> gauss(static_cast<std::size_t>(2 * reach + 1));
+    double sum = 0;
+    for (int i = -reach; i <= reach; ++i) {
+        const double g = std::exp(-0.5 * i * i / (sigma * sigma));
+        gauss[static_cast<std::size_t>(i + reach)] = g;
+        sum += g;
+    }
+    for (double& g : gauss) g /= sum;
+    std::vector<double> kernel(static_cast<std::size_t>(4 * reach + 1));
+    for (std::size_t i = 0; i < gauss.size(); ++i) {
+        kernel[i + static_cast<std::size_t>(reach)] += a * gauss[i];
+        for (std::size_t j = 0; j < gauss.size(); ++j)
+            kernel[i + j] -= (a - 1) * gauss[i] * gauss[j];
+    }
+    // Ends below a thousandth are cut; what is left is brought back to a sum of 1.
+    std::size_t cut = 0;
+    while (cut + 1 < kernel.size() / 2 && std::abs(kernel[cut]) < 1e-3) ++cut;
+    std::vector<float> out;
+    double kept = 0;
+    for (std::size_t i = cut; i + cut < kernel.size(); ++i) kept += kernel[i];
+    for (std::size_t i = cut; i + cut < kernel.size(); ++i)
+        out.push_back(static_cast<float>(kernel[i] / kept));
+    return out;
+}
+
+// out[l] = sum_m kernel[m] in[l + m - reach], lines of `width` values; the border is replicated.
+void smooth_lines(const float* in,
+                  std::size_t width,
+                  int lines,
+                  std::size_t stride,
+                  const std::vector<float>& kernel,
+                  float* out) {
+    const int reach = static_cast<int>(kernel.size() / 2);
+    for (int l = 0; l < lines; ++l) {
+        float* to = out + static_cast<std::size_t>(l) * stride;
+        std::fill(to, to + width, 0.0f);
+        for (int m = -reach; m <= reach; ++m) {
+            const float* from =
+                in + static_cast<std::size_t>(std::clamp(l + m, 0, lines - 1)) * stride;
+            const float k = kernel[static_cast<std::size_t>(m + reach)];
+            for (std::size_t i = 0; i < width; ++i) to[i] += k * from[i];
+        }
+    }
+}
+
+void smooth_rows(
+    const float* in, int count, std::size_t rows, const std::vector<float>& kernel, float* out) {
+    const int reach = static_cast<int>(kernel.size() / 2);
+    std::vector<float> padded(static_cast<std::size_t>(count + 2 * reach));
+    for (std::size_t r = 0; r < rows; ++r) {
+        const float* row = in + r * static_cast<std::size_t>(count);
+        float* to = out + r * static_cast<std::size_t>(count);
+        std::fill(padded.begin(), padded.begin() + reach, row[0]);
+        std::copy(row, row + count, padded.begin() + reach);
+        std::fill(padded.end() - reach, padded.end(), row[count - 1]);
+        std::fill(to, to + count, 0.0f);
+        for (std::size_t m = 0; m < kernel.size(); ++m) {
+            const float k = kernel[m];
+            const float* from = padded.data() + m;
+            for (int i = 0; i < count; ++i) to[i] += k * from[i];
+        }
+    }
+}
+
+// Distance field of one outline alone, on a window of its slice.
+struct OutlineField {
+    VoxelBox window;
+    std::vector<float> phi;
+    float deepest = 0;  // mm, > 0
+
+    float at(double x, double y) const {  // pixels of the slice; clamped to the window
+        const double u = std::clamp(x - window.first.x, 0.0, window.size.x - 1.0);
+        const double v = std::clamp(y - window.first.y, 0.0, window.size.y - 1.0);
+        const int i = std::min(static_cast<int>(u), std::max(0, window.size.x - 2));
+        const int j = std::min(static_cast<int>(v), std::max(0, window.size.y - 2));
+        const float s = static_cast<float>(u - i), t = static_cast<float>(v - j);
+        const int i1 = std::min(i + 1, window.size.x - 1), j1 = std::min(j + 1, window.size.y - 1);
+        const float a = phi[window.index(i, j, 0)], b = phi[window.index(i1, j, 0)];
+        const float c = phi[window.index(i, j1, 0)], d = phi[window.index(i1, j1, 0)];
+        const float low = a + s * (b - a), high = c + s * (d - c);
+        return low + t * (high - low);
+    }
+};
+
+OutlineField outline_field(const LabelVolume& labels,
+                           const SliceGroups& groups,
+                           int outline,
+                           int pad) {
+    const Outline& o = groups.outlines[static_cast<std::size_t>(outline)];
+    OutlineField field;
+    field.window = grow(o.box, {pad, pad, 0}, labels.grid.size);
+    LabelVolume mask;
+    mask.grid = labels.grid;
+    mask.grid.size = {field.window.size.x, field.window.size.y, 1};
+    mask.voxels.resize(mask.grid.voxel_count());
+    for (int j = 0; j < field.window.size.y; ++j) {
+        for (int i = 0; i < field.window.size.x; ++i) {
+            mask.voxels[mask.grid.index(i, j, 0)] =
+                groups.outline_of_voxel[labels.grid.index(
+                    field.window.first.x + i, field.window.first.y + j, o.slice)] == outline;
+        }
+    }
+    signed_distance(mask, 1, {{0, 0, 0}, mask.grid.size}, pad * labels.grid.spacing_mm.x,
+                    {true, true, false}, &field.phi);
+    for (const float p : field.phi) field.deepest = std::max(field.deepest, -p);
+    return field;
+}
+
+}  // namespace
+
+LabelVolume slices_last(const LabelVolume& labels) {
+    const Grid& g = labels.grid;
+    int thick = 2;
+    for (const int a : {1, 0}) {
+        if (g.spacing_mm[a] > g.spacing_mm[thick] * 1.0001) thick = a;
+    }
+    if (thick == 2) return labels;
+    // A cyclic exchange keeps the frame right-handed, whatever that matters to the caller.
+    const int from[3] = {(thick + 1) % 3, (thick + 2) % 3, thick};
+    LabelVolume out;
+    out.labels = labels.labels;
+    out.grid.origin_mm = g.origin_mm;
+    for (int a = 0; a < 3; ++a) {
+        out.grid.size[a] = g.size[from[a]];
+        out.grid.spacing_mm[a] = g.spacing_mm[from[a]];
+        for (int r = 0; r < 3; ++r) out.grid.direction(r, a) = g.direction(r, from[a]);
+    }
+    out.voxels.resize(g.voxel_count());
+    for (int k = 0; k < out.grid.size.z; ++k) {
+        for (int j = 0; j < out.grid.size.y; ++j) {
+            for (int i = 0; i < out.grid.size.x; ++i) {
+                Int3 v;
+                v[from[0]] = i;
+                v[from[1]] = j;
+                v[from[2]] = k;
+                out.voxels[out.grid.index(i, j, k)] = labels.voxels[g.index(v.x, v.y, v.z)];
+            }
+        }
+    }
+    return out;
+}
+
+LabelDistance::LabelDistance(const LabelVolume& labels, const LabelDistanceOptions& options)
+    : labels_(slices_last(labels)), options_(options) {
+    const Vector3 h = labels_.grid.spacing_mm;
+    const double pixel = std::max(h.x, h.y);
+    nodes_ = labels_.grid;
+    if (h.z >= options.thick_ratio * pixel && labels_.grid.size.z > 1) {
+        factor_ = std::max(2, static_cast<int>(std::lround(h.z / pixel)));
+        nodes_.spacing_mm.z = h.z / factor_;
+        nodes_.size.z = (labels_.grid.size.z - 1) * factor_ + 1;
+        groups_ = find_slice_groups(labels_);
+        limit_mm_ = 4 * h.z;
+    } else {
+        limit_mm_ = (4 + 2 * options.sigma_vx) * pixel;
+    }
+    boxes_ = label_boxes(labels_);
+    const double sigma_mm = options.sigma_vx * std::sqrt(h.x * h.y);
+    for (int a = 0; a < 3; ++a) {
+        double sigma = sigma_mm / nodes_.spacing_mm[a];
+        if (a == 2 && factor_ > 1 && options.sigma_slices > 0)
+            sigma = options.sigma_slices * factor_;
+        kernel_[a] = nodes_.size[a] > 1 ? smoothing_kernel(sigma) : std::vector<float>{};
+    }
+}
+
+void LabelDistance::blend_group(const SliceGroup& group,
+                                const VoxelBox& box,
+                                std::vector<float>* phi) const {
+    constexpr int kPad = 6;
+    const OutlineField low =
+        group.lower >= 0 ? outline_field(labels_, groups_, group.lower, kPad) : OutlineField{};
+    const OutlineField high =
+        group.upper >= 0 ? outline_field(labels_, groups_, group.upper, kPad) : OutlineField{};
+    for (int step = 1; step < factor_; ++step) {
+        const double t = static_cast<double>(step) / factor_;
+        const int k = group.slice * factor_ + step - box.first.z;
+        if (k < 0 || k >= box.size.z) continue;
+        // Window of this step: the outlines' windows moved along the shift, together.
+        int x0 = 1 << 30, y0 = x0, x1 = -x0, y1 = -x0;
+        const auto include = [&](const OutlineField& f, double dx, double dy) {
+            x0 = std::min(x0, static_cast<int>(std::floor(f.window.first.x + dx)));
+            y0 = std::min(y0, static_cast<int>(std::floor(f.window.first.y + dy)));
+            x1 = std::max(x1, static_cast<int>(std::ceil(f.window.first.x + f.window.size.x + dx)));
+            y1 = std::max(y1, static_cast<int>(std::ceil(f.window.first.y + f.window.size.y + dy)));
+        };
+        if (group.lower >= 0) include(low, t * group.shift_x, t * group.shift_y);
+        if (group.upper >= 0) include(high, (t - 1) * group.shift_x, (t - 1) * group.shift_y);
+        x0 = std::max(x0, box.first.x);
+        y0 = std::max(y0, box.first.y);
+        x1 = std::min(x1, box.first.x + box.size.x);
+        y1 = std::min(y1, box.first.y + box.size.y);
+        const float w = static_cast<float>(t);
+        for (int y = y0; y < y1; ++y) {
+            for (int x = x0; x < x1; ++x) {
+                // An end closes half-way: the missing side is as far outside as this one is deep.
+                const float a = group.lower >= 0
+                                    ? low.at(x - t * group.shift_x, y - t * group.shift_y)
+                                    : high.deepest;
+                const float b = group.upper >= 0 ? high.at(x + (1 - t) * group.shift_x,
+                                                           y + (1 - t) * group.shift_y)
+                                                 : low.deepest;
+                float& to = (*phi)[box.index(x - box.first.x, y - box.first.y, k)];
+                to = std::min(to, a + w * (b - a));
+            }
+        }
+    }
+}
+
+void LabelDistance::shape_interpolated(std::uint8_t label,
+                                       const VoxelBox& box,
+                                       std::vector<float>* phi) const {
+    // `box` is whole slices: its nodes run from slice `first` to slice `first + slices - 1`.
+    const int first = box.first.z / factor_;
+    const int slices = (box.size.z - 1) / factor_ + 1;
+    const VoxelBox in_slices{{box.first.x, box.first.y, first}, {box.size.x, box.size.y, slices}};
+    std::vector<float> flat;
+    signed_distance(labels_, label, in_slices, limit_mm_, {true, true, false}, &flat);
+    phi->resize(box.count());
+    const std::size_t plane =
+        static_cast<std::size_t>(box.size.x) * static_cast<std::size_t>(box.size.y);
+    for (int k = 0; k < box.size.z; ++k) {
+        const int s = std::min(k / factor_, std::max(0, slices - 2));
+        const float t = static_cast<float>(k - s * factor_) / static_cast<float>(factor_);
+        const auto slice = [&](int i) {
+            return flat.data() + static_cast<std::size_t>(std::clamp(i, 0, slices - 1)) * plane;
+        };
+        const float *a = slice(s - 1), *b = slice(s), *c = slice(s + 1), *d = slice(s + 2);
+        const float wa = 0.5f * t * (-1 + t * (2 - t)), wb = 0.5f * (2 + t * t * (-5 + 3 * t));
+        const float wc = 0.5f * t * (1 + t * (4 - 3 * t)), wd = 0.5f * t * t * (t - 1);
+        float* to = phi->data() + static_cast<std::size_t>(k) * plane;
+        for (std::size_t i = 0; i < plane; ++i)
+            to[i] = wa * a[i] + wb * b[i] + wc * c[i] + wd * d[i];
+    }
+    for (const SliceGroup& group : groups_.of_label[label]) {
+        const bool moves = group.lower >= 0 && group.upper >= 0;
+        if (moves && !options_.follow_shift) continue;
+        blend_group(group, box, phi);
+    }
+}
+
+VoxelBox LabelDistance::distance(std::uint8_t label, std::vector<float>* phi) const {
+    VoxelBox box = boxes_[label];
+    phi->clear();
+    if (box.empty()) return box;
+    const Vector3 h = labels_.grid.spacing_mm;
+    // Beyond this the label cannot win; the kernel's reach is added so that its border is not felt.
+    Int3 pad;
+    for (int a = 0; a < 3; ++a) {
+        const double reach =
+            std::min(limit_mm_, 6 * h[a]) / h[a] +
+            static_cast<double>(kernel_[a].size() / 2) * nodes_.spacing_mm[a] / h[a];
+        pad[a] = static_cast<int>(std::ceil(reach));
+    }
+    if (factor_ > 1) pad.z = 2;
+    box = grow(box, pad, labels_.grid.size);
+    if (factor_ > 1) {
+        box.size.z = (box.size.z - 1) * factor_ + 1;
+        box.first.z *= factor_;
+        shape_interpolated(label, box, phi);
+    } else {
+        signed_distance(labels_, label, box, limit_mm_, {true, true, true}, phi);
+    }
+    std::vector<float> other(phi->size());
+    const std::size_t nx = static_cast<std::size_t>(box.size.x),
+                      ny = static_cast<std::size_t>(box.size.y),
+                      nz = static_cast<std::size_t>(box.size.z);
+    if (!kernel_[0].empty()) {
+        smooth_rows(phi->data(), box.size.x, ny * nz, kernel_[0], other.data());
+        phi->swap(other);
+    }
+    if (!kernel_[1].empty()) {
+        for (std::size_t k = 0; k < nz; ++k) {
+            smooth_lines(phi->data() + k * nx * ny, nx, box.size.y, nx, kernel_[1],
+                         other.data() + k * nx * ny);
+        }
+        phi->swap(other);
+    }
+    if (!kernel_[2].empty()) {
+        for (std::size_t j = 0; j < ny; ++j) {
+            smooth_lines(phi->data() + j * nx, nx, box.size.z, nx * ny, kernel_[2],
+                         other.data() + j * nx);
+        }
+        phi->swap(other);
+    }
+    return box;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,100 @@
+// All labels of a map as one smooth partition of space, to be read at any point.
+//
+//     score_l(x) = phi_l(x) - price_l        label(x) = argmin_l score_l(x)
+// phi_l  smooth signed distance of label_distance.h, read with the cubic B-spline (C2)
+// price  one number a label, mm: shifts its surface outwards; label_prices.h picks them so that
+// each
+//        label keeps its volume
+// No gap and no overlap is possible. Only blocks of 8^3 nodes that hold or touch two labels store
+// anything; elsewhere one byte a node names the label.
+// Between two labels f = score_second - score_first is zero on their surface, and f / |grad f| is
+// the distance to it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "formats/label_volume.h"
+#include "pipeline/progress.h"
+#include "pipeline/segmentation/label_distance.h"
+
+namespace sonocase::pipeline {
+
+struct LabelFieldOptions {
+    LabelDistanceOptions distance;
+};
+
+inline constexpr int kFieldBlock = 8;   // nodes an edge
+inline constexpr int kFieldNodes = 11;  // with the spline's neighbours: one below, two above
+inline constexpr int kFieldRow = 12;    // floats a row, padded
+inline constexpr std::size_t kFieldValues =
+    static_cast<std::size_t>(kFieldRow) * kFieldNodes * kFieldNodes;
+inline constexpr int kMaxCandidates = 24;  // labels that may compete in one block
+
+class LabelField {
+  public:
+    LabelField(const LabelVolume& labels,
+               const LabelFieldOptions& options,
+               const Progress& progress = {});
+
+    const Grid& nodes() const { return nodes_; }
+    const LabelVolume& source() const { return source_; }  // slices along k
+    int factor() const { return factor_; }                 // nodes a slice
+    std::size_t label_count() const { return source_.labels.size(); }
+    bool source_isotropic() const { return factor_ == 1; }
+
+    std::vector<float>& prices() { return prices_; }
+    const std::vector<float>& prices() const { return prices_; }
+
+    struct Block {
+        Int3 first;                        // node
+        std::vector<std::uint8_t> labels;  // candidates; one: nothing is stored
+        std::size_t values = 0;            // into the pool, kFieldValues a candidate
+    };
+    const std::vector<Block>& blocks() const { return blocks_; }
+    const Block& block_of(int i, int j, int k) const {
+        return blocks_[static_cast<std::size_t>(i / kFieldBlock) +
+                       static_cast<std::size_t>(block_count_.x) *
+                           (static_cast<std::size_t>(j / kFieldBlock) +
+                            static_cast<std::size_t>(block_count_.y) *
+                                static_cast<std::size_t>(k / kFieldBlock))];
+    }
+
+    // Where a point of node space (clamped to it) lies among the cells, with spline weights.
+    struct Position {
+        const Block* block = nullptr;
+        std::size_t offset = 0;  // of the first of 4 x 4 x 4 values inside a candidate's values
+        std::array<float, 3> t;  // fraction of the cell
+        std::array<int, 3> cell;
+    };
+    Position locate(float x, float y, float z) const;
+
+    // phi of each candidate at the position; # block->labels.
+    void scores(const Position& position, float* out) const;
+    // Gradient of phi of one candidate, per node, and its value.
+    std::array<float, 4> gradient(const Position& position, std::size_t candidate) const;
+
+    // After the prices are set: per node, how far (mm, whole, at most 254) no other label can come
+    // near. Lets most points be answered by one look-up.
+    void find_sure_nodes();
+    // Label at the node and its margin.
+    std::uint8_t node_label(std::size_t node) const { return node_label_[node]; }
+    float node_margin_mm(std::size_t node) const {
+        return 0.25f * static_cast<float>(node_margin_[node]);
+    }
+
+  private:
+    void mark_candidates(const LabelDistance& distance);
+
+    LabelVolume source_;
+    Grid nodes_;
+    int factor_ = 1;
+    Int3 block_count_;
+    std::vector<Block> blocks_;
+    std::vector<float> pool_;
+    std::vector<float> prices_;
+    std::vector<std::uint8_t> node_label_, node_margin_;
+};
+
+}  // namespace sonocase::pipeline

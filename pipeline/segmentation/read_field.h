@@ -1,0 +1,47 @@
+// Reads a label field on a grid of cubic voxels: labels, and boundary records near every surface.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "formats/brick_volume.h"
+#include "formats/label_volume.h"
+#include "pipeline/progress.h"
+#include "pipeline/registration/inverse_map.h"
+#include "pipeline/segmentation/label_field.h"
+#include "pipeline/segmentation/nearest_labels.h"
+
+namespace sonocase::pipeline {
+
+// How the voxels of the grid lie in the frame of the field.
+struct FieldMap {
+    // Frame positions of voxels (0..size.x-1, j, k), structure of arrays. Thread-safe.
+    std::function<void(int j, int k, float* x, float* y, float* z, MapStatus* status)> row;
+    // d(frame) / d(grid's frame) at a frame point.
+    std::function<Matrix3(Point3 frame)> jacobian;
+    // Grid frame from field frame, for the guard of lost labels.
+    std::function<Point3(Point3 frame)> forward;
+};
+
+struct FieldReadOptions {
+    double record_band_vx = 1.5;  // records where a surface is within this, [0, 2.6]; 0: none
+};
+
+struct FieldRead {
+    LabelVolume volume;
+    BrickVolume<std::uint32_t> boundary;
+    PreimageCounts counts;
+    std::vector<int> rescued;  // labels too small for the grid, kept as one voxel
+    std::vector<int> lost;     // labels whose place lies outside the grid
+};
+
+// The field's labels that have voxels in the source and none in the answer are put back as the one
+// voxel where they come nearest to winning. Same bytes for any number of threads.
+FieldRead read_field(const LabelField& field,
+                     const Grid& grid,
+                     const FieldMap& map,
+                     const FieldReadOptions& options,
+                     const Progress& progress = {});
+
+}  // namespace sonocase::pipeline
