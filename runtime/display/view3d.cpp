@@ -387,8 +387,8 @@ void View3d::Impl::build_plane(const View3dInput& input) {
                 x = (radius + z) * std::sin(angle);
                 z = (radius + z) * std::cos(angle) - radius;
             }
-            const double u =
-                (input.layout.origin_x_px + (input.flipped ? -x : x) / mm) / std::max(input.image_width_px, 1);
+            const double u = (input.layout.origin_x_px + (input.flipped ? -x : x) / mm) /
+                             std::max(input.image_width_px, 1);
             const double v =
                 (input.layout.origin_y_px + z / mm) / std::max(input.image_height_px, 1);
             vertices.push_back({{float(x), 0, float(z)}, {0, 1, 0}, {float(u), float(v)}});

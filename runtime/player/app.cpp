@@ -35,7 +35,8 @@ void rebuild_engine(App& app) {
                                                                            : app.render_px;
     render.height_px = render.width_px;
     render.model = app.model == "paper" ? ImageModel::paper : ImageModel::physical;
-    render.kind = app.arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
+    render.kind =
+        app.arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
     render.threads = app.arguments.threads;
     render.effects = app.arguments.effects.empty() ? app.current().effects : app.arguments.effects;
     options.depth_mm = app.depth_mm;
@@ -80,7 +81,8 @@ bool open_bundle(App& app, const std::string& path, const std::string& exercise)
     }
     close_bundle(app);
     app.open = std::move(*opened);
-    for (const std::string& warning : app.open->warnings) notify(app, Notice::Kind::warning, warning);
+    for (const std::string& warning : app.open->warnings)
+        notify(app, Notice::Kind::warning, warning);
     app.skin = std::make_unique<Skin>(app.open->bundle);
     app.view3d->set_case(app.open->bundle);
     app.page = Page::scan;
@@ -180,9 +182,9 @@ void toggle_needle(App& app, bool in_plane) {
 }
 
 Status save_screenshot(App& app, const std::string& path) {
-    int width = 0, height = 0;
-    const std::vector<std::uint8_t> pixels = app.window->read_pixels(width, height);
-    return write_png(path, width, height, 3, pixels);
+    const Window::Capture& picture = app.window->captured();
+    if (picture.pixels.empty()) return Done{};
+    return write_png(path, picture.width_px, picture.height_px, 3, picture.pixels);
 }
 
 namespace {
@@ -212,8 +214,7 @@ void draw(App& app) {
     const ImGuiIO& io = ImGui::GetIO();
     ImGui::SetNextWindowPos({0, 0});
     ImGui::SetNextWindowSize(io.DisplaySize);
-    ImGui::Begin("sonocase",
-                 nullptr,
+    ImGui::Begin("sonocase", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNav |
                      ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoSavedSettings);
     if (app.page == Page::bundles || !app.open) {
@@ -231,7 +232,8 @@ void advance_cine(App& app) {
     if (!app.playing_cine) return;
     if (app.now_s - app.cine_clock_s < 1 / kCineRate) return;
     app.cine_clock_s = app.now_s;
-    app.cine_back = app.cine_back > 0 ? app.cine_back - 1 : std::max(app.frame().cine_frames - 1, 0);
+    app.cine_back =
+        app.cine_back > 0 ? app.cine_back - 1 : std::max(app.frame().cine_frames - 1, 0);
     app.controls.cine_back = app.cine_back;
 }
 
@@ -255,7 +257,8 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
     apply_settings(app);
     WindowOptions options;
     options.width_px = arguments.width_px > 0 ? arguments.width_px : app.settings.window_width_px;
-    options.height_px = arguments.height_px > 0 ? arguments.height_px : app.settings.window_height_px;
+    options.height_px =
+        arguments.height_px > 0 ? arguments.height_px : app.settings.window_height_px;
     options.ui_scale = arguments.ui_scale > 0 ? arguments.ui_scale : app.settings.ui_scale;
     Result<std::unique_ptr<Window>> window = Window::open(options);
     if (!window) return window.error();
@@ -263,7 +266,8 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
     app.texture = std::make_unique<ImageTexture>();
     app.view3d = std::make_unique<View3d>();
     const double clock_start_s = app.clock_start_s;
-    app.scan = std::make_unique<ScanThread>([clock_start_s] { return steady_seconds() - clock_start_s; });
+    app.scan =
+        std::make_unique<ScanThread>([clock_start_s] { return steady_seconds() - clock_start_s; });
     app.scan->set_first_frame_origin_s(start_s - clock_start_s);
     app.scan->set_calibrations(app.calibrations);
     app.tracker_spec = arguments.tracker.empty() ? "mouse" : arguments.tracker;
@@ -305,8 +309,11 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
             }
         }
         if (app.open) app.scan->set_controls(app.controls);
-        app.window->end_frame();
         ++shown;
+        if (arguments.frames > 0 && shown >= static_cast<std::uint64_t>(arguments.frames))
+            quit = true;
+        const bool last = quit || app.window->should_close();
+        app.window->end_frame(!shot.empty() || (last && !arguments.screenshot.empty()));
         if (fresh) {
             app.screen_ms =
                 1e3 * (steady_seconds() - app.clock_start_s - app.frame().record.reading_time_s);
@@ -315,9 +322,7 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
             const Status saved = save_screenshot(app, shot);
             if (!saved) notify(app, Notice::Kind::error, saved.error().message());
         }
-        if (quit || (arguments.frames > 0 && shown >= static_cast<std::uint64_t>(arguments.frames))) {
-            app.window->request_close();
-        }
+        if (quit) app.window->request_close();
     }
     if (!arguments.screenshot.empty()) {
         const Status saved = save_screenshot(app, arguments.screenshot);

@@ -1,5 +1,5 @@
-// The player with a window: what it holds, and the steps that its panels and keys can take. The panels
-// are free functions over this one struct, each in its own file.
+// The player with a window: what it holds, and the steps that its panels and keys can take. The
+// panels are free functions over this one struct, each in its own file.
 #pragma once
 
 #include <memory>
@@ -49,7 +49,7 @@ struct App {
     int render_px = 512;
     Calibrations calibrations;
     std::string tracker_spec = "mouse";
-    std::unique_ptr<MouseTracker> mouse;    // while tracker_spec is mouse
+    std::unique_ptr<MouseTracker> mouse;  // while tracker_spec is mouse
     std::shared_ptr<PushTracker> mouse_feed;
     std::unique_ptr<ScanThread> scan;
     ScanControls controls;

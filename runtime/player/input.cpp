@@ -10,8 +10,12 @@
 namespace sonocase::runtime {
 namespace {
 
-bool pressed(int key, bool repeat = false) { return ImGui::IsKeyPressed(key, repeat); }
-bool down(int key) { return ImGui::IsKeyDown(key); }
+bool pressed(int key, bool repeat = false) {
+    return ImGui::IsKeyPressed(key, repeat);
+}
+bool down(int key) {
+    return ImGui::IsKeyDown(key);
+}
 // -1, 0 or 1 of a pair of held keys.
 double axis(int negative, int positive) {
     return (down(positive) ? 1.0 : 0.0) - (down(negative) ? 1.0 : 0.0);
@@ -153,7 +157,8 @@ void handle_picture_mouse(App& app) {
     const double flip = app.controls.settings.flip_left_right ? -1 : 1;
     if (app.measuring) {
         if (ImGui::IsMouseClicked(0)) {
-            app.image.click((io.MousePos.x - place.origin_x) * mm, (io.MousePos.y - place.origin_y) * mm);
+            app.image.click((io.MousePos.x - place.origin_x) * mm,
+                            (io.MousePos.y - place.origin_y) * mm);
         }
         return;
     }

@@ -19,16 +19,16 @@ Result<InputScript> InputScript::load(const std::string& path) {
         if (line.words.empty() || line.words[0][0] == '#') continue;
         const std::string& verb = line.words[0];
         const std::size_t n = line.words.size();
-        const bool fine = (verb == "wait" && n == 2) || (verb == "move" && n == 3) ||
-                          (verb == "wheel" && n == 2) || (verb == "shot" && n == 2) ||
-                          (verb == "quit" && n == 1) ||
-                          ((verb == "down" || verb == "up") && n == 2 && line.words[1].size() == 1 &&
-                           line.words[1][0] >= '0' && line.words[1][0] <= '2') ||
-                          (verb == "key" && n >= 2 && key_code(line.words[1]) >= 0) ||
-                          (verb == "hold" && n >= 3 && key_code(line.words[1]) >= 0);
+        const bool fine =
+            (verb == "wait" && n == 2) || (verb == "move" && n == 3) ||
+            (verb == "wheel" && n == 2) || (verb == "shot" && n == 2) ||
+            (verb == "quit" && n == 1) ||
+            ((verb == "down" || verb == "up") && n == 2 && line.words[1].size() == 1 &&
+             line.words[1][0] >= '0' && line.words[1][0] <= '2') ||
+            (verb == "key" && n >= 2 && key_code(line.words[1]) >= 0) ||
+            (verb == "hold" && n >= 3 && key_code(line.words[1]) >= 0);
         if (!fine) {
-            return Error{"line not understood: " + text,
-                         path + ":" + std::to_string(number),
+            return Error{"line not understood: " + text, path + ":" + std::to_string(number),
                          "verbs are wait, key, hold, move, down, up, wheel, shot and quit"};
         }
         script.lines_.push_back(std::move(line));

@@ -19,7 +19,8 @@ void draw_help(App& app) {
         {"Q  E", "rotate"},
         {"Page Down  Page Up", "press and lift"},
         {"Home", "back to the start"},
-        {"Left drag, right drag, wheel", "on the picture: slide, tilt, rotate; Ctrl + wheel presses"},
+        {"Left drag, right drag, wheel",
+         "on the picture: slide, tilt, rotate; Ctrl + wheel presses"},
         {"Right drag in 3-D", "put the probe there; with Shift the needle"},
         {nullptr, "Needle"},
         {"N  Shift + N", "take or withdraw, in plane or across"},
@@ -42,15 +43,17 @@ void draw_help(App& app) {
     };
     const float s = app.window->scale();
     const ImGuiIO& io = ImGui::GetIO();
-    ImGui::SetNextWindowPos({0.5f * io.DisplaySize.x, 0.5f * io.DisplaySize.y}, ImGuiCond_Always, {0.5f, 0.5f});
-    ImGui::SetNextWindowSize({std::min(620 * s, io.DisplaySize.x - 20), std::min(630 * s, io.DisplaySize.y - 20)});
+    ImGui::SetNextWindowPos({0.5f * io.DisplaySize.x, 0.5f * io.DisplaySize.y}, ImGuiCond_Always,
+                            {0.5f, 0.5f});
+    ImGui::SetNextWindowSize(
+        {std::min(620 * s, io.DisplaySize.x - 20), std::min(630 * s, io.DisplaySize.y - 20)});
     ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 7 * s);
     ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1);
     ImGui::PushStyleColor(ImGuiCol_WindowBg, colour::rgba(24, 29, 36, 252));
     ImGui::SetNextWindowFocus();
     if (ImGui::Begin("Help", &app.show_help,
-                     ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
-                         ImGuiWindowFlags_NoSavedSettings)) {
+                     ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize |
+                         ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings)) {
         ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, {5 * s, 1 * s});
         if (ImGui::BeginTable("keys", 2)) {
             ImGui::TableSetupColumn("keys", ImGuiTableColumnFlags_WidthFixed, 218 * s);
@@ -87,7 +90,9 @@ void draw_notices(App& app) {
     for (std::size_t i = app.notices.size(); i-- > 0;) {
         const Notice notice = app.notices[i];
         const double age = app.now_s - notice.since_s;
-        const double life = notice.kind == Notice::Kind::error ? 20 : notice.kind == Notice::Kind::warning ? 12 : 5;
+        const double life = notice.kind == Notice::Kind::error     ? 20
+                            : notice.kind == Notice::Kind::warning ? 12
+                                                                   : 5;
         if (age > life) {
             app.notices.erase(app.notices.begin() + static_cast<std::ptrdiff_t>(i));
             continue;
@@ -100,8 +105,9 @@ void draw_notices(App& app) {
         ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 6 * s);
         ImGui::PushStyleColor(ImGuiCol_WindowBg, colour::rgba(30, 36, 44, 246));
         ImGui::Begin(name, nullptr,
-                     ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNav |
-                         ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoSavedSettings);
+                     ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+                         ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoFocusOnAppearing |
+                         ImGuiWindowFlags_NoSavedSettings);
         const unsigned packed = notice.kind == Notice::Kind::error     ? colour::kBad
                                 : notice.kind == Notice::Kind::warning ? colour::kWarn
                                                                        : colour::kAccent;

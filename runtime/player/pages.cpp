@@ -19,19 +19,26 @@ std::string text(const char* format, double value) {
 
 const char* shape_name(ProbeShape shape) {
     switch (shape) {
-        case ProbeShape::linear: return "Linear";
-        case ProbeShape::curvilinear: return "Curved";
-        case ProbeShape::phased: return "Phased";
+        case ProbeShape::linear:
+            return "Linear";
+        case ProbeShape::curvilinear:
+            return "Curved";
+        case ProbeShape::phased:
+            return "Phased";
     }
     return "";
 }
 
 unsigned phase_colour(TrackerPhase phase) {
     switch (phase) {
-        case TrackerPhase::streaming: return colour::kGood;
-        case TrackerPhase::failed: return colour::kBad;
-        case TrackerPhase::ended: return colour::kDim;
-        default: return colour::kWarn;
+        case TrackerPhase::streaming:
+            return colour::kGood;
+        case TrackerPhase::failed:
+            return colour::kBad;
+        case TrackerPhase::ended:
+            return colour::kDim;
+        default:
+            return colour::kWarn;
     }
 }
 
@@ -65,9 +72,11 @@ void draw_bundle_page(App& app) {
     ImGui::SetCursorPos({pad, pad});
     ImGui::BeginGroup();
     if (app.bundles.empty()) {
-        ImGui::TextWrapped("No case bundle was found in %s/cases, the system's data folders or this folder.",
-                           data_folder().empty() ? "~/.local/share/sonocase" : data_folder().c_str());
-        ImGui::TextDisabled("Make one with: sonocase build scenarios/demo-torso/case.toml -o demo.sonocase");
+        ImGui::TextWrapped(
+            "No case bundle was found in %s/cases, the system's data folders or this folder.",
+            data_folder().empty() ? "~/.local/share/sonocase" : data_folder().c_str());
+        ImGui::TextDisabled(
+            "Make one with: sonocase build scenarios/demo-torso/case.toml -o demo.sonocase");
     }
     for (std::size_t i = 0; i < app.bundles.size(); ++i) {
         const BundleEntry& entry = app.bundles[i];
@@ -90,7 +99,8 @@ void draw_bundle_page(App& app) {
         ImGui::TextDisabled("%s", entry.folder.c_str());
         const std::string right =
             text("%.1f MB", entry.megabytes) + (entry.recent ? "   recent" : "");
-        ImGui::SetCursorPos({width - 2 * pad - ImGui::CalcTextSize(right.c_str()).x - 10 * s, at.y + 15 * s});
+        ImGui::SetCursorPos(
+            {width - 2 * pad - ImGui::CalcTextSize(right.c_str()).x - 10 * s, at.y + 15 * s});
         ImGui::TextDisabled("%s", right.c_str());
         ImGui::PopFont();
         ImGui::SetCursorPos({at.x, at.y + row + 4 * s});
@@ -100,11 +110,9 @@ void draw_bundle_page(App& app) {
     ImGui::EndChild();
     ImGui::Dummy({0, 4 * s});
     ImGui::SetNextItemWidth(width - 96 * s);
-    const bool entered = ImGui::InputTextWithHint("##path",
-                                                  "Path of a *.sonocase file",
-                                                  app.bundle_path,
-                                                  sizeof app.bundle_path,
-                                                  ImGuiInputTextFlags_EnterReturnsTrue);
+    const bool entered =
+        ImGui::InputTextWithHint("##path", "Path of a *.sonocase file", app.bundle_path,
+                                 sizeof app.bundle_path, ImGuiInputTextFlags_EnterReturnsTrue);
     ImGui::SameLine();
     if ((ImGui::Button("Open", {-1, 0}) || entered) && app.bundle_path[0]) {
         open_bundle(app, app.bundle_path, "");
@@ -128,8 +136,9 @@ void draw_top_bar(App& app, float height) {
     }
     ImGui::SameLine();
     ImGui::SetNextItemWidth(250 * s);
-    if (ImGui::BeginCombo("##exercise", app.current().title.empty() ? app.current().name.c_str()
-                                                                   : app.current().title.c_str())) {
+    if (ImGui::BeginCombo("##exercise", app.current().title.empty()
+                                            ? app.current().name.c_str()
+                                            : app.current().title.c_str())) {
         for (std::size_t i = 0; i < app.open->exercises.size(); ++i) {
             const Exercise& e = app.open->exercises[i];
             const std::string label = (e.title.empty() ? e.name : e.title) + "##" + e.name;
@@ -165,8 +174,8 @@ void draw_top_bar(App& app, float height) {
             : "no pose yet";
     const std::string rate = text("%.0f fps", app.ui_rate);
     const float wide = ImGui::CalcTextSize(health.device.c_str()).x +
-                       ImGui::CalcTextSize(latency.c_str()).x + ImGui::CalcTextSize(rate.c_str()).x +
-                       70 * s;
+                       ImGui::CalcTextSize(latency.c_str()).x +
+                       ImGui::CalcTextSize(rate.c_str()).x + 70 * s;
     ImGui::SameLine(std::max(ImGui::GetCursorPosX() + 10, ImGui::GetWindowWidth() - wide));
     ImGui::AlignTextToFramePadding();
     dot(phase_colour(health.phase));
@@ -190,7 +199,8 @@ void draw_scan_page(App& app) {
         ImGui::BeginChild("left", {side, 0}, false, ImGuiWindowFlags_NoBackground);
         if (app.settings.show_exercise) {
             const float share = app.settings.show_tracker ? 0.5f * (area.y - gap) : area.y;
-            ImGui::BeginChild("exercise", {0, share}, false, ImGuiWindowFlags_AlwaysUseWindowPadding);
+            ImGui::BeginChild("exercise", {0, share}, false,
+                              ImGuiWindowFlags_AlwaysUseWindowPadding);
             ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {7 * s, 5 * s});
             draw_exercise_panel(app);
             ImGui::PopStyleVar();
@@ -226,11 +236,12 @@ void draw_scan_page(App& app) {
     input.scale = s;
     const ImageSettings& image = app.controls.settings;
     const Probe& probe = app.current().probe;
-    input.left_lines = {app.open->bundle.manifest.case_name,
-                        std::string(shape_name(probe.shape)) + text("  %.1f MHz", probe.frequency_mhz),
-                        text("Depth %.0f cm", app.depth_mm / 10).substr(0, 0) +
-                            text("Depth %.1f cm", app.depth_mm / 10),
-                        text("Focus %.1f cm", app.focus_mm / 10)};
+    input.left_lines = {
+        app.open->bundle.manifest.case_name,
+        std::string(shape_name(probe.shape)) + text("  %.1f MHz", probe.frequency_mhz),
+        text("Depth %.0f cm", app.depth_mm / 10).substr(0, 0) +
+            text("Depth %.1f cm", app.depth_mm / 10),
+        text("Focus %.1f cm", app.focus_mm / 10)};
     input.right_lines = {text("Gain %+.0f dB", image.gain_db),
                          text("DR %.0f dB", image.dynamic_range_db),
                          text("%.0f frames/s", app.frame().frames_per_s)};

@@ -43,7 +43,8 @@ void row_distance(const char* name, double mm, double good_mm) {
     row(name, "%.1f mm", mm, mm <= good_mm ? colour::kGood : colour::kText);
 }
 
-bool slider(const char* name, const char* id, double& value, double low, double high, const char* format) {
+bool slider(
+    const char* name, const char* id, double& value, double low, double high, const char* format) {
     const float s = ImGui::GetFontSize() / 14;
     ImGui::AlignTextToFramePadding();
     ImGui::TextDisabled("%s", name);
@@ -64,13 +65,26 @@ void sensor_row(const char* tool, const SensorReading* reading, SensorVerdict ve
     unsigned packed = colour::kGood;
     const char* word = "ok";
     switch (verdict) {
-        case SensorVerdict::fine: break;
-        case SensorVerdict::absent: packed = colour::kFaint, word = "none"; break;
-        case SensorVerdict::lost: packed = colour::kBad, word = "out of range"; break;
-        case SensorVerdict::stale: packed = colour::kBad, word = "silent"; break;
-        case SensorVerdict::frozen: packed = colour::kBad, word = "frozen"; break;
-        case SensorVerdict::jumped: packed = colour::kWarn, word = "jumped"; break;
-        case SensorVerdict::poor: packed = colour::kWarn, word = "distorted"; break;
+        case SensorVerdict::fine:
+            break;
+        case SensorVerdict::absent:
+            packed = colour::kFaint, word = "none";
+            break;
+        case SensorVerdict::lost:
+            packed = colour::kBad, word = "out of range";
+            break;
+        case SensorVerdict::stale:
+            packed = colour::kBad, word = "silent";
+            break;
+        case SensorVerdict::frozen:
+            packed = colour::kBad, word = "frozen";
+            break;
+        case SensorVerdict::jumped:
+            packed = colour::kWarn, word = "jumped";
+            break;
+        case SensorVerdict::poor:
+            packed = colour::kWarn, word = "distorted";
+            break;
     }
     row(tool, word, packed);
     if (reading && verdict != SensorVerdict::absent) {
@@ -79,7 +93,8 @@ void sensor_row(const char* tool, const SensorReading* reading, SensorVerdict ve
         ImGui::TextDisabled("  %.1f  %.1f  %.1f mm", t.x, t.y, t.z);
         if (reading->quality >= 0) {
             ImGui::SameLine(ImGui::GetWindowWidth() - 74 * ImGui::GetFontSize() / 12);
-            ImGui::ProgressBar(reading->quality, {60 * ImGui::GetFontSize() / 12, ImGui::GetTextLineHeight()}, "");
+            ImGui::ProgressBar(reading->quality,
+                               {60 * ImGui::GetFontSize() / 12, ImGui::GetTextLineHeight()}, "");
         }
         ImGui::PopFont();
     }
@@ -87,7 +102,9 @@ void sensor_row(const char* tool, const SensorReading* reading, SensorVerdict ve
     if (*sentence) coloured(packed, sentence);
 }
 
-void calibration_row(const char* tool, const std::optional<Calibration>& calibration, const char* without) {
+void calibration_row(const char* tool,
+                     const std::optional<Calibration>& calibration,
+                     const char* without) {
     if (!calibration) {
         row(tool, without, colour::kFaint);
         return;
@@ -112,7 +129,8 @@ void draw_exercise_panel(App& app) {
     const Exercise& exercise = app.current();
     heading(exercise.title.empty() ? exercise.name.c_str() : exercise.title.c_str());
     char stars[32];
-    std::snprintf(stars, sizeof stars, "%s, difficulty %d of 5", exercise.kind.c_str(), exercise.difficulty);
+    std::snprintf(stars, sizeof stars, "%s, difficulty %d of 5", exercise.kind.c_str(),
+                  exercise.difficulty);
     ImGui::PushFont(fonts().small);
     ImGui::TextDisabled("%s", stars);
     ImGui::PopFont();
@@ -122,21 +140,25 @@ void draw_exercise_panel(App& app) {
     const Point3 tip = tools.mannequin_from_needle * Point3{0, 0, 0};
     for (std::size_t i = 0; i < exercise.targets.size(); ++i) {
         const Target& target = exercise.targets[i];
-        const std::string name = target.name.empty() ? "Target " + std::to_string(i + 1) : target.name;
+        const std::string name =
+            target.name.empty() ? "Target " + std::to_string(i + 1) : target.name;
         if (i < app.hits.size() && app.hits[i]) {
             row(name.c_str(), "reached", colour::kGood);
         } else if (tools.has_needle) {
-            row_distance((name + ", tip at").c_str(), distance(tip, target.centre), target.hit_radius_mm);
+            row_distance((name + ", tip at").c_str(), distance(tip, target.centre),
+                         target.hit_radius_mm);
         } else {
             row(name.c_str(), "to reach", colour::kDim);
         }
-        if (tools.has_needle && i < app.hits.size() && distance(tip, target.centre) <= target.hit_radius_mm) {
+        if (tools.has_needle && i < app.hits.size() &&
+            distance(tip, target.centre) <= target.hit_radius_mm) {
             app.hits[i] = true;
         }
     }
     if (app.mouse) {
         ImGui::Separator();
-        if (ImGui::Button(app.mouse->has_needle() ? "Withdraw needle (N)" : "Take needle (N)", {-1, 0})) {
+        if (ImGui::Button(app.mouse->has_needle() ? "Withdraw needle (N)" : "Take needle (N)",
+                          {-1, 0})) {
             toggle_needle(app, true);
         }
         if (app.mouse->has_needle()) {
@@ -181,7 +203,8 @@ void draw_tracker_panel(App& app) {
             health.phase == TrackerPhase::failed ? colour::kBad : colour::kWarn);
     }
     if (!health.message.empty()) {
-        coloured(health.phase == TrackerPhase::failed ? colour::kBad : colour::kDim, health.message);
+        coloured(health.phase == TrackerPhase::failed ? colour::kBad : colour::kDim,
+                 health.message);
     }
     if (health.bad_frames > 0) {
         row("Discarded", "%.0f", static_cast<double>(health.bad_frames), colour::kWarn);
@@ -213,8 +236,8 @@ void draw_console_panel(App& app) {
     const float s = app.window->scale();
     ImageSettings& image = app.controls.settings;
     const float half = 0.5f * (ImGui::GetContentRegionAvail().x - 7 * s);
-    ImGui::PushStyleColor(ImGuiCol_Button,
-                          app.controls.frozen ? colour::rgba(38, 104, 124) : colour::rgba(40, 49, 60));
+    ImGui::PushStyleColor(ImGuiCol_Button, app.controls.frozen ? colour::rgba(38, 104, 124)
+                                                               : colour::rgba(40, 49, 60));
     if (ImGui::Button(app.controls.frozen ? "Live" : "Freeze", {half, 0})) {
         set_frozen(app, !app.controls.frozen);
     }
@@ -330,8 +353,8 @@ void draw_view3d_panel(App& app, float height) {
         app.view_drawn_s = app.now_s;
     }
     ImGui::GetWindowDrawList()->AddImageRounded(app.view_texture, corner,
-                                                {corner.x + size.x, corner.y + size.y}, {0, 1}, {1, 0},
-                                                0xFFFFFFFF, 5 * app.window->scale());
+                                                {corner.x + size.x, corner.y + size.y}, {0, 1},
+                                                {1, 0}, 0xFFFFFFFF, 5 * app.window->scale());
     ImGui::InvisibleButton("orbit", size,
                            ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
     const ImGuiIO& io = ImGui::GetIO();

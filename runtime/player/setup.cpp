@@ -5,6 +5,8 @@
 
 namespace sonocase::runtime {
 
-void draw_setup(App& app) { (void)app; }
+void draw_setup(App& app) {
+    (void)app;
+}
 
 }  // namespace sonocase::runtime
