@@ -1,9 +1,9 @@
 #include "pipeline/tradeoff/trial_file.h"
 
-#include <charconv>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
+
+#include "formats/number_text.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -11,27 +11,12 @@ namespace {
 constexpr const char* kColumns =
     "suite,body,role,name,settings,error,seconds,seconds_low,seconds_high,repeats,front,note";
 
-std::string number(double value) {
-    if (!std::isfinite(value)) return "nan";
-    char text[32];
-    return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
-}
-
 // Commas and line ends within a field would break the row; they carry no meaning in ours.
 std::string field(std::string text) {
     for (char& c : text) {
         if (c == ',' || c == '\n' || c == '\r') c = ';';
     }
     return text;
-}
-
-bool parse_number(const std::string& text, double& value) {
-    if (text == "nan") {
-        value = NAN;
-        return true;
-    }
-    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return code == std::errc() && end == text.data() + text.size();
 }
 
 }  // namespace
@@ -42,9 +27,9 @@ std::string format_trials_csv(const std::vector<Trial>& trials) {
     for (std::size_t i = 0; i < trials.size(); ++i) {
         const Trial& t = trials[i];
         csv += field(t.suite) + "," + field(t.body) + "," + role_name(t.role) + "," +
-               field(t.name) + "," + field(settings_text(t.settings)) + "," + number(t.error) +
-               "," + number(t.seconds) + "," + number(t.seconds_low) + "," +
-               number(t.seconds_high) + "," + std::to_string(t.repeats) + "," +
+               field(t.name) + "," + field(settings_text(t.settings)) + "," + number_text(t.error) +
+               "," + number_text(t.seconds) + "," + number_text(t.seconds_low) + "," +
+               number_text(t.seconds_high) + "," + std::to_string(t.repeats) + "," +
                (front[i] ? "1" : "0") + "," + field(t.note) + "\n";
     }
     return csv;
