@@ -32,6 +32,8 @@ int verb_build(int argc, char** argv);
 int verb_import(int argc, char** argv);
 int verb_inspect(int argc, char** argv);
 int verb_pack(int argc, char** argv);
+int verb_resample(int argc, char** argv);
+int verb_smooth(int argc, char** argv);
 int verb_validate(int argc, char** argv);
 
 }  // namespace sonocase::pipeline
