@@ -32,11 +32,6 @@ int verb_build(int argc, char** argv);
 int verb_import(int argc, char** argv);
 int verb_inspect(int argc, char** argv);
 int verb_pack(int argc, char** argv);
-int verb_warp(int argc, char** argv);
-int verb_surface(int argc, char** argv);
-int verb_register(int argc, char** argv);
-int verb_map(int argc, char** argv);
-int verb_align(int argc, char** argv);
 int verb_validate(int argc, char** argv);
 
 }  // namespace sonocase::pipeline

@@ -211,6 +211,7 @@ struct View3d::Impl {
     Point3 interest;
     Matrix3 home;  // columns: right, up, towards the eye
     Renderer::Layout plane_layout;
+    bool plane_flipped = false;
     Matrix4 clip_from_view{};
     Rigid view_from_mannequin;
     double tan_half = 0.36;
@@ -379,15 +380,15 @@ void View3d::Impl::build_plane(const View3dInput& input) {
     for (int i = 0; i <= kSteps; ++i) {
         const double t = double(i) / kSteps - 0.5;
         for (int end = 0; end < 2; ++end) {
-            double x = t * p.width_mm, z = end * p.depth_mm;
+            double x = t * p.width_mm, z = end * (input.depth_mm > 0 ? input.depth_mm : p.depth_mm);
             if (p.shape != ProbeShape::linear) {
                 const double angle = t * p.field_of_view_rad;
                 const double radius = p.shape == ProbeShape::curvilinear ? p.radius_mm : 0;
                 x = (radius + z) * std::sin(angle);
                 z = (radius + z) * std::cos(angle) - radius;
             }
-            const double u =
-                (input.layout.origin_x_px + x / mm) / std::max(input.image_width_px, 1);
+            const double u = (input.layout.origin_x_px + (input.flipped ? -x : x) / mm) /
+                             std::max(input.image_width_px, 1);
             const double v =
                 (input.layout.origin_y_px + z / mm) / std::max(input.image_height_px, 1);
             vertices.push_back({{float(x), 0, float(z)}, {0, 1, 0}, {float(u), float(v)}});
@@ -422,10 +423,10 @@ void View3d::Impl::draw_mesh(const Mesh& mesh,
 void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
     Impl& d = *impl_;
     d.resize(std::max(width_px, 16), std::max(height_px, 16));
-    const Probe& probe = d.exercise.probe;
-    if (d.plane_layout.mm_per_px != input.layout.mm_per_px ||
+    if (d.plane_flipped != input.flipped || d.plane_layout.mm_per_px != input.layout.mm_per_px ||
         d.plane_layout.origin_y_px != input.layout.origin_y_px || d.plane.count == 0) {
         d.plane_layout = input.layout;
+        d.plane_flipped = input.flipped;
         d.build_plane(input);
     }
     // Camera
@@ -491,7 +492,6 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
     glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
     d.draw_mesh(d.skin, identity, 1, 0xC99A80, 0.34f, 1);
     glDepthFunc(GL_LESS);
-    (void)probe;
     glDisable(GL_DEPTH_TEST);
     glBindVertexArray(0);
     glUseProgram(0);

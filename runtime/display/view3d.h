@@ -23,6 +23,8 @@ struct View3dInput {
     Rigid mannequin_from_probe;
     Rigid mannequin_from_needle;
     Renderer::Layout layout;
+    double depth_mm = 0;  // shown; may differ from the exercise's
+    bool flipped = false;
     int image_width_px = 0, image_height_px = 0;
     unsigned image_texture = 0;  // OpenGL name; 0: a plain plane
     bool show_targets = true;

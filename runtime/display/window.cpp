@@ -148,7 +148,7 @@ void Window::begin_frame(const InjectedInput& injected) {
     ImGui::NewFrame();
 }
 
-void Window::end_frame() {
+void Window::end_frame(bool capture) {
     ImGui::Render();
     int width = 0, height = 0;
     glfwGetFramebufferSize(impl_->window, &width, &height);
@@ -157,23 +157,23 @@ void Window::end_frame() {
     glClearColor(0.03f, 0.04f, 0.05f, 1);
     glClear(GL_COLOR_BUFFER_BIT);
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
-    glfwSwapBuffers(impl_->window);
-}
-
-std::vector<std::uint8_t> Window::read_pixels(int& width_px, int& height_px) const {
-    glfwGetFramebufferSize(impl_->window, &width_px, &height_px);
-    const std::size_t row = static_cast<std::size_t>(width_px) * 3;
-    std::vector<std::uint8_t> pixels(row * static_cast<std::size_t>(height_px));
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, 0);
-    glReadBuffer(GL_FRONT);
-    glPixelStorei(GL_PACK_ALIGNMENT, 1);
-    glReadPixels(0, 0, width_px, height_px, GL_RGB, GL_UNSIGNED_BYTE, pixels.data());
-    for (int y = 0; y < height_px / 2; ++y) {  // OpenGL counts rows from the bottom
-        std::swap_ranges(pixels.begin() + static_cast<std::ptrdiff_t>(row) * y,
-                         pixels.begin() + static_cast<std::ptrdiff_t>(row) * (y + 1),
-                         pixels.begin() + static_cast<std::ptrdiff_t>(row) * (height_px - 1 - y));
+    if (capture) {
+        // Before the swap: what the front buffer holds after it is the window system's affair.
+        const std::size_t row = static_cast<std::size_t>(width) * 3;
+        std::vector<std::uint8_t>& pixels = capture_.pixels;
+        pixels.resize(row * static_cast<std::size_t>(height));
+        capture_.width_px = width;
+        capture_.height_px = height;
+        glPixelStorei(GL_PACK_ALIGNMENT, 1);
+        glReadPixels(0, 0, width, height, GL_RGB, GL_UNSIGNED_BYTE, pixels.data());
+        for (int y = 0; y < height / 2; ++y) {  // OpenGL counts rows from the bottom
+            const auto top = pixels.begin() + static_cast<std::ptrdiff_t>(row) * y;
+            const auto bottom =
+                pixels.begin() + static_cast<std::ptrdiff_t>(row) * (height - 1 - y);
+            std::swap_ranges(top, top + static_cast<std::ptrdiff_t>(row), bottom);
+        }
     }
-    return pixels;
+    glfwSwapBuffers(impl_->window);
 }
 
 void Window::toggle_full_screen() {

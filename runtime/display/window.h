@@ -43,9 +43,14 @@ class Window {
     void wait_events(double seconds);
     // Begins and ends one picture; what ImGui is told between the two is shown.
     void begin_frame(const InjectedInput& injected);
-    void end_frame();
-    // Picture just shown, RGB, rows from the top.
-    std::vector<std::uint8_t> read_pixels(int& width_px, int& height_px) const;
+    // capture: takes a copy of the picture for captured().
+    void end_frame(bool capture = false);
+    // The last captured picture, RGB, rows from the top.
+    struct Capture {
+        int width_px = 0, height_px = 0;
+        std::vector<std::uint8_t> pixels;
+    };
+    const Capture& captured() const { return capture_; }
 
     float scale() const { return scale_; }  // of fonts and sizes, re 1280 x 720
     void set_scale(float scale);            // takes effect with the next picture
@@ -59,6 +64,7 @@ class Window {
     Window() = default;
     std::unique_ptr<Impl> impl_;
     float scale_ = 1;
+    Capture capture_;
 };
 
 // Number of a key by its name as scripts and the help page write it ("left", "a", "f1", "space");

@@ -55,6 +55,9 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         "--serve", arguments.serve,
         "OpenIGTLink server [ADDRESS:]PORT that sends IMAGE and TRANSFORM; loopback unless "
         "an address is given");
+    app.add_option("--ui-scale", arguments.ui_scale,
+                   "Size of words and controls, 1 is for 1280x720")
+        ->check(CLI::Range(0.75, 4.0));
     app.add_option("--screenshot", arguments.screenshot, "Save the window's last picture as PNG")
         ->group("Testing");
     app.add_option("--script", arguments.script, "Play input events from a file into the window")

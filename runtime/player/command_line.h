@@ -22,6 +22,7 @@ struct PlayerArguments {
     int threads = 1;
     std::vector<std::string> calibrations;
     std::string serve;       // [ADDRESS:]PORT of the OpenIGTLink server; empty: none
+    double ui_scale = 0;     // 0: the settings' or the monitor's
     std::string screenshot;  // window: save the last picture of the window here
     std::string script;      // window: input events to play, for tests
 };

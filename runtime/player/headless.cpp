@@ -40,7 +40,9 @@ int frame_count(const PlayerArguments& arguments, const Tracker& tracker) {
     return tracker.is_device() ? 300 : 1;
 }
 
-Status write_text(const std::string& path, const std::string& text) {
+}  // namespace
+
+Status write_text_file(const std::string& path, const std::string& text) {
     if (path == "-") {
         std::fwrite(text.data(), 1, text.size(), stdout);
         return Done{};
@@ -55,8 +57,6 @@ Status write_text(const std::string& path, const std::string& text) {
     std::remove(temporary.c_str());
     return Error{"cannot write: " + reason, path, "check that the folder exists and is writable"};
 }
-
-}  // namespace
 
 double steady_seconds() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
@@ -179,7 +179,7 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
         }
     }
     if (!arguments.stats.empty()) {
-        const Status written = write_text(arguments.stats, stats.json("", &pose_to_pixel));
+        const Status written = write_text_file(arguments.stats, stats.json("", &pose_to_pixel));
         if (!written) return written.error();
     }
     return Done{};

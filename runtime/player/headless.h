@@ -12,6 +12,9 @@ Status run_headless(const PlayerArguments& arguments, double start_s);
 
 double steady_seconds();
 
+// "-" is standard output; otherwise a temporary name, then a rename.
+Status write_text_file(const std::string& path, const std::string& text);
+
 // Reads the --calibration files.
 struct Calibrations;
 Result<Calibrations> load_calibrations(const std::vector<std::string>& files);

@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <exception>
 
+#include "runtime/player/app.h"
 #include "runtime/player/command_line.h"
 #include "runtime/player/headless.h"
 
@@ -14,7 +15,8 @@ int main(int argc, char** argv) {
         bool exit_now = false;
         const int status = parse_arguments(argc, argv, arguments, exit_now);
         if (exit_now) return status;
-        const Status done = run_headless(arguments, start_s);
+        const Status done =
+            arguments.headless ? run_headless(arguments, start_s) : run_window(arguments, start_s);
         if (done) return 0;
         std::fprintf(stderr, "sonoplay: %s\n", done.error().message().c_str());
     } catch (const std::exception& e) {

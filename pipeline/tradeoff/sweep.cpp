@@ -1,0 +1,120 @@
+#include "pipeline/tradeoff/sweep.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace sonocase::pipeline {
+namespace {
+
+const Knob* find_knob(const Suite& suite, const std::string& key) {
+    for (const Knob& knob : suite.knobs) {
+        if (knob.key == key) return &knob;
+    }
+    return nullptr;
+}
+
+std::vector<std::string> values_of(const Knob& knob, bool quick) {
+    std::vector<std::string> values;
+    for (std::size_t i = 0; i < knob.values.size(); ++i) {
+        // Quick keeps both ends, every second value and the standard one.
+        const bool keep =
+            i % 2 == 0 || i + 1 == knob.values.size() || knob.values[i] == knob.standard;
+        if (!quick || keep) values.push_back(knob.values[i]);
+    }
+    return values;
+}
+
+bool same_trial(const Trial& a, const Trial& b) {
+    return a.suite == b.suite && a.body == b.body && a.role == b.role && a.name == b.name &&
+           a.settings == b.settings;
+}
+
+double now_s() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+Trial measure_trial(const Suite& suite, Trial trial, int repeats) {
+    std::vector<double> seconds;
+    for (int i = 0; i < repeats; ++i) {
+        const Result<Measured> result = suite.measure(trial.settings);
+        if (!result) {
+            trial.error = NAN;
+            trial.seconds = trial.seconds_low = trial.seconds_high = NAN;
+            trial.note = result.error().message();
+            return trial;
+        }
+        trial.error = result->error;  // the same each time: stages are deterministic
+        trial.note = result->note;
+        seconds.push_back(result->seconds);
+    }
+    std::sort(seconds.begin(), seconds.end());
+    trial.repeats = repeats;
+    trial.seconds = seconds[seconds.size() / 2];
+    trial.seconds_low = seconds.front();
+    trial.seconds_high = seconds.back();
+    return trial;
+}
+
+}  // namespace
+
+std::vector<Trial> plan_sweep(const Suite& suite, const SweepOptions& options) {
+    std::vector<Trial> plan;
+    const auto add = [&](TrialRole role, const std::string& name, const Settings& settings) {
+        Trial trial;
+        trial.suite = suite.name;
+        trial.body = suite.body;
+        trial.role = role;
+        trial.name = name;
+        trial.settings = settings;
+        plan.push_back(trial);
+    };
+    add(TrialRole::standard, "standard", {});
+    for (const NamedSettings& named : suite.named) add(named.role, named.name, named.settings);
+    for (const Knob& knob : suite.knobs) {
+        for (const std::string& value : values_of(knob, options.quick)) {
+            add(TrialRole::knob, knob.key, {{knob.key, value}});
+        }
+    }
+    if (!options.quick) {
+        for (const auto& [first, second] : suite.pairs) {
+            const Knob *a = find_knob(suite, first), *b = find_knob(suite, second);
+            if (a == nullptr || b == nullptr) continue;
+            for (const std::string& va : values_of(*a, true)) {
+                for (const std::string& vb : values_of(*b, true)) {
+                    if (va == a->standard || vb == b->standard) continue;  // already a knob's trial
+                    add(TrialRole::pair, first + " x " + second, {{first, va}, {second, vb}});
+                }
+            }
+        }
+    }
+    return plan;
+}
+
+std::vector<Trial> run_sweep(const Suite& suite,
+                             const std::vector<Trial>& plan,
+                             const std::vector<Trial>& done,
+                             const SweepOptions& options,
+                             const std::function<void(const Trial&)>& each,
+                             const Progress& progress) {
+    std::vector<Trial> measured;
+    const double start = now_s();
+    for (std::size_t i = 0; i < plan.size(); ++i) {
+        tell(progress, static_cast<double>(i) / static_cast<double>(plan.size()),
+             suite.name + ": " + settings_text(plan[i].settings));
+        const auto known = std::find_if(done.begin(), done.end(),
+                                        [&](const Trial& t) { return same_trial(t, plan[i]); });
+        if (known != done.end()) {
+            measured.push_back(*known);
+            continue;
+        }
+        if (options.limit_s > 0 && now_s() - start > options.limit_s) break;
+        measured.push_back(measure_trial(suite, plan[i], std::max(options.repeats, 1)));
+        if (each) each(measured.back());
+    }
+    tell(progress, 1, suite.name);
+    return measured;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,343 @@
+#include "runtime/player/app.h"
+
+#include <GLFW/glfw3.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+#include "runtime/display/theme.h"
+#include "runtime/player/headless.h"
+#include "runtime/player/png_file.h"
+#include "runtime/tracking/make_tracker.h"
+
+namespace sonocase::runtime {
+
+void notify(App& app, Notice::Kind kind, const std::string& text) {
+    if (kind != Notice::Kind::news) std::fprintf(stderr, "sonoplay: %s\n", text.c_str());
+    for (Notice& notice : app.notices) {
+        if (notice.text == text) {
+            notice.since_s = app.now_s;
+            return;
+        }
+    }
+    app.notices.push_back({kind, text, app.now_s});
+    if (app.notices.size() > 4) app.notices.erase(app.notices.begin());
+}
+
+void rebuild_engine(App& app) {
+    EngineOptions options;
+    RenderOptions& render = options.render;
+    render.width_px = app.arguments.width_px > 0 && app.arguments.headless ? app.arguments.width_px
+                                                                           : app.render_px;
+    render.height_px = render.width_px;
+    render.model = app.model == "paper" ? ImageModel::paper : ImageModel::physical;
+    render.kind =
+        app.arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
+    render.threads = app.arguments.threads;
+    render.effects = app.arguments.effects.empty() ? app.current().effects : app.arguments.effects;
+    options.depth_mm = app.depth_mm;
+    options.focus_mm = app.focus_mm;
+    Result<ScanEngine> engine = ScanEngine::create(app.open->bundle, app.current(), options);
+    if (!engine && render.effects != std::vector<std::string>{"auto"}) {
+        // The effects named may be those of the other model.
+        render.effects = {"auto"};
+        engine = ScanEngine::create(app.open->bundle, app.current(), options);
+    }
+    if (!engine) {
+        notify(app, Notice::Kind::error, engine.error().message());
+        return;
+    }
+    app.controls.frozen = false;
+    app.cine_back = app.controls.cine_back = 0;
+    app.scan->set_controls(app.controls);
+    app.scan->set_engine(std::make_unique<ScanEngine>(std::move(*engine)));
+}
+
+void close_bundle(App& app) {
+    if (app.scan) {
+        app.scan->set_tracker(nullptr);
+        app.scan->set_engine(nullptr);
+    }
+    app.mouse.reset();
+    app.mouse_feed.reset();
+    app.skin.reset();
+    app.open.reset();
+}
+
+bool open_bundle(App& app, const std::string& path, const std::string& exercise) {
+    Result<std::unique_ptr<OpenCase>> opened = open_case(path);
+    if (!opened) {
+        notify(app, Notice::Kind::error, opened.error().message());
+        return false;
+    }
+    Result<int> index = find_exercise(**opened, exercise);
+    if (!index) {
+        notify(app, Notice::Kind::error, index.error().message());
+        index = 0;
+    }
+    close_bundle(app);
+    app.open = std::move(*opened);
+    for (const std::string& warning : app.open->warnings)
+        notify(app, Notice::Kind::warning, warning);
+    app.skin = std::make_unique<Skin>(app.open->bundle);
+    app.view3d->set_case(app.open->bundle);
+    app.page = Page::scan;
+    choose_exercise(app, *index);
+    app.window->set_title(app.open->bundle.manifest.case_name + " - sonocase");
+    std::error_code ignored;
+    const std::string whole = std::filesystem::weakly_canonical(path, ignored).string();
+    auto& recent = app.settings.recent;
+    recent.erase(std::remove(recent.begin(), recent.end(), whole), recent.end());
+    recent.insert(recent.begin(), whole);
+    if (recent.size() > 12) recent.resize(12);
+    return true;
+}
+
+void choose_exercise(App& app, int index) {
+    const int count = static_cast<int>(app.open->exercises.size());
+    app.exercise = (index % count + count) % count;
+    const Exercise& exercise = app.current();
+    app.model = app.arguments.model.empty() ? exercise.model : app.arguments.model;
+    app.depth_mm = exercise.probe.depth_mm;
+    app.focus_mm = exercise.probe.focus_mm;
+    app.hits.assign(exercise.targets.size(), false);
+    app.image.clear_measurements();
+    app.view3d->set_exercise(exercise);
+    app.scan->set_tracker(nullptr);
+    rebuild_engine(app);
+    choose_tracker(app, app.tracker_spec);
+}
+
+void choose_tracker(App& app, const std::string& spec) {
+    app.scan->set_tracker(nullptr);
+    app.mouse.reset();
+    app.mouse_feed.reset();
+    app.tracker_spec = spec;
+    if (spec == "mouse") {
+        app.mouse = std::make_unique<MouseTracker>(*app.skin, app.current());
+        app.mouse_feed = std::make_shared<PushTracker>("Mouse and keyboard");
+        app.scan->set_tracker(app.mouse_feed);
+        return;
+    }
+    TrackerContext context;
+    context.skin = app.skin.get();
+    context.exercise = &app.current();
+    const double start_s = app.clock_start_s;
+    context.clock = [start_s] { return steady_seconds() - start_s; };
+    context.loop = true;
+    Result<std::unique_ptr<Tracker>> made = make_tracker(spec, context);
+    if (!made) {
+        notify(app, Notice::Kind::error, made.error().message());
+        if (spec != "mouse") choose_tracker(app, "mouse");
+        return;
+    }
+    app.scan->set_tracker(std::shared_ptr<Tracker>(std::move(*made)));
+}
+
+void change_depth(App& app, double by_mm) {
+    const double depth = std::clamp(std::round((app.depth_mm + by_mm) / 10) * 10, 30.0, 300.0);
+    if (depth == app.depth_mm) return;
+    app.depth_mm = depth;
+    app.focus_mm = std::min(app.focus_mm, depth);
+    rebuild_engine(app);
+}
+
+void change_focus(App& app, double by_mm) {
+    const double focus = std::clamp(std::round((app.focus_mm + by_mm) / 5) * 5, 10.0, app.depth_mm);
+    if (focus == app.focus_mm) return;
+    app.focus_mm = focus;
+    rebuild_engine(app);
+}
+
+void set_frozen(App& app, bool frozen) {
+    app.controls.frozen = frozen;
+    app.cine_back = app.controls.cine_back = 0;
+    app.playing_cine = false;
+}
+
+void step_cine(App& app, int frames) {
+    if (!app.controls.frozen) set_frozen(app, true);
+    app.cine_back = std::clamp(app.cine_back + frames, 0, std::max(app.frame().cine_frames - 1, 0));
+    app.controls.cine_back = app.cine_back;
+}
+
+void toggle_needle(App& app, bool in_plane) {
+    if (!app.mouse) return;
+    if (app.mouse->has_needle()) {
+        app.mouse->withdraw_needle();
+        return;
+    }
+    // Beside the face: far enough that hand and probe do not meet.
+    const Probe& probe = app.current().probe;
+    const double half = probe.shape == ProbeShape::curvilinear
+                            ? probe.radius_mm * std::sin(0.5 * probe.field_of_view_rad)
+                            : 0.5 * probe.width_mm;
+    if (!app.mouse->place_needle_beside_probe(in_plane ? half + 8 : 18, in_plane)) {
+        notify(app, Notice::Kind::news, "There is no skin beside the probe to put the needle on.");
+    }
+}
+
+Status save_screenshot(App& app, const std::string& path) {
+    const Window::Capture& picture = app.window->captured();
+    if (picture.pixels.empty()) return Done{};
+    return write_png(path, picture.width_px, picture.height_px, 3, picture.pixels);
+}
+
+namespace {
+
+void apply_settings(App& app) {
+    const Settings& s = app.settings;
+    app.controls.settings.gain_db = s.gain_db;
+    app.controls.settings.dynamic_range_db = s.dynamic_range_db;
+    for (std::size_t i = 0; i < 8; ++i) app.controls.settings.tgc_db[i] = s.tgc_db[i];
+    app.controls.assignment = {s.probe_sensor, s.needle_sensor};
+}
+
+void keep_settings(App& app) {
+    Settings& s = app.settings;
+    s.gain_db = app.controls.settings.gain_db;
+    s.dynamic_range_db = app.controls.settings.dynamic_range_db;
+    for (std::size_t i = 0; i < 8; ++i) s.tgc_db[i] = app.controls.settings.tgc_db[i];
+    s.probe_sensor = app.controls.assignment.probe;
+    s.needle_sensor = app.controls.assignment.needle;
+    if (app.arguments.tracker.empty()) s.tracker = app.tracker_spec;
+    if (app.settings_file.empty()) return;
+    const Status saved = save_settings(s, app.settings_file);
+    if (!saved) std::fprintf(stderr, "sonoplay: %s\n", saved.error().message().c_str());
+}
+
+void draw(App& app) {
+    const ImGuiIO& io = ImGui::GetIO();
+    ImGui::SetNextWindowPos({0, 0});
+    ImGui::SetNextWindowSize(io.DisplaySize);
+    ImGui::Begin("sonocase", nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNav |
+                     ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoSavedSettings);
+    if (app.page == Page::bundles || !app.open) {
+        draw_bundle_page(app);
+    } else {
+        draw_scan_page(app);
+    }
+    ImGui::End();
+    if (app.show_help) draw_help(app);
+    if (app.show_setup && app.open) draw_setup(app);
+    draw_notices(app);
+}
+
+void advance_cine(App& app) {
+    if (!app.playing_cine) return;
+    if (app.now_s - app.cine_clock_s < 1 / kCineRate) return;
+    app.cine_clock_s = app.now_s;
+    app.cine_back =
+        app.cine_back > 0 ? app.cine_back - 1 : std::max(app.frame().cine_frames - 1, 0);
+    app.controls.cine_back = app.cine_back;
+}
+
+}  // namespace
+
+Status run_window(const PlayerArguments& arguments, double start_s) {
+    App app;
+    app.arguments = arguments;
+    app.clock_start_s = steady_seconds();
+    if (!config_folder().empty()) app.settings_file = config_folder() + "/player.json";
+    std::string warning;
+    app.settings = load_settings(app.settings_file, warning);
+    if (!arguments.script.empty()) {
+        Result<InputScript> script = InputScript::load(arguments.script);
+        if (!script) return script.error();
+        app.script = std::move(*script);
+    }
+    const Result<Calibrations> calibrations = load_calibrations(arguments.calibrations);
+    if (!calibrations) return calibrations.error();
+    app.calibrations = *calibrations;
+    apply_settings(app);
+    WindowOptions options;
+    options.width_px = arguments.width_px > 0 ? arguments.width_px : app.settings.window_width_px;
+    options.height_px =
+        arguments.height_px > 0 ? arguments.height_px : app.settings.window_height_px;
+    options.ui_scale = arguments.ui_scale > 0 ? arguments.ui_scale : app.settings.ui_scale;
+    Result<std::unique_ptr<Window>> window = Window::open(options);
+    if (!window) return window.error();
+    app.window = std::move(*window);
+    app.texture = std::make_unique<ImageTexture>();
+    app.view3d = std::make_unique<View3d>();
+    const double clock_start_s = app.clock_start_s;
+    app.scan =
+        std::make_unique<ScanThread>([clock_start_s] { return steady_seconds() - clock_start_s; });
+    app.scan->set_first_frame_origin_s(start_s - clock_start_s);
+    app.scan->set_calibrations(app.calibrations);
+    app.tracker_spec = arguments.tracker.empty() ? "mouse" : arguments.tracker;
+    if (!warning.empty()) notify(app, Notice::Kind::warning, warning);
+    app.bundles = find_bundles(app.settings);
+    if (!arguments.bundle.empty()) open_bundle(app, arguments.bundle, arguments.exercise);
+
+    double last_s = steady_seconds(), last_shown_s = last_s;
+    std::uint64_t shown = 0;
+    while (!app.window->should_close()) {
+        // 60 pictures a second; a display that paces itself through the swap is not slowed further.
+        const double due_s = last_s + 1 / 60.0;
+        do {
+            app.window->wait_events(std::max(0.0, due_s - steady_seconds()));
+        } while (steady_seconds() < due_s - 5e-4 && !app.window->should_close());
+        const double now_s = steady_seconds();
+        const double seconds = std::min(now_s - last_s, 0.1);
+        last_s = std::max(due_s, now_s - 1 / 60.0);
+        app.now_s = now_s - app.clock_start_s;
+        if (now_s > last_shown_s) app.ui_rate += 0.08 * (1 / (now_s - last_shown_s) - app.ui_rate);
+        last_shown_s = now_s;
+
+        std::string shot;
+        bool quit = false;
+        InjectedInput input;
+        if (app.script.active()) input = app.script.next(shot, quit);
+        app.window->begin_frame(input);
+        const bool fresh = app.scan->refresh();
+        if (fresh && app.frame().width_px > 0) {
+            app.texture->upload(app.frame().pixels, app.frame().width_px, app.frame().height_px);
+        }
+        handle_keys(app, seconds);
+        advance_cine(app);
+        draw(app);
+        if (app.mouse && app.mouse_feed) {
+            TrackerReading reading;
+            if (app.mouse->poll(steady_seconds() - app.clock_start_s, reading)) {
+                app.mouse_feed->push(reading);
+            }
+        }
+        if (app.open) app.scan->set_controls(app.controls);
+        ++shown;
+        if (arguments.frames > 0 && shown >= static_cast<std::uint64_t>(arguments.frames))
+            quit = true;
+        const bool last = quit || app.window->should_close();
+        app.window->end_frame(!shot.empty() || (last && !arguments.screenshot.empty()));
+        if (fresh) {
+            app.screen_ms =
+                1e3 * (steady_seconds() - app.clock_start_s - app.frame().record.reading_time_s);
+        }
+        if (!shot.empty()) {
+            const Status saved = save_screenshot(app, shot);
+            if (!saved) notify(app, Notice::Kind::error, saved.error().message());
+        }
+        if (quit) app.window->request_close();
+    }
+    if (!arguments.screenshot.empty()) {
+        const Status saved = save_screenshot(app, arguments.screenshot);
+        if (!saved) std::fprintf(stderr, "sonoplay: %s\n", saved.error().message().c_str());
+    }
+    if (!arguments.stats.empty()) {
+        const Status written = write_text_file(arguments.stats, app.scan->stats_json(""));
+        if (!written) std::fprintf(stderr, "sonoplay: %s\n", written.error().message().c_str());
+    }
+    keep_settings(app);
+    close_bundle(app);
+    app.scan.reset();
+    app.view3d.reset();
+    app.texture.reset();
+    return Done{};
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,42 @@
+// Input from a file, for tests of the window: one command a line.
+//
+//   wait N              N pictures pass
+//   key NAME [mods]     press and release; mods are shift, ctrl, alt
+//   hold NAME N [mods]  keep it down for N pictures
+//   move X Y            the mouse, in window pixels
+//   down B | up B       button 0 left, 1 right, 2 middle
+//   wheel DY
+//   shot FILE           save the window as PNG
+//   quit
+// Empty lines and lines that start with # do nothing.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/result.h"
+#include "runtime/display/window.h"
+
+namespace sonocase::runtime {
+
+class InputScript {
+  public:
+    static Result<InputScript> load(const std::string& path);
+
+    bool active() const { return next_ < lines_.size() || waiting_ > 0; }
+    // Input of the next picture. `shot` is set to a file to save after it, `quit` when it is over.
+    InjectedInput next(std::string& shot, bool& quit);
+
+  private:
+    struct Line {
+        int number = 0;
+        std::vector<std::string> words;
+    };
+    std::vector<Line> lines_;
+    std::size_t next_ = 0;
+    int waiting_ = 0;
+    InjectedInput input_;
+    bool release_ = false;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,67 @@
+#include "pipeline/tradeoff/sweep.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace sonocase::pipeline {
+namespace {
+
+Suite suite(int& runs) {
+    Suite s;
+    s.name = "toy";
+    s.body = "none";
+    s.knobs = {{"toy.n", {"1", "2", "4", "8"}, "2", "", "", "", ""},
+               {"toy.m", {"1", "3"}, "1", "", "", "", ""}};
+    s.pairs = {{"toy.n", "toy.m"}};
+    s.named = {{TrialRole::preset, "draft", {{"toy.n", "1"}}}};
+    s.measure = [&runs](const Settings& settings) -> Result<Measured> {
+        ++runs;
+        for (const Setting& setting : settings) {
+            if (setting.value == "8") return Error{"too many", "toy", ""};
+        }
+        return Measured{1.0 / static_cast<double>(settings.size() + 1), 0.5, ""};
+    };
+    return s;
+}
+
+TEST(Sweep, PlanHoldsStandardNamedKnobsAndPairsOnce) {
+    int runs = 0;
+    const Suite s = suite(runs);
+    const auto full = plan_sweep(s, {});
+    // 1 standard, 1 preset, 4 + 2 knob values, and pairs of (1, 4, 8) with 3 off the standard.
+    EXPECT_EQ(full.size(), 1u + 1 + 6 + 3);
+    SweepOptions quick;
+    quick.quick = true;
+    EXPECT_LT(plan_sweep(s, quick).size(), full.size());
+}
+
+TEST(Sweep, ResumedSweepMeasuresOnlyWhatIsMissing) {
+    int runs = 0;
+    const Suite s = suite(runs);
+    SweepOptions options;
+    options.repeats = 3;
+    const auto plan = plan_sweep(s, options);
+    const auto first = run_sweep(s, plan, {}, options, {}, {});
+    const int once = runs;
+    const auto again = run_sweep(s, plan, first, options, {}, {});
+    EXPECT_EQ(runs, once);
+    EXPECT_EQ(again.size(), first.size());
+}
+
+TEST(Sweep, FailedSettingIsKeptWithItsMessage) {
+    int runs = 0;
+    const Suite s = suite(runs);
+    bool seen = false;
+    for (const Trial& t : run_sweep(s, plan_sweep(s, {}), {}, {}, {}, {})) {
+        if (t.settings == Settings{{"toy.n", "8"}}) {
+            seen = true;
+            EXPECT_TRUE(std::isnan(t.error));
+            EXPECT_EQ(t.note, "toy: too many");
+        }
+    }
+    EXPECT_TRUE(seen);
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
