@@ -3,16 +3,17 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
+#include "runtime/imaging/effects.h"
 #include "runtime/imaging/paper_fast.h"
-#include "runtime/imaging/paper_reference.h"
+#include "runtime/imaging/physical_fast.h"
 #include "runtime/imaging/simd_target.h"
 
 namespace sonocase::runtime {
 namespace {
 
-constexpr std::array<const char*, 8> kPaperEffects{
-    "slice", "texture", "needle", "noise", "shadow", "blur", "attenuation", "scan_conversion"};
+constexpr int kMaxLines = 4096, kMaxSamples = 8192, kMaxPixels = 8192;
 
 bool valid_pose(const Rigid& t) {
     return is_finite(t) && orthonormality_error(t.rotation) < 1e-3 && determinant(t.rotation) > 0;
@@ -22,11 +23,35 @@ bool finite(double x, double y, double z) {
     return std::isfinite(x) && std::isfinite(y) && std::isfinite(z);
 }
 
-}  // namespace
-
-std::span<const char* const> effect_names(ImageModel) {
-    return kPaperEffects;
+Status check_options(const Exercise& exercise, const RenderOptions& o) {
+    const Probe& p = exercise.probe;
+    if (o.width_px < 1 || o.height_px < 1 || o.width_px > kMaxPixels || o.height_px > kMaxPixels) {
+        return Error{"a picture of " + std::to_string(o.width_px) + " x " +
+                         std::to_string(o.height_px) + " pixels",
+                     "", "give 1 to 8192 pixels each way"};
+    }
+    if (o.threads < 1 || o.threads > 256)
+        return Error{std::to_string(o.threads) + " threads", "", "give 1 to 256"};
+    if (o.scanlines < 0 || o.scanlines > kMaxLines || o.samples < 0 || o.samples > kMaxSamples) {
+        return Error{
+            std::to_string(o.scanlines) + " beams of " + std::to_string(o.samples) + " samples", "",
+            "give at most 4096 x 8192"};
+    }
+    const bool linear = p.shape == ProbeShape::linear;
+    const double extent = linear ? p.width_mm : p.field_of_view_rad;
+    const bool radius_fits =
+        p.shape != ProbeShape::curvilinear || (p.radius_mm > 0 && p.radius_mm < 1e4);
+    if (!(p.depth_mm > 0 && p.depth_mm <= 1000) ||
+        !(extent > 0 && extent <= (linear ? 1000 : 6.2)) || !radius_fits ||
+        !(p.frequency_mhz > 0.1 && p.frequency_mhz < 100) || !std::isfinite(p.focus_mm) ||
+        !(p.elevation_mm >= 0 && p.elevation_mm < 100)) {
+        return Error{"the probe of exercise " + exercise.name + " has no area to scan", "",
+                     "give depth in (0, 1000] mm, opening, radius, width and frequency above 0"};
+    }
+    return Done{};
 }
+
+}  // namespace
 
 struct Renderer::Impl {
     const CaseBundle& bundle;
@@ -34,16 +59,48 @@ struct Renderer::Impl {
     RenderOptions options;
     ScanGeometry geometry;
     WorkerPool workers;
+    EffectChoice effects;
+    std::vector<float> row_gain, row_gain_db;  // # samples
+    std::vector<EffectCost> costs;
+
     PaperScene paper_scene;
     std::unique_ptr<PaperFast> paper;
-    PaperEffects effects;
-    bool keep_all = false;
-    std::vector<float> row_gain;
-    std::vector<std::int8_t> noise_tile;
-    std::vector<EffectCost> costs;
+
+    PhysicalScene physical_scene;
+    physical::Tables tables;
+    PhysicalNoise noise;
+    BreathingField breathing;
+    std::unique_ptr<PhysicalFast> physical;
 
     Impl(const CaseBundle& b, const Exercise& e, const RenderOptions& o)
         : bundle(b), exercise(e), options(o), workers(o.threads) {}
+
+    void set_gain(const ImageSettings& settings);
+    FrameStatus render_paper(const FrameInput& input,
+                             const NeedleShape* needle,
+                             std::span<std::uint8_t> pixels);
+    FrameStatus render_physical(const FrameInput& input,
+                                const NeedleShape* needle,
+                                std::span<std::uint8_t> pixels);
+    void flip(std::span<std::uint8_t> pixels) const;
+
+    // Shares the time of each pass among its effects that ran. `skipped` says why an effect did
+    // not, or
+    // "" where it did.
+    template <class Skipped>
+    void set_costs(std::span<const double> pass_ms, Skipped&& skipped) {
+        const auto table = effect_table(options.model);
+        std::array<double, 6> total{};
+        for (std::size_t i = 0; i < table.size(); ++i) {
+            const char* why = skipped(table[i]);
+            costs[i] = {table[i].name, 0, *why == '\0', why};
+            if (costs[i].ran) total[static_cast<std::size_t>(table[i].pass)] += table[i].weight;
+        }
+        for (std::size_t i = 0; i < table.size(); ++i) {
+            const auto pass = static_cast<std::size_t>(table[i].pass);
+            if (costs[i].ran) costs[i].ms = pass_ms[pass] * table[i].weight / total[pass];
+        }
+    }
 };
 
 Renderer::Renderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -54,59 +111,157 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 Result<Renderer> Renderer::create(const CaseBundle& bundle,
                                   const Exercise& exercise,
                                   const RenderOptions& options) {
-    const Probe& probe = exercise.probe;
-    if (options.width_px < 1 || options.height_px < 1 || options.width_px > 8192 ||
-        options.height_px > 8192) {
-        return Error{"a picture of " + std::to_string(options.width_px) + " x " +
-                         std::to_string(options.height_px) + " pixels",
-                     "", "give 1 to 8192 pixels each way"};
-    }
-    if (options.threads < 1 || options.threads > 256) {
-        return Error{std::to_string(options.threads) + " threads", "", "give 1 to 256"};
-    }
-    const double extent =
-        probe.shape == ProbeShape::linear ? probe.width_mm : probe.field_of_view_rad;
-    const bool radius_fits =
-        probe.shape != ProbeShape::curvilinear || (probe.radius_mm > 0 && probe.radius_mm < 1e4);
-    if (!(probe.depth_mm > 0 && probe.depth_mm <= 1000) || !(extent > 0) ||
-        extent > (probe.shape == ProbeShape::linear ? 1000 : 6.2) || !radius_fits ||
-        !(probe.frequency_mhz > 0 && probe.frequency_mhz < 100)) {
-        return Error{"the probe of exercise " + exercise.name + " has no area to scan", "",
-                     "depth in (0, 1000] mm, opening, radius, width and frequency above 0"};
-    }
+    if (const Status fits = check_options(exercise, options); !fits) return fits.error();
     choose_simd_target();
     auto impl = std::make_unique<Impl>(bundle, exercise, options);
-    const int lines = options.scanlines > 0 ? options.scanlines : 512;
+    Impl& m = *impl;
+    Result<EffectChoice> effects = choose_effects(options.model, options.effects);
+    if (!effects) return effects.error();
+    m.effects = *effects;
+    const bool is_paper = options.model == ImageModel::paper;
+    const int lines = options.scanlines > 0 ? options.scanlines : is_paper ? 512 : 192;
     const int samples = options.samples > 0 ? options.samples : 512;
-    if (lines > 4096 || samples > 8192)
-        return Error{"too many beams or samples", "", "at most 4096 x 8192"};
-    impl->geometry = make_scan_geometry(probe, lines, samples, options.width_px, options.height_px);
-    Result<PaperScene> scene = make_paper_scene(bundle);
-    if (!scene) return scene.error();
-    impl->paper_scene = std::move(*scene);
-    impl->paper =
-        std::make_unique<PaperFast>(impl->paper_scene, impl->geometry, options.seed, impl->workers);
-    impl->row_gain.resize(static_cast<std::size_t>(samples));
-
-    PaperEffects& on = impl->effects;
-    const auto has = [&](const char* name) {
-        return std::find(options.effects.begin(), options.effects.end(), name) !=
-               options.effects.end();
-    };
-    for (const std::string& name : options.effects) {
-        if (name == "auto" || name == "all" || name == "none") continue;
-        if (std::find(kPaperEffects.begin(), kPaperEffects.end(), name) == kPaperEffects.end()) {
-            return Error{"no effect is called " + name, "",
-                         "auto, all, none, or names of the effects table"};
+    m.geometry =
+        make_scan_geometry(exercise.probe, lines, samples, options.width_px, options.height_px);
+    m.row_gain.assign(static_cast<std::size_t>(samples), 1.0f);
+    m.row_gain_db.assign(static_cast<std::size_t>(samples), 0.0f);
+    if (is_paper) {
+        Result<PaperScene> scene = make_paper_scene(bundle);
+        if (!scene) return scene.error();
+        m.paper_scene = std::move(*scene);
+        m.paper = std::make_unique<PaperFast>(m.paper_scene, m.geometry, options.seed, m.workers);
+    } else {
+        Result<PhysicalScene> scene = make_physical_scene(bundle);
+        if (!scene) return scene.error();
+        m.physical_scene = std::move(*scene);
+        m.tables = physical::make_tables(exercise.probe, m.geometry);
+        m.noise = make_physical_noise(options.seed, lines + 128);
+        if (exercise.breathing.amplitude_mm != 0) m.breathing = BreathingField(bundle);
+        if (options.kind == RendererKind::fast) {
+            m.physical = std::make_unique<PhysicalFast>(m.physical_scene, m.geometry, m.tables,
+                                                        m.noise, m.workers);
         }
     }
-    impl->keep_all = has("all");
-    if (!has("auto") && !has("all")) {
-        on = {has("texture"), has("needle"),      has("noise"),
-              has("shadow"),  has("attenuation"), has("blur")};
-    }
-    for (const char* name : kPaperEffects) impl->costs.push_back({name, 0, false, ""});
+    for (const EffectEntry& e : effect_table(options.model))
+        m.costs.push_back({e.name, 0, false, ""});
     return Renderer(std::move(impl));
+}
+
+void Renderer::Impl::set_gain(const ImageSettings& s) {
+    for (int k = 0; k < geometry.samples; ++k) {
+        const double at = (k + 0.5) / geometry.samples * 7;  // eight sliders, linear in between
+        const auto i = static_cast<std::size_t>(at);
+        const double slider =
+            s.tgc_db[i] * (1 - (at - static_cast<double>(i))) +
+            s.tgc_db[std::min<std::size_t>(i + 1, 7)] * (at - static_cast<double>(i));
+        const double db = s.gain_db + slider;
+        row_gain_db[static_cast<std::size_t>(k)] =
+            static_cast<float>(std::isfinite(db) ? std::clamp(db, -100.0, 100.0) : 0.0);
+    }
+}
+
+void Renderer::Impl::flip(std::span<std::uint8_t> pixels) const {
+    const auto width = static_cast<std::size_t>(geometry.width_px);
+    for (std::size_t row = 0; row < pixels.size(); row += width) {
+        const auto line = pixels.subspan(row, width);
+        std::reverse(line.begin(), line.end());
+    }
+}
+
+FrameStatus Renderer::Impl::render_paper(const FrameInput& input,
+                                         const NeedleShape* needle,
+                                         std::span<std::uint8_t> pixels) {
+    for (std::size_t k = 0; k < row_gain.size(); ++k) {
+        row_gain[k] =
+            row_gain_db[k] == 0
+                ? 1.0f
+                : static_cast<float>(std::pow(10.0, static_cast<double>(row_gain_db[k]) / 20));
+    }
+    PaperFrame frame;
+    frame.volume_from_probe = input.mannequin_from_probe;
+    frame.needle = needle;
+    frame.seed = options.seed;
+    frame.frame = input.frame;
+    frame.row_gain = row_gain;
+    frame.effects = effects.paper;
+    if (options.kind == RendererKind::reference) {
+        const auto start = std::chrono::steady_clock::now();
+        render_paper_reference(paper_scene, geometry, paper->noise_tile(), frame, pixels);
+        if (input.settings.flip_left_right) flip(pixels);
+        const double ms =
+            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+                .count();
+        const std::array<double, 6> passes{0, ms, 0, 0, 0, 0};
+        set_costs(passes, [&](const EffectEntry& e) {
+            return e.paper != nullptr && !(effects.paper.*e.paper) ? "switched off" : "";
+        });
+        return FrameStatus::rendered;
+    }
+    paper->render(frame, input.settings.flip_left_right, effects.keep_all, pixels);
+    const PaperPasses& p = paper->passes();
+    const std::array<double, 6> passes{0, p.beams_ms, p.needle_ms, p.blur_ms, 0, p.convert_ms};
+    set_costs(passes, [&](const EffectEntry& e) {
+        if (e.paper != nullptr && !(effects.paper.*e.paper)) return "switched off";
+        if (e.paper == &PaperEffects::shadow && !p.shadow_met) return "no bone or gas crossed";
+        if (e.paper == &PaperEffects::needle && needle == nullptr) return "no needle";
+        if (e.paper == &PaperEffects::needle && !p.needle_met) return "needle outside the slab";
+        return "";
+    });
+    return FrameStatus::rendered;
+}
+
+FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
+                                            const NeedleShape* needle,
+                                            std::span<std::uint8_t> pixels) {
+    PhysicalFrame frame;
+    frame.volume_from_probe = input.mannequin_from_probe;
+    frame.needle = needle;
+    frame.seed = options.seed;
+    frame.frame = input.frame;
+    frame.row_gain_db = row_gain_db;
+    frame.dynamic_range_db = std::isfinite(input.settings.dynamic_range_db)
+                                 ? std::clamp(input.settings.dynamic_range_db, 20.0, 120.0)
+                                 : 60.0;
+    frame.motion = motion_at(exercise.breathing, exercise.pulsation,
+                             std::isfinite(input.time_s) ? input.time_s : 0);
+    frame.effects = effects.physical;
+    if (options.kind == RendererKind::reference) {
+        const auto start = std::chrono::steady_clock::now();
+        render_physical_reference(physical_scene, geometry, tables, noise, frame, pixels);
+        if (input.settings.flip_left_right) flip(pixels);
+        const double ms =
+            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+                .count();
+        const std::array<double, 6> passes{0, ms, 0, 0, 0, 0};
+        set_costs(passes, [&](const EffectEntry& e) {
+            return e.physical != nullptr && !(effects.physical.*e.physical) ? "switched off" : "";
+        });
+        return FrameStatus::rendered;
+    }
+    physical->render(frame, breathing, input.settings.flip_left_right, effects.keep_all, pixels);
+    const PhysicalPasses& p = physical->passes();
+    const std::array<double, 6> passes{p.contact_ms, p.beams_ms, p.needle_ms,
+                                       p.filter_ms,  p.grey_ms,  p.convert_ms};
+    using Y = PhysicalEffects;
+    set_costs(passes, [&](const EffectEntry& e) {
+        if (e.physical == nullptr) return "";
+        if (!(effects.physical.*e.physical)) return "switched off";
+        if (e.physical == &Y::breathing && !frame.motion.breathes())
+            return "the scenario does not breathe, or is at rest";
+        if (e.physical == &Y::pulsation && frame.motion.pulse_mm == 0) return "no pulse";
+        if ((e.physical == &Y::boundaries || e.physical == &Y::interfaces) && !p.boundary_met)
+            return "no interface crossed";
+        if (e.physical == &Y::edge_shadow && !p.refraction_met) return "no fluid crossed";
+        if ((e.physical == &Y::bone_tail || e.physical == &Y::gas_ring_down) && !p.hard_met)
+            return "no bone or gas crossed";
+        if (e.physical == &Y::needle && needle == nullptr) return "no needle";
+        if (e.physical == &Y::needle && !p.needle_met) return "needle outside the slab";
+        if (e.physical == &Y::contact && !p.gap_met) return "the probe touches everywhere";
+        if (e.physical == &Y::structure && !physical_scene.has_echo)
+            return "the bundle holds no structure";
+        return "";
+    });
+    return p.beams_in_contact == 0 ? FrameStatus::no_contact : FrameStatus::rendered;
 }
 
 FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pixels) {
@@ -114,70 +269,23 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
     assert(pixels.size() == static_cast<std::size_t>(m.options.width_px) *
                                 static_cast<std::size_t>(m.options.height_px));
     if (!valid_pose(input.mannequin_from_probe)) return FrameStatus::held_bad_pose;
-
-    const ScanGeometry& g = m.geometry;
-    for (int k = 0; k < g.samples; ++k) {
-        const double at = (k + 0.5) / g.samples * 7;
-        const auto i = static_cast<std::size_t>(at);
-        const double slider =
-            input.settings.tgc_db[i] * (1 - (at - static_cast<double>(i))) +
-            input.settings.tgc_db[std::min<std::size_t>(i + 1, 7)] * (at - static_cast<double>(i));
-        const double db = std::clamp(input.settings.gain_db + slider, -100.0, 100.0);
-        m.row_gain[static_cast<std::size_t>(k)] = static_cast<float>(std::pow(10.0, db / 20));
-    }
-
+    m.set_gain(input.settings);
     NeedleShape needle;
-    PaperFrame frame;
-    frame.volume_from_probe = input.mannequin_from_probe;
+    const NeedleShape* shown = nullptr;
     const Vector3 d = input.needle.direction;
-    if (input.has_needle && finite(input.needle.tip.x, input.needle.tip.y, input.needle.tip.z) &&
-        finite(d.x, d.y, d.z) && norm(d) > 0.5) {
+    const Point3 tip = input.needle.tip;
+    if (input.has_needle && finite(tip.x, tip.y, tip.z) && finite(d.x, d.y, d.z) && norm(d) > 0.5) {
         const Rigid probe_from_mannequin = inverse(input.mannequin_from_probe);
-        needle = needle_shape(m.exercise.needle, probe_from_mannequin * input.needle.tip,
-                              normalized(probe_from_mannequin * d));
-        frame.needle = &needle;
+        NeedleModel model = m.exercise.needle;
+        // The physical slab is the beam's own thickness unless the exercise sets one.
+        if (m.options.model == ImageModel::physical && !(model.slab_mm > 0))
+            model.slab_mm = m.exercise.probe.elevation_mm;
+        needle =
+            needle_shape(model, probe_from_mannequin * tip, normalized(probe_from_mannequin * d));
+        if (needle.radius_mm > 0 && std::isfinite(needle.slab_mm)) shown = &needle;
     }
-    frame.seed = m.options.seed;
-    frame.frame = input.frame;
-    frame.row_gain = m.row_gain;
-    frame.effects = m.effects;
-
-    if (m.options.kind == RendererKind::reference) {
-        const auto start = std::chrono::steady_clock::now();
-        render_paper_reference(m.paper_scene, g, m.paper->noise_tile(), frame, pixels);
-        if (input.settings.flip_left_right) {
-            for (int row = 0; row < g.height_px; ++row) {
-                const auto line = pixels.subspan(
-                    static_cast<std::size_t>(row) * static_cast<std::size_t>(g.width_px),
-                    static_cast<std::size_t>(g.width_px));
-                std::reverse(line.begin(), line.end());
-            }
-        }
-        for (EffectCost& c : m.costs) c = {c.name, 0, true, ""};
-        m.costs[0].ms =
-            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-                .count();
-    } else {
-        m.paper->render(frame, input.settings.flip_left_right, m.keep_all, pixels);
-        const PaperPasses& p = m.paper->passes();
-        const char* off = "switched off";
-        const auto set = [&](std::size_t i, double ms, bool on, const char* why) {
-            m.costs[i] = {m.costs[i].name, on ? ms : 0, on, on ? "" : why};
-        };
-        set(0, p.beams_ms, true, "");
-        set(1, 0, m.effects.texture, off);
-        set(2, 0, m.effects.needle && p.needle_met,
-            !m.effects.needle         ? off
-            : frame.needle == nullptr ? "no needle"
-                                      : "needle outside the slab");
-        set(3, 0, m.effects.noise, off);
-        set(4, 0, m.effects.shadow && p.shadow_met,
-            !m.effects.shadow ? off : "no bone or gas crossed");
-        set(5, p.blur_ms, m.effects.blur, off);
-        set(6, 0, m.effects.attenuation, off);
-        set(7, p.convert_ms, true, "");
-    }
-    return FrameStatus::rendered;
+    return m.options.model == ImageModel::paper ? m.render_paper(input, shown, pixels)
+                                                : m.render_physical(input, shown, pixels);
 }
 
 std::span<const EffectCost> Renderer::costs() const {

@@ -3,20 +3,12 @@
 
 #include <cmath>
 
-#include "runtime/imaging/renderer.h"
-#include "runtime/imaging/simd_target.h"
-#include "support/phantom_bundle.h"
-#include "support/picture.h"
+#include "imaging_support.h"
 
 namespace sonocase::runtime {
 namespace {
 
 using namespace sonocase::testing;
-
-const CaseBundle& phantom() {
-    static const CaseBundle bundle = Phantom().bundle();
-    return bundle;
-}
 
 RenderOptions paper_options(RendererKind kind = RendererKind::fast) {
     RenderOptions o;
@@ -24,51 +16,6 @@ RenderOptions paper_options(RendererKind kind = RendererKind::fast) {
     o.kind = kind;
     o.width_px = o.height_px = 256;
     return o;
-}
-
-FrameInput needle_input() {
-    FrameInput input;
-    input.has_needle = true;
-    input.needle.tip = {10, 0.3, 60};
-    input.needle.direction = normalized({0.6, 0.004, 0.8});
-    return input;
-}
-
-std::vector<std::uint8_t> draw(const Exercise& exercise,
-                               const RenderOptions& options,
-                               const FrameInput& input,
-                               const CaseBundle& bundle = phantom()) {
-    auto renderer = Renderer::create(bundle, exercise, options);
-    EXPECT_TRUE(renderer.has_value());
-    std::vector<std::uint8_t> pixels(
-        static_cast<std::size_t>(options.width_px) * static_cast<std::size_t>(options.height_px),
-        77);
-    EXPECT_EQ(renderer->render(input, pixels), FrameStatus::rendered);
-    return pixels;
-}
-
-struct Difference {
-    double mean = 0, bias = 0;
-    int worst = 0;
-};
-
-Difference compare(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
-    Difference d;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        const int e = int(a[i]) - int(b[i]);
-        d.mean += std::abs(e);
-        d.bias += e;
-        d.worst = std::max(d.worst, std::abs(e));
-    }
-    d.mean /= static_cast<double>(a.size());
-    d.bias /= static_cast<double>(a.size());
-    return d;
-}
-
-Rigid random_pose(Random& random) {
-    const Matrix3 turn = rotation_about({0, 0, 1}, random.uniform(-3.1, 3.1)) *
-                         rotation_about(random.direction(), random.uniform(0, 0.4));
-    return {turn, {random.uniform(-20, 20), random.uniform(-10, 10), random.uniform(-4, 4)}};
 }
 
 // The literal renderer looks up the voxel and texture cell at each pixel, the fast one at beam

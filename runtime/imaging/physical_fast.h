@@ -1,0 +1,71 @@
+// Model `physical`, vectorised across beams. Every arithmetic step is one rounding of single
+// precision in fixed order, or integer: the same pixels on every instruction set and thread count.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/imaging/physical_frame.h"
+#include "runtime/imaging/physical_kernels.h"
+#include "runtime/imaging/worker_pool.h"
+
+namespace sonocase::runtime {
+
+// Milliseconds of the last frame by pass, and what it met.
+struct PhysicalPasses {
+    double contact_ms = 0, beams_ms = 0, needle_ms = 0, filter_ms = 0, grey_ms = 0, convert_ms = 0;
+    bool boundary_met = false, refraction_met = false, hard_met = false, needle_met = false,
+         gap_met = false;
+    int beams_in_contact = 0;
+};
+
+class PhysicalFast {
+  public:
+    PhysicalFast(const PhysicalScene& scene,
+                 const ScanGeometry& geometry,
+                 const physical::Tables& tables,
+                 const PhysicalNoise& noise,
+                 WorkerPool& workers);
+
+    // keep_all: also run what cannot show; the pixels are the same.
+    void render(const PhysicalFrame& frame,
+                const BreathingField& breathing,
+                bool flip,
+                bool keep_all,
+                std::span<std::uint8_t> pixels);
+    const PhysicalPasses& passes() const { return passes_; }
+
+  private:
+    void place_beams(const PhysicalFrame& frame, const BreathingField& breathing);
+    void sample_beams(const PhysicalFrame& frame, bool keep_all);
+    void filter_rows(const PhysicalFrame& frame);
+    void spread_haze();
+    void make_grey(const PhysicalFrame& frame);
+
+    const PhysicalScene& scene_;
+    const ScanGeometry geometry_;
+    const physical::Tables& tables_;
+    const PhysicalNoise& noise_;
+    WorkerPool& workers_;
+    ScanConversionTable conversion_;
+    int lines_ = 0, stride_ = 0, pair_stride_ = 0, cells_k_ = 0, cells_l_ = 0;
+
+    std::vector<std::int32_t> looks_, pairs_word_;  // packed
+    std::vector<float> r_, contact_, elevation_, interface_scale_, gain_;
+    std::vector<float> elevation_off_;
+    std::vector<std::uint32_t> elevation_start_, lookup_start_, clutter_start_, haze_start_,
+        noise_start_;
+
+    std::vector<float> gaps_, beams_, breathing_;
+    std::vector<float> re_, im_, light_, tail_;  // samples x stride
+    std::vector<std::int32_t> tail_from_;        // per block
+    std::vector<float> work_, ring_;             // per thread
+    std::vector<float> power_;
+    std::vector<float> envelope_, mean_, wide_;  // haze
+    std::vector<std::uint8_t> shade_;            // per thread: two rows
+    std::vector<std::uint16_t> pairs_;
+    PhysicalPasses passes_;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,114 @@
+// What the vectorised calls of model `physical` work on.
+#pragma once
+
+#include <cstdint>
+
+#include "formats/geometry.h"
+#include "runtime/imaging/needle_strip.h"
+
+namespace sonocase::runtime {
+
+// Labels' looks in one word: attenuation (bits 0-15, log2 of amplitude per mm there and back,
+// 1/4096), kind (16-19), echo (20-31, signed, 1/16 dB).
+enum PackedKind : std::uint32_t {
+    kPackedOutside,
+    kPackedSoft,
+    kPackedFluid,
+    kPackedGas,
+    kPackedBone
+};
+
+// A pair's echo in one word: log2 of the amplitude (bits 0-11, 1/128, + 2048; 0: none), thickness
+// (12-19, 1/200 mm), hard (20), refracts (21), own label pulses (22), second label pulses (23).
+inline constexpr int kPairHard = 1 << 20, kPairRefracts = 1 << 21, kPairOwnPulse = 1 << 22,
+                     kPairSecondPulse = 1 << 23;
+
+// Rows of per-beam numbers, `lines` apart.
+enum BeamNumber {
+    kVoxelOrigin = 0,
+    kVoxelPerMm = 3,
+    kSpeckleOrigin = 6,
+    kSpecklePerMm = 9,
+    kBeam = 12,
+    kGap = 15,
+    kBeamNumbers = 16
+};
+
+inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
+
+struct PhysicalBlock {
+    const float* beams = nullptr;
+    int lines = 0, samples = 0;
+    const float *r = nullptr, *contact = nullptr, *elevation = nullptr, *interface_scale = nullptr,
+                *gain = nullptr;
+    float across[3] = {0, 0, 0};    // voxels per mm across the plane
+    float sideways[3] = {0, 0, 0};  // voxels per unit of look-up jitter
+    const std::int8_t* white = nullptr;
+    const std::uint32_t *elevation_start = nullptr, *lookup_start = nullptr;
+
+    const float* breathing = nullptr;  // null: still. weight at nodes, `lines` apart
+    float shift_voxel[3] = {0, 0, 0}, shift_speckle[3] = {0, 0, 0};
+    float pulse_mm = 0;
+
+    const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
+    const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr, *speckle = nullptr;
+    Int3 size;
+    int bricks_x = 0, bricks_xy = 0, label_count = 0, speckle_log2 = 0;
+    float voxel_mm = 1, rough_per_voxel = 2, step_mm = 0.3f;
+    bool structure = true, speckled = true, interfaces = true, edge_shadow = true,
+         attenuation = true;
+    bool bone_tail = true, gas_tail = true;
+    bool keep_all = false;
+
+    float *re = nullptr, *im = nullptr, *light = nullptr,
+          *tail = nullptr;  // at the block's first beam
+    int stride = 0;
+    int tail_from = 0;  // out: first sample with a tail; samples if none
+    bool boundary_met = false, refraction_met = false, hard_met = false;  // out
+};
+
+// A part of a row's filters.
+struct PhysicalRowTask {
+    int lines = 0, scanlines = 0;
+    const float *re = nullptr, *im = nullptr, *light = nullptr;
+    const float* lateral = nullptr;  // centre tap
+    int reach = 0;
+    bool point_spread = true;
+    float *work_re = nullptr, *work_im = nullptr;  // with margins
+    float *out_re = nullptr, *out_im = nullptr;
+};
+
+struct PhysicalPowerTask {
+    int lines = 0;
+    const float* const* re = nullptr;  // 2 * axial_reach + 1 rows; null rows count as zero
+    const float* const* im = nullptr;
+    const float* axial = nullptr;  // first tap
+    int axial_count = 1;
+    float gain = 1, near_field = 0, noise = 0;
+    const float* tail = nullptr;              // null: none in this row
+    const std::int32_t* tail_from = nullptr;  // per block
+    int sample = 0;
+    bool clutter = true;
+    const std::int8_t *clutter_re = nullptr, *clutter_im = nullptr;
+    int noise_rows = 0;  // 0: none
+    const std::int8_t* noise_re[4] = {nullptr, nullptr, nullptr, nullptr};
+    const std::int8_t* noise_im[4] = {nullptr, nullptr, nullptr, nullptr};
+    float noise_weight[4] = {0, 0, 0, 0};
+    bool want_mean = true;
+    float* envelope_sum = nullptr;  // accumulates the envelope
+    float* power = nullptr;
+};
+
+struct PhysicalGreyTask {
+    int lines = 0, scanlines = 0;
+    const float* power = nullptr;
+    const float *haze_above = nullptr, *haze_below = nullptr;  // null: none
+    float haze_mix = 0;
+    const std::int8_t *haze_re = nullptr, *haze_im = nullptr;
+    float offset = 0, per_log2 = 0;
+    bool post_filter = true;
+    float* work = nullptr;  // with margins
+    float* out = nullptr;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,101 @@
+// Model `physical`: its constants and the tables that both renderers read. Distances in mm,
+// attenuation in dB/cm/MHz, amplitudes relative to a homogeneous liver. docs/effects.md names the
+// source of each.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "formats/exercise.h"
+#include "formats/geometry.h"
+#include "runtime/imaging/scan_geometry.h"
+
+namespace sonocase::runtime::physical {
+
+inline constexpr double kDbPerLog2 = 6.020599913279624;  // amplitude: 20 log10(2)
+
+// Contact: a gap of at most kMaxGapMm between face and skin closes under the probe's pressure, and
+// the tissue's shift dies out with depth.
+inline constexpr double kMaxGapMm = 25;
+inline constexpr double kGapReachMm = 45;
+inline constexpr double kGapStepMm = 0.5;
+
+// Boundary roughness (mm) and the texture that carries it.
+inline constexpr double kRoughnessMm = 0.45;
+inline constexpr int kRoughEdge = 64;
+inline constexpr double kRoughVoxelMm = 0.5;
+
+// Interfaces: amplitude 60 R^0.85 with R at most 0.5; share of specular and diffuse by angle.
+inline constexpr double kInterfaceGain = 60;
+inline constexpr double kInterfacePower = 0.85;
+inline constexpr double kMaxReflection = 0.5;
+
+// Refraction at fluid: a beam that grazes within kEdgeCos of the tangent loses energy along the
+// wall.
+inline constexpr double kEdgeCos = 0.42;
+inline constexpr double kEdgeLossLog2PerMm = 0.55;
+inline constexpr double kEdgeReachMm = 1.0;
+
+// Tails behind bone and gas.
+inline constexpr double kBoneTail = 6, kBoneTailMm = 0.75, kBoneTailSlow = 0.1,
+                        kBoneTailSlowMm = 4.5;
+inline constexpr double kGasTail = 2.4, kGasTailMm = 22;
+
+// Haze: side lobes and reverberation, this far below the mean envelope nearby.
+inline constexpr double kHazeDb = -24;
+inline constexpr int kHazeCell = 8;   // samples and beams of a cell of the mean
+inline constexpr int kHazeReach = 3;  // cells to each side
+
+inline constexpr double kGainSlope = 0.56;  // TGC, dB/cm/MHz
+inline constexpr double kMaxNoiseGainDb = 48;
+inline constexpr double kNoiseDb = -70;
+inline constexpr double kGreyOfUnit = 130;
+inline constexpr double kGreyFloor = -25, kGreyCeiling = 290;  // before the post-filter
+inline constexpr double kGreyMap =
+    0.31;  // t - kGreyMap t (1 - t)(1 - 2t): 0.03 sin(2 pi t) without the sine
+
+// Echo offsets are baked one a voxel: a random step of this many voxels (one deviation) blends
+// them.
+inline constexpr double kLookupJitter = 0.4;
+
+inline constexpr int kMaxLateral = 12;  // taps to each side
+inline constexpr int kMaxAxial = 10;
+
+// Needle: a mirror of steel. Amplitude by the angle between beam and shaft.
+inline constexpr double kNeedleGain = 60;
+inline constexpr double kNeedleDiffuse = 0.035;
+inline constexpr double kNeedleShadowLog2 = 1.6;  // behind a needle that fills the slab
+inline constexpr double kNeedleTail = 0.09, kNeedleTailMm = 9;
+inline constexpr double kTipGlintMm = 1.0;
+
+// What one depth needs, the same for every beam.
+struct Row {
+    double r_mm = 0;
+    double gain = 1;             // TGC, amplitude
+    double contact = 0;          // exp(-r / kGapReachMm)
+    double interface_scale = 1;  // keeps an interface's peak through a filter of unit power
+    double near_field = 0;       // amplitude
+    double noise = 0;            // amplitude of the electronic noise
+    double elevation_mm = 0;     // standard deviation of the beam across the plane
+    int reach = 0;               // lateral taps to each side
+    std::array<float, 2 * kMaxLateral + 1> lateral{};  // centre at kMaxLateral; unit power
+};
+
+struct Tables {
+    std::vector<Row> rows;  // # samples
+    int axial_reach = 0;
+    std::array<float, 2 * kMaxAxial + 1> axial{};  // centre at kMaxAxial; unit power
+    double scatter_mm = 0.3;                       // spacing of scatterers
+    double frequency_mhz = 3.5;
+};
+
+// Hides the speckle volume's period: a fixed turn along no special direction.
+inline Matrix3 speckle_rotation() {
+    return rotation_about(normalized(Vector3{0.36, 0.48, 0.8}), 0.7) *
+           rotation_about({0, 0, 1}, 0.55);
+}
+
+Tables make_tables(const Probe& probe, const ScanGeometry& geometry);
+
+}  // namespace sonocase::runtime::physical

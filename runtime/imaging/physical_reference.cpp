@@ -1,0 +1,415 @@
+#include <algorithm>
+#include <cmath>
+
+#include "formats/boundary_record.h"
+#include "runtime/imaging/physical_frame.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using namespace physical;
+
+int nearest(double x) {
+    return static_cast<int>(std::nearbyint(std::clamp(x, -1e6, 1e6)));
+}
+
+template <class T>
+T pool_value(const PhysicalScene& s,
+             int word,
+             const BrickVolume<T>& volume,
+             int i,
+             int j,
+             int k,
+             T uniform) {
+    const std::size_t brick =
+        static_cast<std::size_t>(i / 4) +
+        static_cast<std::size_t>(s.bricks.x) *
+            (static_cast<std::size_t>(j / 4) +
+             static_cast<std::size_t>(s.bricks.y) * static_cast<std::size_t>(k / 4));
+    const std::uint32_t entry = s.table[4 * brick + static_cast<std::size_t>(word)];
+    if (entry & kUniformBrick) return uniform;
+    return volume.pool[static_cast<std::size_t>(entry) * kBrickVoxels +
+                       static_cast<std::size_t>((i & 3) + 4 * (j & 3) + 16 * (k & 3))];
+}
+
+double echo_offset_db(const PhysicalScene& s, Point3 v) {
+    const int i = nearest(v.x), j = nearest(v.y), k = nearest(v.z);
+    if (!s.has_echo || !s.grid.contains(i, j, k)) return 0;
+    const std::size_t brick =
+        static_cast<std::size_t>(i / 4) +
+        static_cast<std::size_t>(s.bricks.x) *
+            (static_cast<std::size_t>(j / 4) +
+             static_cast<std::size_t>(s.bricks.y) * static_cast<std::size_t>(k / 4));
+    const std::uint32_t entry = s.table[4 * brick + 1];
+    if (entry & kUniformBrick) return static_cast<std::int8_t>(entry & 0xFF) / 4.0;
+    return s.bundle->echo_offset
+               .pool[static_cast<std::size_t>(entry) * kBrickVoxels +
+                     static_cast<std::size_t>((i & 3) + 4 * (j & 3) + 16 * (k & 3))] /
+           4.0;
+}
+
+struct Roughness {
+    double shift = 0, log2_glint = 0, re = 1, im = 0;
+};
+
+Roughness roughness_at(const PhysicalScene& s, Point3 v) {
+    const auto wrap = [&](double voxel) {
+        return static_cast<std::size_t>(nearest(voxel * s.voxel_mm / kRoughVoxelMm) &
+                                        (kRoughEdge - 1));
+    };
+    const std::uint32_t bits =
+        s.rough[wrap(v.x) + kRoughEdge * (wrap(v.y) + kRoughEdge * wrap(v.z))];
+    const auto byte = [&](int n) {
+        return static_cast<double>(static_cast<std::int8_t>(bits >> (8 * n) & 0xFF));
+    };
+    return {byte(0) / 32, byte(1) / 32, byte(2) / 127, byte(3) / 127};
+}
+
+// What lies at a point: its label, and the surface next to it if there is one.
+struct Place {
+    int label = 0, own = 0, second = -1;  // second < 0: no surface near
+    double distance_mm = 0;               // > 0 on own's side
+    Vector3 normal;
+    Roughness rough;
+};
+
+// v: the point, voxel coordinates. near: a point at random less than a voxel away, whose voxel is
+// asked; its plane is extended to v. Where no plane is stored, the random step blends the voxels.
+Place place_at(const PhysicalScene& s, const PhysicalFrame& f, Point3 v, Point3 near) {
+    Place p;
+    const int i = nearest(near.x), j = nearest(near.y), k = nearest(near.z);
+    p.own = p.label = label_at(s, i, j, k);
+    if (!f.effects.boundaries || !s.has_boundary || !s.grid.contains(i, j, k)) return p;
+    const std::uint32_t bits = pool_value(s, 2, s.bundle->boundary, i, j, k, kNoBoundary);
+    if (bits == kNoBoundary || (bits & 0xFF) >= s.looks.size()) return p;
+    const BoundaryRecord r = unpack_boundary(bits);
+    p.second = r.second_label;
+    p.normal = r.normal;
+    p.rough = roughness_at(s, v);
+    const Vector3 from_centre{v.x - i, v.y - j, v.z - k};
+    p.distance_mm = (r.distance_vx + dot(r.normal, from_centre)) * s.voxel_mm +
+                    kRoughnessMm * p.rough.shift * (p.own < p.second ? 1 : -1);
+    const PairEcho& pair = s.pairs[static_cast<std::size_t>(p.own * s.labels() + p.second)];
+    p.distance_mm += pair.pulse * f.motion.pulse_mm;
+    if (p.distance_mm < 0) p.label = p.second;
+    return p;
+}
+
+int reflect(int l, int n) {
+    if (l < 0) l = -1 - l;
+    if (l >= n) l = 2 * n - 1 - l;
+    return std::clamp(l, 0, n - 1);
+}
+
+}  // namespace
+
+void render_physical_reference(const PhysicalScene& s,
+                               const ScanGeometry& g,
+                               const Tables& tables,
+                               const PhysicalNoise& noise,
+                               const PhysicalFrame& f,
+                               std::span<std::uint8_t> pixels) {
+    const PhysicalEffects& on = f.effects;
+    const int lines = g.scanlines, samples = g.samples;
+    const auto at = [&](int k, int l) {
+        return static_cast<std::size_t>(k) * static_cast<std::size_t>(lines) +
+               static_cast<std::size_t>(l);
+    };
+    const std::size_t count = static_cast<std::size_t>(samples) * static_cast<std::size_t>(lines);
+    std::vector<double> q_re(count, 0.0), q_im(count, 0.0), light(count, 1.0), tail(count, 0.0);
+    std::vector<float> gaps(static_cast<std::size_t>(lines), 0.0f);
+    if (on.contact) find_gaps(s, g, f, gaps);
+    const BreathingField breathing =
+        on.breathing && f.motion.breathes() ? BreathingField(*s.bundle) : BreathingField();
+    const auto tile = [&](const std::vector<std::int8_t>& t, NoiseUse use, std::uint32_t frame,
+                          int k, int l) {
+        return t[noise_start(f.seed, use, frame, k) + static_cast<std::uint32_t>(l)] / 32.0;
+    };
+    const Matrix3 turn = speckle_rotation();
+
+    // 1. Down each beam: scatterers, interfaces, light that is left, tails.
+    for (int l = 0; l < lines; ++l) {
+        const PlanePoint o = g.beam_origin(l), d = g.beam_direction(l);
+        const Vector3 beam = f.volume_from_probe.rotation * Vector3{d.x, 0, d.z};
+        const Vector3 across = f.volume_from_probe.rotation * Vector3{0, 1, 0};
+        const Vector3 sideways = f.volume_from_probe.rotation * Vector3{1, 0, 0};
+        const double gap = static_cast<double>(gaps[static_cast<std::size_t>(l)]);
+        double log2_light = 0, needle_light = 0, bone = 0, bone_slow = 0, gas = 0, needle_tail = 0;
+        TissueKind before = TissueKind::soft;
+        for (int k = 0; k < samples; ++k) {
+            const Row& row = tables.rows[static_cast<std::size_t>(k)];
+            bone *= std::exp(-g.step_mm / kBoneTailMm);
+            bone_slow *= std::exp(-g.step_mm / kBoneTailSlowMm);
+            gas *= std::exp(-g.step_mm / kGasTailMm);
+            needle_tail *= std::exp(-g.step_mm / kNeedleTailMm);
+            if (gap < 0) {  // air: nothing comes back
+                light[at(k, l)] = 0;
+                continue;
+            }
+            const double along = row.r_mm + gap * row.contact;
+            Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
+            if (!breathing.empty()) x = x - breathing.weight(x) * f.motion.breathing_mm;
+            const Vector3 from_origin = x - s.grid.origin_mm;
+
+            const double jitter = tile(noise.white, NoiseUse::elevation, 0, k, l);
+            const double jitter2 = tile(noise.white, NoiseUse::lookup, 0, k, l);
+            const Point3 slab = on.elevation ? x + (row.elevation_mm * jitter) * across : x;
+            const Point3 v = s.grid.voxel_from_point(slab);
+            const Point3 h = s.grid.voxel_from_point(
+                slab + (kLookupJitter * s.voxel_mm) * (jitter2 * sideways + jitter * beam));
+            const Place place = place_at(s, f, v, h);
+            const LabelLook& look = s.looks[static_cast<std::size_t>(place.label)];
+
+            double echo_db = look.echo_db;
+            if (on.structure) echo_db += echo_offset_db(s, h);
+            double amplitude =
+                look.kind == TissueKind::outside ? 0 : std::exp2(echo_db / kDbPerLog2);
+            double re = amplitude, im = 0;
+            if (on.speckle) {
+                const Vector3 c = (1 / tables.scatter_mm) * (turn * from_origin);
+                const auto wrap = [&](double u) {
+                    return static_cast<std::size_t>(nearest(u) & s.speckle_mask);
+                };
+                const std::size_t cell =
+                    wrap(c.x) + ((wrap(c.y) + (wrap(c.z) << s.speckle_log2)) << s.speckle_log2);
+                const double unit = 1 / (32 * std::sqrt(2.0));
+                re = amplitude * s.bundle->speckle.voxels[2 * cell] * unit;
+                im = amplitude * s.bundle->speckle.voxels[2 * cell + 1] * unit;
+            }
+
+            double facing = 1;
+            double loss = on.attenuation ? look.attenuation * tables.frequency_mhz * g.step_mm *
+                                               0.1 * 2 / kDbPerLog2
+                                         : 0;
+            if (place.second >= 0) {
+                const PairEcho& pair =
+                    s.pairs[static_cast<std::size_t>(place.own * s.labels() + place.second)];
+                const double cosine = std::abs(dot(place.normal, beam));
+                facing = pair.hard ? 0.25 * cosine + 0.75 * std::pow(cosine, 6)
+                                   : 0.08 * cosine + 0.92 * std::pow(cosine, 10);
+                if (on.interfaces && pair.amplitude > 0) {
+                    const double u = place.distance_mm / pair.sigma_mm;
+                    const double i = pair.amplitude * facing * std::exp2(place.rough.log2_glint) *
+                                     std::exp(-0.5 * u * u) * row.interface_scale;
+                    re += i * place.rough.re;
+                    im += i * place.rough.im;
+                }
+                if (on.edge_shadow && pair.refracts) {
+                    const double graze = std::max(1 - cosine / kEdgeCos, 0.0);
+                    const double near =
+                        std::max(1 - std::abs(place.distance_mm) / kEdgeReachMm, 0.0);
+                    loss += kEdgeLossLog2PerMm * graze * graze * near * g.step_mm;
+                }
+            }
+
+            const double here = std::exp2(log2_light);
+            if (look.kind == TissueKind::bone && before != TissueKind::bone) {
+                bone = std::max(bone, kBoneTail * kMaxReflection * facing * here * row.gain);
+                bone_slow = std::max(bone_slow, kBoneTailSlow * kBoneTail * kMaxReflection *
+                                                    facing * here * row.gain);
+            }
+            if (look.kind == TissueKind::gas && before != TissueKind::gas)
+                gas = std::max(gas, kGasTail * here * row.gain);
+            before = look.kind;
+
+            if (on.needle && f.needle != nullptr) {
+                const NeedleShape& n = *f.needle;
+                const double r = row.r_mm;
+                double back = 0;
+                const double share = needle_share(n, o.x + r * d.x, o.z + r * d.z, back);
+                const double seen = std::min(share * n.slab_mm / (2 * n.radius_mm), 1.0);
+                if (seen > 0) {
+                    const double cosine = n.axis.x * d.x + n.axis.z * d.z;
+                    const double mirror = std::pow(std::max(1 - cosine * cosine, 0.0), 6);
+                    const double glint = 0.25 * std::max(1 - back / kTipGlintMm, 0.0);
+                    const double i = kNeedleGain * seen *
+                                     (kNeedleDiffuse + (1 - kNeedleDiffuse) * mirror + glint) *
+                                     row.interface_scale;
+                    re += i;
+                    needle_light -=
+                        kNeedleShadowLog2 * seen * std::min(g.step_mm / (2 * n.radius_mm), 1.0);
+                    needle_tail =
+                        std::max(needle_tail, kNeedleTail * kNeedleGain * seen *
+                                                  (kNeedleDiffuse + mirror) * here * row.gain);
+                }
+            }
+
+            q_re[at(k, l)] = re;
+            q_im[at(k, l)] = im;
+            light[at(k, l)] = here * std::exp2(needle_light);
+            double power = 0;
+            if (on.bone_tail) power += bone * bone + bone_slow * bone_slow;
+            if (on.gas_ring_down) power += gas * gas;
+            tail[at(k, l)] = power + needle_tail * needle_tail;
+            log2_light -= loss;
+        }
+    }
+
+    // 2. The light is that of the whole aperture: boxes of 5 and 3 beams.
+    std::vector<double> f_re(count), f_im(count);
+    for (int k = 0; k < samples; ++k) {
+        for (int l = 0; l < lines; ++l) {
+            double smooth = 0;
+            constexpr std::array<double, 7> kBoxes{1 / 15.0, 2 / 15.0, 3 / 15.0, 3 / 15.0,
+                                                   3 / 15.0, 2 / 15.0, 1 / 15.0};
+            for (int j = -3; j <= 3; ++j)
+                smooth +=
+                    kBoxes[static_cast<std::size_t>(j + 3)] * light[at(k, reflect(l + j, lines))];
+            f_re[at(k, l)] = q_re[at(k, l)] * smooth;
+            f_im[at(k, l)] = q_im[at(k, l)] * smooth;
+        }
+    }
+
+    // 3. Point spread, across then along.
+    if (on.point_spread) {
+        for (int k = 0; k < samples; ++k) {
+            const Row& row = tables.rows[static_cast<std::size_t>(k)];
+            for (int l = 0; l < lines; ++l) {
+                double re = 0, im = 0;
+                for (int j = -row.reach; j <= row.reach; ++j) {
+                    const double tap =
+                        static_cast<double>(row.lateral[static_cast<std::size_t>(kMaxLateral + j)]);
+                    re += tap * f_re[at(k, reflect(l + j, lines))];
+                    im += tap * f_im[at(k, reflect(l + j, lines))];
+                }
+                q_re[at(k, l)] = re;
+                q_im[at(k, l)] = im;
+            }
+        }
+        for (int k = 0; k < samples; ++k) {
+            for (int l = 0; l < lines; ++l) {
+                double re = 0, im = 0;
+                for (int j = -tables.axial_reach; j <= tables.axial_reach; ++j) {
+                    if (k + j < 0 || k + j >= samples) continue;
+                    const double tap =
+                        static_cast<double>(tables.axial[static_cast<std::size_t>(kMaxAxial + j)]);
+                    re += tap * q_re[at(k + j, l)];
+                    im += tap * q_im[at(k + j, l)];
+                }
+                f_re[at(k, l)] = re;
+                f_im[at(k, l)] = im;
+            }
+        }
+    }
+
+    // 4. Gain, clutter and electronic noise; power of the envelope, and its mean nearby for the
+    // haze.
+    std::vector<double> power(count);
+    const int cells_k = (samples + kHazeCell - 1) / kHazeCell,
+              cells_l = (lines + kHazeCell - 1) / kHazeCell;
+    std::vector<double> mean(static_cast<std::size_t>(cells_k * cells_l), 0.0),
+        cell_n(mean.size(), 0.0);
+    for (int k = 0; k < samples; ++k) {
+        const Row& row = tables.rows[static_cast<std::size_t>(k)];
+        for (int l = 0; l < lines; ++l) {
+            double re = f_re[at(k, l)] * row.gain, im = f_im[at(k, l)] * row.gain;
+            const auto cell = static_cast<std::size_t>(k / kHazeCell * cells_l + l / kHazeCell);
+            mean[cell] += std::sqrt(re * re + im * im);
+            cell_n[cell] += 1;
+            const double near = on.near_field ? row.near_field * row.near_field : 0;
+            const double clutter = std::sqrt(0.5 * (tail[at(k, l)] + near));
+            re += clutter * tile(noise.streak, NoiseUse::clutter_re, 0, k, l);
+            im += clutter * tile(noise.streak, NoiseUse::clutter_im, 0, k, l);
+            if (on.noise) {
+                double n_re = 0, n_im = 0;
+                for (int j = 0; j < (on.persistence ? kPersistedFrames : 1); ++j) {
+                    const double w = on.persistence ? kPersistence[static_cast<std::size_t>(j)] : 1;
+                    n_re += w * tile(noise.fine, NoiseUse::electronic_re,
+                                     f.frame - static_cast<std::uint32_t>(j), k, l);
+                    n_im += w * tile(noise.fine, NoiseUse::electronic_im,
+                                     f.frame - static_cast<std::uint32_t>(j), k, l);
+                }
+                re += row.noise * std::sqrt(0.5) * n_re;
+                im += row.noise * std::sqrt(0.5) * n_im;
+            }
+            power[at(k, l)] = re * re + im * im;
+        }
+    }
+    if (on.haze) {
+        std::vector<double> wide(mean.size());
+        for (int ck = 0; ck < cells_k; ++ck) {
+            for (int cl = 0; cl < cells_l; ++cl) {
+                double sum = 0, n = 0;
+                for (int j = std::max(cl - kHazeReach, 0);
+                     j <= std::min(cl + kHazeReach, cells_l - 1); ++j) {
+                    sum += mean[static_cast<std::size_t>(ck * cells_l + j)];
+                    n += cell_n[static_cast<std::size_t>(ck * cells_l + j)];
+                }
+                wide[static_cast<std::size_t>(ck * cells_l + cl)] =
+                    std::pow(10.0, kHazeDb / 20) * sum / n;
+            }
+        }
+        for (int k = 0; k < samples; ++k) {
+            for (int l = 0; l < lines; ++l) {
+                const double ck = std::clamp((k + 0.5) / kHazeCell - 0.5, 0.0, cells_k - 1.0);
+                const double cl = std::clamp((l + 0.5) / kHazeCell - 0.5, 0.0, cells_l - 1.0);
+                const int k0 = std::min(static_cast<int>(ck), std::max(cells_k - 2, 0)),
+                          l0 = std::min(static_cast<int>(cl), std::max(cells_l - 2, 0));
+                const int k1 = std::min(k0 + 1, cells_k - 1), l1 = std::min(l0 + 1, cells_l - 1);
+                const auto w = [&](int a, int b) {
+                    return wide[static_cast<std::size_t>(a * cells_l + b)];
+                };
+                const double haze =
+                    (w(k0, l0) * (1 - (cl - l0)) + w(k0, l1) * (cl - l0)) * (1 - (ck - k0)) +
+                    (w(k1, l0) * (1 - (cl - l0)) + w(k1, l1) * (cl - l0)) * (ck - k0);
+                const double a = tile(noise.streak, NoiseUse::haze_re, 0, k, l),
+                             b = tile(noise.streak, NoiseUse::haze_im, 0, k, l);
+                power[at(k, l)] += haze * haze * 0.5 * (a * a + b * b);
+            }
+        }
+    }
+
+    // 5. Log compression, post-filter, grey map.
+    std::vector<double> grey(count);
+    for (int k = 0; k < samples; ++k) {
+        for (int l = 0; l < lines; ++l) {
+            const double db = 10 * std::log10(power[at(k, l)] + 1e-12) +
+                              static_cast<double>(f.row_gain_db[static_cast<std::size_t>(k)]);
+            grey[at(k, l)] =
+                std::clamp(kGreyOfUnit + 255 * db / f.dynamic_range_db, kGreyFloor, kGreyCeiling);
+        }
+    }
+    if (on.post_filter) {
+        std::vector<double> across(count);
+        for (int k = 0; k < samples; ++k) {
+            for (int l = 0; l < lines; ++l) {
+                across[at(k, l)] = 0.25 * grey[at(k, reflect(l - 1, lines))] +
+                                   0.5 * grey[at(k, l)] + 0.25 * grey[at(k, reflect(l + 1, lines))];
+            }
+        }
+        for (int k = 0; k < samples; ++k) {
+            for (int l = 0; l < lines; ++l) {
+                grey[at(k, l)] = 0.25 * across[at(std::max(k - 1, 0), l)] + 0.5 * across[at(k, l)] +
+                                 0.25 * across[at(std::min(k + 1, samples - 1), l)];
+            }
+        }
+    }
+    std::vector<double> shade(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        double t = std::clamp(grey[i] / 255, 0.0, 1.0);
+        if (on.grey_map) t -= kGreyMap * t * (1 - t) * (1 - 2 * t);
+        shade[i] = std::nearbyint(255 * t);
+    }
+
+    // 6. Scan conversion.
+    for (int r = 0; r < g.height_px; ++r) {
+        for (int c = 0; c < g.width_px; ++c) {
+            double line = 0, sample = 0, value = 0;
+            if (g.locate(g.pixel_centre(c, r), line, sample)) {
+                line = std::clamp(line, 0.0, lines - 1.0);
+                sample = std::clamp(sample, 0.0, samples - 1.0);
+                const int l = std::min(static_cast<int>(line), std::max(lines - 2, 0)),
+                          k = std::min(static_cast<int>(sample), std::max(samples - 2, 0));
+                const int l1 = std::min(l + 1, lines - 1), k1 = std::min(k + 1, samples - 1);
+                value = (shade[at(k, l)] * (1 - (line - l)) + shade[at(k, l1)] * (line - l)) *
+                            (1 - (sample - k)) +
+                        (shade[at(k1, l)] * (1 - (line - l)) + shade[at(k1, l1)] * (line - l)) *
+                            (sample - k);
+            }
+            pixels[static_cast<std::size_t>(r) * static_cast<std::size_t>(g.width_px) +
+                   static_cast<std::size_t>(c)] = static_cast<std::uint8_t>(std::lround(value));
+        }
+    }
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,186 @@
+#include "runtime/imaging/physical_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/boundary_record.h"
+#include "runtime/imaging/noise.h"
+#include "runtime/imaging/physical_model.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using namespace physical;
+
+bool contains(const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+}
+
+bool is_artery(const std::string& label) {
+    return contains(label, "aorta") || contains(label, "artery") || contains(label, "arter");
+}
+
+bool is_muscle(const Tissue& t) {
+    return t.name == "muscle";
+}
+bool is_fat(const Tissue& t) {
+    return t.name == "fat";
+}
+
+PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tissue& b) {
+    PairEcho e;
+    const bool outside = a.kind == TissueKind::outside || b.kind == TissueKind::outside;
+    e.pulse = is_artery(la.name) ? 1 : is_artery(lb.name) ? -1 : 0;
+    if (outside) return e;  // gel: no step in impedance
+    const auto hard = [](const Tissue& t) {
+        return t.kind == TissueKind::bone || t.kind == TissueKind::gas;
+    };
+    const auto fluid = [](const Tissue& t) { return t.kind == TissueKind::fluid; };
+    e.hard = hard(a) || hard(b);
+    e.refracts = !e.hard && fluid(a) != fluid(b);
+    double reflection =
+        std::abs(a.impedance_mrayl - b.impedance_mrayl) / (a.impedance_mrayl + b.impedance_mrayl);
+    e.sigma_mm = e.hard ? 0.28 : 0.22;
+    // Between muscles, and between muscle and fat, lies a sheet of connective tissue that the label
+    // volume does not show.
+    if (is_muscle(a) && is_muscle(b) && la.name != lb.name) {
+        reflection = std::max(reflection, 0.045);
+        e.sigma_mm = 0.34;
+    } else if ((is_muscle(a) && is_fat(b)) || (is_fat(a) && is_muscle(b))) {
+        reflection = std::max(reflection, 0.09);
+        e.sigma_mm = 0.38;
+    }
+    if (reflection > 1e-4) {
+        e.amplitude =
+            kInterfaceGain * std::pow(std::min(reflection, kMaxReflection), kInterfacePower);
+    }
+    return e;
+}
+
+// Smooth periodic noise of unit deviation: three passes of a box in each axis.
+std::vector<float> smooth_noise(int edge, int reach, std::uint32_t seed) {
+    const std::size_t n = static_cast<std::size_t>(edge);
+    std::vector<float> a(n * n * n), b(a.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        a[i] = static_cast<float>(hash32(seed + static_cast<std::uint32_t>(i) * 2654435761u) >> 8) *
+                   0x1p-24f -
+               0.5f;
+    }
+    const std::array<std::size_t, 3> stride{1, n, n * n};
+    for (int pass = 0; pass < 2; ++pass) {
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::size_t s = stride[static_cast<std::size_t>(axis)];
+            for (std::size_t i = 0; i < a.size(); ++i) {
+                const std::size_t at = i / s % n, base = i - at * s;
+                if (at != 0) continue;
+                float sum = 0;
+                for (int j = -reach; j <= reach; ++j)
+                    sum += a[base + (static_cast<std::size_t>(j + edge) % n) * s];
+                for (std::size_t j = 0; j < n; ++j) {
+                    b[base + j * s] = sum;
+                    sum += a[base + (j + static_cast<std::size_t>(reach) + 1) % n * s] -
+                           a[base + (j + n - static_cast<std::size_t>(reach)) % n * s];
+                }
+            }
+            std::swap(a, b);
+        }
+    }
+    double square = 0;
+    for (const float v : a) square += static_cast<double>(v) * static_cast<double>(v);
+    const auto scale = static_cast<float>(1 / std::sqrt(square / static_cast<double>(a.size())));
+    for (float& v : a) v *= scale;
+    return a;
+}
+
+std::uint32_t signed_byte(double v) {
+    return static_cast<std::uint32_t>(
+               static_cast<std::int32_t>(std::lround(std::clamp(v, -127.0, 127.0)))) &
+           0xFFu;
+}
+
+}  // namespace
+
+Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle) {
+    PhysicalScene s;
+    s.bundle = &bundle;
+    s.grid = bundle.grid;
+    s.bricks = brick_count(bundle.label_bricks.size);
+    s.voxel_mm = bundle.grid.spacing_mm.x;
+    if (bundle.labels.empty() || bundle.label_bricks.table.empty()) {
+        return Error{"the bundle holds no label volume", "", "build the case again"};
+    }
+    const int edge = bundle.speckle.edge;
+    if (edge < 8 ||
+        bundle.speckle.voxels.size() != 2 * static_cast<std::size_t>(edge) * edge * edge) {
+        return Error{"the bundle holds no speckle volume", "",
+                     "build the case again, or use --model paper"};
+    }
+    while ((1 << s.speckle_log2) < edge) ++s.speckle_log2;
+    s.speckle_mask = edge - 1;
+
+    const std::vector<int> tissue_of = tissue_of_label(bundle);
+    const Tissue nothing{};
+    const auto tissue = [&](std::size_t l) -> const Tissue& {
+        return tissue_of[l] >= 0 ? bundle.tissues[static_cast<std::size_t>(tissue_of[l])] : nothing;
+    };
+    const std::size_t count = bundle.labels.size();
+    for (std::size_t l = 0; l < count; ++l) {
+        const Tissue& t = tissue(l);
+        s.looks.push_back(
+            {t.echo_db, t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind});
+    }
+    s.pairs.resize(count * count);
+    for (std::size_t a = 0; a < count; ++a) {
+        for (std::size_t b = 0; b < count; ++b) {
+            if (a != b)
+                s.pairs[a * count + b] =
+                    pair_echo(bundle.labels[a], tissue(a), bundle.labels[b], tissue(b));
+        }
+    }
+
+    const auto same = [&](const auto& volume) {
+        return volume.table.size() == bundle.label_bricks.table.size();
+    };
+    s.has_echo = same(bundle.echo_offset);
+    s.has_boundary = same(bundle.boundary);
+    s.table.resize(4 * bundle.label_bricks.table.size());
+    for (std::size_t b = 0; b < bundle.label_bricks.table.size(); ++b) {
+        std::uint32_t* words = s.table.data() + 4 * b;
+        const std::uint32_t label = bundle.label_bricks.table[b];
+        words[0] = label & kUniformBrick
+                       ? kUniformBrick | bundle.label_bricks.uniform[label & ~kUniformBrick]
+                       : label;
+        words[1] = kUniformBrick;
+        words[2] = kUniformBrick;
+        if (s.has_echo) {
+            const std::uint32_t e = bundle.echo_offset.table[b];
+            words[1] = e & kUniformBrick
+                           ? kUniformBrick | static_cast<std::uint8_t>(
+                                                 bundle.echo_offset.uniform[e & ~kUniformBrick])
+                           : e;
+        }
+        if (s.has_boundary) {
+            const std::uint32_t e = bundle.boundary.table[b];
+            // A uniform record would be the same plane in 64 voxels: no surface does that.
+            if (!(e & kUniformBrick)) {
+                words[2] = e;
+                words[0] |= kBoundaryFlag;
+            }
+        }
+    }
+
+    const std::vector<float> rough = smooth_noise(kRoughEdge, 2, 11),
+                             glint = smooth_noise(kRoughEdge, 2, 12),
+                             phase = smooth_noise(kRoughEdge, 2, 13);
+    s.rough.resize(rough.size());
+    for (std::size_t i = 0; i < rough.size(); ++i) {
+        const double p = 0.9 * static_cast<double>(phase[i]);
+        s.rough[i] = signed_byte(32 * static_cast<double>(rough[i])) |
+                     signed_byte(32 * 0.55 * 1.4426950408889634 * static_cast<double>(glint[i]))
+                         << 8 |
+                     signed_byte(127 * std::cos(p)) << 16 | signed_byte(127 * std::sin(p)) << 24;
+    }
+    return s;
+}
+
+}  // namespace sonocase::runtime

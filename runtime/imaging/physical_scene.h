@@ -1,0 +1,57 @@
+// What model `physical` needs of a bundle, laid out for the frame loop. Voxel pools are used where
+// they lie in the bundle; only the brick tables are merged, so that one cache line answers for a
+// brick.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "formats/case_bundle.h"
+#include "formats/result.h"
+
+namespace sonocase::runtime {
+
+// The echo of the surface between two labels.
+struct PairEcho {
+    double amplitude = 0;   // 60 R^0.85; 0: none
+    double sigma_mm = 0.2;  // of the reflecting layer
+    bool hard = false;      // bone or gas on one side
+    bool refracts = false;  // fluid on one side
+    int pulse = 0;          // +1: the first label swells with the pulse, -1: the second
+};
+
+struct LabelLook {
+    double echo_db = 0;
+    double attenuation = 0;  // dB/cm/MHz
+    TissueKind kind = TissueKind::outside;
+};
+
+inline constexpr std::uint32_t kBoundaryFlag =
+    0x40000000u;  // in a brick's label word: it holds surfaces
+
+struct PhysicalScene {
+    const CaseBundle* bundle = nullptr;
+    Grid grid;
+    Int3 bricks{0, 0, 0};
+    double voxel_mm = 1;
+
+    // Four words a brick: label entry, echo entry, boundary entry, unused. A uniform label entry is
+    // kUniformBrick | label; a uniform echo entry kUniformBrick | (offset & 0xFF); a boundary entry
+    // is kUniformBrick where the brick holds no interface.
+    std::vector<std::uint32_t> table;
+    std::vector<LabelLook> looks;  // # labels
+    std::vector<PairEcho> pairs;   // # labels^2, [own * # labels + second]
+    bool has_boundary = false, has_echo = false;
+
+    // Boundary roughness and glint, kRoughEdge^3: byte 0 roughness (/ 32), byte 1 log2 of the glint
+    // (/ 32), bytes 2 and 3 cosine and sine of its phase (/ 127); all signed.
+    std::vector<std::uint32_t> rough;
+    int speckle_mask = 0, speckle_log2 = 0;
+
+    int labels() const { return static_cast<int>(looks.size()); }
+};
+
+Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle);
+
+}  // namespace sonocase::runtime
