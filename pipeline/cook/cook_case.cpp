@@ -356,7 +356,8 @@ Result<CookResult> cook_case(const Recipe& recipe,
 
     // Volumes.
     auto resampled = cook.run<LabelCodec>(
-        "resample", 1, {imported->digest, registered->digest, canonical_options("resample", stage)},
+        "resample", kResampleVersion,
+        {imported->digest, registered->digest, canonical_options("resample", stage)},
         0.4, [&](const Progress& p) -> Result<LabelFile> {
             auto result = resample_labels({ct.volume, registration}, stage.resample, p);
             if (!result) return result.error();

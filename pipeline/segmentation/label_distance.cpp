@@ -158,7 +158,7 @@ LabelDistance::LabelDistance(const LabelVolume& labels, const LabelDistanceOptio
     const Vector3 h = labels_.grid.spacing_mm;
     const double pixel = std::max(h.x, h.y);
     nodes_ = labels_.grid;
-    if (h.z >= options.thick_ratio * pixel && labels_.grid.size.z > 1) {
+    if (options.shape_slices && h.z >= options.thick_ratio * pixel && labels_.grid.size.z > 1) {
         factor_ = std::max(2, static_cast<int>(std::lround(h.z / pixel)));
         nodes_.spacing_mm.z = h.z / factor_;
         nodes_.size.z = (labels_.grid.size.z - 1) * factor_ + 1;

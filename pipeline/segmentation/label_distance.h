@@ -21,6 +21,7 @@ struct LabelDistanceOptions {
     double sigma_slices = 0;  // smoothing along thick slices, in slices; 0: as in the plane, in mm
     double thick_ratio =
         1.5;  // slice spacing over pixel from which slices are interpolated by shape
+    bool shape_slices = true;  // false: thick slices are measured in 3-D like any others
     bool follow_shift = true;  // blend outlines that move sideways along their shift
 };
 

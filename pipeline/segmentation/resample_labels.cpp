@@ -23,10 +23,10 @@ FieldRead through_field(const ResampleInput& input,
                         const ResampleOptions& options,
                         const Grid& grid,
                         const Progress& progress,
-                        StageReport* report) {
+                        ResampleResult* result) {
     auto start = Clock::now();
-    const auto lap = [&](const char* name) {
-        report->measures.push_back({name, seconds_since(start)});
+    const auto lap = [&](double* seconds) {
+        *seconds = seconds_since(start);
         start = Clock::now();
     };
     LabelFieldOptions field_options;
@@ -34,13 +34,13 @@ FieldRead through_field(const ResampleInput& input,
                               .sigma_slices = options.sigma_slices,
                               .follow_shift = options.follow_shift};
     LabelField field(input.ct_labels, field_options, progress);
-    lap("distance_seconds");
+    lap(&result->seconds.distances);
     const Registration registration = with_voxel_rim(input.registration, input.ct_labels.grid);
     LabelPriceOptions price_options;
     price_options.iterations = options.volume_iterations;
     const LabelPriceReport prices = set_label_prices(
         &field, [&](Point3 ct) { return determinant(jacobian(registration, ct)); }, price_options);
-    lap("volume_seconds");
+    lap(&result->seconds.volumes);
     const InverseMap inverse_map(registration);
     FieldMap map;
     map.row = [&](int j, int k, float* x, float* y, float* z, MapStatus* status) {
@@ -51,7 +51,8 @@ FieldRead through_field(const ResampleInput& input,
     map.jacobian = [&](Point3 ct) { return inverse(jacobian(registration, ct)); };
     map.forward = [&](Point3 ct) { return mannequin_from_ct(registration, ct); };
     FieldRead read = read_field(field, grid, map, {options.record_band_vx}, progress);
-    lap("voxel_seconds");
+    lap(&result->seconds.voxels);
+    StageReport* report = &result->report;
     report->measures.push_back({"slice_factor", static_cast<double>(field.factor())});
     report->measures.push_back({"volume_steps", static_cast<double>(prices.iterations)});
     report->measures.push_back({"volume_miss", prices.largest_miss});
@@ -64,6 +65,11 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
                                        const ResampleOptions& options,
                                        const Progress& progress) {
     const auto started = std::chrono::steady_clock::now();
+    const bool shape = options.method == "shape", paper = options.method == "paper";
+    if (!shape && !paper && options.method != "nearest") {
+        return Error{"unknown method '" + options.method + "'", "resample",
+                     "shape, nearest or paper"};
+    }
     const auto grid =
         cooked_grid(input.ct_labels, input.registration, {options.voxel_mm, options.margin_mm});
     if (!grid) return grid.error();
@@ -71,14 +77,20 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
     PreimageCounts counts;
     std::vector<int> rescued;
     result.report.stage = "resample";
-    result.report.version = 2;
+    result.report.version = kResampleVersion;
     result.report.measures = {{"voxel_mm", options.voxel_mm},
                               {"voxels", static_cast<double>(grid->voxel_count())}};
-    if (options.method == ResampleMethod::nearest) {
+    if (!shape) {
         result.volume =
             nearest_labels(input.ct_labels, input.registration, *grid, &counts, progress);
+        if (paper) {
+            auto level_set = level_set_smoothing(result.volume, options.level_set, progress);
+            if (!level_set) return level_set.error();
+            result.volume = std::move(level_set->volume);
+            result.report.measures.push_back({"time_step", level_set->time_step});
+        }
     } else {
-        FieldRead read = through_field(input, options, *grid, progress, &result.report);
+        FieldRead read = through_field(input, options, *grid, progress, &result);
         result.volume = std::move(read.volume);
         result.boundary = std::move(read.boundary);
         counts = read.counts;
@@ -91,8 +103,9 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
         if (std::find(rescued.begin(), rescued.end(), c.label) != rescued.end()) {
             c.note = "smaller than a voxel, kept as one";
         } else if (c.lost()) {
-            c.note = options.method == ResampleMethod::nearest ? "no voxel centre falls on it"
-                                                               : "its place lies outside the grid";
+            c.note = shape   ? "its place lies outside the grid"
+                     : paper ? "thinner than 4 / sqrt(K0) or than a voxel"
+                             : "no voxel centre falls on it";
         }
     }
     result.report.measures.push_back({"outside_voxels", static_cast<double>(counts.outside)});

@@ -1,18 +1,92 @@
 #include "pipeline/segmentation/smooth_labels.h"
 
+#include <algorithm>
+#include <chrono>
 #include <utility>
 
+#include "pipeline/segmentation/label_field.h"
+#include "pipeline/segmentation/label_prices.h"
+#include "pipeline/segmentation/read_field.h"
+
 namespace sonocase::pipeline {
+namespace {
+
+FieldRead read_on_itself(const LabelField& field,
+                         const Grid& grid,
+                         double band_vx,
+                         const Progress& progress) {
+    FieldMap map;
+    map.row = [&](int j, int k, float* x, float* y, float* z, MapStatus* status) {
+        const Point3 start =
+            grid.point_from_voxel({0, static_cast<double>(j), static_cast<double>(k)});
+        const Vector3 step = grid.spacing_mm.x * grid.direction.column(0);
+        for (int i = 0; i < grid.size.x; ++i) {
+            x[i] = static_cast<float>(start.x + i * step.x);
+            y[i] = static_cast<float>(start.y + i * step.y);
+            z[i] = static_cast<float>(start.z + i * step.z);
+            status[i] = MapStatus::ok;
+        }
+    };
+    map.jacobian = [&](Point3) { return grid.direction; };  // d(frame) / d(axes of the grid)
+    map.forward = [](Point3 p) { return p; };
+    return read_field(field, grid, map, {band_vx}, progress);
+}
+
+}  // namespace
 
 Result<SmoothResult> smooth_labels(const LabelVolume& volume,
                                    const SmoothOptions& options,
                                    const Progress& progress) {
-    auto level_set = level_set_smoothing(volume, options.level_set, progress);
-    if (!level_set) return level_set.error();
     SmoothResult result;
-    result.volume = std::move(level_set->volume);
-    result.changes = std::move(level_set->changes);
-    result.report = std::move(level_set->report);
+    if (options.method == "level_set") {
+        auto level_set = level_set_smoothing(volume, options.level_set, progress);
+        if (!level_set) return level_set.error();
+        result.volume = std::move(level_set->volume);
+        result.changes = std::move(level_set->changes);
+        result.report = std::move(level_set->report);
+        return result;
+    }
+    if (options.method != "joint") {
+        return Error{"unknown method '" + options.method + "'", "smooth", "joint or level_set"};
+    }
+    const auto started = std::chrono::steady_clock::now();
+    const Vector3 h = volume.grid.spacing_mm;
+    const bool cubic = std::max({h.x, h.y, h.z}) < 1.001 * std::min({h.x, h.y, h.z});
+    result.volume = volume;
+    std::vector<int> rescued;
+    LabelPriceReport prices;
+    for (int i = 0; i < std::max(1, options.iterations); ++i) {
+        LabelFieldOptions field_options;
+        field_options.distance = {.sigma_vx = options.sigma_vx, .shape_slices = false};
+        LabelField field(result.volume, field_options, progress);
+        prices = set_label_prices(&field, [](Point3) { return 1.0; },
+                                  {.iterations = options.volume_iterations});
+        const bool last = i + 1 >= options.iterations;
+        FieldRead read = read_on_itself(field, volume.grid,
+                                        last && cubic ? options.record_band_vx : 0, progress);
+        result.volume.voxels = std::move(read.volume.voxels);
+        result.boundary = std::move(read.boundary);
+        rescued.insert(rescued.end(), read.rescued.begin(), read.rescued.end());
+    }
+    result.changes =
+        compare_volumes(volume.labels, label_volumes_ml(volume), label_volumes_ml(result.volume));
+    for (LabelChange& c : result.changes) {
+        if (std::find(rescued.begin(), rescued.end(), c.label) != rescued.end()) {
+            c.note = "thinner than the smoothing, kept as one voxel";
+        }
+    }
+    result.report.stage = "smooth";
+    result.report.version = 2;
+    result.report.measures = {{"sigma_vx", options.sigma_vx},
+                              {"volume_steps", static_cast<double>(prices.iterations)},
+                              {"volume_miss", prices.largest_miss}};
+    if (!cubic && options.record_band_vx > 0) {
+        result.report.warnings.emplace_back(
+            "the voxels are not cubic, so that no boundary records were made; resample first");
+    }
+    report_changes(result.changes, 0.2, &result.report);
+    result.report.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     return result;
 }
 

@@ -1,7 +1,14 @@
-// Smoothing of a label volume of cubic voxels.
+// Smoothing of a label volume, all labels at once.
+//
+// joint      the labels become one smooth partition of space in which every label keeps its volume
+//            (label_field.h, label_prices.h), read back on the same voxels, with boundary records.
+//            No gap, no overlap and no lost label is possible. On thick slices the steps stay steps
+//            of whole voxels; resample_labels.h is what makes cubic voxels of them.
+// level_set  the paper's eq. (10) per label (level_set_smoothing.h): cubic voxels only, no records.
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "formats/brick_volume.h"
@@ -15,11 +22,16 @@
 namespace sonocase::pipeline {
 
 struct SmoothOptions {
+    std::string method = "joint";  // joint | level_set
+    double sigma_vx = 1.5;         // joint: voxels, [0, 4]
+    int iterations = 1;            // joint: times over, [1, 20]
+    int volume_iterations = 8;     // joint: Newton steps of the volumes, [0, 50]; 0: not kept
+    double record_band_vx = 1.5;   // joint: boundary records up to this distance, [0, 2.6]; 0: none
     LevelSetOptions level_set;
 };
 
 struct SmoothResult {
-    LabelVolume volume;
+    LabelVolume volume;                   // on the grid of the input
     BrickVolume<std::uint32_t> boundary;  // formats/boundary_record.h; empty: none made
     std::vector<LabelChange> changes;
     StageReport report;

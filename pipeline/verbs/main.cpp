@@ -30,6 +30,13 @@ const std::vector<Verb>& verbs() {
         {kCase, "inspect", "show what a bundle holds", verb_inspect},
         {kCase, "validate", "check a bundle", verb_validate},
         {kStage, "import", "read a label map of any kind", verb_import},
+        {kStage, "resample", "carry labels through the fit into cubic voxels", verb_resample},
+        {kStage, "smooth", "take the steps out of labels", verb_smooth},
+        {kStage, "surface", "extract the patient's skin from a label map", verb_surface},
+        {kStage, "align", "lay the skin on the mannequin rigidly", verb_align},
+        {kStage, "warp", "fit the quadratic and residual warps", verb_warp},
+        {kStage, "register", "surface, align and warp in one call", verb_register},
+        {kStage, "map", "carry points through a fitted map", verb_map},
         {kStage, "pack", "put the stages' files into a bundle", verb_pack},
     };
     return table;

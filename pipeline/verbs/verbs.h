@@ -32,6 +32,13 @@ int verb_build(int argc, char** argv);
 int verb_import(int argc, char** argv);
 int verb_inspect(int argc, char** argv);
 int verb_pack(int argc, char** argv);
+int verb_resample(int argc, char** argv);
+int verb_smooth(int argc, char** argv);
+int verb_warp(int argc, char** argv);
+int verb_surface(int argc, char** argv);
+int verb_register(int argc, char** argv);
+int verb_map(int argc, char** argv);
+int verb_align(int argc, char** argv);
 int verb_validate(int argc, char** argv);
 
 }  // namespace sonocase::pipeline

@@ -1,0 +1,16 @@
+// Labels as a .seg.nrrd that 3D Slicer opens as a segmentation, with names and colours.
+#pragma once
+
+#include <string>
+
+#include "formats/label_volume.h"
+#include "formats/result.h"
+
+namespace sonocase::pipeline {
+
+// One 8-bit layer, gzip inside; a label's value is its palette index. The volume's frame is written
+// as right-anterior-superior, so that reading the file back gives the same coordinates. Labels
+// without a colour get one each. Same volume, same bytes.
+Status export_seg_nrrd(const LabelVolume& volume, const std::string& path);
+
+}  // namespace sonocase::pipeline

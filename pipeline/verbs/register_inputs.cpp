@@ -1,0 +1,121 @@
+#include "pipeline/verbs/register_inputs.h"
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+
+#include "formats/number_text.h"
+#include "pipeline/import/label_map.h"
+#include "pipeline/import/surface_file.h"
+#include "pipeline/registration/landmark_file.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+Result<Vector3> parse_direction(const std::string& text) {
+    Vector3 v;
+    std::string_view rest = text;
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::size_t comma = axis < 2 ? rest.find(',') : rest.size();
+        if (comma == std::string_view::npos || !parse_number(rest.substr(0, comma), v[axis]) ||
+            !std::isfinite(v[axis])) {
+            return Error{"'" + text + "' is no direction", "--up",
+                         "three numbers X,Y,Z, e.g. 0,1,0"};
+        }
+        rest = rest.substr(std::min(rest.size(), comma + 1));
+    }
+    if (!(norm(v) > 1e-9)) {
+        return Error{"'" + text + "' has no length", "--up",
+                     "the patient's head direction in the surface's frame, e.g. 0,1,0"};
+    }
+    return v;
+}
+
+}  // namespace
+
+void add_register_options(CLI::App& app, RegisterArguments& a) {
+    app.add_option("--labels", a.labels,
+                   "Label map: NIfTI, NRRD, MetaImage, DICOM or a folder of masks")
+        ->type_name("FILE")
+        ->required();
+    app.add_option("--surface", a.surface, "Mannequin: PLY, STL, OBJ, VTP, or CSV of readings")
+        ->type_name("FILE")
+        ->required();
+    app.add_option("--table", a.table, "CSV of value,name[,tissue_class] for the label map")
+        ->type_name("FILE.csv");
+    app.add_option("--up", a.up, "The patient's head direction in the surface's frame")
+        ->type_name("X,Y,Z");
+    app.add_option("--landmarks", a.landmarks, "Rows name,ct_x,ct_y,ct_z,x,y,z in mm")
+        ->type_name("FILE.csv");
+    app.add_option("--scale", a.surface_scale, "mm per unit of the surface file")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--seed", a.seed, "Seed of the starts and trials")->capture_default_str();
+    app.add_flag("--no-residual", a.no_residual, "Leave the residual warp out");
+    app.add_flag("--paper", a.paper, "Stop after the paper's RANSAC quadratic, eqs. (3)-(9)");
+    add_common_options(app, a.common);
+}
+
+Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Progress& progress) {
+    const Stopwatch watch;
+    RegisterInputs inputs;
+    if (!a.up.empty()) {
+        const Result<Vector3> up = parse_direction(a.up);
+        if (!up) return up.error();
+        inputs.options.up = *up;
+    }
+    if (!a.landmarks.empty()) {
+        Result<std::vector<Landmark>> landmarks = load_landmarks(a.landmarks);
+        if (!landmarks) return landmarks.error();
+        inputs.options.landmarks = std::move(*landmarks);
+    }
+    inputs.options.seed = a.seed;
+    inputs.options.residual_warp = !a.no_residual;
+    inputs.options.paper_warp = a.paper;
+    StageReport surface_report;
+    Result<Surface> surface = import_surface(a.surface, {a.surface_scale}, &surface_report);
+    if (!surface) return surface.error();
+    inputs.mannequin = std::move(*surface);
+    ImportOptions import;
+    import.table = a.table;
+    import.scale = a.labels_scale;
+    Result<ImportedLabels> labels = import_label_map(a.labels, import, progress);
+    if (!labels) return labels.error();
+    inputs.warnings = surface_report.warnings;
+    inputs.warnings.insert(inputs.warnings.end(), labels->report.warnings.begin(),
+                           labels->report.warnings.end());
+    inputs.import_seconds = watch.seconds();
+    Result<SkinSurfaceResult> skin = extract_skin_surface(labels->labels);
+    if (!skin) {
+        Error error = skin.error();
+        if (error.where.empty()) error.where = a.labels;
+        return error;
+    }
+    inputs.skin = std::move(*skin);
+    inputs.warnings.insert(inputs.warnings.end(), inputs.skin.report.warnings.begin(),
+                           inputs.skin.report.warnings.end());
+    return inputs;
+}
+
+void add_input_reports(const RegisterInputs& inputs, StageReport& report) {
+    report.measures.insert(report.measures.end(), inputs.skin.report.measures.begin(),
+                           inputs.skin.report.measures.end());
+    report.measures.push_back({"import_seconds", inputs.import_seconds});
+    report.measures.push_back({"surface_seconds", inputs.skin.report.seconds});
+    report.seconds += inputs.skin.report.seconds;
+    report.warnings.insert(report.warnings.begin(), inputs.warnings.begin(), inputs.warnings.end());
+}
+
+void print_fit(const RegisterResult& result) {
+    const auto line = [](const char* step, const FitMeasure& fit) {
+        std::printf("%-10s %7.2f %7.2f %7.2f %7.2f   %.2f\n", step, fit.rms_mm, fit.median_mm,
+                    fit.p95_mm, fit.max_mm, fit.coverage);
+    };
+    std::printf("gap, mm        rms  median     p95     max   coverage\n");
+    line("rigid", result.rigid_fit);
+    line("quadratic", result.quadratic_fit);
+    line("final", result.fit);
+    std::printf("det J >= %.3f (proven)\n", result.registration.min_det_jacobian);
+}
+
+}  // namespace sonocase::pipeline

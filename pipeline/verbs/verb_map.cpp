@@ -1,0 +1,132 @@
+// sonocase map: points through a fitted map, either way, each with a status.
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "formats/number_text.h"
+#include "formats/registration_file.h"
+#include "pipeline/files.h"
+#include "pipeline/import/delimited_text.h"
+#include "pipeline/parallel.h"
+#include "pipeline/registration/inverse_map.h"
+#include "pipeline/verbs/command_line.h"
+#include "pipeline/verbs/verbs.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// Columns x, y, z by the header, or the first three. Rows that are no numbers become NaN, so that
+// the output has the rows of the input.
+Result<std::vector<Point3>> read_points(const std::string& path) {
+    const Result<std::string> text = read_text_file(path);
+    if (!text) return text.error();
+    std::vector<Point3> points;
+    std::size_t column[3] = {0, 1, 2};
+    bool first = true;
+    for (const TextRow& row : split_rows(*text)) {
+        if (first) {
+            first = false;
+            bool header = false;
+            for (std::size_t c = 0; c < row.cells.size(); ++c) {
+                const std::string name = lower_case(row.cells[c]);
+                for (int axis = 0; axis < 3; ++axis) {
+                    if (name == std::string(1, "xyz"[axis])) {
+                        column[axis] = c;
+                        header = true;
+                    }
+                }
+            }
+            if (header) continue;
+            if (!row.cells.empty() && !number_in(row.cells[0])) continue;  // some other header
+        }
+        Point3 p{kNan, kNan, kNan};
+        for (int axis = 0; axis < 3; ++axis) {
+            if (column[axis] >= row.cells.size()) {
+                return Error{"row of " + std::to_string(row.cells.size()) + " cells",
+                             path + ":" + std::to_string(row.line), "x,y,z in mm"};
+            }
+            if (const auto v = number_in(row.cells[column[axis]])) p[axis] = *v;
+        }
+        points.push_back(p);
+    }
+    return points;
+}
+
+const char* status_name(MapStatus status) {
+    return status == MapStatus::ok        ? "ok"
+           : status == MapStatus::outside ? "outside"
+                                          : "no_preimage";
+}
+
+bool is_finite(Point3 p) {
+    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+}
+
+}  // namespace
+
+int verb_map(int argc, char** argv) {
+    CLI::App app(
+        "Carry points through a fitted map. Status ok: inside the CT; outside: the CT end of the "
+        "pair "
+        "lies beyond the CT, where nothing is proven; no_preimage: nothing maps onto the point");
+    std::string registration_path, from, to, in, out;
+    CommonOptions common;
+    app.add_option("registration", registration_path, "What register wrote")
+        ->type_name("REG.json")
+        ->required();
+    const CLI::IsMember frame({"ct", "mannequin"});
+    app.add_option("--from", from, "Frame of the points")->check(frame)->required();
+    app.add_option("--to", to, "Frame to carry them to")->check(frame)->required();
+    app.add_option("--points", in, "Points x,y,z in mm")->type_name("IN.csv")->required();
+    app.add_option("-o,--output", out, "Rows x,y,z,status")->type_name("OUT.csv")->required();
+    add_common_options(app, common);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    const ThreadLimit limit(common.threads);
+    const Stopwatch watch;
+    const Result<Registration> registration = load_registration(registration_path);
+    if (!registration) return fail("map", registration.error());
+    const Result<std::vector<Point3>> points = read_points(in);
+    if (!points) return fail("map", points.error());
+
+    std::vector<Point3> mapped(points->size(), Point3{kNan, kNan, kNan});
+    std::vector<MapStatus> status(points->size(), MapStatus::no_preimage);
+    if (from == "mannequin" && to == "ct") {
+        const InverseMap inverse(*registration);
+        parallel_for(points->size(), 256, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i)
+                status[i] = inverse.invert((*points)[i], &mapped[i]);
+        });
+    } else {
+        for (std::size_t i = 0; i < points->size(); ++i) {
+            const Point3 p = (*points)[i];
+            if (!is_finite(p)) continue;
+            mapped[i] = from == to ? p : mannequin_from_ct(*registration, p);
+            const bool inside = (from == "mannequin") || registration->ct_box.empty() ||
+                                registration->ct_box.contains(p);
+            status[i] = inside ? MapStatus::ok : MapStatus::outside;
+        }
+    }
+    StageReport report;
+    report.stage = "map";
+    double counts[3] = {0, 0, 0};
+    std::string csv = "x,y,z,status\n";
+    for (std::size_t i = 0; i < mapped.size(); ++i) {
+        for (int axis = 0; axis < 3; ++axis) csv += number_text(mapped[i][axis]) + ",";
+        csv += status_name(status[i]);
+        csv += '\n';
+        ++counts[static_cast<std::size_t>(status[i])];
+    }
+    if (auto s = write_text_file(out, csv); !s) return fail("map", s.error());
+    report.measures = {{"points", static_cast<double>(mapped.size())},
+                       {"ok", counts[0]},
+                       {"outside", counts[1]},
+                       {"no_preimage", counts[2]}};
+    report.seconds = watch.seconds();
+    if (auto s = write_report(common, report); !s) return fail("map", s.error());
+    return kDone;
+}
+
+}  // namespace sonocase::pipeline
