@@ -64,6 +64,17 @@ Result<std::string> read_text_file(const std::string& path) {
 }
 
 Status write_file(const std::string& path, std::span<const std::uint8_t> bytes) {
+    std::error_code code;
+    const bool special =
+        fs::exists(path, code) && !fs::is_regular_file(path, code) && !fs::is_directory(path, code);
+    if (special || path.starts_with("/dev/") || path.starts_with("/proc/")) {
+        // A pipe or a device, or /dev/stdout, which may lead to a file: renaming would replace it.
+        FilePointer file(std::fopen(path.c_str(), "ab"));
+        if (!file || std::fwrite(bytes.data(), 1, bytes.size(), file.get()) != bytes.size() ||
+            std::fflush(file.get()) != 0)
+            return system_error("cannot write", path, "check that it may be written");
+        return Done{};
+    }
     OutputFile output(path);
     {
         FilePointer file(std::fopen(output.temporary().c_str(), "wb"));

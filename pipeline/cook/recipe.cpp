@@ -417,6 +417,17 @@ Status load_exercises(Recipe& recipe, const std::vector<std::string>& named) {
     return Done{};
 }
 
+// Those named, in that order; all where none is named.
+std::vector<EmbeddedExercise> chosen(const std::vector<EmbeddedExercise>& all,
+                                     const std::vector<std::string>& named) {
+    if (named.empty()) return all;
+    std::vector<EmbeddedExercise> result;
+    for (const std::string& name : named)
+        for (const EmbeddedExercise& exercise : all)
+            if (exercise.name == name) result.push_back(exercise);
+    return result;
+}
+
 }  // namespace
 
 std::string Recipe::resolve(const std::string& given) const {
@@ -469,7 +480,7 @@ Result<Recipe> parse_recipe(std::string_view text,
     if (recipe.name.empty()) recipe.name = "case";
 
     if (exercises != nullptr)
-        recipe.exercises = *exercises;
+        recipe.exercises = chosen(*exercises, named);
     else if (auto status = load_exercises(recipe, named); !status)
         return status.error();
     for (const EmbeddedExercise& exercise : recipe.exercises) {
