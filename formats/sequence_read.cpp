@@ -180,13 +180,12 @@ Status Reader::read_structure() {
                                                     "space",
                                                     "space dimension",
                                                     "space origin",
-                                                    "spacings",
-                                                    "Comment"};
+                                                    "spacings"};
     static constexpr std::string_view kSkippedNrrd[] = {"kinds", "labels", "centers", "units",
                                                         "content"};
     bool channels_first = false;
     for (const HeaderLine& line : header_.lines) {
-        if (line.key.substr(0, 9) == "Seq_Frame") continue;
+        if (line.key.substr(0, 9) == "Seq_Frame" || line.key.substr(0, 7) == "Comment") continue;
         if (line.key == "DimSize" || line.key == "sizes") {
             if (Status s = read_sizes(line); !s) return s;
         } else if (line.key == "ElementType") {
@@ -334,6 +333,11 @@ Status Reader::read_frame_field(const HeaderLine& line, std::size_t index, std::
     }
     if (name == "ImageStatus" || (nrrd_ && name == "Status")) {
         frame.image_ok = line.value == "OK";
+        return Done{};
+    }
+    for (SequenceField& field : frame.fields) {
+        if (field.name != name) continue;
+        field.value = line.value;  // written again after a write that failed
         return Done{};
     }
     frame.fields.push_back({std::string(name), std::string(line.value)});

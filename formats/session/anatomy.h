@@ -1,0 +1,59 @@
+// What a point of the body is, for scores and events: inside or out, and which structure.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "formats/case_bundle.h"
+#include "formats/geometry.h"
+#include "formats/surface.h"
+
+namespace sonocase {
+
+class Anatomy {
+  public:
+    virtual ~Anatomy() = default;
+    virtual bool inside(Point3 p) const = 0;
+    // Palette index at a point; 0 outside. Where structures are not known, 1 for all that is
+    // inside.
+    virtual int label(Point3 p) const { return inside(p) ? 1 : 0; }
+    // Distance from `from` (inside) along the unit vector `direction` to where the body ends;
+    // `reach` if it does not end before. Runs of outside shorter than `gap_mm` do not end it.
+    virtual double exit_distance(Point3 from, Vector3 direction, double reach) const = 0;
+};
+
+// The cooked labels: a voxel's own label, or the second one beyond its boundary plane, which is the
+// rule that the picture follows. The bundle must outlive it. inside() and label() are constant time
+// and allocate nothing; exit_distance() costs reach / (half a voxel) of them.
+class CaseAnatomy final : public Anatomy {
+  public:
+    explicit CaseAnatomy(const CaseBundle& bundle);
+    bool inside(Point3 p) const override { return label(p) != 0; }
+    int label(Point3 p) const override;
+    double exit_distance(Point3 from, Vector3 direction, double reach) const override;
+
+  private:
+    const CaseBundle* bundle_;
+};
+
+// A closed triangle mesh, as trainers built on mesh anatomy use. Parity of crossings along +z,
+// nudged so that no vertex or edge is hit; inside() costs the triangles of one column of a grid.
+class MeshAnatomy final : public Anatomy {
+  public:
+    explicit MeshAnatomy(Surface mesh);
+    bool inside(Point3 p) const override;
+    double exit_distance(Point3 from, Vector3 direction, double reach) const override;
+
+  private:
+    const std::vector<std::uint32_t>& column(double x, double y) const;
+    Surface mesh_;
+    Box3 box_;
+    int columns_x_ = 1, columns_y_ = 1;
+    double column_mm_ = 1;
+    std::vector<std::vector<std::uint32_t>> triangles_of_column_;
+};
+
+}  // namespace sonocase
