@@ -1,184 +1,29 @@
 #include "pipeline/cook/cook_case.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <utility>
 
-#include "formats/digest.h"
 #include "formats/nearest_name.h"
-#include "formats/registration_file.h"
-#include "formats/stage_files.h"
 #include "pipeline/cook/input_files.h"
 #include "pipeline/cook/pack_case.h"
-#include "pipeline/cook/stage_cache.h"
+#include "pipeline/cook/stage_codecs.h"
+#include "pipeline/cook/stage_runner.h"
 #include "pipeline/import/label_map.h"
 #include "pipeline/import/plausible_size.h"
 #include "pipeline/import/surface_file.h"
+#include "pipeline/registration/landmark_file.h"
 #include "pipeline/texture/speckle.h"
 #include "pipeline/texture/tissue_table.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-constexpr int kSpeckleVersion = 1;
-
-class Clock {
-  public:
-    double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    }
-
-  private:
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
-// A stage's answer as it goes from stage to stage. `digest` stands for the answer in later keys;
-// empty without a cache.
-template <class T>
-struct Made {
-    T value;
-    std::string digest;
-};
-
-// Runs the stages one after the other and keeps their reports.
-class Cook {
-  public:
-    Cook(const Recipe& recipe, const CookOptions& options, const Progress& progress)
-        : recipe_(recipe), cache_(options.cache_folder, options.cache_bytes), progress_(progress) {}
-
-    // The answer of `stage` from the cache, or made by `make` and stored. `inputs` holds whatever
-    // the answer depends on. The codec's encode must not depend on seconds; its reports() gives the
-    // reports in the answer, whose seconds are then filled in.
-    template <class Codec, class Make>
-    auto run(const std::string& stage,
-             int version,
-             std::vector<std::string> inputs,
-             double share,
-             const Make& make) -> Result<Made<typename Codec::Value>> {
-        using Value = typename Codec::Value;
-        const double begin = done_;
-        const Progress part = [this, begin, share](double fraction, std::string_view doing) {
-            tell(progress_, begin + share * fraction, doing);
-        };
-        part(0, stage);
-        done_ += share;
-        std::string key;
-        bool damaged = false;
-        if (cache_.enabled()) {
-            Digest digest;
-            digest.add(std::string_view("sonocase stage")).add(std::string_view(stage));
-            digest.add(std::int64_t{version});
-            for (const std::string& input : inputs) digest.add(std::string_view(input));
-            key = digest.hex();
-            if (auto entry = cache_.find(stage, key, &damaged)) {
-                auto value = Codec::decode(entry->bytes, cache_.path_of(stage, key));
-                if (value) {
-                    keep(Codec::reports(*value), entry->seconds, key, true);
-                    return Made<Value>{std::move(*value), entry->digest};
-                }
-                damaged = true;
-            }
-        }
-        const Clock clock;
-        Result<Value> value = make(part);
-        if (!value) return value.error();
-        const double seconds = clock.seconds();
-        std::string digest;
-        if (cache_.enabled()) {
-            CacheEntry entry{Codec::encode(*value), "", seconds};
-            digest = entry.digest = digest_of(entry.bytes);
-            if (auto status = cache_.store(stage, key, entry); !status)
-                note_ = "the cache could not be written (" + status.error().message() + ")";
-        }
-        keep(Codec::reports(*value), seconds, key, false);
-        if (damaged) runs_.back().report.warnings.push_back("a damaged cache entry was made anew");
-        if (!note_.empty()) runs_.back().report.warnings.push_back(std::exchange(note_, {}));
-        return Made<Value>{std::move(*value), digest};
-    }
-
-    Result<std::string> digest_of_file_input(const std::string& given) {
-        if (given.empty()) return std::string();
-        auto digest = digest_of_input(recipe_.resolve(given));
-        if (digest) inputs_.push_back({given, *digest});
-        return digest;
-    }
-
-    void keep(const std::vector<StageReport>& reports,
-              double seconds,
-              const std::string& key,
-              bool cached) {
-        // A stage of several parts (align, warp) knows its parts' shares itself when it ran just
-        // now; from the cache, whose entries hold no seconds, the first part carries the sum.
-        double known = 0;
-        for (const StageReport& report : reports) known += report.seconds;
-        for (std::size_t i = 0; i < reports.size(); ++i) {
-            StageRun run{reports[i], key, cached};
-            if (known <= 0) run.report.seconds = i == 0 ? seconds : 0;
-            runs_.push_back(std::move(run));
-        }
-    }
-
-    const Recipe& recipe_;
-    StageCache cache_;
-    const Progress& progress_;
-    double done_ = 0;
-    std::string note_;
-    std::vector<StageRun> runs_;
-    std::vector<InputHash> inputs_;
-};
-
-std::vector<StageReport> without_seconds(std::vector<StageReport> reports) {
-    for (StageReport& report : reports) report.seconds = 0;
-    return reports;
-}
-
-struct LabelCodec {
-    using Value = LabelFile;
-    static std::vector<std::uint8_t> encode(const LabelFile& file) {
-        LabelFile copy = file;
-        copy.reports = without_seconds(copy.reports);
-        return write_label_file(copy);
-    }
-    static Result<LabelFile> decode(const std::vector<std::uint8_t>& bytes,
-                                    const std::string& where) {
-        return sonocase::read_label_file(bytes, where);
-    }
-    static std::vector<StageReport> reports(const LabelFile& file) { return file.reports; }
-};
-
-struct TextureCodec {
-    using Value = TextureFile;
-    static std::vector<std::uint8_t> encode(const TextureFile& file) {
-        TextureFile copy = file;
-        copy.reports = without_seconds(copy.reports);
-        return write_texture_file(copy);
-    }
-    static Result<TextureFile> decode(const std::vector<std::uint8_t>& bytes,
-                                      const std::string& where) {
-        return read_texture_file(bytes, where);
-    }
-    static std::vector<StageReport> reports(const TextureFile& file) { return file.reports; }
-};
-
-struct RegistrationCodec {
-    using Value = Registration;
-    static std::vector<std::uint8_t> encode(const Registration& registration) {
-        Registration copy = registration;
-        copy.reports = without_seconds(copy.reports);
-        const std::string text = format_registration(copy);
-        return {text.begin(), text.end()};
-    }
-    static Result<Registration> decode(const std::vector<std::uint8_t>& bytes,
-                                       const std::string& where) {
-        return parse_registration({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
-                                  where);
-    }
-    static std::vector<StageReport> reports(const Registration& registration) {
-        return registration.reports;
-    }
-};
+// Of stages whose headers name none. A change of what a stage computes raises its number, and with
+// it every key of the cache that the stage has a part in.
+constexpr int kSmoothVersion = 2;
+constexpr int kTextureVersion = 1;
+constexpr int kStructureVersion = 1;
 
 // The recipe's [labels] laid over the built-in choice of tissues.
 Status assign_tissues(const Recipe& recipe, std::vector<Label>& labels) {
@@ -234,17 +79,31 @@ Result<LabelFile> import_labels(const Recipe& recipe, const Progress& progress) 
     return file;
 }
 
+// The map from the patient to the mannequin. The analytic torso may take its own, which is exact.
 Result<Registration> fit(const Recipe& recipe,
-                         const SkinSurfaceResult&,
-                         const Surface&,
-                         const Progress&) {
-    if (!recipe.inputs.analytic)
-        return Error{"no registration of files yet", recipe.path, "cook an [analytic] recipe"};
-    Registration registration = analytic_torso_truth(recipe.inputs.torso.mannequin.strength);
-    StageReport report;
-    report.stage = "warp";
-    registration.reports = {report};
-    return registration;
+                         const SkinSurfaceResult& skin,
+                         const Surface& mannequin,
+                         const Progress& progress) {
+    if (recipe.inputs.analytic && recipe.inputs.torso.known_map) {
+        Registration registration = analytic_torso_truth(recipe.inputs.torso.mannequin.strength);
+        StageReport report;
+        report.stage = "warp";
+        report.version = kRegisterVersion;
+        report.warnings = {"the map is the analytic torso's own and was not fitted"};
+        registration.reports = {report};
+        return registration;
+    }
+    RegisterOptions options = recipe.options.fit;
+    options.seed = static_cast<std::uint64_t>(recipe.options.seed);
+    options.up = recipe.inputs.up;
+    if (!recipe.inputs.landmarks.empty()) {
+        auto landmarks = load_landmarks(recipe.resolve(recipe.inputs.landmarks));
+        if (!landmarks) return landmarks.error();
+        options.landmarks = std::move(*landmarks);
+    }
+    auto result = register_surfaces({skin, mannequin}, options, progress);
+    if (!result) return result.error();
+    return std::move(result->registration);
 }
 
 Result<Surface> mannequin_of(const Recipe& recipe, StageReport* report) {
@@ -286,6 +145,19 @@ std::string tissues_text(const std::vector<Tissue>& tissues) {
     return text;
 }
 
+std::string palette_text(const std::vector<Label>& labels) {
+    std::string text;
+    for (const Label& label : labels) text += label.name + "=" + label.tissue + "\n";
+    return text;
+}
+
+std::string hint_text(const RecipeInputs& in) {
+    if (in.analytic && in.torso.known_map) return "known";
+    if (!in.up) return "";
+    return "up " + number_text(in.up->x) + " " + number_text(in.up->y) + " " +
+           number_text(in.up->z);
+}
+
 // The tissues that the palette uses, in the table's order, outside first.
 std::vector<Tissue> used_tissues(const std::vector<Tissue>& all, const std::vector<Label>& labels) {
     std::vector<Tissue> used;
@@ -304,24 +176,34 @@ std::vector<Tissue> used_tissues(const std::vector<Tissue>& all, const std::vect
 Result<CookResult> cook_case(const Recipe& recipe,
                              const CookOptions& options,
                              const Progress& progress) {
-    Cook cook(recipe, options, progress);
+    StageRunner cook(options, progress);
     const StageOptions& stage = recipe.options;
     const RecipeInputs& in = recipe.inputs;
+
+    std::vector<InputHash> inputs;
+    const auto input_digest = [&](const std::string& given) -> Result<std::string> {
+        if (given.empty()) return std::string();
+        auto digest = digest_of_input(recipe.resolve(given));
+        if (digest) inputs.push_back({given, *digest});
+        return digest;
+    };
 
     // Inputs. Every file is looked at before the first long stage.
     std::string labels_key = analytic_text(in.torso), surface_key = labels_key, examples_key;
     if (!in.analytic) {
-        auto labels = cook.digest_of_file_input(in.labels);
+        auto labels = input_digest(in.labels);
         if (!labels) return labels.error();
-        auto table = cook.digest_of_file_input(in.label_table);
+        auto table = input_digest(in.label_table);
         if (!table) return table.error();
-        auto surface = cook.digest_of_file_input(in.surface);
+        auto surface = input_digest(in.surface);
         if (!surface) return surface.error();
         labels_key = *labels + " " + *table + " " + number_text(in.labels_scale);
         surface_key = *surface + " " + number_text(in.surface_scale);
     }
-    auto examples = cook.digest_of_file_input(in.examples);
+    auto examples = input_digest(in.examples);
     if (!examples) return examples.error();
+    auto landmarks_key = input_digest(in.landmarks);
+    if (!landmarks_key) return landmarks_key.error();
     StageReport surface_report;
     auto mannequin = mannequin_of(recipe, &surface_report);
     if (!mannequin) return mannequin.error();
@@ -331,7 +213,7 @@ Result<CookResult> cook_case(const Recipe& recipe,
                              [&](const Progress& p) { return import_labels(recipe, p); });
     if (!imported) return imported.error();
     for (const std::string& warning : surface_report.warnings)
-        cook.runs_.back().report.warnings.push_back("surface: " + warning);
+        cook.runs.back().report.warnings.push_back("surface: " + warning);
     LabelFile& ct = imported->value;
     if (auto status = assign_tissues(recipe, ct.volume.labels); !status) return status.error();
     Box3 mannequin_box;
@@ -341,14 +223,17 @@ Result<CookResult> cook_case(const Recipe& recipe,
         return *error;
 
     // Surface and registration.
-    const Clock surface_clock;
+    const StageClock surface_clock;
     auto skin = extract_skin_surface(ct.volume, stage.surface);
     if (!skin) return skin.error();
     skin->report.seconds = surface_clock.seconds();
-    cook.runs_.push_back({skin->report, "", false});
+    cook.runs.push_back({skin->report, "", false});
     auto registered = cook.run<RegistrationCodec>(
-        "warp", 1, {imported->digest, surface_key, canonical_options("surface", stage)}, 0.2,
-        [&](const Progress& p) -> Result<Registration> {
+        "warp", kRegisterVersion,
+        {imported->digest, surface_key, *landmarks_key, hint_text(in),
+         canonical_options("surface", stage), canonical_options("align", stage),
+         canonical_options("warp", stage), canonical_options("case", stage)},
+        0.2, [&](const Progress& p) -> Result<Registration> {
             return fit(recipe, *skin, *mannequin, p);
         });
     if (!registered) return registered.error();
@@ -357,8 +242,8 @@ Result<CookResult> cook_case(const Recipe& recipe,
     // Volumes.
     auto resampled = cook.run<LabelCodec>(
         "resample", kResampleVersion,
-        {imported->digest, registered->digest, canonical_options("resample", stage)},
-        0.4, [&](const Progress& p) -> Result<LabelFile> {
+        {imported->digest, registered->digest, canonical_options("resample", stage)}, 0.4,
+        [&](const Progress& p) -> Result<LabelFile> {
             auto result = resample_labels({ct.volume, registration}, stage.resample, p);
             if (!result) return result.error();
             return LabelFile{"mannequin",
@@ -369,16 +254,42 @@ Result<CookResult> cook_case(const Recipe& recipe,
         });
     if (!resampled) return resampled.error();
 
-    // Textures.
-    std::vector<Label>& palette = resampled->value.volume.labels;
+    const std::string& method = stage.smooth_method;
+    LabelFile cooked = std::move(resampled->value);
+    std::string cooked_digest = resampled->digest;
+    if (method == "joint" || method == "level_set" ||
+        (method == "auto" && stage.resample.method == "nearest")) {
+        auto smoothed = cook.run<LabelCodec>(
+            "smooth", kSmoothVersion, {cooked_digest, canonical_options("smooth", stage)}, 0.1,
+            [&](const Progress& p) -> Result<LabelFile> {
+                SmoothOptions smooth = stage.smooth;
+                smooth.method = method == "level_set" ? "level_set" : "joint";
+                auto result = smooth_labels(cooked.volume, smooth, p);
+                if (!result) return result.error();
+                return LabelFile{"mannequin",
+                                 std::move(result->volume),
+                                 std::move(result->boundary),
+                                 {},
+                                 {result->report}};
+            });
+        if (!smoothed) return smoothed.error();
+        cooked = std::move(smoothed->value);
+        cooked_digest = smoothed->digest;
+    }
+
+    // Textures and structure.
+    std::vector<Label>& palette = cooked.volume.labels;
     if (auto status = assign_tissues(recipe, palette); !status) return status.error();
     const std::vector<Tissue> tissues = used_tissues(recipe.tissues, palette);
+    const std::string tissue_key = tissues_text(tissues) + palette_text(palette);
     auto textures = cook.run<TextureCodec>(
-        "texture", kSpeckleVersion,
-        {*examples, tissues_text(tissues), canonical_options("texture", stage),
+        "texture", kTextureVersion,
+        {*examples, tissue_key, canonical_options("texture", stage),
          canonical_options("case", stage)},
-        0.15, [&](const Progress& p) -> Result<TextureFile> {
+        0.1, [&](const Progress& p) -> Result<TextureFile> {
             TextureBankOptions bank = stage.texture.bank;
+            bank.mode =
+                stage.texture_mode == "pyramid" ? TextureMode::pyramid : TextureMode::matched;
             bank.example_folder = recipe.resolve(in.examples);
             bank.seed = static_cast<std::uint64_t>(stage.seed);
             auto result = build_texture_bank(tissues, bank, p);
@@ -389,20 +300,33 @@ Result<CookResult> cook_case(const Recipe& recipe,
                                {result->report}};
         });
     if (!textures) return textures.error();
+    auto structure = cook.run<EchoCodec>(
+        "structure", kStructureVersion,
+        {cooked_digest, tissue_key, canonical_options("structure", stage),
+         canonical_options("case", stage)},
+        0.2, [&](const Progress& p) -> Result<EchoOffsets> {
+            BakeStructureOptions bake = stage.structure;
+            bake.seed = static_cast<std::uint64_t>(stage.seed);
+            auto result = bake_structure(cooked.volume, tissues, bake, p);
+            if (!result) return result.error();
+            return EchoOffsets{std::move(result->echo_offset), {result->report}};
+        });
+    if (!structure) return structure.error();
+    cooked.echo_offset = std::move(structure->value.offset);
 
     // Pack.
-    const Clock pack_clock;
+    const StageClock pack_clock;
     tell(progress, 0.95, "packing");
     auto packed = pack_case({recipe.name, recipe.text, recipe.exercises, &skin->skin, &registration,
-                             *mannequin, resampled->value, textures->value, tissues});
+                             *mannequin, cooked, textures->value, tissues});
     if (!packed) return packed.error();
     packed->report.seconds = pack_clock.seconds();
-    cook.runs_.push_back({packed->report, "", false});
+    cook.runs.push_back({packed->report, "", false});
 
-    CookResult result{std::move(packed->bundle), std::move(cook.runs_)};
+    CookResult result{std::move(packed->bundle), std::move(cook.runs)};
     CaseManifest& manifest = result.bundle.manifest;
     manifest.producer = options.producer;
-    manifest.inputs = std::move(cook.inputs_);
+    manifest.inputs = std::move(inputs);
     for (const StageRun& run : result.stages) {
         manifest.stages.push_back(run.report);
         manifest.stages.back().seconds = 0;

@@ -206,9 +206,10 @@ class RecipeParser {
     Status analytic(const toml::table& table) {
         recipe_.inputs.analytic = true;
         AnalyticInput& in = recipe_.inputs.torso;
-        const std::vector<std::string> known{
-            "voxel_mm",   "slice_mm", "points",      "noise_mm",    "mesh",     "seed",
-            "front_only", "strength", "width_scale", "depth_scale", "belly_mm", "examples"};
+        const std::vector<std::string> known{"voxel_mm", "slice_mm",    "points",      "noise_mm",
+                                             "mesh",     "seed",        "known_map",   "front_only",
+                                             "strength", "width_scale", "depth_scale", "belly_mm",
+                                             "examples"};
         for (const auto& [key, node] : table) {
             const std::string name(key.str()), full = "analytic." + name;
             Status status = Done{};
@@ -229,6 +230,8 @@ class RecipeParser {
                 status = number(node, full, 0, 40, &in.body.belly_mm);
             else if (name == "mesh")
                 status = flag(node, full, &in.mannequin.mesh);
+            else if (name == "known_map")
+                status = flag(node, full, &in.known_map);
             else if (name == "front_only")
                 status = flag(node, full, &in.mannequin.front_only);
             else if (name == "examples")

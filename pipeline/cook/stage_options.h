@@ -10,9 +10,11 @@
 
 #include "formats/result.h"
 #include "pipeline/import/analytic_torso.h"
+#include "pipeline/registration/register_surfaces.h"
 #include "pipeline/registration/skin_surface.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/segmentation/smooth_labels.h"
+#include "pipeline/texture/bake_structure.h"
 #include "pipeline/texture/texture_bank.h"
 
 namespace sonocase::pipeline {
@@ -23,6 +25,7 @@ struct AnalyticInput {
     AnalyticMannequinOptions mannequin;
     double voxel_mm = 2;
     double slice_mm = 3;
+    bool known_map = false;  // take the map that made the mannequin instead of fitting one
 };
 
 struct TextureStageOptions {
@@ -32,9 +35,14 @@ struct TextureStageOptions {
 
 struct StageOptions {
     SkinSurfaceOptions surface;
+    RegisterOptions fit;  // [align] and [warp]
     ResampleOptions resample;
+    // Resampling by shape smooths as it goes; "auto" smooths again only after "nearest".
+    std::string smooth_method = "auto";
     SmoothOptions smooth;
     TextureStageOptions texture;
+    std::string texture_mode = "matched";
+    BakeStructureOptions structure;
     int seed = 1;  // of everything random in a case; [case] seed
 };
 

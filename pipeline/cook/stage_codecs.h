@@ -1,0 +1,55 @@
+// How the answers of stages become bytes in the cache and come back. Seconds are left out, so that
+// the same inputs give the same bytes and a later stage's key changes only where the answer did.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "formats/registration.h"
+#include "formats/result.h"
+#include "formats/stage_files.h"
+
+namespace sonocase::pipeline {
+
+using Bytes = std::vector<std::uint8_t>;
+
+struct LabelCodec {
+    using Value = LabelFile;
+    static Bytes encode(const LabelFile& file);
+    static Result<LabelFile> decode(const Bytes& bytes, const std::string& where);
+    static const std::vector<StageReport>& reports(const LabelFile& file) { return file.reports; }
+};
+
+struct TextureCodec {
+    using Value = TextureFile;
+    static Bytes encode(const TextureFile& file);
+    static Result<TextureFile> decode(const Bytes& bytes, const std::string& where);
+    static const std::vector<StageReport>& reports(const TextureFile& file) { return file.reports; }
+};
+
+struct RegistrationCodec {
+    using Value = Registration;
+    static Bytes encode(const Registration& registration);
+    static Result<Registration> decode(const Bytes& bytes, const std::string& where);
+    static const std::vector<StageReport>& reports(const Registration& registration) {
+        return registration.reports;
+    }
+};
+
+// Echo offsets alone, without the labels that they belong to.
+struct EchoOffsets {
+    BrickVolume<std::int8_t> offset;
+    std::vector<StageReport> reports;
+};
+
+struct EchoCodec {
+    using Value = EchoOffsets;
+    static Bytes encode(const EchoOffsets& offsets);
+    static Result<EchoOffsets> decode(const Bytes& bytes, const std::string& where);
+    static const std::vector<StageReport>& reports(const EchoOffsets& offsets) {
+        return offsets.reports;
+    }
+};
+
+}  // namespace sonocase::pipeline
