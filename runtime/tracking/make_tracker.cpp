@@ -6,6 +6,7 @@
 #include "runtime/tracking/null_tracker.h"
 #include "runtime/tracking/replay_tracker.h"
 #include "runtime/tracking/scripted_sweep.h"
+#include "runtime/tracking/usb_tracker.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -46,6 +47,13 @@ Made make_tracker(const std::string& spec, const TrackerContext& context) {
     if (spec == "null") {
         const MouseTracker start(*context.skin, *context.exercise);
         return Made(std::make_unique<NullTracker>(start.mannequin_from_probe()));
+    }
+    using MakeDriver = std::unique_ptr<UsbDriver> (*)();
+    constexpr std::pair<const char*, MakeDriver> kDevices[] = {{"viper", make_viper_driver},
+                                                               {"3dg", make_guidance_driver},
+                                                               {"liberty", make_liberty_driver}};
+    for (const auto& [name, make] : kDevices) {
+        if (spec == name) return Made(std::make_unique<UsbTracker>(make(), context.clock));
     }
     return Error{"unknown tracker " + spec, "--tracker",
                  "use mouse, sweep:NAME, replay:FILE, igtl:HOST:PORT, viper, 3dg, liberty or null"};

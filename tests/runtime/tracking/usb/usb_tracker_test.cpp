@@ -1,0 +1,492 @@
+// The USB drivers against emulated devices, under an unmodified libusb in a process of its own.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "runtime/tracking/byte_fields.h"
+#include "runtime/tracking/usb/emulated_device.h"
+#include "runtime/tracking/viper_protocol.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using sonocase::testing::Bytes;
+using sonocase::testing::ClientResult;
+using sonocase::testing::DevicePort;
+using sonocase::testing::DeviceSpec;
+using sonocase::testing::Firmware;
+using sonocase::testing::run_with_device;
+
+// What goes wrong, and when, in numbers of position frames; -1: never.
+struct Trouble {
+    int not_ready = 0;     // NAKs "not ready" before the first real answer
+    bool refuses = false;  // NAKs the units command for good
+    bool mute = false;     // answers nothing
+    int bad_crc_every = -1;
+    int stall_at = -1;
+    int silent_at = -1;
+    int unplug_at = -1;
+    bool split = false;  // frames in pieces of 29 bytes
+    int merge = 1;       // so many frames in one transfer
+    bool already_streaming = false;
+    double hz = 240;
+};
+
+class ViperFirmware final : public Firmware {
+  public:
+    explicit ViperFirmware(const Trouble& trouble)
+        : trouble_(trouble), streaming_(trouble.already_streaming) {}
+
+    void on_out(const Bytes& transfer, DevicePort& port) override {
+        if (trouble_.mute) return;
+        viper::FrameReader reader;
+        reader.add(transfer);
+        viper::Frame frame;
+        viper::Reply command;
+        if (!reader.next(frame) || !viper::parse_reply(frame.body, command)) return;
+        Bytes payload;
+        std::uint32_t action = viper::kAck;
+        const auto nak = [&](std::uint32_t code, const char* words) {
+            action = viper::kNak;
+            put_u32_le(payload, code);
+            const std::size_t at = payload.size();
+            payload.resize(at + 128 + 48);
+            std::memcpy(payload.data() + at, words, std::strlen(words));
+        };
+        if (command.command != viper::kContinuousPno && trouble_.not_ready > 0) {
+            --trouble_.not_ready;
+            nak(1, "WARMING UP");
+        } else if (trouble_.refuses && command.command == viper::kUnits) {
+            nak(2, "UNITS NOT UNDERSTOOD");
+        } else {
+            switch (command.command) {
+                case viper::kWhoAmI:
+                    payload.assign(64 + 4 * 32, 0);
+                    std::memcpy(payload.data(), "VIPER 4 SN 1234", 15);
+                    break;
+                case viper::kUnits:
+                    units_ok_ = command.payload.size() == 8 && u32_le(command.payload, 0) == 2 &&
+                                u32_le(command.payload, 4) == 2;
+                    break;
+                case viper::kFrameRate:
+                    rate_ok_ = command.payload.size() == 4 && u32_le(command.payload, 0) == 3;
+                    break;
+                case viper::kContinuousPno:
+                    streaming_ = command.action == viper::kSet;
+                    break;
+                default:
+                    break;
+            }
+        }
+        Bytes answer = viper::encode(command.command, action, 0, 0, payload);
+        port.send(answer);
+    }
+
+    void on_tick(double now_s, DevicePort& port) override {
+        if (next_s_ < 0) next_s_ = now_s;
+        while (now_s >= next_s_) {
+            next_s_ += 1 / trouble_.hz;
+            if (!streaming_) continue;
+            const int n = static_cast<int>(number_++);
+            if (n == trouble_.unplug_at) {
+                port.unplug();
+                return;
+            }
+            if (trouble_.silent_at >= 0 && n >= trouble_.silent_at) continue;
+            if (n == trouble_.stall_at) {
+                port.stall();
+                continue;
+            }
+            Bytes frame = position(n);
+            if (trouble_.bad_crc_every > 0 && n % trouble_.bad_crc_every == 0) frame[20] ^= 1;
+            pending_.insert(pending_.end(), frame.begin(), frame.end());
+            if (++merged_ < trouble_.merge) continue;
+            merged_ = 0;
+            if (trouble_.split) {
+                for (std::size_t at = 0; at < pending_.size(); at += 29) {
+                    const std::size_t end = std::min(at + 29, pending_.size());
+                    port.send(Bytes(pending_.begin() + static_cast<std::ptrdiff_t>(at),
+                                    pending_.begin() + static_cast<std::ptrdiff_t>(end)));
+                }
+            } else {
+                port.send(pending_);
+            }
+            pending_.clear();
+        }
+    }
+
+  private:
+    Bytes position(int n) const {
+        Bytes out = {'V', 'P', 'R', 'P'};
+        put_u32_le(out, 16 + 64 + 4);
+        for (std::uint32_t word : {0u, static_cast<std::uint32_t>(n), 0u, 2u})
+            put_u32_le(out, word);
+        const double half = 0.25 * 3.14159265358979;  // a quarter turn about z
+        for (std::uint32_t sensor : {0u, 1u}) {
+            // Wrong units are told by wrong numbers.
+            const double unit = units_ok_ && rate_ok_ ? 1 : 100;
+            put_u32_le(out, sensor | 2u << 8 | 2u << 10);
+            for (double v : {unit * (10.0 + sensor), -5.0, 0.001 * n, std::cos(half), 0.0, 0.0,
+                             std::sin(half)}) {
+                put_f32_le(out, static_cast<float>(v));
+            }
+        }
+        put_u32_le(out, viper::crc16(out));
+        return out;
+    }
+
+    Trouble trouble_;
+    bool streaming_ = false, units_ok_ = false, rate_ok_ = false;
+    double next_s_ = -1;
+    std::uint32_t number_ = 0;
+    int merged_ = 0;
+    Bytes pending_;
+};
+
+nlohmann::json run(const char* spec,
+                   const DeviceSpec& device,
+                   const std::function<std::unique_ptr<Firmware>()>& make,
+                   double seconds,
+                   int readings = 0) {
+    std::vector<std::string> command = {SONOCASE_BIN "/tracker_client", spec,
+                                        std::to_string(seconds)};
+    if (readings > 0) command.push_back(std::to_string(readings));
+    const ClientResult result = run_with_device(device, make, command);
+    EXPECT_EQ(result.status, 0) << result.out;
+    auto json = nlohmann::json::parse(result.out, nullptr, false);
+    EXPECT_TRUE(json.is_object()) << result.out;
+    return json;
+}
+
+nlohmann::json run_viper(const Trouble& trouble,
+                         double seconds,
+                         int readings = 0,
+                         DeviceSpec device = {}) {
+    device.vendor = 0x0F44;
+    device.product = 0xBF01;
+    return run(
+        "viper", device, [&] { return std::make_unique<ViperFirmware>(trouble); }, seconds,
+        readings);
+}
+
+bool says(const nlohmann::json& seen, const char* words) {
+    return seen["messages"].dump().find(words) != std::string::npos;
+}
+
+void expect_poses(const nlohmann::json& seen) {
+    ASSERT_EQ(seen["sensors"].size(), 2u) << seen;
+    EXPECT_NEAR(seen["sensors"][0]["position"][0].get<double>(), 100, 1e-3);
+    EXPECT_NEAR(seen["sensors"][1]["position"][0].get<double>(), 110, 1e-3);
+    EXPECT_NEAR(seen["sensors"][0]["position"][1].get<double>(), -50, 1e-3);
+    EXPECT_NEAR(seen["sensors"][0]["x_axis"][1].get<double>(), 1, 1e-6);
+}
+
+TEST(ViperOverUsb, StartsAndStreamsAt240Hz) {
+    const auto seen = run_viper({}, 20, 480);
+    EXPECT_GE(seen["readings"].get<int>(), 480);
+    EXPECT_EQ(seen["bad_frames"], 0);
+    EXPECT_EQ(seen["connects"], 1);
+    EXPECT_NEAR(seen["rate_hz"].get<double>(), 240, 60);
+    EXPECT_EQ(seen["device"], "Polhemus Viper (VIPER 4 SN 1234)");
+    expect_poses(seen);
+}
+
+TEST(ViperOverUsb, StartsADeviceThatIsStreamingAlready) {
+    Trouble trouble;
+    trouble.already_streaming = true;
+    const auto seen = run_viper(trouble, 20, 50);
+    EXPECT_GE(seen["readings"].get<int>(), 50);
+    expect_poses(seen);
+}
+
+TEST(ViperOverUsb, WaitsForADeviceThatIsNotReady) {
+    Trouble trouble;
+    trouble.not_ready = 3;
+    const auto seen = run_viper(trouble, 20, 20);
+    EXPECT_GE(seen["readings"].get<int>(), 20);
+}
+
+TEST(ViperOverUsb, TellsWhatADeviceRefuses) {
+    Trouble trouble;
+    trouble.refuses = true;
+    const auto seen = run_viper(trouble, 2);
+    EXPECT_EQ(seen["readings"], 0);
+    EXPECT_TRUE(says(seen, "UNITS NOT UNDERSTOOD")) << seen;
+}
+
+TEST(ViperOverUsb, TellsOfADeviceThatDoesNotAnswer) {
+    Trouble trouble;
+    trouble.mute = true;
+    const auto seen = run_viper(trouble, 4);
+    EXPECT_EQ(seen["readings"], 0);
+    EXPECT_TRUE(says(seen, "does not answer")) << seen;
+}
+
+TEST(ViperOverUsb, CountsAndSkipsFramesWithABadChecksum) {
+    Trouble trouble;
+    trouble.bad_crc_every = 10;
+    const auto seen = run_viper(trouble, 20, 200);
+    EXPECT_GE(seen["readings"].get<int>(), 200);
+    EXPECT_GE(seen["bad_frames"].get<int>(), 20);
+    EXPECT_EQ(seen["lost"], 0);
+    expect_poses(seen);
+}
+
+TEST(ViperOverUsb, ReadsSplitAndMergedTransfers) {
+    for (int merge : {1, 3}) {
+        Trouble trouble;
+        trouble.split = true;
+        trouble.hz = 60;  // four transfers a frame: the emulation carries about a thousand a second
+        trouble.merge = merge;
+        const auto seen = run_viper(trouble, 20, 40);
+        EXPECT_GE(seen["readings"].get<int>(), 40);
+        EXPECT_EQ(seen["bad_frames"], 0);
+        expect_poses(seen);
+    }
+    Trouble trouble;
+    trouble.merge = 4;
+    const auto seen = run_viper(trouble, 20, 30);
+    EXPECT_EQ(seen["bad_frames"], 0);
+    expect_poses(seen);
+}
+
+TEST(ViperOverUsb, GoesOnAfterAStall) {
+    Trouble trouble;
+    trouble.stall_at = 40;
+    const auto seen = run_viper(trouble, 20, 120);
+    EXPECT_GE(seen["readings"].get<int>(), 120);
+    EXPECT_EQ(seen["connects"], 1);
+}
+
+TEST(ViperOverUsb, StartsADeviceAgainThatFallsSilent) {
+    Trouble trouble;
+    trouble.silent_at = 40;
+    const auto seen = run_viper(trouble, 3);
+    EXPECT_GE(seen["connects"].get<int>(), 2) << seen;
+    EXPECT_TRUE(says(seen, "No reading comes")) << seen;
+}
+
+TEST(ViperOverUsb, SurvivesAnUnplugInTheMiddle) {
+    Trouble trouble;
+    trouble.unplug_at = 40;
+    const auto seen = run_viper(trouble, 1.6);
+    EXPECT_GE(seen["readings"].get<int>(), 30);
+    EXPECT_LE(seen["readings"].get<int>(), 40);
+    EXPECT_TRUE(says(seen, "unplugged")) << seen;
+    EXPECT_EQ(seen["phases"].back(), "searching");
+}
+
+TEST(ViperOverUsb, ComesBackWhenPluggedInAgain) {
+    Trouble trouble;
+    trouble.unplug_at = 40;
+    DeviceSpec device;
+    device.replug_after_s = 0.3;
+    const auto seen = run_viper(trouble, 20, 70, device);
+    EXPECT_GE(seen["readings"].get<int>(), 70);
+    EXPECT_EQ(seen["connects"], 2);
+    expect_poses(seen);
+}
+
+TEST(ViperOverUsb, TellsOfTwoAlike) {
+    DeviceSpec device;
+    device.second_alike = true;
+    const auto seen = run_viper({}, 20, 20, device);
+    EXPECT_GE(seen["readings"].get<int>(), 20);
+    EXPECT_TRUE(says(seen, "Two are plugged in")) << seen;
+}
+
+TEST(ViperOverUsb, NamesARelativeThatItCannotUse) {
+    DeviceSpec device;
+    device.vendor = 0x0F44;
+    device.product = 0x0001;
+    const auto seen = run(
+        "viper", device, [] { return std::make_unique<ViperFirmware>(Trouble{}); }, 0.5);
+    EXPECT_TRUE(says(seen, "0f44:0001")) << seen;
+    EXPECT_EQ(seen["phases"].back(), "searching");
+}
+
+// 3D Guidance: polled, two sensors.
+class GuidanceFirmware final : public Firmware {
+  public:
+    explicit GuidanceFirmware(int unplug_at = -1,
+                              bool no_transmitter = false,
+                              int error = 0,
+                              int slip_at = -1)
+        : unplug_at_(unplug_at),
+          no_transmitter_(no_transmitter),
+          error_(error),
+          slip_at_(slip_at) {}
+    void on_out(const Bytes& request, DevicePort& port) override {
+        const auto is = [&](std::initializer_list<int> bytes) {
+            return request.size() == bytes.size() &&
+                   std::equal(bytes.begin(), bytes.end(), request.begin(),
+                              [](int a, std::uint8_t b) { return a < 0 || a == b; });
+        };
+        if (is({0x4F, 0x03})) return port.send({1, 0});  // 72 inches
+        if (is({0x4F, 0x0A})) return port.send({static_cast<std::uint8_t>(error_)});
+        if (is({0xF1, 0x4F, 0x1B})) {
+            return port.send(no_transmitter_ ? Bytes{0, 0} : Bytes{0x34, 0x12});
+        }
+        if (is({-1, 0x4F, 0x1A})) return port.send(request[0] <= 0xF2 ? Bytes{7, 1} : Bytes{0, 0});
+        if (is({-1, 0x59})) angles_ = true;
+        if (is({-1, 0x42})) {
+            if (polls_++ == unplug_at_) return port.unplug();
+            Bytes record;
+            const double inches = request[0] == 0xF1 ? 9 : -18;
+            for (double part : {inches / 72, -inches / 72, 0.0, 0.5, 0.0, 0.0}) {
+                const auto bits =
+                    static_cast<std::uint16_t>(static_cast<std::int16_t>(part * 32768)) >> 2;
+                record.push_back(bits & 0x7F);
+                record.push_back(bits >> 7 & 0x7F);
+            }
+            record[0] |= 0x80;
+            if (polls_ == slip_at_) record.insert(record.begin(), 0x11);  // out of phase
+            if (angles_) port.send(record);
+        }
+    }
+    void on_tick(double, DevicePort&) override {}
+
+  private:
+    int unplug_at_;
+    bool no_transmitter_;
+    int error_;
+    int slip_at_;
+    bool angles_ = false;
+    int polls_ = 0;
+};
+
+nlohmann::json run_guidance(double seconds,
+                            int readings,
+                            const std::function<std::unique_ptr<Firmware>()>& make) {
+    DeviceSpec device;
+    device.vendor = 0x04B4;
+    device.product = 0x1005;
+    device.endpoint_in = 0x86;
+    return run("3dg", device, make, seconds, readings);
+}
+
+TEST(GuidanceOverUsb, StartsAndPolls) {
+    const auto seen = run_guidance(20, 100, [] { return std::make_unique<GuidanceFirmware>(); });
+    EXPECT_GE(seen["readings"].get<int>(), 100);
+    EXPECT_EQ(seen["bad_frames"], 0);
+    ASSERT_EQ(seen["sensors"].size(), 2u);
+    // 0.3 mm: half a step of 14 bits over 72 inches is 0.06 mm, and the words are cut, not rounded.
+    EXPECT_NEAR(seen["sensors"][0]["position"][0].get<double>(), 9 * 25.4, 0.3);
+    EXPECT_NEAR(seen["sensors"][1]["position"][0].get<double>(), -18 * 25.4, 0.3);
+    EXPECT_NEAR(seen["sensors"][0]["x_axis"][1].get<double>(), 1, 1e-3);
+}
+
+TEST(GuidanceOverUsb, FindsItsPhaseAgain) {
+    const auto seen =
+        run_guidance(20, 60, [] { return std::make_unique<GuidanceFirmware>(-1, false, 0, 21); });
+    EXPECT_GE(seen["readings"].get<int>(), 60);
+    EXPECT_GE(seen["bad_frames"].get<int>(), 1);
+    EXPECT_NEAR(seen["sensors"][0]["position"][0].get<double>(), 9 * 25.4, 0.3);
+}
+
+TEST(GuidanceOverUsb, TellsOfAMissingTransmitterAndOfAFault) {
+    auto seen = run_guidance(2, 0, [] { return std::make_unique<GuidanceFirmware>(-1, true); });
+    EXPECT_TRUE(says(seen, "transmitter")) << seen;
+    seen = run_guidance(2, 0, [] { return std::make_unique<GuidanceFirmware>(-1, false, 21); });
+    EXPECT_TRUE(says(seen, "error 21")) << seen;
+    EXPECT_EQ(seen["readings"], 0);
+}
+
+TEST(GuidanceOverUsb, SurvivesAnUnplugInTheMiddle) {
+    const auto seen = run_guidance(3, 0, [] { return std::make_unique<GuidanceFirmware>(41); });
+    EXPECT_GE(seen["readings"].get<int>(), 15);
+    EXPECT_TRUE(says(seen, "unplugged")) << seen;
+}
+
+// Liberty: streams two stations.
+class LibertyFirmware final : public Firmware {
+  public:
+    explicit LibertyFirmware(int unplug_at = -1) : unplug_at_(unplug_at) {}
+    void on_out(const Bytes& transfer, DevicePort&) override {
+        for (std::uint8_t c : transfer) {
+            if (line_.empty() && c == 'p') {
+                streaming_ = false;
+                continue;
+            }
+            if (c != '\r') {
+                line_ += static_cast<char>(c);
+                continue;
+            }
+            if (line_ == "f1") binary_ = true;
+            if (line_ == "U1") centimetres_ = true;
+            if (line_ == "O*,8,9,11,3,7") listed_ = true;
+            if (line_ == "c") streaming_ = binary_ && centimetres_ && listed_;
+            line_.clear();
+        }
+    }
+    void on_tick(double now_s, DevicePort& port) override {
+        if (next_s_ < 0) next_s_ = now_s;
+        while (now_s >= next_s_) {
+            next_s_ += 1 / 240.0;
+            if (!streaming_) continue;
+            if (static_cast<int>(frame_) == unplug_at_) return port.unplug();
+            Bytes both;
+            for (int station : {1, 2}) {
+                Bytes record = {'L', 'Y', static_cast<std::uint8_t>(station), 'C', ' ', 0, 40, 0};
+                put_u32_le(record, frame_ * 4);
+                put_u32_le(record, frame_);
+                put_u32_le(record, 0);
+                for (double v :
+                     {9.0 + station, -5.0, 0.01 * frame_, 0.70710678, 0.0, 0.0, 0.70710678}) {
+                    put_f32_le(record, static_cast<float>(v));
+                }
+                both.insert(both.end(), record.begin(), record.end());
+            }
+            ++frame_;
+            port.send(both);
+        }
+    }
+
+  private:
+    int unplug_at_;
+    std::string line_;
+    bool binary_ = false, centimetres_ = false, listed_ = false, streaming_ = false;
+    double next_s_ = -1;
+    std::uint32_t frame_ = 0;
+};
+
+nlohmann::json run_liberty(std::uint16_t product,
+                           double seconds,
+                           int readings,
+                           int unplug_at = -1) {
+    DeviceSpec device;
+    device.vendor = 0x0F44;
+    device.product = product;
+    device.endpoint_in = product == 0xEF12 ? 0x82 : 0x88;
+    device.endpoint_out = product == 0xEF12 ? 0x02 : 0x04;
+    return run(
+        "liberty", device, [&] { return std::make_unique<LibertyFirmware>(unplug_at); }, seconds,
+        readings);
+}
+
+TEST(LibertyOverUsb, StartsAndStreams) {
+    for (const std::uint16_t product :
+         std::initializer_list<std::uint16_t>{0xFF20, 0xEF12, 0xEF20}) {
+        const auto seen = run_liberty(product, 20, 100);
+        EXPECT_GE(seen["readings"].get<int>(), 100) << product;
+        EXPECT_EQ(seen["bad_frames"], 0);
+        expect_poses(seen);
+    }
+}
+
+TEST(LibertyOverUsb, TellsOfADeviceThatWaitsForFirmware) {
+    const auto seen = run_liberty(0xFF21, 1, 0);
+    EXPECT_TRUE(says(seen, "firmware")) << seen;
+    EXPECT_EQ(seen["phases"].back(), "failed");
+}
+
+TEST(LibertyOverUsb, SurvivesAnUnplugInTheMiddle) {
+    const auto seen = run_liberty(0xFF20, 2, 0, 50);
+    EXPECT_GE(seen["readings"].get<int>(), 40);
+    EXPECT_TRUE(says(seen, "unplugged")) << seen;
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
