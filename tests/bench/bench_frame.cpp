@@ -1,0 +1,177 @@
+// Frames a second and what each effect costs. Ratios inside one run are what to read:
+//   Frame/paper     <= 0.5 x Peer/vtkImageReslice, and Reference/paper >= 50 x Frame/paper
+//   Frame/physical  <= 1.0 x Peer/vtkImageReslice (aim 0.6)
+// Counters: ns_per_sample; p50_ms and p99_ms over the run of a jumping probe; quiet_ms, the mean
+// over the poses of each pose's fastest frame: what a machine that does nothing else would show.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "bench_bundle.h"
+#include "peer_vtk.h"
+#include "runtime/imaging/renderer.h"
+
+namespace sonocase::bench {
+namespace {
+
+using runtime::ImageModel;
+using runtime::RendererKind;
+using runtime::RenderOptions;
+
+Exercise bench_exercise() {
+    Exercise e;
+    e.name = "bench";
+    e.probe.depth_mm = 150;
+    e.needle.gauge = 18;
+    return e;
+}
+
+RenderOptions options_of(ImageModel model,
+                         std::vector<std::string> effects = {"auto"},
+                         int threads = 1,
+                         int size = 512) {
+    RenderOptions o;
+    o.model = model;
+    o.effects = std::move(effects);
+    o.threads = threads;
+    o.width_px = o.height_px = size;
+    return o;
+}
+
+runtime::FrameInput input_of(std::size_t i, bool needle) {
+    runtime::FrameInput input;
+    input.mannequin_from_probe = bench_poses()[i % bench_poses().size()];
+    input.frame = static_cast<std::uint32_t>(i);
+    input.time_s = static_cast<double>(i) / 60;
+    if (needle) {  // in the plane, slanting across it
+        input.has_needle = true;
+        input.needle.tip = input.mannequin_from_probe * Point3{15, 0, 70};
+        input.needle.direction =
+            input.mannequin_from_probe.rotation * normalized(Vector3{0.7, 0, 0.7});
+    }
+    return input;
+}
+
+// Times of single frames, kept beside the library's own mean.
+class Laps {
+  public:
+    Laps() : fastest_(bench_poses().size(), 1e9) { all_.reserve(1 << 20); }
+    void add(std::size_t i, double ms) {
+        double& fastest = fastest_[i % fastest_.size()];
+        fastest = std::min(fastest, ms);
+        if (all_.size() < all_.capacity()) all_.push_back(ms);
+    }
+    void report(benchmark::State& state) {
+        if (all_.empty()) return;
+        std::sort(all_.begin(), all_.end());
+        state.counters["p50_ms"] = all_[all_.size() / 2];
+        state.counters["p99_ms"] = all_[all_.size() * 99 / 100];
+        double sum = 0;
+        int seen = 0;
+        for (const double ms : fastest_) {
+            if (ms >= 1e9) continue;
+            sum += ms;
+            ++seen;
+        }
+        state.counters["quiet_ms"] = sum / seen;
+        state.SetLabel(bench_bundle_name());
+    }
+
+  private:
+    std::vector<double> fastest_, all_;
+};
+
+template <class F>
+void timed_loop(benchmark::State& state, F&& work) {
+    Laps laps;
+    std::size_t i = 0;
+    for (auto _ : state) {
+        const auto start = std::chrono::steady_clock::now();
+        work(i);
+        laps.add(i++,
+                 std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+                     .count());
+    }
+    laps.report(state);
+}
+
+void frame(benchmark::State& state, const RenderOptions& options, bool needle) {
+    auto renderer = runtime::Renderer::create(bench_bundle(), bench_exercise(), options);
+    if (!renderer) {
+        state.SkipWithError(renderer.error().message().c_str());
+        return;
+    }
+    std::vector<std::uint8_t> pixels(static_cast<std::size_t>(options.width_px) *
+                                     static_cast<std::size_t>(options.height_px));
+    timed_loop(state, [&](std::size_t i) {
+        renderer->render(input_of(i, needle), pixels);
+        benchmark::DoNotOptimize(pixels.data());
+    });
+    const double samples = options.model == ImageModel::paper ? 512.0 * 512 : 192.0 * 512;
+    state.counters["ns_per_sample"] = state.counters["quiet_ms"] * 1e6 / samples;
+}
+
+void reslice(benchmark::State& state) {
+    VtkReslice vtk(bench_bundle());
+    const double mm_per_px = 1.04 * 150 / 512;
+    timed_loop(state, [&](std::size_t i) {
+        vtk.slice(bench_poses()[i % bench_poses().size()], mm_per_px, 512);
+    });
+}
+
+// From a bundle in memory to the first picture.
+void first_frame(benchmark::State& state, ImageModel model) {
+    const RenderOptions options = options_of(model);
+    std::vector<std::uint8_t> pixels(512 * 512);
+    for (auto _ : state) {
+        auto renderer = runtime::Renderer::create(bench_bundle(), bench_exercise(), options);
+        renderer->render(input_of(0, true), pixels);
+        benchmark::DoNotOptimize(pixels.data());
+    }
+}
+
+[[maybe_unused]] const bool kRegistered = [] {
+    const auto add = [](const std::string& name, const RenderOptions& options, bool needle) {
+        benchmark::RegisterBenchmark(name.c_str(), [options, needle](benchmark::State& s) {
+            frame(s, options, needle);
+        })->Unit(benchmark::kMillisecond);
+    };
+    const auto paper = ImageModel::paper, physical = ImageModel::physical;
+    benchmark::RegisterBenchmark("Peer/vtkImageReslice", reslice)->Unit(benchmark::kMillisecond);
+    add("Frame/bare", options_of(paper, {"none"}), false);
+    add("Frame/paper", options_of(paper), true);
+    add("Frame/paper/2threads", options_of(paper, {"auto"}, 2), true);
+    add("Frame/paper/1024", options_of(paper, {"auto"}, 1, 1024), true);
+    add("Frame/physical", options_of(physical), true);
+    add("Frame/physical/2threads", options_of(physical, {"auto"}, 2), true);
+    add("Frame/physical/1024", options_of(physical, {"auto"}, 1, 1024), true);
+    add("Frame/physical/everything", options_of(physical, {"all"}), true);
+    RenderOptions reference = options_of(paper);
+    reference.kind = RendererKind::reference;
+    add("Reference/paper", reference, true);
+    reference = options_of(physical);
+    reference.kind = RendererKind::reference;
+    add("Reference/physical", reference, true);
+    benchmark::RegisterBenchmark("Start/paper", [](benchmark::State& s) {
+        first_frame(s, ImageModel::paper);
+    })->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark("Start/physical", [](benchmark::State& s) {
+        first_frame(s, ImageModel::physical);
+    })->Unit(benchmark::kMillisecond);
+    // A frame without one effect: the difference to Frame/physical is what it costs.
+    for (const auto model : {paper, physical}) {
+        const std::string prefix =
+            model == paper ? "Effect/paper/without/" : "Effect/physical/without/";
+        for (const char* name : runtime::effect_names(model)) {
+            if (const std::string n = name;
+                n == "slice" || n == "scan_conversion" || n == "compression")
+                continue;
+            add(prefix + name, options_of(model, {std::string("-") + name}), true);
+        }
+    }
+    return true;
+}();
+
+}  // namespace
+}  // namespace sonocase::bench
