@@ -27,10 +27,17 @@ std::string escape(const std::string& text) {
     std::string out;
     for (char c : text) {
         switch (c) {
-            case '<': out += "&lt;"; break;
-            case '>': out += "&gt;"; break;
-            case '&': out += "&amp;"; break;
-            default: out += c;
+            case '<':
+                out += "&lt;";
+                break;
+            case '>':
+                out += "&gt;";
+                break;
+            case '&':
+                out += "&amp;";
+                break;
+            default:
+                out += c;
         }
     }
     return out;
@@ -60,8 +67,12 @@ Chart suite_chart(const Suite& suite, const std::vector<Trial>& trials) {
     chart.series = {all, best};
 
     std::size_t colour = 0;
-    constexpr std::array<std::array<std::uint8_t, 3>, 6> marks{
-        {{0, 158, 115}, {230, 159, 0}, {204, 121, 167}, {86, 180, 233}, {240, 228, 66}, {90, 60, 160}}};
+    constexpr std::array<std::array<std::uint8_t, 3>, 6> marks{{{0, 158, 115},
+                                                                {230, 159, 0},
+                                                                {204, 121, 167},
+                                                                {86, 180, 233},
+                                                                {240, 228, 66},
+                                                                {90, 60, 160}}};
     for (const Trial& t : trials) {
         const bool shown = t.role == TrialRole::standard || t.role == TrialRole::preset ||
                            t.role == TrialRole::paper || t.role == TrialRole::peer;
@@ -76,19 +87,21 @@ Chart suite_chart(const Suite& suite, const std::vector<Trial>& trials) {
 std::vector<Trial> trials_of_knob(const std::vector<Trial>& trials, const Knob& knob) {
     std::vector<Trial> own;
     for (const Trial& t : trials) {
-        if (t.role == TrialRole::knob && t.name == knob.key && std::isfinite(t.error)) own.push_back(t);
+        if (t.role == TrialRole::knob && t.name == knob.key && std::isfinite(t.error))
+            own.push_back(t);
     }
     return own;
 }
 
 // A cheaper setting whose error is no worse than the standard one's, if the sweep found one.
 const Trial* cheaper_than_standard(const std::vector<Trial>& trials, double noise) {
-    const auto standard = std::find_if(trials.begin(), trials.end(),
-                                       [](const Trial& t) { return t.role == TrialRole::standard; });
+    const auto standard = std::find_if(
+        trials.begin(), trials.end(), [](const Trial& t) { return t.role == TrialRole::standard; });
     if (standard == trials.end()) return nullptr;
     const Trial* best = nullptr;
     for (const Trial& t : trials) {
-        if (!(t.error <= standard->error * 1.02) || !(t.seconds < standard->seconds * (1 - noise))) continue;
+        if (!(t.error <= standard->error * 1.02) || !(t.seconds < standard->seconds * (1 - noise)))
+            continue;
         if (best == nullptr || t.seconds < best->seconds) best = &t;
     }
     return best;
@@ -98,12 +111,13 @@ std::string knob_rows(const Suite& suite, const std::vector<Trial>& trials, doub
     std::string html;
     for (const Knob& knob : suite.knobs) {
         const std::vector<Trial> curve = trials_of_knob(trials, knob);
-        html += "<tr><td><code>" + escape(knob.key) + "</code></td><td>" + escape(knob.meaning) + "</td><td>" +
-                escape(knob.standard + (knob.unit.empty() ? "" : " " + knob.unit)) + "</td><td>" +
-                escape(knob.trades) + "</td><td>";
+        html += "<tr><td><code>" + escape(knob.key) + "</code></td><td>" + escape(knob.meaning) +
+                "</td><td>" + escape(knob.standard + (knob.unit.empty() ? "" : " " + knob.unit)) +
+                "</td><td>" + escape(knob.trades) + "</td><td>";
         for (const Trial& t : curve) {
-            html += escape(t.settings.empty() ? "" : t.settings.front().value) + ": " + number(t.error) + " " +
-                    escape(suite.error_unit) + " in " + number(t.seconds) + " s<br>";
+            html += escape(t.settings.empty() ? "" : t.settings.front().value) + ": " +
+                    number(t.error) + " " + escape(suite.error_unit) + " in " + number(t.seconds) +
+                    " s<br>";
         }
         html += "</td><td>";
         const CurveVerdict verdict = judge_curve(curve, noise);
@@ -111,8 +125,9 @@ std::string knob_rows(const Suite& suite, const std::vector<Trial>& trials, doub
             html += "more time, less error (within noise)";
         } else {
             html += "not monotone (" + escape(verdict.worst) + "). " +
-                    escape(knob.why_not_monotone.empty() ? "No reason is known; look before trusting it."
-                                                         : knob.why_not_monotone);
+                    escape(knob.why_not_monotone.empty()
+                               ? "No reason is known; look before trusting it."
+                               : knob.why_not_monotone);
         }
         html += "</td></tr>\n";
     }
@@ -120,20 +135,29 @@ std::string knob_rows(const Suite& suite, const std::vector<Trial>& trials, doub
 }
 
 constexpr const char* kStyle =
-    "body{font:15px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem;color:#1b1f24}"
-    "table{border-collapse:collapse;width:100%;font-size:13px}td,th{border:1px solid #d0d7de;padding:.35rem .5rem;"
-    "vertical-align:top;text-align:left}th{background:#f6f8fa}img{max-width:100%}code{background:#f6f8fa}"
+    "body{font:15px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 "
+    "1rem;color:#1b1f24}"
+    "table{border-collapse:collapse;width:100%;font-size:13px}td,th{border:1px solid "
+    "#d0d7de;padding:.35rem .5rem;"
+    "vertical-align:top;text-align:left}th{background:#f6f8fa}img{max-width:100%}code{background:#"
+    "f6f8fa}"
     "h2{margin-top:2.5rem;border-bottom:1px solid #d0d7de}.front{background:#eaf4fb}";
 
 }  // namespace
 
 Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
-    std::string html = "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>What accuracy costs"
-                       "</title><style>" + std::string(kStyle) + "</style><body><h1>What accuracy costs in time</h1>"
-                       "<p>Each point is one setting of one stage: how wrong its answer is against the truth named "
-                       "below, and how long it took (median of its repeats). Lower and further left is better. The "
-                       "blue line is the Pareto front: no other setting tried is both faster and better. Measured on "
-                       + escape(input.machine) + "; another machine moves all points sideways alike.</p>\n";
+    std::string html =
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>What accuracy costs"
+        "</title><style>" +
+        std::string(kStyle) +
+        "</style><body><h1>What accuracy costs in time</h1>"
+        "<p>Each point is one setting of one stage: how wrong its answer is against the truth "
+        "named "
+        "below, and how long it took (median of its repeats). Lower and further left is better. "
+        "The "
+        "blue line is the Pareto front: no other setting tried is both faster and better. Measured "
+        "on " +
+        escape(input.machine) + "; another machine moves all points sideways alike.</p>\n";
     for (const Suite& suite : input.suites) {
         const std::vector<Trial> trials = trials_of(input, suite);
         if (trials.empty()) continue;
@@ -141,31 +165,40 @@ Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
         const ChartSheet sheet{{suite_chart(suite, trials)}, 1, 900, 560};
         if (const Status s = write_chart_png(sheet, folder + "/" + stem + ".png"); !s) return s;
         if (const Status s = write_chart_svg(sheet, folder + "/" + stem + ".svg"); !s) return s;
-        html += "<h2>" + escape(suite.title) + " <small>(" + escape(suite.body) + ")</small></h2><p>" +
-                escape(suite.truth) + "</p>\n<a href=\"" + stem + ".svg\"><img src=\"" + stem +
-                ".png\" alt=\"error against seconds\"></a>\n";
+        html += "<h2>" + escape(suite.title) + " <small>(" + escape(suite.body) +
+                ")</small></h2><p>" + escape(suite.truth) + "</p>\n<a href=\"" + stem +
+                ".svg\"><img src=\"" + stem + ".png\" alt=\"error against seconds\"></a>\n";
         const Trial* cheaper = cheaper_than_standard(trials, input.noise);
-        html += cheaper == nullptr
-                    ? std::string("<p>No setting tried is cheaper than the standard one at equal error.</p>\n")
-                    : "<p>Cheaper than the standard setting at equal error: <code>" +
-                          escape(settings_text(cheaper->settings)) + "</code>, " + number(cheaper->error) + " " +
-                          escape(suite.error_unit) + " in " + number(cheaper->seconds) + " s.</p>\n";
-        html += "<table><tr><th>knob</th><th>meaning</th><th>standard</th><th>error it trades</th><th>measured"
-                "</th><th>curve</th></tr>\n" + knob_rows(suite, trials, input.noise) + "</table>\n";
+        html +=
+            cheaper == nullptr
+                ? std::string(
+                      "<p>No setting tried is cheaper than the standard one at equal error.</p>\n")
+                : "<p>Cheaper than the standard setting at equal error: <code>" +
+                      escape(settings_text(cheaper->settings)) + "</code>, " +
+                      number(cheaper->error) + " " + escape(suite.error_unit) + " in " +
+                      number(cheaper->seconds) + " s.</p>\n";
+        html +=
+            "<table><tr><th>knob</th><th>meaning</th><th>standard</th><th>error it "
+            "trades</th><th>measured"
+            "</th><th>curve</th></tr>\n" +
+            knob_rows(suite, trials, input.noise) + "</table>\n";
 
         std::vector<bool> front = pareto_front(trials);
-        html += "<h3>The front, presets, the paper and peers</h3><table><tr><th>what</th><th>settings</th><th>" +
-                escape(suite.error_name + ", " + suite.error_unit) + "</th><th>seconds (low to high)</th><th>note"
-                "</th></tr>\n";
+        html +=
+            "<h3>The front, presets, the paper and "
+            "peers</h3><table><tr><th>what</th><th>settings</th><th>" +
+            escape(suite.error_name + ", " + suite.error_unit) +
+            "</th><th>seconds (low to high)</th><th>note"
+            "</th></tr>\n";
         for (std::size_t i = 0; i < trials.size(); ++i) {
             const Trial& t = trials[i];
             const bool named = t.role != TrialRole::knob && t.role != TrialRole::pair;
             if (!front[i] && !named) continue;
             html += std::string("<tr") + (front[i] ? " class=\"front\"" : "") + "><td>" +
                     (named ? escape(t.name) : std::string("on the front")) + "</td><td><code>" +
-                    escape(settings_text(t.settings)) + "</code></td><td>" + number(t.error) + "</td><td>" +
-                    number(t.seconds) + " (" + number(t.seconds_low) + " to " + number(t.seconds_high) +
-                    ")</td><td>" + escape(t.note) + "</td></tr>\n";
+                    escape(settings_text(t.settings)) + "</code></td><td>" + number(t.error) +
+                    "</td><td>" + number(t.seconds) + " (" + number(t.seconds_low) + " to " +
+                    number(t.seconds_high) + ")</td><td>" + escape(t.note) + "</td></tr>\n";
         }
         html += "</table>\n";
     }
@@ -176,22 +209,27 @@ Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
 std::string format_accuracy_markdown(const PageInput& input) {
     std::string text =
         "# What accuracy costs\n\n"
-        "Written by `scripts/accuracy` from the table of knobs and a sweep (`sonocase tradeoff`); do not edit.\n"
-        "Measured on " + input.machine + ".\n";
+        "Written by `scripts/accuracy` from the table of knobs and a sweep (`sonocase tradeoff`); "
+        "do not edit.\n"
+        "Measured on " +
+        input.machine + ".\n";
     for (const Suite& suite : input.suites) {
         const std::vector<Trial> trials = trials_of(input, suite);
         text += "\n## " + suite.title + " (" + suite.body + ")\n\n" + suite.truth + "\n\n";
-        text += "| knob | standard | meaning | error it trades | value: " + suite.error_unit + ", s |\n|---|---|---|---|---|\n";
+        text += "| knob | standard | meaning | error it trades | value: " + suite.error_unit +
+                ", s |\n|---|---|---|---|---|\n";
         for (const Knob& knob : suite.knobs) {
-            text += "| `" + knob.key + "` | " + knob.standard + (knob.unit.empty() ? "" : " " + knob.unit) + " | " +
-                    knob.meaning + " | " + knob.trades + " | ";
+            text += "| `" + knob.key + "` | " + knob.standard +
+                    (knob.unit.empty() ? "" : " " + knob.unit) + " | " + knob.meaning + " | " +
+                    knob.trades + " | ";
             for (const Trial& t : trials_of_knob(trials, knob)) {
-                text += (t.settings.empty() ? std::string() : t.settings.front().value) + ": " + number(t.error) +
-                        ", " + number(t.seconds) + "; ";
+                text += (t.settings.empty() ? std::string() : t.settings.front().value) + ": " +
+                        number(t.error) + ", " + number(t.seconds) + "; ";
             }
             text += "|\n";
         }
-        text += "\n| setting | " + suite.error_name + ", " + suite.error_unit + " | s |\n|---|---|---|\n";
+        text += "\n| setting | " + suite.error_name + ", " + suite.error_unit +
+                " | s |\n|---|---|---|\n";
         for (const Trial& t : trials) {
             if (t.role == TrialRole::knob || t.role == TrialRole::pair) continue;
             text += "| " + t.name + " | " + number(t.error) + " | " + number(t.seconds) + " |\n";

@@ -10,10 +10,10 @@
 namespace sonocase::pipeline {
 
 struct PageInput {
-    std::vector<Suite> suites;   // measure is not called
-    std::vector<Trial> trials;   // of all suites
-    std::string machine;         // "2 cores, ..."; as the page shows it
-    double noise = 0.15;         // relative differences below this are not differences
+    std::vector<Suite> suites;  // measure is not called
+    std::vector<Trial> trials;  // of all suites
+    std::string machine;        // "2 cores, ..."; as the page shows it
+    double noise = 0.15;        // relative differences below this are not differences
 };
 
 // Writes SUITE-BODY.png and .svg (error against seconds, log-log: all trials, the front as a line,

@@ -1,0 +1,40 @@
+// How far the surfaces of a cooked volume lie from the true ones, in one figure that means
+// something in mm whatever the anatomy.
+//
+// At random points the cooked class is compared with the analytic torso's. The share of wrong
+// points, divided by the true interface area per volume, is the mean distance by which surfaces are
+// displaced. Area per volume comes from Crofton's formula: twice the rate at which short random
+// segments change class.
+#pragma once
+
+#include <cstdint>
+
+#include "formats/brick_volume.h"
+#include "formats/label_volume.h"
+#include "formats/registration.h"
+#include "pipeline/import/analytic_torso.h"
+
+namespace sonocase::pipeline {
+
+struct BoundaryError {
+    double displaced_mm = 0;  // mean displacement of the surfaces
+    double wrong_share = 0;   // of the points inside the body
+    int lost_labels = 0;      // labels of the palette without a voxel
+};
+
+// cooked: volume and boundary records in `mannequin`, palette as analytic_torso_labels() names it;
+// truth: the map that made the mannequin. Points whose true preimage lies outside truth.ct_box do
+// not count. Deterministic. Cost: about 1 us a point.
+BoundaryError measure_boundary_error(const LabelVolume& cooked,
+                                     const BrickVolume<std::uint32_t>& boundary,
+                                     const Registration& truth,
+                                     const AnalyticBody& body = {},
+                                     int points = 200000);
+
+// Palette index at a point of `mannequin`, surfaces placed by the boundary records; 0 outside the
+// grid.
+std::uint8_t label_at_point(const LabelVolume& volume,
+                            const BrickVolume<std::uint32_t>& boundary,
+                            Point3 point);
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,71 @@
+#include <algorithm>
+#include <chrono>
+#include <string_view>
+
+#include "pipeline/texture/prepare_example.h"
+#include "pipeline/texture/synthetic_examples.h"
+#include "pipeline/texture/texture_bank.h"
+#include "pipeline/texture/texture_quality.h"
+#include "pipeline/tradeoff/suites.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr const char* kExamples[] = {"liver", "muscle", "fat"};
+
+Result<Measured> measure_bank(const Settings& settings) {
+    TextureSpec spec;
+    for (const Setting& s : settings) {
+        if (s.key == "texture.edge") spec.edge = std::stoi(s.value);
+        if (s.key == "texture.mode") {
+            spec.mode = s.value == "pyramid" ? TextureMode::pyramid : TextureMode::matched;
+        }
+    }
+    Measured sum;
+    for (const char* name : kExamples) {
+        const auto example = prepare_example(synthetic_example(name));
+        if (!example) return example.error();
+        spec.name = name;
+        spec.examples = {synthetic_example(name)};
+        const auto start = std::chrono::steady_clock::now();
+        const auto made = make_solid_texture(spec);
+        sum.seconds +=
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        if (!made) return made.error();
+        const TextureQuality quality = measure_texture(*made, example->image);
+        sum.error += quality.distance.grain / std::size(kExamples);
+    }
+    return sum;
+}
+
+}  // namespace
+
+Suite texture_suite() {
+    Suite suite;
+    suite.name = "texture";
+    suite.title = "Solid textures";
+    suite.body = "synthetic-examples";
+    suite.error_name = "grain";
+    suite.error_unit = "rms of autocorrelations";
+    suite.truth =
+        "Liver, muscle and fat are learned from examples and synthesised; the error is the rms "
+        "difference "
+        "between the autocorrelation of example and texture within the grain's width, averaged "
+        "over the three.";
+    suite.knobs = {{"texture.edge",
+                    {"16", "32", "64", "128"},
+                    "64",
+                    "voxels",
+                    "edge of the texture cube; memory goes with its cube",
+                    "coarse structure that does not fit",
+                    "coarse examples are thinned to fit small cubes, which changes the grain that "
+                    "is compared"}};
+    suite.named = {{TrialRole::paper,
+                    "paper, eq. (15), 32 voxels",
+                    {{"texture.mode", "pyramid"}, {"texture.edge", "32"}}},
+                   {TrialRole::peer, "eq. (15), 64 voxels", {{"texture.mode", "pyramid"}}}};
+    suite.measure = measure_bank;
+    return suite;
+}
+
+}  // namespace sonocase::pipeline
