@@ -30,6 +30,7 @@ const std::vector<Verb>& verbs() {
         {kCase, "inspect", "show what a bundle holds", verb_inspect},
         {kCase, "validate", "check a bundle", verb_validate},
         {kCase, "export", "unpack a bundle for other tools", verb_export},
+        {kCase, "tradeoff", "sweep accuracy against time", verb_tradeoff},
         {kStage, "import", "read a label map of any kind", verb_import},
         {kStage, "resample", "carry labels through the fit into cubic voxels", verb_resample},
         {kStage, "smooth", "take the steps out of labels", verb_smooth},

@@ -40,6 +40,7 @@ int verb_surface(int argc, char** argv);
 int verb_register(int argc, char** argv);
 int verb_map(int argc, char** argv);
 int verb_align(int argc, char** argv);
+int verb_tradeoff(int argc, char** argv);
 int verb_validate(int argc, char** argv);
 
 }  // namespace sonocase::pipeline
