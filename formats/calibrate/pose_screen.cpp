@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <cstring>
+
+#include "formats/digest.h"
 
 namespace sonocase {
 namespace {
@@ -215,24 +216,13 @@ std::vector<Pose> relative_poses(std::span<const Pose> reference, std::span<cons
 }
 
 std::string digest_of_poses(std::span<const Pose> poses) {
-    // FNV-1a over the bit patterns: names the readings, protects nothing.
-    std::uint64_t h = 14695981039346656037ull;
-    const auto mix = [&h](double value) {
-        std::uint64_t bits = 0;
-        std::memcpy(&bits, &value, sizeof bits);
-        for (int k = 0; k < 8; ++k) {
-            h = (h ^ ((bits >> (8 * k)) & 0xff)) * 1099511628211ull;
-        }
-    };
+    Digest digest;
     for (const Pose& pose : poses) {
-        mix(pose.timestamp_s);
-        mix(pose.ok ? 1 : 0);
-        for (double v : pose.tracker_from_tool.rotation.m) mix(v);
-        for (int c = 0; c < 3; ++c) mix(pose.tracker_from_tool.translation[c]);
+        digest.add(pose.timestamp_s).add(std::int64_t{pose.ok});
+        for (double v : pose.tracker_from_tool.rotation.m) digest.add(v);
+        for (int c = 0; c < 3; ++c) digest.add(pose.tracker_from_tool.translation[c]);
     }
-    char text[24];
-    std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(h));
-    return text;
+    return digest.hex();
 }
 
 }  // namespace sonocase

@@ -40,6 +40,7 @@ const std::vector<Verb>& verbs() {
         {kStage, "register", "surface, align and warp in one call", verb_register},
         {kStage, "map", "carry points through a fitted map", verb_map},
         {kStage, "pack", "put the stages' files into a bundle", verb_pack},
+        {kSession, "calibrate", "find tips, axes and frames of tracked tools", verb_calibrate},
     };
     return table;
 }

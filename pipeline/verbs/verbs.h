@@ -30,6 +30,7 @@ namespace sonocase::pipeline {
 
 int verb_build(int argc, char** argv);
 int verb_export(int argc, char** argv);
+int verb_calibrate(int argc, char** argv);
 int verb_import(int argc, char** argv);
 int verb_inspect(int argc, char** argv);
 int verb_pack(int argc, char** argv);

@@ -1,0 +1,45 @@
+// Pictures of a calibration, for the eye that no number replaces: residuals over the recording,
+// their histogram, how far the tool was tilted each way, and the image with its mark. PNG and SVG.
+#pragma once
+
+#include <string>
+
+#include "formats/calibrate/direction.h"
+#include "formats/calibrate/image_plane.h"
+#include "formats/calibrate/lag.h"
+#include "formats/calibrate/landmarks.h"
+#include "formats/calibrate/needle.h"
+#include "formats/calibrate/point.h"
+
+namespace sonocase::pipeline {
+
+// Each writes FOLDER/NAME.png and .svg; the folder is made if need be.
+Status draw_point_pictures(std::span<const Pose> poses,
+                           const PointFit& fit,
+                           const std::string& folder,
+                           const std::string& name);
+Status draw_direction_pictures(std::span<const Pose> poses,
+                               const DirectionFit& fit,
+                               const std::string& folder,
+                               const std::string& name);
+Status draw_needle_pictures(const NeedleFit& fit,
+                            const std::string& folder,
+                            const std::string& name);
+Status draw_rigid_pictures(std::span<const Point3> from,
+                           std::span<const Point3> to,
+                           const RigidFit& fit,
+                           const std::string& folder,
+                           const std::string& name);
+Status draw_lag_pictures(const Signal& first,
+                         const Signal& second,
+                         const LagFit& fit,
+                         const std::string& folder,
+                         const std::string& name);
+// The image's outline in the probe's plane as it will stand on the screen, with the orientation
+// mark, the letter F (which shows a mirror at once) and the touches.
+Status draw_image_picture(const ImagePlaneInput& input,
+                          const ImagePlane& plane,
+                          const std::string& folder,
+                          const std::string& name);
+
+}  // namespace sonocase::pipeline

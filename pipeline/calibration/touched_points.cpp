@@ -1,0 +1,113 @@
+#include "pipeline/calibration/touched_points.h"
+
+#include <algorithm>
+
+#include "formats/atomic_file.h"
+#include "formats/digest.h"
+#include "pipeline/import/delimited_text.h"
+
+namespace sonocase::pipeline {
+
+Result<NamedPoints> parse_named_points(std::string_view csv, const std::string& where) {
+    NamedPoints out;
+    bool first = true;
+    for (const TextRow& row : split_rows(csv)) {
+        const std::string at = where + ": line " + std::to_string(row.line);
+        const std::size_t columns = row.cells.size();
+        const bool named = columns >= 4;
+        if (columns < 3) {
+            return Error{std::to_string(columns) + " columns", at, "expected name,x,y,z or x,y,z"};
+        }
+        Point3 p;
+        bool numbers = true;
+        for (std::size_t c = 0; c < 3; ++c) {
+            const auto value = number_in(row.cells[c + (named ? 1 : 0)]);
+            numbers = numbers && value.has_value();
+            if (value) p[static_cast<int>(c)] = *value;
+        }
+        if (!numbers) {
+            if (first) {  // the header
+                first = false;
+                continue;
+            }
+            return Error{"a coordinate is no number", at, "expected name,x,y,z or x,y,z in mm"};
+        }
+        first = false;
+        if (named) out.names.push_back(row.cells[0]);
+        out.points.push_back(p);
+        if (!out.names.empty() && out.names.size() != out.points.size()) {
+            return Error{"some rows have names and some have none", at, "name every row or none"};
+        }
+    }
+    if (out.points.empty()) return Error{"no points", where, "expected rows name,x,y,z in mm"};
+    return out;
+}
+
+Result<NamedPoints> load_named_points(const std::string& path) {
+    const auto text = read_text_file(path);
+    if (!text) return text.error();
+    return parse_named_points(*text, path);
+}
+
+Result<std::pair<NamedPoints, NamedPoints>> pair_points(const NamedPoints& known,
+                                                        const NamedPoints& touched) {
+    if (known.names.empty() || touched.names.empty()) {
+        if (known.points.size() != touched.points.size()) {
+            return Error{std::to_string(touched.points.size()) + " touched points for " +
+                             std::to_string(known.points.size()) + " landmarks",
+                         "", "touch each once, in the order of the list, or name the rows"};
+        }
+        return std::pair{known, touched};
+    }
+    NamedPoints a, b;
+    for (std::size_t i = 0; i < touched.points.size(); ++i) {
+        const auto found = std::find(known.names.begin(), known.names.end(), touched.names[i]);
+        if (found == known.names.end()) {
+            std::string names;
+            for (const std::string& n : known.names) names += (names.empty() ? "" : ", ") + n;
+            return Error{"there is no landmark called \"" + touched.names[i] + "\"", "",
+                         "the list has " + names};
+        }
+        a.names.push_back(touched.names[i]);
+        b.names.push_back(touched.names[i]);
+        a.points.push_back(known.points[static_cast<std::size_t>(found - known.names.begin())]);
+        b.points.push_back(touched.points[i]);
+    }
+    return std::pair{a, b};
+}
+
+Result<Signal> parse_signal(std::string_view csv, const std::string& where) {
+    Signal out;
+    bool first = true;
+    for (const TextRow& row : split_rows(csv)) {
+        const auto time = row.cells.size() >= 2 ? number_in(row.cells[0]) : std::nullopt;
+        const auto value = row.cells.size() >= 2 ? number_in(row.cells[1]) : std::nullopt;
+        if (!time || !value) {
+            if (first) {
+                first = false;
+                continue;
+            }
+            return Error{"the row is not two numbers", where + ": line " + std::to_string(row.line),
+                         "expected time_s,value"};
+        }
+        first = false;
+        out.time_s.push_back(*time);
+        out.value.push_back(*value);
+    }
+    if (out.time_s.empty()) return Error{"no rows", where, "expected time_s,value"};
+    return out;
+}
+
+Result<Signal> load_signal(const std::string& path) {
+    const auto text = read_text_file(path);
+    if (!text) return text.error();
+    return parse_signal(*text, path);
+}
+
+std::string digest_of_points(const std::vector<Point3>& points) {
+    Digest digest;
+    for (const Point3& p : points) digest.add(p.x).add(p.y).add(p.z);
+    return digest.hex();
+}
+
+}  // namespace sonocase::pipeline
