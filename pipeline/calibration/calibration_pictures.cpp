@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "formats/calibrate/pose_screen.h"
-#include "pipeline/plot/chart.h"
+#include "pipeline/pictures/chart.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -22,29 +22,30 @@ Status draw(std::span<const Chart> charts,
             const std::string& name) {
     std::error_code error;
     std::filesystem::create_directories(folder, error);
-    const std::vector<std::string> paths{folder + "/" + name + ".png",
-                                         folder + "/" + name + ".svg"};
-    return draw_charts(charts, columns, 560, 420, paths);
+    const ChartSheet sheet{{charts.begin(), charts.end()}, columns, 560, 420};
+    if (Status s = write_chart_png(sheet, folder + "/" + name + ".png"); !s) return s;
+    return write_chart_svg(sheet, folder + "/" + name + ".svg");
 }
 
-ChartSeries marks(const std::string& name, Colour colour, double size = 5) {
-    ChartSeries s;
+Series marks(const std::string& name, Colour colour, double size = 5) {
+    Series s;
     s.name = name;
     s.colour = colour;
-    s.marker_px = size;
+    s.look = SeriesLook::points;
+    s.width_px = size / 3;
     return s;
 }
 
-ChartSeries stroke(const std::string& name, Colour colour, double width = 1.5) {
-    ChartSeries s;
+Series stroke(const std::string& name, Colour colour, double width = 1.5) {
+    Series s;
     s.name = name;
     s.colour = colour;
-    s.line_px = width;
+    s.width_px = width;
     return s;
 }
 
-ChartSeries ring(double radius, double cx = 0, double cy = 0) {
-    ChartSeries s = stroke("", kGuide, 1);
+Series ring(double radius, double cx = 0, double cy = 0) {
+    Series s = stroke("", kGuide, 1);
     for (int k = 0; k <= 72; ++k) {
         s.x.push_back(cx + radius * std::cos(2 * kPi * k / 72));
         s.y.push_back(cy + radius * std::sin(2 * kPi * k / 72));
@@ -55,18 +56,18 @@ ChartSeries ring(double radius, double cx = 0, double cy = 0) {
 Chart residual_chart(std::span<const PoseResidual> residuals,
                      const std::string& title,
                      double rms_mm) {
-    Chart chart{title, "reading", "residual [mm]", false, false, false, {}};
-    ChartSeries used = marks("used", kUsed, 4), out = marks("left out", kLeftOut, 6);
-    out.marker = ChartSeries::Marker::cross;
+    Chart chart{title, "reading", "residual [mm]", false, false, {}, false};
+    Series used = marks("used", kUsed, 4), out = marks("left out", kLeftOut, 6);
+    out.look = SeriesLook::crosses;
     // Stray readings lie far away: they are shown at the upper edge.
     const double edge = std::max(8 * rms_mm, 1e-6);
     for (std::size_t i = 0; i < residuals.size(); ++i) {
-        ChartSeries& s = residuals[i].inlier ? used : out;
+        Series& s = residuals[i].inlier ? used : out;
         s.x.push_back(static_cast<double>(i));
         s.y.push_back(std::min(residuals[i].residual_mm, edge));
     }
-    ChartSeries level = stroke("rms of those used", kGuide, 1);
-    level.dashed = true;
+    Series level = stroke("rms of those used", kGuide, 1);
+    level.look = SeriesLook::dashed;
     level.x = {0, static_cast<double>(residuals.size())};
     level.y = {rms_mm, rms_mm};
     chart.series = {used, out, level};
@@ -76,7 +77,7 @@ Chart residual_chart(std::span<const PoseResidual> residuals,
 
 Chart histogram(std::span<const PoseResidual> residuals) {
     Chart chart{
-        "Residuals of the readings used", "residual [mm]", "readings", false, false, false, {}};
+        "Residuals of the readings used", "residual [mm]", "readings", false, false, {}, false};
     std::vector<double> values;
     for (const PoseResidual& r : residuals) {
         if (r.inlier) values.push_back(r.residual_mm);
@@ -88,7 +89,7 @@ Chart histogram(std::span<const PoseResidual> residuals) {
     for (double v : values) {
         ++count[static_cast<std::size_t>(std::min(kBins - 1, static_cast<int>(v / top * kBins)))];
     }
-    ChartSeries steps = stroke("", kUsed, 2);
+    Series steps = stroke("", kUsed, 2);
     for (int k = 0; k < kBins; ++k) {
         for (int side = 0; side < 2; ++side) {
             steps.x.push_back(top * (k + side) / kBins);
@@ -109,10 +110,10 @@ std::vector<Chart> coverage(std::span<const Pose> poses,
                "tilt across [degrees]",
                false,
                false,
-               true,
-               {}};
+               {},
+               true};
     Chart twist{
-        "Twist about the tool's axis", "reading", "twist [degrees]", false, false, false, {}};
+        "Twist about the tool's axis", "reading", "twist [degrees]", false, false, {}, false};
     if (poses.empty()) return {tilt, twist};
     const Vector3 axis = norm(tip) > 1e-6 ? normalized(tip) : Vector3{0, 0, 1};
     const Vector3 side = any_perpendicular(axis);
@@ -120,9 +121,9 @@ std::vector<Chart> coverage(std::span<const Pose> poses,
     for (const Pose& p : poses) mean = mean + p.tracker_from_tool.rotation * axis;
     mean = norm(mean) > 1e-9 ? normalized(mean) : Vector3{0, 0, 1};
     const Vector3 u = any_perpendicular(mean), v = cross(mean, u);
-    ChartSeries used = marks("used", kUsed, 4), out = marks("left out", kLeftOut, 5),
-                turned = marks("", kUsed, 4);
-    out.marker = ChartSeries::Marker::cross;
+    Series used = marks("used", kUsed, 4), out = marks("left out", kLeftOut, 5),
+           turned = marks("", kUsed, 4);
+    out.look = SeriesLook::crosses;
     double widest = 5;
     for (std::size_t i = 0; i < poses.size(); ++i) {
         const Matrix3& r = poses[i].tracker_from_tool.rotation;
@@ -130,7 +131,7 @@ std::vector<Chart> coverage(std::span<const Pose> poses,
         const double angle = std::atan2(norm(cross(mean, a)), dot(mean, a)) * 180 / kPi;
         const double x = dot(a, u), y = dot(a, v), across = std::hypot(x, y);
         const bool inlier = i >= residuals.size() || residuals[i].inlier;
-        ChartSeries& s = inlier ? used : out;
+        Series& s = inlier ? used : out;
         s.x.push_back(across > 0 ? angle * x / across : 0);
         s.y.push_back(across > 0 ? angle * y / across : 0);
         if (!inlier) continue;
@@ -147,8 +148,8 @@ std::vector<Chart> coverage(std::span<const Pose> poses,
     for (double r = step; r < widest + step; r += step) tilt.series.push_back(ring(r));
     tilt.series.push_back(used);
     if (!out.x.empty()) {
-        ChartSeries near_by = marks("left out", kLeftOut, 5);
-        near_by.marker = ChartSeries::Marker::cross;
+        Series near_by = marks("left out", kLeftOut, 5);
+        near_by.look = SeriesLook::crosses;
         for (std::size_t i = 0; i < out.x.size(); ++i) {
             if (std::hypot(out.x[i], out.y[i]) > 1.5 * widest) continue;
             near_by.x.push_back(out.x[i]);
@@ -181,16 +182,16 @@ Status draw_direction_pictures(std::span<const Pose> readings,
     const std::vector<Pose> poses = screen_poses(readings).poses;
     std::vector<Chart> charts{residual_chart(fit.residuals, "Distance from the line", fit.rms_mm)};
     Chart path{
-        "Path along and across the line", "along [mm]", "across [mm]", false, false, false, {}};
-    Chart time{"Way along the line", "reading", "along [mm]", false, false, false, {}};
+        "Path along and across the line", "along [mm]", "across [mm]", false, false, {}, false};
+    Chart time{"Way along the line", "reading", "along [mm]", false, false, {}, false};
     if (!poses.empty()) {
         // The line in the tracker's frame, by the mean orientation.
         Vector3 way;
         for (const Pose& p : poses) way = way + p.tracker_from_tool.rotation * fit.direction;
         way = norm(way) > 1e-9 ? normalized(way) : Vector3{0, 0, 1};
         const Vector3 u = any_perpendicular(way), v = cross(way, u);
-        ChartSeries a = stroke("first way across", kUsed), b = stroke("second", kSecond),
-                    s = stroke("", kUsed);
+        Series a = stroke("first way across", kUsed), b = stroke("second", kSecond),
+               s = stroke("", kUsed);
         const Vector3 first = poses[0].tracker_from_tool.translation;
         for (std::size_t i = 0; i < poses.size(); ++i) {
             const Vector3 d = poses[i].tracker_from_tool.translation - first;
@@ -217,12 +218,12 @@ Status draw_needle_pictures(const NeedleFit& fit,
                "across [mm]",
                false,
                false,
-               false,
-               {}};
+               {},
+               false};
     const Vector3 u = any_perpendicular(fit.direction), v = cross(fit.direction, u);
-    ChartSeries a = marks("first way across", kUsed, 8), b = marks("second", kSecond, 8),
-                tip = marks("tip", kLeftOut, 10);
-    tip.marker = ChartSeries::Marker::diamond;
+    Series a = marks("first way across", kUsed, 8), b = marks("second", kSecond, 8),
+           tip = marks("tip", kLeftOut, 10);
+    tip.look = SeriesLook::diamonds;
     double low = 0;
     for (const PointFit& p : fit.points) {
         if (!p.determined) continue;
@@ -236,13 +237,13 @@ Status draw_needle_pictures(const NeedleFit& fit,
     }
     tip.x = {0};
     tip.y = {0};
-    ChartSeries line = stroke("", kGuide, 1);
+    Series line = stroke("", kGuide, 1);
     line.x = {low, 0};
     line.y = {0, 0};
     axis.series = {line, a, b, tip};
     std::vector<Chart> charts{axis};
-    Chart fits{"Quality of each depth", "recording", "mm", false, false, false, {}};
-    ChartSeries rms = marks("rms", kUsed, 8), sigma = marks("one sigma, weakest way", kSecond, 8);
+    Chart fits{"Quality of each depth", "recording", "mm", false, false, {}, false};
+    Series rms = marks("rms", kUsed, 8), sigma = marks("one sigma, weakest way", kSecond, 8);
     for (std::size_t k = 0; k < fit.points.size(); ++k) {
         if (!fit.points[k].determined) continue;
         rms.x.push_back(static_cast<double>(k + 1));
@@ -266,11 +267,11 @@ Status draw_rigid_pictures(std::span<const Point3> from,
     static constexpr int kAxes[][2] = {{0, 2}, {1, 2}, {0, 1}};
     const Rigid back = inverse(fit.to_from);
     for (int plane = 0; plane < 3; ++plane) {
-        Chart chart{std::string("Mannequin ") + kPlanes[plane], "mm", "mm", false, false, true, {}};
-        ChartSeries known = marks("mannequin", kGuide, from.size() > 100 ? 3 : 9);
-        ChartSeries touched = marks("touched", kUsed, to.size() > 100 ? 3 : 7),
-                    out = marks("left out", kLeftOut, 7);
-        out.marker = ChartSeries::Marker::cross;
+        Chart chart{std::string("Mannequin ") + kPlanes[plane], "mm", "mm", false, false, {}, true};
+        Series known = marks("mannequin", kGuide, from.size() > 100 ? 3 : 9);
+        Series touched = marks("touched", kUsed, to.size() > 100 ? 3 : 7),
+               out = marks("left out", kLeftOut, 7);
+        out.look = SeriesLook::crosses;
         const int a = kAxes[plane][0], b = kAxes[plane][1];
         const std::size_t thin = std::max<std::size_t>(1, from.size() / 4000);
         for (std::size_t i = 0; i < from.size(); i += thin) {
@@ -279,7 +280,7 @@ Status draw_rigid_pictures(std::span<const Point3> from,
         }
         for (std::size_t i = 0; i < to.size(); ++i) {
             const Point3 q = back * to[i];
-            ChartSeries& s = i < fit.used.size() && !fit.used[i] ? out : touched;
+            Series& s = i < fit.used.size() && !fit.used[i] ? out : touched;
             s.x.push_back(q[a] / fit.scale);
             s.y.push_back(q[b] / fit.scale);
         }
@@ -287,11 +288,11 @@ Status draw_rigid_pictures(std::span<const Point3> from,
         if (!out.x.empty()) chart.series.push_back(out);
         charts.push_back(chart);
     }
-    Chart residuals{"Distance after the fit", "reading", "mm", false, false, false, {}};
-    ChartSeries used = marks("used", kUsed, 6), out = marks("left out", kLeftOut, 6);
+    Chart residuals{"Distance after the fit", "reading", "mm", false, false, {}, false};
+    Series used = marks("used", kUsed, 6), out = marks("left out", kLeftOut, 6);
     for (std::size_t i = 0; i < fit.residuals_mm.size(); ++i) {
         if (fit.residuals_mm[i] < 0) continue;
-        ChartSeries& s = fit.used[i] ? used : out;
+        Series& s = fit.used[i] ? used : out;
         s.x.push_back(static_cast<double>(i + 1));
         s.y.push_back(fit.residuals_mm[i]);
     }
@@ -306,8 +307,8 @@ Status draw_lag_pictures(const Signal& first,
                          const LagFit& fit,
                          const std::string& folder,
                          const std::string& name) {
-    Chart curve{"Correlation over lag", "lag [s]", "correlation", false, false, false, {}};
-    ChartSeries c = stroke("", kUsed, 2), peak = marks("estimate", kLeftOut, 10);
+    Chart curve{"Correlation over lag", "lag [s]", "correlation", false, false, {}, false};
+    Series c = stroke("", kUsed, 2), peak = marks("estimate", kLeftOut, 10);
     c.x = fit.curve_lag_s;
     c.y = fit.curve;
     peak.x = {fit.lag_s};
@@ -318,11 +319,11 @@ Status draw_lag_pictures(const Signal& first,
                "normalised",
                false,
                false,
-               false,
-               {}};
+               {},
+               false};
     const auto line = [](const Signal& s, double shift, double sign, const std::string& label,
                          Colour colour) {
-        ChartSeries out = stroke(label, colour, 1.5);
+        Series out = stroke(label, colour, 1.5);
         double mean = 0, square = 0;
         for (double v : s.value) mean += v / static_cast<double>(s.value.size());
         for (double v : s.value)
@@ -349,14 +350,14 @@ Status draw_image_picture(const ImagePlaneInput& input,
         "depth [mm], downwards",
         false,
         false,
-        true,
-        {}};
+        {},
+        true};
     // On the screen: x to the right, depth down.
-    const auto at = [&](Point3 probe, ChartSeries& s) {
+    const auto at = [&](Point3 probe, Series& s) {
         s.x.push_back(plane.lateral_sign * probe.x);
         s.y.push_back(-probe.z);
     };
-    ChartSeries outline = stroke("image", kGuide, 2), face = stroke("probe's face", kThird, 5);
+    Series outline = stroke("image", kGuide, 2), face = stroke("probe's face", kThird, 5);
     const double w = input.width_px - 1.0, h = input.height_px - 1.0;
     for (const auto& [u, v] : {std::pair{0.0, 0.0}, {w, 0.0}, {w, h}, {0.0, h}, {0.0, 0.0}}) {
         at(plane.probe_from_pixel(u, v), outline);
@@ -364,10 +365,10 @@ Status draw_image_picture(const ImagePlaneInput& input,
     const double half = 0.5 * plane.footprint_mm;
     at({half, 0, 0}, face);
     at({-half, 0, 0}, face);
-    ChartSeries mark = marks("orientation mark", kLeftOut, 14);
+    Series mark = marks("orientation mark", kLeftOut, 14);
     at({half, 0, -0.04 * input.depth_mm}, mark);
     // An F on the probe's own body, written to be read with the mark on the left.
-    ChartSeries letter = stroke("F reads rightly: not mirrored", kUsed, 3);
+    Series letter = stroke("F reads rightly: not mirrored", kUsed, 3);
     const double size = 0.12 * input.depth_mm, side = input.mark_on_left ? -1 : 1;
     const auto pen = [&](double x, double y) {
         at({side * x * size, 0, 0.35 * input.depth_mm - y * size}, letter);
@@ -381,7 +382,7 @@ Status draw_image_picture(const ImagePlaneInput& input,
     chart.series = {outline, face, letter, mark};
     const Rigid probe_from_sensor = inverse(plane.sensor_from_probe);
     const auto touches = [&](std::span<const Point3> points, const char* label, Colour colour) {
-        ChartSeries s = marks(label, colour, 8);
+        Series s = marks(label, colour, 8);
         for (const Point3& p : points) at(probe_from_sensor * p, s);
         if (!s.x.empty()) chart.series.push_back(s);
     };

@@ -105,8 +105,8 @@ RefinePointResult refine_point(std::span<const Pose> readings,
     double block[9];
     const double unscaled =
         std::max(1.0, 2 * summary.final_cost / std::max(1.0, 3.0 * static_cast<double>(used) - 6));
-    if (covariance.Compute({{tip, tip}}, &problem) &&
-        covariance.GetCovarianceBlock(tip, tip, block)) {
+    const std::vector<std::pair<const double*, const double*>> wanted{{tip, tip}};
+    if (covariance.Compute(wanted, &problem) && covariance.GetCovarianceBlock(tip, tip, block)) {
         out.sigma_mm = {std::sqrt(unscaled * block[0]), std::sqrt(unscaled * block[4]),
                         std::sqrt(unscaled * block[8])};
     } else {

@@ -821,7 +821,10 @@ constexpr SubVerb kSubVerbs[] = {
 int verb_calibrate(int argc, char** argv) {
     const std::string name = argc > 1 ? argv[1] : "";
     for (const SubVerb& sub : kSubVerbs) {
-        if (name == sub.name) return sub.run(argc - 1, argv + 1);
+        if (name != sub.name) continue;
+        std::string full = "calibrate " + name;  // as messages and help name it
+        argv[1] = full.data();
+        return sub.run(argc - 1, argv + 1);
     }
     const bool help = name == "--help" || name == "-h" || name == "help";
     if (!help && !name.empty())

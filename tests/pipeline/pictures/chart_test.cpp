@@ -45,7 +45,11 @@ TEST(Chart, PngIsWrittenWithoutADisplayAndTheSameTwice) {
 TEST(Chart, SvgHoldsTheTitle) {
     const std::string path = ::testing::TempDir() + "chart.svg";
     ASSERT_TRUE(write_chart_svg(sheet(), path));
-    EXPECT_NE(read_all(path).find("<svg"), std::string::npos);
+    const std::string svg = read_all(path);
+    EXPECT_NE(svg.find("<svg"), std::string::npos);
+    for (const char* words : {"Error against time", "seconds", "error in mm", "front", "paper"}) {
+        EXPECT_NE(svg.find(words), std::string::npos) << words;
+    }
 }
 
 TEST(Chart, FolderThatIsNotThereIsAnErrorThatNamesTheFile) {

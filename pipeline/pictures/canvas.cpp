@@ -1,4 +1,4 @@
-#include "pipeline/plot/canvas.h"
+#include "pipeline/pictures/canvas.h"
 
 #include <algorithm>
 #include <cmath>
@@ -59,7 +59,7 @@ void Canvas::blend(int x, int y, double coverage, CanvasColour c) {
 }
 
 void Canvas::fill(std::span<const CanvasPoint> polygon, CanvasColour colour) {
-    if (polygon.size() < 3) return;
+    if (polygon.size() < 3 || colour[3] == 0) return;
     body_ += "<polygon points=\"";
     double low = INFINITY, high = -INFINITY;
     for (const CanvasPoint& p : polygon) {
@@ -113,7 +113,7 @@ void Canvas::line(std::span<const CanvasPoint> points,
                   double width,
                   CanvasColour colour,
                   double dash) {
-    if (points.size() < 2) return;
+    if (points.size() < 2 || colour[3] == 0) return;
     const std::string body = body_;
     const double half = std::max(0.5, 0.5 * width);
     // Each dash is a box; joints of a solid line are covered by discs.
