@@ -343,53 +343,69 @@ Status draw_image_picture(const ImagePlaneInput& input,
                           const ImagePlane& plane,
                           const std::string& folder,
                           const std::string& name) {
-    Chart chart{
-        plane.mirrored ? "The image as it will be shown (was mirrored, turned round)"
-                       : "The image as it will be shown",
-        plane.lateral_sign < 0 ? "<- mark        lateral [mm]" : "lateral [mm]        mark ->",
-        "depth [mm], downwards",
-        false,
-        false,
-        {},
-        true};
-    // On the screen: x to the right, depth down.
-    const auto at = [&](Point3 probe, Series& s) {
-        s.x.push_back(plane.lateral_sign * probe.x);
-        s.y.push_back(-probe.z);
+    // The letter is written on the probe's body: its foot towards the tissue, its back towards the
+    // mark. Seen through a frame that is mirrored or upside down, it is mirrored or stands on its
+    // head.
+    const double sign = plane.lateral_sign;
+    const auto panel = [&](const std::string& title, const Rigid& sensor_from_frame) {
+        Chart chart{title,
+                    sign < 0 ? "<- mark        lateral [mm]" : "lateral [mm]        mark ->",
+                    "depth [mm], downwards",
+                    false,
+                    false,
+                    {},
+                    true};
+        const Rigid frame_from_sensor = inverse(sensor_from_frame);
+        const auto at_frame = [&](Point3 p, Series& s) {
+            s.x.push_back(sign * p.x);
+            s.y.push_back(-p.z);
+        };
+        const auto at_body = [&](Point3 p, Series& s) {
+            at_frame(frame_from_sensor * (plane.sensor_from_probe * p), s);
+        };
+        Series outline = stroke("", kGuide, 2), face = stroke("face", kThird, 5);
+        Series mark = marks("mark on the screen", kLeftOut, 10), letter = stroke("", kUsed, 4);
+        const double w = input.width_px - 1.0, h = input.height_px - 1.0;
+        for (const auto& [u, v] : {std::pair{0.0, 0.0}, {w, 0.0}, {w, h}, {0.0, h}, {0.0, 0.0}}) {
+            at_frame(plane.probe_from_pixel(u, v), outline);
+        }
+        const double half = 0.5 * plane.footprint_mm, size = 0.12 * input.depth_mm;
+        at_body({half, 0, 0}, face);
+        at_body({-half, 0, 0}, face);
+        at_frame({0.5 * w * plane.mm_per_px, 0, -0.05 * input.depth_mm}, mark);
+        const auto pen = [&](double x, double y) {
+            at_body({-x * size, 0, 0.45 * input.depth_mm - y * size}, letter);
+        };
+        // With the mark on the left an F; on the right its back still lies towards the mark.
+        pen(-0.5, -1);
+        pen(-0.5, 1);
+        pen(0.6, 1);
+        pen(-0.5, 1);
+        pen(-0.5, 0.1);
+        pen(0.3, 0.1);
+        chart.series = {outline, face, letter, mark};
+        const auto touches = [&](std::span<const Point3> points, const char* label, Colour colour) {
+            Series s = marks(label, colour, 8);
+            for (const Point3& p : points) at_frame(frame_from_sensor * p, s);
+            if (!s.x.empty()) chart.series.push_back(s);
+        };
+        touches(input.mark_end, "touched: marked end", kSecond);
+        touches(input.other_end, "touched: other end", {140, 86, 75});
+        touches(input.in_front, "touched: in front", {148, 103, 189});
+        return chart;
     };
-    Series outline = stroke("image", kGuide, 2), face = stroke("probe's face", kThird, 5);
-    const double w = input.width_px - 1.0, h = input.height_px - 1.0;
-    for (const auto& [u, v] : {std::pair{0.0, 0.0}, {w, 0.0}, {w, h}, {0.0, h}, {0.0, 0.0}}) {
-        at(plane.probe_from_pixel(u, v), outline);
+    std::vector<Chart> charts;
+    if (plane.mirrored || plane.upside_down) {
+        charts.push_back(panel(plane.mirrored && plane.upside_down
+                                   ? "As given: MIRRORED and UPSIDE DOWN"
+                               : plane.mirrored ? "As given: MIRRORED"
+                                                : "As given: UPSIDE DOWN",
+                               input.sensor_from_probe));
+        charts.push_back(panel("As turned round and saved", plane.sensor_from_probe));
+    } else {
+        charts.push_back(panel("The image as it will be shown", plane.sensor_from_probe));
     }
-    const double half = 0.5 * plane.footprint_mm;
-    at({half, 0, 0}, face);
-    at({-half, 0, 0}, face);
-    Series mark = marks("orientation mark", kLeftOut, 14);
-    at({half, 0, -0.04 * input.depth_mm}, mark);
-    // An F on the probe's own body, written to be read with the mark on the left.
-    Series letter = stroke("F reads rightly: not mirrored", kUsed, 3);
-    const double size = 0.12 * input.depth_mm, side = input.mark_on_left ? -1 : 1;
-    const auto pen = [&](double x, double y) {
-        at({side * x * size, 0, 0.35 * input.depth_mm - y * size}, letter);
-    };
-    pen(-0.5, -1);
-    pen(-0.5, 1);
-    pen(0.6, 1);
-    pen(-0.5, 1);
-    pen(-0.5, 0.1);
-    pen(0.3, 0.1);
-    chart.series = {outline, face, letter, mark};
-    const Rigid probe_from_sensor = inverse(plane.sensor_from_probe);
-    const auto touches = [&](std::span<const Point3> points, const char* label, Colour colour) {
-        Series s = marks(label, colour, 8);
-        for (const Point3& p : points) at(probe_from_sensor * p, s);
-        if (!s.x.empty()) chart.series.push_back(s);
-    };
-    touches(input.mark_end, "touched: marked end", kSecond);
-    touches(input.other_end, "touched: other end", {140, 86, 75});
-    touches(input.in_front, "touched: in front", {148, 103, 189});
-    return draw(std::span(&chart, 1), 1, folder, name);
+    return draw(charts, 2, folder, name);
 }
 
 }  // namespace sonocase::pipeline

@@ -393,7 +393,10 @@ void paint(const Chart& given, Canvas& canvas, double x, double y, int width, in
         named = named || !s.name.empty();
     }
     chart->SetShowLegend(named);
-    chart->GetLegend()->SetInline(true);
+    int entries = 0;
+    for (const Series& s : given.series) entries += !s.name.empty();
+    // A long legend would hide the plot: it goes beside it.
+    chart->GetLegend()->SetInline(entries < 5);
     chart->GetLegend()->GetPen()->SetColor(200, 200, 200);
     chart->GetLegend()->SetLabelSize(12);
     chart->SetRenderEmpty(true);
