@@ -189,16 +189,42 @@ void LabelDistance::blend_group(const SliceGroup& group,
         const double t = static_cast<double>(step) / factor_;
         const int k = group.slice * factor_ + step - box.first.z;
         if (k < 0 || k >= box.size.z) continue;
-        // Window of this step: the outlines' windows moved along the shift, together.
-        int x0 = 1 << 30, y0 = x0, x1 = -x0, y1 = -x0;
-        const auto include = [&](const OutlineField& f, double dx, double dy) {
-            x0 = std::min(x0, static_cast<int>(std::floor(f.window.first.x + dx)));
-            y0 = std::min(y0, static_cast<int>(std::floor(f.window.first.y + dy)));
-            x1 = std::max(x1, static_cast<int>(std::ceil(f.window.first.x + f.window.size.x + dx)));
-            y1 = std::max(y1, static_cast<int>(std::ceil(f.window.first.y + f.window.size.y + dy)));
+        // Where a pixel of this step lies in either slice: turned and shifted back or onwards.
+        struct Pose {
+            double c, s, from_x, from_y, to_x, to_y;  // pixel - from, turned, + to
         };
-        if (group.lower >= 0) include(low, t * group.shift_x, t * group.shift_y);
-        if (group.upper >= 0) include(high, (t - 1) * group.shift_x, (t - 1) * group.shift_y);
+        const auto pose = [&](double x, double y, double part) {
+            const double angle = part * group.turn_rad;
+            return Pose{std::cos(angle),
+                        std::sin(angle),
+                        x - part * group.shift_x,
+                        y - part * group.shift_y,
+                        x,
+                        y};
+        };
+        const auto centre = [&](int outline) -> const Outline& {
+            return groups_.outlines[static_cast<std::size_t>(std::max(outline, 0))];
+        };
+        const Pose to_low = pose(centre(group.lower).x, centre(group.lower).y, -t);
+        const Pose to_high = pose(centre(group.upper).x, centre(group.upper).y, 1 - t);
+        const auto value = [](const OutlineField& f, const Pose& p, int x, int y) {
+            const double u = x - p.from_x, v = y - p.from_y;
+            return f.at(p.to_x + p.c * u - p.s * v, p.to_y + p.s * u + p.c * v);
+        };
+        int x0 = 1 << 30, y0 = x0, x1 = -x0, y1 = -x0;
+        const auto include = [&](const OutlineField& f, const Pose& p) {
+            for (int corner = 0; corner < 4; ++corner) {
+                const double u = f.window.first.x + (corner & 1 ? f.window.size.x : 0) - p.to_x;
+                const double v = f.window.first.y + (corner & 2 ? f.window.size.y : 0) - p.to_y;
+                const double x = p.from_x + p.c * u + p.s * v, y = p.from_y - p.s * u + p.c * v;
+                x0 = std::min(x0, static_cast<int>(std::floor(x)));
+                y0 = std::min(y0, static_cast<int>(std::floor(y)));
+                x1 = std::max(x1, static_cast<int>(std::ceil(x)));
+                y1 = std::max(y1, static_cast<int>(std::ceil(y)));
+            }
+        };
+        if (group.lower >= 0) include(low, to_low);
+        if (group.upper >= 0) include(high, to_high);
         x0 = std::max(x0, box.first.x);
         y0 = std::max(y0, box.first.y);
         x1 = std::min(x1, box.first.x + box.size.x);
@@ -207,12 +233,8 @@ void LabelDistance::blend_group(const SliceGroup& group,
         for (int y = y0; y < y1; ++y) {
             for (int x = x0; x < x1; ++x) {
                 // An end closes half-way: the missing side is as far outside as this one is deep.
-                const float a = group.lower >= 0
-                                    ? low.at(x - t * group.shift_x, y - t * group.shift_y)
-                                    : high.deepest;
-                const float b = group.upper >= 0 ? high.at(x + (1 - t) * group.shift_x,
-                                                           y + (1 - t) * group.shift_y)
-                                                 : low.deepest;
+                const float a = group.lower >= 0 ? value(low, to_low, x, y) : high.deepest;
+                const float b = group.upper >= 0 ? value(high, to_high, x, y) : low.deepest;
                 float& to = (*phi)[box.index(x - box.first.x, y - box.first.y, k)];
                 to = std::min(to, a + w * (b - a));
             }

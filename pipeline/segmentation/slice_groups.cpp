@@ -57,11 +57,23 @@ void find_outlines(const LabelVolume& volume, int k, SliceGroups* out) {
             ++o.area;
             o.x += i;
             o.y += j;
+            o.xx += static_cast<double>(i) * i;
+            o.xy += static_cast<double>(i) * j;
+            o.yy += static_cast<double>(j) * j;
         }
     }
 }
 
 }  // namespace
+
+bool Outline::elongated() const {
+    const double mean = 0.5 * (xx + yy), spread = std::hypot(0.5 * (xx - yy), xy);
+    return mean + spread > 6.25 * (mean - spread + 1.0 / 12);  // 2.5 times as long as wide
+}
+
+double Outline::direction_rad() const {
+    return 0.5 * std::atan2(2 * xy, xx - yy);
+}
 
 SliceGroups find_slice_groups(const LabelVolume& volume) {
     SliceGroups out;
@@ -72,6 +84,9 @@ SliceGroups find_slice_groups(const LabelVolume& volume) {
     for (Outline& o : out.outlines) {
         o.x /= o.area;
         o.y /= o.area;
+        o.xx = o.xx / o.area - o.x * o.x;
+        o.xy = o.xy / o.area - o.x * o.y;
+        o.yy = o.yy / o.area - o.y * o.y;
     }
     const std::size_t plane =
         static_cast<std::size_t>(g.size.x) * static_cast<std::size_t>(g.size.y);
@@ -83,15 +98,28 @@ SliceGroups find_slice_groups(const LabelVolume& volume) {
     const auto outline = [&](int o) -> const Outline& {
         return out.outlines[static_cast<std::size_t>(o)];
     };
-    // Pixels of `a` that land on `b` when moved by whole pixels.
-    const auto shared = [&](int a, int b, int dx, int dy) {
+    const auto turn = [&](int a, int b) {
+        if (!outline(a).elongated() || !outline(b).elongated()) return 0.0;
+        double d = outline(b).direction_rad() - outline(a).direction_rad();
+        constexpr double kPi = 3.14159265358979323846;
+        if (d > kPi / 2) d -= kPi;
+        if (d < -kPi / 2) d += kPi;
+        // A tube does not swing round between two slices; such outlines are of another kind.
+        return std::abs(d) < 0.8 ? d : 0.0;
+    };
+    // Pixels of `a` that land on `b` when moved.
+    const auto shared = [&](int a, int b, double dx, double dy, double angle) {
         const VoxelBox& box = outline(a).box;
+        const double c = std::cos(angle), s = std::sin(angle);
         int count = 0;
         for (int j = box.first.y; j < box.first.y + box.size.y; ++j) {
             for (int i = box.first.x; i < box.first.x + box.size.x; ++i) {
                 if (out.outline_of_voxel[g.index(i, j, outline(a).slice)] != a) continue;
-                if (!g.contains(i + dx, j + dy, 0)) continue;
-                count += out.outline_of_voxel[g.index(i + dx, j + dy, outline(b).slice)] == b;
+                const double u = i - outline(a).x, v = j - outline(a).y;
+                const int x = static_cast<int>(std::lround(outline(a).x + dx + c * u - s * v));
+                const int y = static_cast<int>(std::lround(outline(a).y + dy + s * u + c * v));
+                if (!g.contains(x, y, 0)) continue;
+                count += out.outline_of_voxel[g.index(x, y, outline(b).slice)] == b;
             }
         }
         return count;
@@ -126,10 +154,11 @@ SliceGroups find_slice_groups(const LabelVolume& volume) {
             }
         }
         const auto add = [&](int a, int b) {
-            SliceGroup group{a, b, k, 0, 0};
+            SliceGroup group{a, b, k, 0, 0, 0};
             if (a >= 0 && b >= 0) {
                 group.shift_x = outline(b).x - outline(a).x;
                 group.shift_y = outline(b).y - outline(a).y;
+                group.turn_rad = turn(a, b);
             }
             out.of_label[outline(a >= 0 ? a : b).label].push_back(group);
         };
@@ -137,11 +166,10 @@ SliceGroups find_slice_groups(const LabelVolume& volume) {
             const auto [a, b] = pair;
             if (ups[a] != 1 || downs[b] != 1) continue;
             const int smaller = std::min(outline(a).area, outline(b).area);
-            const int still = shared(a, b, 0, 0);
+            const int still = shared(a, b, 0, 0, 0);
             if (still > 0.7 * smaller) continue;
             const int moved =
-                shared(a, b, static_cast<int>(std::lround(outline(b).x - outline(a).x)),
-                       static_cast<int>(std::lround(outline(b).y - outline(a).y)));
+                shared(a, b, outline(b).x - outline(a).x, outline(b).y - outline(a).y, turn(a, b));
             if (moved > 1.15 * still && may_pair(a, b)) add(a, b);
         }
         std::vector<std::int32_t> loose_low, loose_high;

@@ -3,8 +3,8 @@
 // A vessel that runs obliquely through thick slices appears at another place in each, often without
 // overlap: blending the slices' distance fields where they are makes a chain of discs of it.
 // Outlines (8-connected components of one label in one slice) are therefore paired, and a pair that
-// a shift brings together better than leaving it in place is blended along that shift. An outline
-// that simply ends is closed half-way to the next slice.
+// a shift and a turn bring together better than leaving it in place is blended along them. An
+// outline that simply ends is closed half-way to the next slice.
 #pragma once
 
 #include <vector>
@@ -17,9 +17,14 @@ namespace sonocase::pipeline {
 struct Outline {
     int slice = 0;
     std::uint8_t label = 0;
-    VoxelBox box;         // one slice thick
-    int area = 0;         // pixels
-    double x = 0, y = 0;  // centroid, pixels
+    VoxelBox box;                   // one slice thick
+    int area = 0;                   // pixels
+    double x = 0, y = 0;            // centroid, pixels
+    double xx = 0, xy = 0, yy = 0;  // second moments about it, pixels^2
+
+    // Long enough for its direction to mean something.
+    bool elongated() const;
+    double direction_rad() const;  // of the long axis, in (-pi/2, pi/2]
 };
 
 struct SliceGroup {
@@ -27,6 +32,7 @@ struct SliceGroup {
     int upper = -1;                   // outline in slice k + 1, or -1: it ends above k
     int slice = 0;                    // k
     double shift_x = 0, shift_y = 0;  // pixels, from the lower to the upper
+    double turn_rad = 0;              // about the centroid, likewise
 };
 
 struct SliceGroups {
