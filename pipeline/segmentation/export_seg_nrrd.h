@@ -1,6 +1,7 @@
 // Labels as a .seg.nrrd that 3D Slicer opens as a segmentation, with names and colours.
 #pragma once
 
+#include <map>
 #include <string>
 
 #include "formats/label_volume.h"
@@ -8,9 +9,13 @@
 
 namespace sonocase::pipeline {
 
+// Slicer's header fields: one segment a label, in one layer, with its own extent. Labels without a
+// colour get one each.
+std::map<std::string, std::string> seg_nrrd_fields(const LabelVolume& volume);
+
 // One 8-bit layer, gzip inside; a label's value is its palette index. The volume's frame is written
-// as right-anterior-superior, so that reading the file back gives the same coordinates. Labels
-// without a colour get one each. Same volume, same bytes.
+// as right-anterior-superior, so that reading the file back gives the same coordinates. Same
+// volume, same bytes.
 Status export_seg_nrrd(const LabelVolume& volume, const std::string& path);
 
 }  // namespace sonocase::pipeline

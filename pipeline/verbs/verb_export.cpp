@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "pipeline/cook/export_files.h"
+#include "pipeline/segmentation/export_level_sets.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/verbs.h"
 
@@ -15,12 +16,22 @@ int verb_export(int argc, char** argv) {
     CommonOptions common;
     app.add_option("BUNDLE", path, "The bundle")->required();
     app.add_option("-o,--output", folder, "Folder to write")->type_name("DIR")->required();
+    bool level_sets = false;
+    app.add_flag("--level-sets", level_sets, "Also labels.vdb: an OpenVDB level set a label");
     add_common_options(app, common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     auto bundle = load_bundle(path);
     if (!bundle) return fail("export", bundle.error());
     auto names = export_case(*bundle, folder);
     if (!names) return fail("export", names.error());
+    if (level_sets) {
+        const LabelVolume labels{bundle->grid, dense_from_bricks(bundle->label_bricks),
+                                 bundle->labels};
+        ProgressBar bar(common);
+        const auto status = export_level_sets(labels, folder + "/labels.vdb", {}, bar.progress());
+        if (!status) return fail("export", status.error());
+        names->push_back("labels.vdb");
+    }
     for (const std::string& name : *names) std::printf("%s/%s\n", folder.c_str(), name.c_str());
     return kDone;
 }

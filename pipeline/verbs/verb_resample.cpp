@@ -4,6 +4,7 @@
 #include "formats/registration_file.h"
 #include "pipeline/parallel.h"
 #include "pipeline/segmentation/resample_labels.h"
+#include "pipeline/segmentation/segmentation_pictures.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/label_files.h"
 #include "pipeline/verbs/verbs.h"
@@ -82,6 +83,11 @@ int verb_resample(int argc, char** argv) {
     print_warnings("resample", result->report);
     LabelFile file{
         "mannequin", std::move(result->volume), std::move(result->boundary), {}, {result->report}};
+    if (!pictures.empty()) {
+        const auto status = write_segmentation_pictures(
+            {input->volume, &*registration, file.volume, file.boundary}, pictures);
+        if (!status) return fail("resample", status.error());
+    }
     if (auto status = save_any_labels(file, out); !status) return fail("resample", status.error());
     if (auto status = write_report(common, result->report); !status)
         return fail("resample", status.error());

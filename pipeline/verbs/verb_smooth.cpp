@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include "pipeline/parallel.h"
+#include "pipeline/segmentation/segmentation_pictures.h"
 #include "pipeline/segmentation/smooth_labels.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/label_files.h"
@@ -78,6 +79,11 @@ int verb_smooth(int argc, char** argv) {
     LabelFile file{
         input->frame, std::move(result->volume), std::move(result->boundary), {}, input->reports};
     file.reports.push_back(result->report);
+    if (!pictures.empty()) {
+        const auto status = write_segmentation_pictures(
+            {input->volume, nullptr, file.volume, file.boundary}, pictures);
+        if (!status) return fail("smooth", status.error());
+    }
     if (auto status = save_any_labels(file, out); !status) return fail("smooth", status.error());
     if (auto status = write_report(common, result->report); !status)
         return fail("smooth", status.error());
