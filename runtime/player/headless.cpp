@@ -6,12 +6,15 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "runtime/player/frame_stats.h"
 #include "runtime/player/open_case.h"
 #include "runtime/player/png_file.h"
 #include "runtime/player/scan_engine.h"
+#include "runtime/player/session_run.h"
+#include "runtime/session/settings_text.h"
 #include "runtime/tracking/make_tracker.h"
 
 namespace sonocase::runtime {
@@ -141,7 +144,16 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     FrameStats stats;
     TimeHistogram pose_to_pixel;
     stats.set_effects(engine->renderer().costs());
-    const ImageSettings settings;
+    ImageSettings settings;
+    // A replayed session brings the console's settings along.
+    std::optional<SessionReplay> replay;
+    if (spec.compare(0, 7, "replay:") == 0) replay = session_replay(spec.substr(7));
+    std::unique_ptr<SessionRun> session;
+    if (!arguments.record.empty()) {
+        auto started = SessionRun::start(arguments.record, open, *engine, "", utc_now(), 0);
+        if (!started) return started.error();
+        session = std::move(*started);
+    }
     const int frames = frame_count(arguments, tracker);
     for (int i = 0; i < frames; ++i) {
         double now_s = frame_time_s(tracker, i, frames);
@@ -164,11 +176,15 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
             fresh = tracker.poll(now_s, reading);
         }
         if (fresh) engine->observe(reading, tracker.is_device());
+        if (replay && static_cast<std::size_t>(i) < replay->settings.size()) {
+            apply_settings_text(replay->settings[static_cast<std::size_t>(i)], settings);
+        }
         const double before_s = steady_seconds();
         engine->frame(now_s, settings, pixels);
         const double after_s = steady_seconds();
         stats.add((after_s - before_s) * 1e3, engine->renderer().costs());
         if (tracker.is_device()) pose_to_pixel.add((context.clock() - reading.time_s) * 1e3);
+        if (session) session->observe(engine->last(), pixels, !tracker.is_device());
         if (i == 0) stats.set_first_frame_ms((after_s - start_s) * 1e3);
         if (!arguments.out.empty()) {
             char name[32];
@@ -178,8 +194,15 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
             if (!written) return written.error();
         }
     }
+    std::string metrics;
+    if (session) {
+        const Result<SessionScore> score = session->finish();
+        if (!score) return score.error();
+        metrics = score_json(*score, exercise);
+    }
     if (!arguments.stats.empty()) {
-        const Status written = write_text_file(arguments.stats, stats.json("", &pose_to_pixel));
+        const Status written =
+            write_text_file(arguments.stats, stats.json(metrics, &pose_to_pixel));
         if (!written) return written.error();
     }
     return Done{};

@@ -84,11 +84,14 @@ void ScanEngine::observe(const TrackerReading& reading, bool is_device) {
     reading_ = reading;
     ToolPoses tools = tool_poses(reading, calibrations_, assignment_);
     // A lost probe keeps its last place, so that the picture freezes rather than flickers.
-    if (!tools.has_probe || probe_watch_.hold()) {
+    // What comes in `mannequin` (scripts, the mouse, sessions recorded here) was checked where it
+    // was made: holding it back a second time would make a replay differ.
+    const bool checked = reading.in_mannequin;
+    if (!tools.has_probe || (!checked && probe_watch_.hold())) {
         tools.has_probe = tools_.has_probe;
         tools.mannequin_from_probe = tools_.mannequin_from_probe;
     }
-    if (needle_watch_.hold()) {
+    if (!checked && needle_watch_.hold()) {
         tools.has_needle = tools_.has_needle;
         tools.mannequin_from_needle = tools_.mannequin_from_needle;
     }
@@ -104,16 +107,24 @@ FrameStatus ScanEngine::frame(double now_s,
     FrameInput& input = record.input;
     input.mannequin_from_probe = tools_.mannequin_from_probe;
     input.has_needle = tools_.has_needle;
+    const double time_s = now_s - origin_s_;
     if (tools_.has_needle) {
-        const Rigid& needle = tools_.mannequin_from_needle;
+        record.needle = needle_.update(time_s, tools_.mannequin_from_needle);
+        const Rigid& needle = record.needle.mannequin_from_drawn;
         input.needle.tip = needle * Point3{0, 0, 0};
         input.needle.direction = needle.rotation.column(2);
     }
-    input.time_s = now_s;
+    input.time_s = time_s;
     input.frame = frame_++;
     input.settings = settings;
     last_ = record;
     return finish(input, renderer_.render(input, pixels), pixels);
+}
+
+void ScanEngine::begin_session(double now_s) {
+    origin_s_ = now_s;
+    frame_ = 0;
+    needle_ = NeedleState(anatomy_.get(), exercise_.needle);
 }
 
 FrameStatus ScanEngine::frame_again(const FrameRecord& record, std::span<std::uint8_t> pixels) {

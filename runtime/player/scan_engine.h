@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -11,7 +12,9 @@
 #include "formats/calibration.h"
 #include "formats/case_bundle.h"
 #include "formats/exercise.h"
+#include "formats/session/anatomy.h"
 #include "runtime/imaging/renderer.h"
+#include "runtime/needle/needle_state.h"
 #include "runtime/tracking/sensor_watch.h"
 #include "runtime/tracking/skin.h"
 #include "runtime/tracking/tracker.h"
@@ -47,6 +50,7 @@ ToolPoses tool_poses(const TrackerReading& reading,
 struct FrameRecord {
     FrameInput input;
     ToolPoses tools;
+    NeedleView needle;  // as drawn, after the bend constraint
     double reading_time_s = 0;
 };
 
@@ -71,6 +75,10 @@ class ScanEngine {
     void observe(const TrackerReading& reading, bool is_device);
     // Renders the frame of the last reading; pixels # width * height. Neither throws nor allocates.
     FrameStatus frame(double now_s, const ImageSettings& settings, std::span<std::uint8_t> pixels);
+    // Begins a session: its time and its frame numbers count from here, and no needle is inserted
+    // yet. What is rendered afterwards depends on readings, settings and times since now_s alone,
+    // so that a replay of the recording gives the same pixels.
+    void begin_session(double now_s);
     // Renders a past frame again: the same pixels.
     FrameStatus frame_again(const FrameRecord& record, std::span<std::uint8_t> pixels);
 
@@ -78,6 +86,7 @@ class ScanEngine {
     void set_assignment(const SensorAssignment& assignment) { assignment_ = assignment; }
 
     const FrameRecord& last() const { return last_; }
+    const Anatomy& anatomy() const { return *anatomy_; }
     SensorVerdict probe_verdict(double now_s) const { return probe_watch_.verdict(now_s); }
     SensorVerdict needle_verdict(double now_s) const { return needle_watch_.verdict(now_s); }
     int jumps() const { return probe_watch_.jumps() + needle_watch_.jumps(); }
@@ -91,6 +100,8 @@ class ScanEngine {
                EngineOptions options,
                Renderer renderer)
         : skin_(bundle),
+          anatomy_(std::make_unique<CaseAnatomy>(bundle)),
+          needle_(anatomy_.get(), exercise.needle),
           exercise_(std::move(exercise)),
           options_(std::move(options)),
           renderer_(std::move(renderer)) {}
@@ -98,6 +109,8 @@ class ScanEngine {
     FrameStatus finish(const FrameInput& input, FrameStatus status, std::span<std::uint8_t> pixels);
 
     Skin skin_;
+    std::unique_ptr<CaseAnatomy> anatomy_;  // stays in place when the engine moves
+    NeedleState needle_;
     Exercise exercise_;
     EngineOptions options_;
     Renderer renderer_;
@@ -108,6 +121,7 @@ class ScanEngine {
     FrameRecord last_;
     ToolPoses tools_;
     std::uint32_t frame_ = 0;
+    double origin_s_ = 0;  // of the session
 };
 
 }  // namespace sonocase::runtime

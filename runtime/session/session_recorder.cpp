@@ -58,11 +58,13 @@ struct SessionRecorder::Impl {
     void run() {
         std::unique_lock lock(mutex);
         while (!stopping) {
-            wake.wait_for(lock, kBatchEvery, [&] { return stopping; });
+            wake.wait_for(lock, kBatchEvery, [&] { return stopping || hurry; });
+            hurry = false;
             lock.unlock();
             write_batch();
             write_picture();
             lock.lock();
+            room.notify_all();
         }
     }
 
@@ -144,8 +146,8 @@ struct SessionRecorder::Impl {
     Sequence pictures;
 
     mutable std::mutex mutex;
-    std::condition_variable wake;
-    bool stopping = false;
+    std::condition_variable wake, room;
+    bool stopping = false, hurry = false;
     RecorderStatus state;
     std::thread thread;
 };
@@ -171,18 +173,31 @@ Result<std::unique_ptr<SessionRecorder>> SessionRecorder::start(const std::strin
     return std::unique_ptr<SessionRecorder>(new SessionRecorder(std::move(impl)));
 }
 
-void SessionRecorder::push(const RecordedFrame& frame, std::span<const LiveEvent> events) {
+bool SessionRecorder::push(const RecordedFrame& frame, std::span<const LiveEvent> events) {
     Impl& impl = *impl_;
     const std::size_t at = impl.given.load(std::memory_order_relaxed);
     if (at - impl.taken.load(std::memory_order_acquire) >= kQueue) {
         ++impl.dropped;
-        return;
+        return false;
     }
     Record& record = impl.queue[at % kQueue];
     record.frame = frame;
     record.event_count = std::min(events.size(), kEvents);
     std::copy_n(events.begin(), record.event_count, record.events.begin());
     impl.given.store(at + 1, std::memory_order_release);
+    return true;
+}
+
+void SessionRecorder::wait_for_room() {
+    Impl& impl = *impl_;
+    const auto roomy = [&] {
+        return impl.given.load() - impl.taken.load() < kQueue / 2 && !impl.picture.full.load();
+    };
+    if (roomy()) return;
+    std::unique_lock lock(impl.mutex);
+    impl.hurry = true;
+    impl.wake.notify_all();
+    impl.room.wait(lock, roomy);
 }
 
 void SessionRecorder::push_picture(std::int64_t frame,

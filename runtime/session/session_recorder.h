@@ -48,8 +48,9 @@ class SessionRecorder {
     SessionRecorder(const SessionRecorder&) = delete;
     SessionRecorder& operator=(const SessionRecorder&) = delete;
 
-    // From the frame loop. Never blocks, never allocates; at most 8 events a frame are kept.
-    void push(const RecordedFrame& frame, std::span<const LiveEvent> events);
+    // From the frame loop. Never blocks, never allocates; at most 8 events a frame are kept. False
+    // where the writer is so far behind that the frame is lost; status() counts them.
+    bool push(const RecordedFrame& frame, std::span<const LiveEvent> events);
     // Keeps the picture of the frame just pushed: grey, # width * height. The picture is copied;
     // when two come within the time of a write, the second is left out. `why` is a literal.
     void push_picture(std::int64_t frame,
@@ -58,6 +59,10 @@ class SessionRecorder {
                       int width_px,
                       int height_px,
                       std::span<const std::uint8_t> pixels);
+
+    // Returns when there is room for frames and a picture: for runs faster than life, which may
+    // wait.
+    void wait_for_room();
 
     RecorderStatus status() const;  // for the screen; takes a lock for the time of a copy
     // Writes what is left and ends the thread. An Error where frames did not reach the disk.

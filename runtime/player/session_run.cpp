@@ -1,0 +1,141 @@
+#include "runtime/player/session_run.h"
+
+#include <algorithm>
+#include <cstring>
+#include <ctime>
+
+#include "formats/digest.h"
+#include "runtime/session/settings_text.h"
+
+namespace sonocase::runtime {
+namespace {
+
+const char* picture_worth(std::span<const LiveEvent> events) {
+    for (const LiveEvent& event : events) {
+        switch (event.kind) {
+            case LiveEventKind::target_hit:
+                return "target_hit";
+            case LiveEventKind::no_go_contact:
+                return "no_go_contact";
+            case LiveEventKind::needle_entry:
+                return "needle_entry";
+            case LiveEventKind::target_scanned:
+                return "target_scanned";
+            case LiveEventKind::needle_exit:
+                return "needle_exit";
+            default:
+                break;
+        }
+    }
+    return nullptr;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+    std::string out;
+    for (const std::string& word : words) out += (out.empty() ? "" : ",") + word;
+    return out;
+}
+
+}  // namespace
+
+std::string utc_now() {
+    const std::time_t now = std::time(nullptr);
+    std::tm parts{};
+    ::gmtime_r(&now, &parts);
+    char text[32];
+    std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+    return text;
+}
+
+SessionRun::SessionRun(const OpenCase& open, const ScanEngine& engine, std::string path)
+    : open_(open),
+      engine_(engine),
+      exercise_(engine.exercise()),
+      path_(std::move(path)),
+      monitor_(exercise_, &engine.anatomy(), open.bundle.labels) {}
+
+Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
+                                                      const OpenCase& open,
+                                                      ScanEngine& engine,
+                                                      const std::string& trainee,
+                                                      const std::string& started,
+                                                      double now_s) {
+    std::unique_ptr<SessionRun> run(new SessionRun(open, engine, path));
+    SessionHeader header;
+    header.case_name = open.bundle.manifest.case_name;
+    header.exercise = run->exercise_.name;
+    for (const EmbeddedExercise& embedded : open.bundle.exercises) {
+        if (embedded.name == header.exercise) header.exercise_digest = digest_of(embedded.toml);
+    }
+    header.trainee = trainee;
+    header.started = started;
+    header.program = "sonoplay";
+    const RenderOptions& render = engine.render_options();
+    header.render =
+        std::string("model=") + (render.model == ImageModel::paper ? "paper" : "physical") +
+        " effects=" + joined(render.effects) + " size=" + std::to_string(render.width_px) + "x" +
+        std::to_string(render.height_px) + " seed=" + std::to_string(render.seed);
+    auto recorder = SessionRecorder::start(path, header, run->exercise_, open.bundle.labels);
+    if (!recorder) return recorder.error();
+    run->recorder_ = std::move(*recorder);
+    engine.begin_session(now_s);
+    return run;
+}
+
+void SessionRun::observe(const FrameRecord& record,
+                         std::span<const std::uint8_t> pixels,
+                         bool may_wait) {
+    if (may_wait) recorder_->wait_for_room();
+    const FrameInput& input = record.input;
+    RecordedFrame frame;
+    frame.time_s = input.time_s;
+    frame.frame = input.frame;
+    frame.probe_ok = record.tools.has_probe;
+    frame.needle_ok = record.tools.has_needle;
+    frame.mannequin_from_probe = record.tools.mannequin_from_probe;
+    frame.mannequin_from_needle = record.tools.mannequin_from_needle;
+    frame.mannequin_from_drawn = record.needle.mannequin_from_drawn;
+    const ImageSettings& s = input.settings;
+    const bool changed = first_ || s.gain_db != settings_.gain_db ||
+                         s.dynamic_range_db != settings_.dynamic_range_db ||
+                         s.tgc_db != settings_.tgc_db ||
+                         s.flip_left_right != settings_.flip_left_right;
+    if (changed) {
+        const std::string text = settings_text(s);  // short, and only while a slider moves
+        std::strncpy(frame.settings.data(), text.c_str(), frame.settings.size() - 1);
+        settings_ = s;
+    }
+    first_ = false;
+    const auto events =
+        monitor_.update(frame.time_s, frame.frame, frame.probe_ok, frame.mannequin_from_probe,
+                        frame.needle_ok, frame.mannequin_from_drawn);
+    recorder_->push(frame, events);
+    if (const char* why = picture_worth(events)) {
+        const RenderOptions& render = engine_.render_options();
+        recorder_->push_picture(frame.frame, frame.time_s, why, render.width_px, render.height_px,
+                                pixels);
+    }
+    last_ = record;
+}
+
+Result<SessionScore> SessionRun::finish() {
+    if (Status written = recorder_->finish(); !written) return written.error();
+    const auto sequence = load_sequence(path_);
+    if (!sequence) return sequence.error();
+    const auto session = session_from_sequence(*sequence, guess_names(*sequence), path_);
+    if (!session) return session.error();
+    return score_session(*session, exercise_, &engine_.anatomy(), open_.bundle.labels);
+}
+
+std::optional<SessionReplay> session_replay(const std::string& path) {
+    const auto sequence = load_sequence(path);
+    if (!sequence || sequence->transform_index(kProbeTransform) < 0) return {};
+    const auto session = session_from_sequence(*sequence, guess_names(*sequence), path);
+    if (!session || session->header.program.empty()) return {};
+    SessionReplay replay;
+    replay.header = session->header;
+    for (const SessionSample& sample : session->samples) replay.settings.push_back(sample.settings);
+    return replay;
+}
+
+}  // namespace sonocase::runtime
