@@ -12,6 +12,7 @@
 
 #include "formats/nearest_name.h"
 #include "formats/number_text.h"
+#include "formats/session/metric_table.h"
 
 namespace sonocase {
 namespace {
@@ -260,6 +261,10 @@ void read_pass_mark(Table table, std::vector<Exercise::PassMark>& marks) {
     table.text("metric", mark.metric);
     if (mark.metric.empty())
         table.complain("metric", "is missing or empty", "a name of docs/metrics.md");
+    if (!mark.metric.empty() && !find_metric(mark.metric)) {
+        table.complain("metric", "'" + mark.metric + "' is no score",
+                       suggest_name(mark.metric, metric_names()));
+    }
     const bool most = table.number("at_most", mark.at_most, -1e12, 1e12);
     const bool least = table.number("at_least", mark.at_least, -1e12, 1e12);
     if (!most && !least && !table.has("at_most") && !table.has("at_least")) {

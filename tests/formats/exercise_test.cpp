@@ -130,6 +130,8 @@ TEST(Exercise, RangesAreChecked) {
     expect_fault("name = \"x\"\n[[targets]]\nradius_mm = 2\n", {"centre is missing"});
     expect_fault("name = \"x\"\n[[targets]]\ncentre = [1, 2]\n", {"3 numbers"});
     expect_fault("name = \"x\"\n[[pass_marks]]\nmetric = \"elapsed_time_s\"\n", {"no limit"});
+    expect_fault("name = \"x\"\n[[pass_marks]]\nmetric = \"elapsed_tme_s\"\nat_most = 3\n",
+                 {"line 3", "no score", "'elapsed_time_s'"});
     expect_fault("title = \"x\"\n", {"name is missing"});
     expect_fault("name = \"x\"\n[[sweeps]]\nname = \"s\"\n", {"keys is empty"});
     expect_fault(
