@@ -1,5 +1,6 @@
 #include "runtime/player/headless.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
@@ -9,6 +10,7 @@
 #include <optional>
 #include <thread>
 
+#include "runtime/player/contact_sheet.h"
 #include "runtime/player/frame_stats.h"
 #include "runtime/player/open_case.h"
 #include "runtime/player/png_file.h"
@@ -155,6 +157,8 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
         session = std::move(*started);
     }
     const int frames = frame_count(arguments, tracker);
+    ContactSheet sheet(frames, std::max(render.width_px, 2), std::max(render.height_px, 2));
+    const bool has_sheet = !arguments.out.empty() && render.width_px > 1 && render.height_px > 1;
     for (int i = 0; i < frames; ++i) {
         double now_s = frame_time_s(tracker, i, frames);
         TrackerReading reading;
@@ -192,7 +196,12 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
             const Status written =
                 write_png(arguments.out + name, render.width_px, render.height_px, 1, pixels);
             if (!written) return written.error();
+            if (has_sheet) sheet.add(i, pixels);
         }
+    }
+    if (has_sheet) {
+        const Status written = sheet.write(arguments.out + "/contact-sheet.png");
+        if (!written) return written.error();
     }
     std::string metrics;
     if (session) {

@@ -1,0 +1,31 @@
+// One picture of a whole run: up to twelve frames, evenly spread, at a quarter of their area.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/result.h"
+
+namespace sonocase::runtime {
+
+class ContactSheet {
+  public:
+    // Of a run of `frames` frames of width x height pixels; frames >= 1, width and height >= 2.
+    ContactSheet(int frames, int width, int height);
+
+    // Frame i of the run, in any order; those that are not on the sheet cost nothing.
+    void add(int i, std::span<const std::uint8_t> pixels);
+
+    Status write(const std::string& path) const;
+
+  private:
+    int frames_;
+    int source_width_;
+    int width_, height_;  // of a frame on the sheet
+    int shown_, columns_, rows_;
+    std::vector<std::uint8_t> sheet_;
+};
+
+}  // namespace sonocase::runtime
