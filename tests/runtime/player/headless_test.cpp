@@ -44,6 +44,7 @@ TEST_F(Headless, WritesFramesAndStatsOfASweep) {
     EXPECT_EQ(run.error, "");
     int frames = 0;
     for (const auto& entry : std::filesystem::directory_iterator(folder_ / "frames")) {
+        if (entry.path().filename() == "contact-sheet.png") continue;
         EXPECT_EQ(entry.path().extension(), ".png");
         const std::string png = read_text(entry.path().string());
         ASSERT_GT(png.size(), 100u);
