@@ -5,6 +5,7 @@
 
 #include "formats/exercise.h"
 #include "formats/nearest_name.h"
+#include "pipeline/cook/exercise_frame.h"
 #include "pipeline/cook/preview_picture.h"
 
 namespace sonocase::pipeline {
@@ -111,7 +112,18 @@ Result<PackResult> pack_case(const PackInput& input) {
     bundle.mannequin_skin = input.mannequin;
     bundle.preview_png = png_of(preview_picture(volume));
 
-    for (const EmbeddedExercise& embedded : input.exercises) {
+    for (EmbeddedExercise& embedded : bundle.exercises) {
+        auto framed = strip_frame(embedded.toml, embedded.name);
+        if (!framed) return framed.error();
+        embedded.toml = framed->toml;
+        if (framed->in_ct) {
+            if (input.registration == nullptr)
+                return Error{"the exercise is written in the frame 'ct'", embedded.name,
+                             "give the registration that carries it to the mannequin"};
+            auto mapped = exercise_to_mannequin(framed->toml, embedded.name, *input.registration);
+            if (!mapped) return mapped.error();
+            embedded.toml = std::move(*mapped);
+        }
         auto exercise = parse_exercise(embedded.toml, embedded.name);
         if (!exercise) return exercise.error();
         check_exercise(*exercise, volume, &report.warnings);

@@ -13,6 +13,7 @@
 #include "formats/exercise.h"
 #include "formats/nearest_name.h"
 #include "pipeline/cook/embedded_scenario.h"
+#include "pipeline/cook/exercise_frame.h"
 #include "pipeline/files.h"
 #include "pipeline/texture/tissue_table.h"
 
@@ -488,7 +489,9 @@ Result<Recipe> parse_recipe(std::string_view text,
         return status.error();
     for (const EmbeddedExercise& exercise : recipe.exercises) {
         const std::string where = (fs::path(recipe.folder) / (exercise.name + ".toml")).string();
-        if (auto parsed_exercise = parse_exercise(exercise.toml, where); !parsed_exercise)
+        auto framed = strip_frame(exercise.toml, where);
+        if (!framed) return framed.error();
+        if (auto parsed_exercise = parse_exercise(framed->toml, where); !parsed_exercise)
             return parsed_exercise.error();
     }
     return recipe;

@@ -47,11 +47,13 @@ Result<PackResult> pack(const PackFiles& files) {
     }
     Surface skin;
     Registration registration;
-    const bool has_skin = !files.skin.empty();
+    const bool has_skin = !files.skin.empty(), has_fit = !files.registration.empty();
     if (has_skin) {
         auto loaded = load_any_surface(files.skin);
         if (!loaded) return loaded.error();
         skin = std::move(*loaded);
+    }
+    if (has_fit) {
         auto fit = load_registration(files.registration);
         if (!fit) return fit.error();
         registration = std::move(*fit);
@@ -63,12 +65,12 @@ Result<PackResult> pack(const PackFiles& files) {
     }
     auto packed =
         pack_case({files.name, "", exercises, has_skin ? &skin : nullptr,
-                   has_skin ? &registration : nullptr, *mannequin, *labels, *textures, tissues});
+                   has_fit ? &registration : nullptr, *mannequin, *labels, *textures, tissues});
     if (!packed) return packed;
     auto& stages = packed->bundle.manifest.stages;
     for (const auto* reports : {&labels->reports, &textures->reports})
         stages.insert(stages.end(), reports->begin(), reports->end());
-    if (has_skin)
+    if (has_fit)
         stages.insert(stages.begin(), registration.reports.begin(), registration.reports.end());
     stages.push_back(packed->report);
     for (StageReport& report : stages) report.seconds = 0;
@@ -94,10 +96,10 @@ int verb_pack(int argc, char** argv) {
         ->required();
     auto* skin =
         app.add_option("--skin", files.skin, "The patient's skin, ct frame")->type_name("FILE");
-    auto* fit = app.add_option("--registration", files.registration, "The fit that maps it")
+    auto* fit = app.add_option("--registration", files.registration,
+                               "The fit, for the skin and for exercises in ct")
                     ->type_name("REG.json");
     skin->needs(fit);
-    fit->needs(skin);
     app.add_option("--exercise", files.exercises, "Exercise to put in; may be repeated")
         ->type_name("FILE.toml")
         ->take_all();
