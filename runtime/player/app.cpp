@@ -28,7 +28,7 @@ void notify(App& app, Notice::Kind kind, const std::string& text) {
     if (app.notices.size() > 4) app.notices.erase(app.notices.begin());
 }
 
-void rebuild_engine(App& app) {
+void rebuild_engine(App& app, bool goes_on) {
     EngineOptions options;
     RenderOptions& render = options.render;
     render.width_px = app.arguments.width_px > 0 && app.arguments.headless ? app.arguments.width_px
@@ -54,11 +54,12 @@ void rebuild_engine(App& app) {
     app.controls.frozen = false;
     app.cine_back = app.controls.cine_back = 0;
     app.scan->set_controls(app.controls);
-    app.scan->set_engine(std::make_unique<ScanEngine>(std::move(*engine)));
+    app.scan->set_engine(std::make_unique<ScanEngine>(std::move(*engine)), goes_on);
 }
 
 void close_bundle(App& app) {
     if (app.scan) {
+        finish_attempt(app);
         app.scan->set_tracker(nullptr);
         app.scan->set_engine(nullptr);
     }
@@ -98,6 +99,8 @@ bool open_bundle(App& app, const std::string& path, const std::string& exercise)
 }
 
 void choose_exercise(App& app, int index) {
+    finish_attempt(app);
+    app.score.reset();
     const int count = static_cast<int>(app.open->exercises.size());
     app.exercise = (index % count + count) % count;
     const Exercise& exercise = app.current();
@@ -108,7 +111,7 @@ void choose_exercise(App& app, int index) {
     app.image.clear_measurements();
     app.view3d->set_exercise(exercise);
     app.scan->set_tracker(nullptr);
-    rebuild_engine(app);
+    rebuild_engine(app, false);
     choose_tracker(app, app.tracker_spec);
 }
 
@@ -179,6 +182,46 @@ void toggle_needle(App& app, bool in_plane) {
     if (!app.mouse->place_needle_beside_probe(in_plane ? half + 8 : 18, in_plane)) {
         notify(app, Notice::Kind::news, "There is no skin beside the probe to put the needle on.");
     }
+}
+
+void start_attempt(App& app, const std::string& path) {
+    if (app.attempt || !app.open) return;
+    std::string file = path;
+    if (file.empty())
+        file = new_session_path(app.open->bundle.manifest.case_name, app.current().name);
+    if (file.empty()) {
+        notify(app, Notice::Kind::error,
+               "There is no folder to record to: set HOME or XDG_DATA_HOME.");
+        return;
+    }
+    Result<std::unique_ptr<SessionRun>> run = Error{"there is no picture to record", file, ""};
+    const double now_s = steady_seconds() - app.clock_start_s;
+    app.scan->with_engine([&](ScanEngine& engine) {
+        run = SessionRun::start(file, *app.open, engine, "", utc_now(), now_s);
+    });
+    if (!run) {
+        notify(app, Notice::Kind::error, run.error().message());
+        return;
+    }
+    app.attempt = std::make_shared<Attempt>(*app.open, app.current(), std::move(*run));
+    app.score.reset();
+    app.hits.assign(app.hits.size(), false);
+    app.scan->set_observer([attempt = app.attempt](const ScanFrame& frame) {
+        attempt->observe(frame.record, frame.width_px, frame.height_px, frame.pixels);
+    });
+}
+
+void finish_attempt(App& app) {
+    if (!app.attempt) return;
+    app.scan->set_observer({});  // returns when the thread has let go of the attempt
+    Result<SessionScore> score = app.attempt->finish();
+    if (score) {
+        app.score = std::move(*score);
+        app.score_file = app.attempt->path();
+    } else {
+        notify(app, Notice::Kind::error, score.error().message());
+    }
+    app.attempt.reset();
 }
 
 Status save_screenshot(App& app, const std::string& path) {
@@ -273,7 +316,10 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
     app.tracker_spec = arguments.tracker.empty() ? "mouse" : arguments.tracker;
     if (!warning.empty()) notify(app, Notice::Kind::warning, warning);
     app.bundles = find_bundles(app.settings);
-    if (!arguments.bundle.empty()) open_bundle(app, arguments.bundle, arguments.exercise);
+    if (!arguments.bundle.empty() && open_bundle(app, arguments.bundle, arguments.exercise) &&
+        !arguments.record.empty()) {
+        start_attempt(app, arguments.record);
+    }
 
     double last_s = steady_seconds(), last_shown_s = last_s;
     std::uint64_t shown = 0;
@@ -328,8 +374,11 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
         const Status saved = save_screenshot(app, arguments.screenshot);
         if (!saved) std::fprintf(stderr, "sonoplay: %s\n", saved.error().message().c_str());
     }
+    finish_attempt(app);
     if (!arguments.stats.empty()) {
-        const Status written = write_text_file(arguments.stats, app.scan->stats_json(""));
+        const std::string score =
+            app.score && app.open ? score_json(*app.score, app.current()) : "";
+        const Status written = write_text_file(arguments.stats, app.scan->stats_json(score));
         if (!written) std::fprintf(stderr, "sonoplay: %s\n", written.error().message().c_str());
     }
     keep_settings(app);

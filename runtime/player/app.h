@@ -9,6 +9,7 @@
 #include "runtime/display/image_texture.h"
 #include "runtime/display/view3d.h"
 #include "runtime/display/window.h"
+#include "runtime/player/attempt.h"
 #include "runtime/player/command_line.h"
 #include "runtime/player/image_view.h"
 #include "runtime/player/input_script.h"
@@ -54,6 +55,11 @@ struct App {
     std::unique_ptr<ScanThread> scan;
     ScanControls controls;
 
+    // An attempt at the exercise, and the scores of the last one.
+    std::shared_ptr<Attempt> attempt;  // shared with the scan thread
+    std::optional<SessionScore> score;
+    std::string score_file;
+
     // Of the picture
     std::unique_ptr<ImageTexture> texture;
     std::unique_ptr<View3d> view3d;
@@ -62,7 +68,7 @@ struct App {
     int cine_back = 0;
     bool playing_cine = false;
     double cine_clock_s = 0;
-    std::vector<bool> hits;
+    std::vector<bool> hits;  // targets reached in free scanning or in the attempt
     void* view_texture = nullptr;
     double view_drawn_s = -1;
     double screen_ms = 0;  // pose to the picture handed to the display, of the last frame shown
@@ -83,12 +89,14 @@ bool open_bundle(App& app, const std::string& path, const std::string& exercise)
 void close_bundle(App& app);
 void choose_exercise(App& app, int index);
 void choose_tracker(App& app, const std::string& spec);
-void rebuild_engine(App& app);  // after depth, focus, model or picture size
+void rebuild_engine(App& app, bool goes_on = true);  // after depth, focus, model, picture size
 void change_depth(App& app, double by_mm);
 void change_focus(App& app, double by_mm);
 void set_frozen(App& app, bool frozen);
 void step_cine(App& app, int frames);
 void toggle_needle(App& app, bool in_plane);
+void start_attempt(App& app, const std::string& path);  // "": a new file of the user's
+void finish_attempt(App& app);
 Status save_screenshot(App& app, const std::string& path);
 
 // Panels, one file each.

@@ -59,7 +59,7 @@ void FrameStats::add(double frame_ms, std::span<const EffectCost> costs) {
     }
 }
 
-std::string FrameStats::json(const std::string& metrics_json,
+std::string FrameStats::json(const std::string& score_json,
                              const TimeHistogram* pose_to_pixel_ms) const {
     nlohmann::ordered_json out;
     out["frames"] = frame_ms_.count();
@@ -81,9 +81,9 @@ std::string FrameStats::json(const std::string& metrics_json,
         out["pose_to_pixel_ms"]["median"] = rounded(pose_to_pixel_ms->quantile(0.5));
         out["pose_to_pixel_ms"]["p99"] = rounded(pose_to_pixel_ms->quantile(0.99));
     }
-    if (!metrics_json.empty()) {
-        auto metrics = nlohmann::ordered_json::parse(metrics_json, nullptr, false);
-        if (!metrics.is_discarded()) out["metrics"] = std::move(metrics);
+    if (!score_json.empty()) {
+        const auto score = nlohmann::ordered_json::parse(score_json, nullptr, false);
+        if (score.is_object()) out.update(score);
     }
     return out.dump(2) + "\n";
 }

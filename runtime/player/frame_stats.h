@@ -36,8 +36,9 @@ class FrameStats {
     void set_first_frame_ms(double ms) { first_frame_ms_ = ms; }
 
     const TimeHistogram& frame_ms() const { return frame_ms_; }
-    // The JSON of --stats. `metrics_json` is put in as "metrics" when not empty.
-    std::string json(const std::string& metrics_json, const TimeHistogram* pose_to_pixel_ms) const;
+    // The JSON of --stats. score_json: of a recorded session (formats/session/session_score.h); its
+    // entries, "metrics" first, are put in as they are.
+    std::string json(const std::string& score_json, const TimeHistogram* pose_to_pixel_ms) const;
 
   private:
     struct Effect {

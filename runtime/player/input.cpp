@@ -143,6 +143,13 @@ void handle_keys(App& app, double seconds) {
     if (pressed(GLFW_KEY_F)) {
         app.controls.settings.flip_left_right = !app.controls.settings.flip_left_right;
     }
+    if (pressed(GLFW_KEY_B)) {
+        if (app.attempt) {
+            finish_attempt(app);
+        } else {
+            start_attempt(app, "");
+        }
+    }
     if (pressed(GLFW_KEY_N)) toggle_needle(app, !io.KeyShift);
     if (pressed(GLFW_KEY_V)) app.settings.show_3d = !app.settings.show_3d;
     move_probe(app, seconds);

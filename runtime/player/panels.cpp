@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "formats/session/metric_table.h"
 #include "runtime/display/theme.h"
 #include "runtime/player/app.h"
 
@@ -123,6 +124,67 @@ void calibration_row(const char* tool,
     for (const std::string& warning : calibration->warnings) coloured(colour::kWarn, warning);
 }
 
+void draw_attempt(const AttemptView& view) {
+    ImGui::Separator();
+    char clock[32];
+    std::snprintf(clock, sizeof clock, "%d:%04.1f", static_cast<int>(view.seconds) / 60,
+                  std::fmod(view.seconds, 60.0));
+    row("Recording", clock, colour::kBad);
+    row("Insertions", "%.0f", static_cast<double>(view.insertions));
+    if (view.depth_mm > 0) {
+        row("Tip", view.tip_in_view ? "in the picture" : "out of the plane",
+            view.tip_in_view ? colour::kGood : colour::kWarn);
+    }
+    if (view.in_no_go) coloured(colour::kBad, "The needle is in a structure to be spared.");
+    ImGui::PushFont(fonts().small);
+    for (const std::string& news : view.news) ImGui::TextDisabled("%s", news.c_str());
+    ImGui::PopFont();
+    if (!view.problem.empty()) coloured(colour::kBad, view.problem);
+}
+
+void draw_score(const App& app) {
+    const SessionScore& score = *app.score;
+    ImGui::Separator();
+    if (!score.pass_marks.empty()) {
+        coloured(score.passed ? colour::kGood : colour::kWarn,
+                 score.passed ? "Passed" : "Not passed yet");
+    } else {
+        heading("Scores");
+    }
+    const auto number = [](double value) {
+        char text[32];
+        std::snprintf(text, sizeof text, std::abs(value) >= 100 ? "%.0f" : "%.2f", value);
+        return std::string(text);
+    };
+    const auto title = [](const std::string& name) {
+        const MetricInfo* info = find_metric(name);
+        return std::string(info ? info->title : name.c_str());
+    };
+    ImGui::PushFont(fonts().small);
+    for (const PassResult& mark : score.pass_marks) {
+        const std::string limit =
+            std::isfinite(mark.at_most)    ? " (at most " + number(mark.at_most) + ")"
+            : std::isfinite(mark.at_least) ? " (at least " + number(mark.at_least) + ")"
+                                           : "";
+        row(title(mark.metric).c_str(),
+            std::isfinite(mark.value) ? number(mark.value).c_str() : "-",
+            mark.passed ? colour::kGood : colour::kBad);
+        if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s%s", mark.metric.c_str(), limit.c_str());
+    }
+    if (!score.pass_marks.empty()) ImGui::Separator();
+    for (const Metric& metric : score.metrics) {
+        if (!std::isfinite(metric.value)) continue;
+        const std::string name = title(metric.name);
+        const std::string value =
+            number(metric.value) + " " + std::string(metric_unit(metric.name));
+        row(name.c_str(), value.c_str());
+    }
+    for (const std::string& warning : score.warnings) coloured(colour::kWarn, warning);
+    ImGui::TextDisabled("Kept in");
+    ImGui::TextWrapped("%s", app.score_file.c_str());
+    ImGui::PopFont();
+}
+
 }  // namespace
 
 void draw_exercise_panel(App& app) {
@@ -135,34 +197,46 @@ void draw_exercise_panel(App& app) {
     ImGui::TextDisabled("%s", stars);
     ImGui::PopFont();
     if (!exercise.description.empty()) ImGui::TextWrapped("%s", exercise.description.c_str());
-    ImGui::Separator();
-    const ToolPoses& tools = app.frame().record.tools;
-    const Point3 tip = tools.mannequin_from_needle * Point3{0, 0, 0};
+    const float wide = ImGui::GetContentRegionAvail().x;
+    ImGui::PushStyleColor(ImGuiCol_Button,
+                          app.attempt ? colour::rgba(150, 58, 54) : colour::rgba(32, 112, 92));
+    if (ImGui::Button(app.attempt ? "Finish (B)" : "Start attempt (B)", {wide, 0})) {
+        if (app.attempt) {
+            finish_attempt(app);
+        } else {
+            start_attempt(app, "");
+        }
+    }
+    ImGui::PopStyleColor();
+    const FrameRecord& record = app.frame().record;
+    const Point3 tip = record.needle.mannequin_from_drawn * Point3{0, 0, 0};
     for (std::size_t i = 0; i < exercise.targets.size(); ++i) {
         const Target& target = exercise.targets[i];
         const std::string name =
             target.name.empty() ? "Target " + std::to_string(i + 1) : target.name;
-        if (i < app.hits.size() && app.hits[i]) {
-            row(name.c_str(), "reached", colour::kGood);
-        } else if (tools.has_needle) {
-            row_distance((name + ", tip at").c_str(), distance(tip, target.centre),
-                         target.hit_radius_mm);
-        } else {
-            row(name.c_str(), "to reach", colour::kDim);
-        }
-        if (tools.has_needle && i < app.hits.size() &&
+        if (record.tools.has_needle && i < app.hits.size() &&
             distance(tip, target.centre) <= target.hit_radius_mm) {
             app.hits[i] = true;
         }
+        const bool hit = i < app.hits.size() && app.hits[i];
+        if (record.tools.has_needle) {
+            row_distance((name + (hit ? ", reached" : ", tip at")).c_str(),
+                         distance(tip, target.centre), target.hit_radius_mm);
+        } else {
+            row(name.c_str(), hit ? "reached" : "to reach", hit ? colour::kGood : colour::kDim);
+        }
+    }
+    if (record.tools.has_needle) row("Needle depth", "%.0f mm", record.needle.depth_mm);
+    if (app.attempt) {
+        draw_attempt(app.attempt->view());
+    } else if (app.score) {
+        draw_score(app);
     }
     if (app.mouse) {
         ImGui::Separator();
         if (ImGui::Button(app.mouse->has_needle() ? "Withdraw needle (N)" : "Take needle (N)",
                           {-1, 0})) {
             toggle_needle(app, true);
-        }
-        if (app.mouse->has_needle()) {
-            row("Needle depth", "%.0f mm", std::max(app.mouse->needle_depth_mm(), 0.0));
         }
     }
 }
@@ -337,7 +411,7 @@ void draw_view3d_panel(App& app, float height) {
     input.has_needle = tools.has_needle;
     input.in_contact = frame.status == FrameStatus::rendered;
     input.mannequin_from_probe = tools.mannequin_from_probe;
-    input.mannequin_from_needle = tools.mannequin_from_needle;
+    input.mannequin_from_needle = frame.record.needle.mannequin_from_drawn;
     input.layout = frame.layout;
     input.depth_mm = frame.depth_mm;
     input.image_width_px = frame.width_px;

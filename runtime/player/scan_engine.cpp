@@ -127,6 +127,18 @@ void ScanEngine::begin_session(double now_s) {
     needle_ = NeedleState(anatomy_.get(), exercise_.needle);
 }
 
+void ScanEngine::take_over(const ScanEngine& before) {
+    anatomy_ = before.anatomy_;  // the needle's state points to it
+    needle_ = before.needle_;
+    probe_watch_ = before.probe_watch_;
+    needle_watch_ = before.needle_watch_;
+    reading_ = before.reading_;
+    tools_ = before.tools_;
+    last_ = before.last_;
+    frame_ = before.frame_;
+    origin_s_ = before.origin_s_;
+}
+
 FrameStatus ScanEngine::frame_again(const FrameRecord& record, std::span<std::uint8_t> pixels) {
     return finish(record.input, renderer_.render(record.input, pixels), pixels);
 }

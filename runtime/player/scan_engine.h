@@ -79,6 +79,9 @@ class ScanEngine {
     // yet. What is rendered afterwards depends on readings, settings and times since now_s alone,
     // so that a replay of the recording gives the same pixels.
     void begin_session(double now_s);
+    // Goes on where another engine of the same bundle and exercise stood: session clock, frame
+    // numbers, tools, inserted needle. For a change of depth in the middle of a session.
+    void take_over(const ScanEngine& before);
     // Renders a past frame again: the same pixels.
     FrameStatus frame_again(const FrameRecord& record, std::span<std::uint8_t> pixels);
 
@@ -86,7 +89,7 @@ class ScanEngine {
     void set_assignment(const SensorAssignment& assignment) { assignment_ = assignment; }
 
     const FrameRecord& last() const { return last_; }
-    const Anatomy& anatomy() const { return *anatomy_; }
+    std::shared_ptr<const Anatomy> anatomy() const { return anatomy_; }
     SensorVerdict probe_verdict(double now_s) const { return probe_watch_.verdict(now_s); }
     SensorVerdict needle_verdict(double now_s) const { return needle_watch_.verdict(now_s); }
     int jumps() const { return probe_watch_.jumps() + needle_watch_.jumps(); }
@@ -100,7 +103,7 @@ class ScanEngine {
                EngineOptions options,
                Renderer renderer)
         : skin_(bundle),
-          anatomy_(std::make_unique<CaseAnatomy>(bundle)),
+          anatomy_(std::make_shared<CaseAnatomy>(bundle)),
           needle_(anatomy_.get(), exercise.needle),
           exercise_(std::move(exercise)),
           options_(std::move(options)),
@@ -109,7 +112,7 @@ class ScanEngine {
     FrameStatus finish(const FrameInput& input, FrameStatus status, std::span<std::uint8_t> pixels);
 
     Skin skin_;
-    std::unique_ptr<CaseAnatomy> anatomy_;  // stays in place when the engine moves
+    std::shared_ptr<CaseAnatomy> anatomy_;  // stays in place when the engine moves
     NeedleState needle_;
     Exercise exercise_;
     EngineOptions options_;

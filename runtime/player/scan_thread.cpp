@@ -32,9 +32,16 @@ void ScanThread::wake() {
     wake_condition_.notify_one();
 }
 
-void ScanThread::set_engine(std::unique_ptr<ScanEngine> engine) {
+bool ScanThread::with_engine(const std::function<void(ScanEngine&)>& use) {
+    const std::lock_guard lock(mutex_);
+    if (engine_) use(*engine_);
+    return engine_ != nullptr;
+}
+
+void ScanThread::set_engine(std::unique_ptr<ScanEngine> engine, bool goes_on) {
     {
         const std::lock_guard lock(mutex_);
+        if (engine && engine_ && goes_on) engine->take_over(*engine_);
         std::swap(engine_, engine);
         if (engine_) {
             engine_->set_calibrations(calibrations_);
@@ -85,9 +92,9 @@ TrackerHealth ScanThread::tracker_health() const {
     return tracker ? tracker->health() : TrackerHealth{};
 }
 
-std::string ScanThread::stats_json(const std::string& metrics_json) const {
+std::string ScanThread::stats_json(const std::string& score_json) const {
     const std::lock_guard lock(mutex_);
-    return stats_.json(metrics_json, &pose_to_pixel_);
+    return stats_.json(score_json, &pose_to_pixel_);
 }
 
 void ScanThread::run() {

@@ -68,10 +68,13 @@ class ScanThread {
 
     // Each takes effect between two frames. The bundle must outlive the engine's use: set_engine
     // waits until the thread has let go of the engine before it.
-    void set_engine(std::unique_ptr<ScanEngine> engine);
+    // goes_on: the new engine continues where the old one stood.
+    void set_engine(std::unique_ptr<ScanEngine> engine, bool goes_on = false);
     void set_tracker(std::shared_ptr<Tracker> tracker);
     void set_calibrations(const Calibrations& calibrations);
     void set_observer(FrameObserver observer);
+    // Between two frames; false when there is no engine.
+    bool with_engine(const std::function<void(ScanEngine&)>& use);
     void set_controls(const ScanControls& controls);
 
     // Window thread: true if frame() is newer than at the last call.
@@ -80,7 +83,7 @@ class ScanThread {
 
     TrackerHealth tracker_health() const;
     // JSON of --stats over the thread's life.
-    std::string stats_json(const std::string& metrics_json) const;
+    std::string stats_json(const std::string& score_json) const;
     void set_first_frame_origin_s(double start_s) { start_s_ = start_s; }
     double first_frame_s() const { return first_frame_s_.load(); }
 

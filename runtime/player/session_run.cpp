@@ -49,10 +49,12 @@ std::string utc_now() {
 
 SessionRun::SessionRun(const OpenCase& open, const ScanEngine& engine, std::string path)
     : open_(open),
-      engine_(engine),
+      anatomy_(engine.anatomy()),
+      width_px_(engine.render_options().width_px),
+      height_px_(engine.render_options().height_px),
       exercise_(engine.exercise()),
       path_(std::move(path)),
-      monitor_(exercise_, &engine.anatomy(), open.bundle.labels) {}
+      monitor_(exercise_, anatomy_.get(), open.bundle.labels) {}
 
 Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
                                                       const OpenCase& open,
@@ -82,9 +84,9 @@ Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
     return run;
 }
 
-void SessionRun::observe(const FrameRecord& record,
-                         std::span<const std::uint8_t> pixels,
-                         bool may_wait) {
+std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
+                                               std::span<const std::uint8_t> pixels,
+                                               bool may_wait) {
     if (may_wait) recorder_->wait_for_room();
     const FrameInput& input = record.input;
     RecordedFrame frame;
@@ -111,11 +113,10 @@ void SessionRun::observe(const FrameRecord& record,
                         frame.needle_ok, frame.mannequin_from_drawn);
     recorder_->push(frame, events);
     if (const char* why = picture_worth(events)) {
-        const RenderOptions& render = engine_.render_options();
-        recorder_->push_picture(frame.frame, frame.time_s, why, render.width_px, render.height_px,
-                                pixels);
+        recorder_->push_picture(frame.frame, frame.time_s, why, width_px_, height_px_, pixels);
     }
     last_ = record;
+    return events;
 }
 
 Result<SessionScore> SessionRun::finish() {
@@ -124,7 +125,7 @@ Result<SessionScore> SessionRun::finish() {
     if (!sequence) return sequence.error();
     const auto session = session_from_sequence(*sequence, guess_names(*sequence), path_);
     if (!session) return session.error();
-    return score_session(*session, exercise_, &engine_.anatomy(), open_.bundle.labels);
+    return score_session(*session, exercise_, anatomy_.get(), open_.bundle.labels);
 }
 
 std::optional<SessionReplay> session_replay(const std::string& path) {

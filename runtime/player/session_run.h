@@ -16,8 +16,8 @@ namespace sonocase::runtime {
 
 class SessionRun {
   public:
-    // Begins the engine's session clock at now_s. `open` and the engine must outlive the run.
-    // `started`: ISO 8601, UTC.
+    // Begins the engine's session clock at now_s. `open` must outlive the run; the engine may be
+    // replaced while it lasts (ScanEngine::take_over). `started`: ISO 8601, UTC.
     static Result<std::unique_ptr<SessionRun>> start(const std::string& path,
                                                      const OpenCase& open,
                                                      ScanEngine& engine,
@@ -26,10 +26,15 @@ class SessionRun {
                                                      double now_s);
 
     // The frame that the engine just rendered. Allocates nothing and waits for nothing, unless
-    // `may_wait` (runs faster than life).
-    void observe(const FrameRecord& record,
-                 std::span<const std::uint8_t> pixels,
-                 bool may_wait = false);
+    // `may_wait` (runs faster than life). Returns what happened, valid until the next call.
+    std::span<const LiveEvent> observe(const FrameRecord& record,
+                                       std::span<const std::uint8_t> pixels,
+                                       bool may_wait = false);
+    // When later pictures have another size.
+    void set_picture_size(int width_px, int height_px) {
+        width_px_ = width_px;
+        height_px_ = height_px;
+    }
 
     // Live values for the screen.
     const SessionMonitor& monitor() const { return monitor_; }
@@ -43,7 +48,8 @@ class SessionRun {
     SessionRun(const OpenCase& open, const ScanEngine& engine, std::string path);
 
     const OpenCase& open_;
-    const ScanEngine& engine_;
+    std::shared_ptr<const Anatomy> anatomy_;
+    int width_px_, height_px_;
     Exercise exercise_;
     std::string path_;
     SessionMonitor monitor_;

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "runtime/tracking/igtl_tracker.h"
 #include "runtime/tracking/mouse_tracker.h"
 #include "runtime/tracking/null_tracker.h"
 #include "runtime/tracking/replay_tracker.h"
@@ -47,6 +48,20 @@ Made make_tracker(const std::string& spec, const TrackerContext& context) {
     if (spec == "null") {
         const MouseTracker start(*context.skin, *context.exercise);
         return Made(std::make_unique<NullTracker>(start.mannequin_from_probe()));
+    }
+    if (kind == "igtl") {
+        IgtlTrackerOptions options;
+        std::string address = rest;
+        if (address.rfind("listen:", 0) == 0) {
+            options.listening = true;
+            address = address.substr(7);
+        }
+        if (!split_address(address, options.host, options.port)) {
+            return Error{
+                "not an address: " + spec, "--tracker",
+                "use igtl:HOST:PORT or igtl:listen:[ADDRESS:]PORT, e.g. igtl:127.0.0.1:18944"};
+        }
+        return IgtlTracker::start(options, context.clock);
     }
     using MakeDriver = std::unique_ptr<UsbDriver> (*)();
     constexpr std::pair<const char*, MakeDriver> kDevices[] = {{"viper", make_viper_driver},

@@ -53,7 +53,7 @@ TEST(FrameStats, CountsCostAndSkippedFramesPerEffect) {
         costs[1].skipped_because = i == 0 ? "" : "no needle near the plane";
         stats.add(5, costs);
     }
-    const auto json = nlohmann::json::parse(stats.json(R"({"hits": 2})", nullptr));
+    const auto json = nlohmann::json::parse(stats.json(R"({"metrics": {"hits": 2}})", nullptr));
     EXPECT_EQ(json["frames"], 4);
     EXPECT_EQ(json["effects"][0]["name"], "texture");
     EXPECT_EQ(json["effects"][0]["ms"], 2);

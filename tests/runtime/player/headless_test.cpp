@@ -131,6 +131,31 @@ TEST_F(Headless, ReplaysEveryRowInOrderAndAppliesCalibrations) {
     }
 }
 
+TEST_F(Headless, RecordsASessionAndScoresIt) {
+    const std::string record = folder_ / "session.igs.mha";
+    const CommandResult run =
+        play(bundle_ + " --headless --model paper --size 96x96 --frames 60 --stats - --record " +
+             record);
+    ASSERT_EQ(run.status, 0) << run.error;
+    const auto stats = nlohmann::json::parse(run.out);
+    ASSERT_TRUE(stats.contains("metrics")) << run.out;
+    // The script pushes the needle in once.
+    ASSERT_TRUE(stats["insertions"].is_array());
+    EXPECT_EQ(stats["insertions"].size(), 1u);
+    EXPECT_EQ(read_text(record).substr(0, 18), "ObjectType = Image");
+    // What was recorded plays again, probe and needle at the same places: the same pictures.
+    const CommandResult first =
+        play(bundle_ + " --headless --model paper --size 96x96 --frames 60 --out " +
+             (folder_ / "first"));
+    const CommandResult again =
+        play(bundle_ + " --headless --model paper --size 96x96 --tracker replay:" + record +
+             " --out " + (folder_ / "again"));
+    ASSERT_EQ(first.status, 0) << first.error;
+    ASSERT_EQ(again.status, 0) << again.error;
+    EXPECT_EQ(read_text(folder_ / "first/frame_00030.png"),
+              read_text(folder_ / "again/frame_00030.png"));
+}
+
 TEST_F(Headless, SaysInOneLineWhatIsWrong) {
     struct Case {
         std::string arguments;
@@ -152,6 +177,8 @@ TEST_F(Headless, SaysInOneLineWhatIsWrong) {
         {bundle_ + " --headless --model paper --effects glitter", 1, "glitter"},
         {bundle_ + " --headless --model paper --out /proc/nothing", 1, "/proc/nothing"},
         {bundle_ + " --headless --model paper --stats /proc/nothing.json", 1, "/proc/nothing.json"},
+        {bundle_ + " --headless --model paper --record /proc/nothing.igs.mha", 1,
+         "/proc/nothing.igs.mha"},
         {bundle_ + " --headless --size huge", 2, "WxH"},
         {bundle_ + " --headless --model cubist", 2, "physical"},
         {bundle_ + " --headless --frames 0", 2, "frames"},
