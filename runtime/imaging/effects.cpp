@@ -22,7 +22,7 @@ constexpr std::array<EffectEntry, 8> kPaper{{
     {"scan_conversion", Pass::convert, 1, nullptr, nullptr},
 }};
 
-constexpr std::array<EffectEntry, 23> kPhysical{{
+constexpr std::array<EffectEntry, 25> kPhysical{{
     {"contact", Pass::contact, 1, nullptr, &Y::contact},
     {"slice", Pass::beams, 4, nullptr, nullptr},
     {"breathing", Pass::beams, 1, nullptr, &Y::breathing},
@@ -30,6 +30,8 @@ constexpr std::array<EffectEntry, 23> kPhysical{{
     {"elevation", Pass::beams, 0.5, nullptr, &Y::elevation},
     {"boundaries", Pass::beams, 3, nullptr, &Y::boundaries},
     {"structure", Pass::beams, 1.5, nullptr, &Y::structure},
+    {"fine_structure", Pass::beams, 1, nullptr, &Y::fine_structure},
+    {"targets", Pass::beams, 0.5, nullptr, &Y::targets},
     {"speckle", Pass::beams, 2, nullptr, &Y::speckle},
     {"interfaces", Pass::beams, 1, nullptr, &Y::interfaces},
     {"edge_shadow", Pass::beams, 0.3, nullptr, &Y::edge_shadow},

@@ -76,6 +76,7 @@ void sample_physical(PhysicalBlock& b) {
     const auto speckle_unit = hn::Set(d, 0.70710678f / 32);
     const float bone_decay = std::exp(-b.step_mm / static_cast<float>(kBoneTailMm));
     const float bone_slow_decay = std::exp(-b.step_mm / static_cast<float>(kBoneTailSlowMm));
+    const float bone_floor_decay = std::exp(-b.step_mm / static_cast<float>(kBoneFloorMm));
     const float gas_decay = std::exp(-b.step_mm / static_cast<float>(kGasTailMm));
     // A byte of a pool: the word that holds it, shifted; nothing past the pool's end is read.
     const auto pool_word = [&](const std::int32_t* pool, I address) HWY_ATTR {
@@ -84,6 +85,16 @@ void sample_physical(PhysicalBlock& b) {
                        hn::BitCast(du, hn::ShiftLeft<3>(hn::And(address, three))));
     };
 
+    static_assert(kRoughEdge == 64 && kFineEdge == 64);
+    const auto rough_at = [&](V px, V py, V pz) HWY_ATTR {
+        const auto mask = hn::Set(di, kRoughEdge - 1);
+        const auto scale = hn::Set(d, b.rough_per_voxel);
+        const auto i = hn::And(hn::NearestInt(hn::Mul(px, scale)), mask);
+        const auto j = hn::And(hn::NearestInt(hn::Mul(py, scale)), mask);
+        const auto l = hn::And(hn::NearestInt(hn::Mul(pz, scale)), mask);
+        return hn::GatherIndex(di, b.rough,
+                               hn::Or(i, hn::Or(hn::ShiftLeft<6>(j), hn::ShiftLeft<12>(l))));
+    };
     int from[kBeamBlock];
     for (int v = 0; v < kBeamBlock; v += lanes) {
         const auto beam = [&](int number)
@@ -100,7 +111,7 @@ void sample_physical(PhysicalBlock& b) {
         const V jx = hn::Mul(dx, jitter), jy = hn::Mul(dy, jitter), jz = hn::Mul(dz, jitter);
         const auto air = hn::Lt(gap, zero);
         const bool any_air = !hn::AllFalse(d, air);
-        V light_log2 = zero, bone = zero, bone_slow = zero, gas = zero;
+        V light_log2 = zero, bone = zero, bone_slow = zero, bone_floor = zero, gas = zero;
         I before = hn::Zero(di);
         bool tails = false;
         from[v] = b.samples;
@@ -199,15 +210,7 @@ void sample_physical(PhysicalBlock& b) {
                     const auto nx = hn::Mul(nu, inverse), ny = hn::Mul(nv, inverse),
                                nz = hn::Mul(nz0, inverse);
 
-                    const auto rough_mask = hn::Set(di, kRoughEdge - 1);
-                    const auto rpv = hn::Set(d, b.rough_per_voxel);
-                    const auto ri = hn::And(hn::NearestInt(hn::Mul(px, rpv)), rough_mask),
-                               rj = hn::And(hn::NearestInt(hn::Mul(py, rpv)), rough_mask),
-                               rl = hn::And(hn::NearestInt(hn::Mul(pz, rpv)), rough_mask);
-                    const auto rough = hn::GatherIndex(
-                        di, b.rough,
-                        hn::Or(ri, hn::Or(hn::ShiftLeft<6>(rj), hn::ShiftLeft<12>(rl))));
-                    static_assert(kRoughEdge == 64);
+                    const auto rough = rough_at(px, py, pz);
 
                     const auto own = label;
                     const auto pair = hn::IfThenElseZero(
@@ -294,9 +297,75 @@ void sample_physical(PhysicalBlock& b) {
                 }
             }
 
-            // Looks of the label; in most places all lanes share one.
-            const auto look = hn::GatherIndex(di, b.looks, label);
-            const auto kind = hn::And(hn::ShiftRight<16>(look), hn::Set(di, 15));
+            I look = hn::GatherIndex(di, b.looks, label);
+            auto replaced = hn::MaskFromVec(hn::Zero(di));
+            if (b.target_count > 0) {
+                const auto soft =
+                    hn::RebindMask(d, hn::Eq(hn::And(hn::ShiftRight<16>(look), hn::Set(di, 7)),
+                                             hn::Set(di, static_cast<std::int32_t>(kPackedSoft))));
+                for (int t = 0; t < b.target_count; ++t) {
+                    const PhysicalTarget& ball = b.targets[t];
+                    const auto mm = hn::Set(d, b.voxel_mm);
+                    const auto fx = hn::Mul(hn::Sub(px, hn::Set(d, ball.x)), mm),
+                               fy = hn::Mul(hn::Sub(py, hn::Set(d, ball.y)), mm),
+                               fz = hn::Mul(hn::Sub(pz, hn::Set(d, ball.z)), mm);
+                    const auto away = hn::Sqrt(
+                        hn::Add(hn::Add(hn::Mul(fx, fx), hn::Mul(fy, fy)), hn::Mul(fz, fz)));
+                    auto distance = hn::Sub(away, hn::Set(d, ball.radius_mm));
+                    const auto close = hn::And(
+                        soft, hn::Le(distance, hn::Set(d, static_cast<float>(kTargetReachMm))));
+                    if (hn::AllFalse(d, close)) continue;
+                    const auto one = hn::Set(d, 1.0f);
+                    const auto rough = rough_at(px, py, pz);
+                    const auto rough_byte = [&](I bits) HWY_ATTR {
+                        return hn::ConvertTo(d, hn::ShiftRight<24>(bits));
+                    };
+                    distance = hn::Add(distance,
+                                       hn::Mul(rough_byte(hn::ShiftLeft<24>(rough)),
+                                               hn::Set(d, static_cast<float>(kRoughnessMm) / 32)));
+                    const auto cosine =
+                        hn::Div(hn::Abs(hn::Add(hn::Add(hn::Mul(fx, dx), hn::Mul(fy, dy)),
+                                                hn::Mul(fz, dz))),
+                                hn::Max(away, hn::Set(d, 1e-3f)));
+                    const auto within = hn::RebindMask(di, hn::And(close, hn::Lt(distance, zero)));
+                    look = hn::IfThenElse(within, hn::Set(di, ball.look), look);
+                    replaced = hn::Or(replaced, within);
+                    if (b.interfaces) {
+                        const auto u = hn::Mul(distance, hn::Set(d, 1 / 0.16f));
+                        const auto c2 = hn::Mul(cosine, cosine);
+                        const auto mirror =
+                            hn::Add(hn::Mul(hn::Set(d, 0.08f), cosine),
+                                    hn::Mul(hn::Set(d, 0.92f), hn::Mul(hn::Mul(c2, c2), c2)));
+                        const auto glint =
+                            hn::Mul(rough_byte(hn::ShiftLeft<16>(rough)), hn::Set(d, 1.0f / 32));
+                        const auto profile = exp2_of(
+                            d, hn::Add(glint, hn::Mul(hn::Mul(u, u), hn::Set(d, -0.72134752f))));
+                        const auto echo_of_wall = hn::IfThenElseZero(
+                            close, hn::Mul(hn::Mul(profile, mirror),
+                                           hn::Set(d, ball.wall * b.interface_scale[k] / 127)));
+                        add_re = hn::Add(
+                            add_re, hn::Mul(echo_of_wall, rough_byte(hn::ShiftLeft<8>(rough))));
+                        add_im = hn::Add(add_im, hn::Mul(echo_of_wall, rough_byte(rough)));
+                    }
+                    if (b.edge_shadow && ball.fluid) {
+                        const auto graze = hn::Max(
+                            hn::Sub(one,
+                                    hn::Mul(cosine, hn::Set(d, static_cast<float>(1 / kEdgeCos)))),
+                            zero);
+                        const auto near_wall = hn::Max(
+                            hn::Sub(one, hn::Mul(hn::Abs(distance),
+                                                 hn::Set(d, static_cast<float>(1 / kEdgeReachMm)))),
+                            zero);
+                        loss = hn::Add(
+                            loss, hn::IfThenElseZero(
+                                      close,
+                                      hn::Mul(hn::Mul(hn::Mul(graze, graze), near_wall),
+                                              hn::Set(d, static_cast<float>(kEdgeLossLog2PerMm)))));
+                    }
+                    b.target_met = true;
+                }
+            }
+            const auto kind = hn::And(hn::ShiftRight<16>(look), hn::Set(di, 7));
             I echo = hn::ShiftRight<20>(look);  // 1/16 dB
             if (b.structure) {
                 const auto word = hn::GatherIndex(di, b.table + 1, brick);
@@ -309,8 +378,36 @@ void sample_physical(PhysicalBlock& b) {
                         hn::IfThenElse(same, word, hn::BitCast(di, pool_word(b.echo, address)));
                 }
                 // Signed quarter dB to sixteenths.
-                echo = hn::Add(echo, hn::IfThenElseZero(inside, hn::ShiftLeft<2>(hn::ShiftRight<24>(
+                const auto counts = hn::AndNot(replaced, inside);
+                echo = hn::Add(echo, hn::IfThenElseZero(counts, hn::ShiftLeft<2>(hn::ShiftRight<24>(
                                                                     hn::ShiftLeft<24>(offset)))));
+            }
+            if (b.fine != nullptr) {
+                // Label by label: one as a rule, and no lane depends on its neighbours.
+                auto left = hn::AndNot(replaced, hn::TestBit(look, hn::Set(di, kLookFine)));
+                while (!hn::AllFalse(di, left)) {
+                    HWY_ALIGN std::int32_t all[kBeamBlock];
+                    hn::Store(label, di, all);
+                    const std::int32_t one_label = all[hn::FindFirstTrue(di, left)];
+                    const auto mine = hn::And(left, hn::Eq(label, hn::Set(di, one_label)));
+                    const float* m = b.fine_frames + 10 * one_label;
+                    const auto coordinate = [&](int r) HWY_ATTR {
+                        const auto u = hn::Add(hn::Add(hn::Mul(px, hn::Set(d, m[3 * r])),
+                                                       hn::Mul(py, hn::Set(d, m[3 * r + 1]))),
+                                               hn::Mul(pz, hn::Set(d, m[3 * r + 2])));
+                        return hn::And(hn::NearestInt(u), hn::Set(di, kFineEdge - 1));
+                    };
+                    const auto at = hn::Or(coordinate(0), hn::Or(hn::ShiftLeft<6>(coordinate(1)),
+                                                                 hn::ShiftLeft<12>(coordinate(2))));
+                    const auto word =
+                        hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(b.fine),
+                                         hn::Add(at, hn::Set(di, static_cast<std::int32_t>(m[9]))));
+                    echo =
+                        hn::Add(echo, hn::IfThenElseZero(mine, hn::ShiftLeft<2>(hn::ShiftRight<24>(
+                                                                   hn::ShiftLeft<24>(word)))));
+                    left = hn::AndNot(mine, left);
+                    b.fine_met = true;
+                }
             }
             const auto solid = hn::Gt(kind, hn::Zero(di));
             V amplitude = hn::IfThenElseZero(hn::RebindMask(d, solid),
@@ -346,6 +443,7 @@ void sample_physical(PhysicalBlock& b) {
                 const auto fresh = hn::And(hard, hn::Ne(kind, before));
                 bone = hn::Mul(bone, hn::Set(d, bone_decay));
                 bone_slow = hn::Mul(bone_slow, hn::Set(d, bone_slow_decay));
+                bone_floor = hn::Mul(bone_floor, hn::Set(d, bone_floor_decay));
                 gas = hn::Mul(gas, hn::Set(d, gas_decay));
                 if (!hn::AllFalse(di, fresh)) {
                     const auto here = hn::Mul(light, hn::Set(d, b.gain[k]));
@@ -366,13 +464,17 @@ void sample_physical(PhysicalBlock& b) {
                         hn::Max(bone_slow,
                                 hn::Mul(face, hn::Set(d, static_cast<float>(kBoneTailSlow)))),
                         bone_slow);
+                    const auto floor = hn::Mul(hn::Min(here, hn::Set(d, 1.0f)),
+                                               hn::Set(d, static_cast<float>(kBoneFloor)));
+                    bone_floor = hn::IfThenElse(to_bone, hn::Max(bone_floor, floor), bone_floor);
                     gas = hn::IfThenElse(
                         to_gas,
                         hn::Max(gas, hn::Mul(here, hn::Set(d, static_cast<float>(kGasTail)))), gas);
                 }
                 V power = zero;
                 if (b.bone_tail)
-                    power = hn::Add(hn::Mul(bone, bone), hn::Mul(bone_slow, bone_slow));
+                    power = hn::Add(hn::Add(hn::Mul(bone, bone), hn::Mul(bone_slow, bone_slow)),
+                                    hn::Mul(bone_floor, bone_floor));
                 if (b.gas_tail) power = hn::Add(power, hn::Mul(gas, gas));
                 hn::StoreU(power, d, b.tail + out);
             }
@@ -482,7 +584,7 @@ void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int ro
 
 // Light of the aperture times echoes, then the point spread across beams.
 void filter_across(const PhysicalRowTask& t) {
-    const hn::ScalableTag<float> d;
+    const hn::CappedTag<float, kBeamBlock> d;
     const int lanes = static_cast<int>(hn::Lanes(d));
     float* mre = t.work_re;
     float* mim = t.work_im;
@@ -494,42 +596,55 @@ void filter_across(const PhysicalRowTask& t) {
         hn::StoreU(hn::Mul(hn::LoadU(d, t.re + i), sum), d, mre + i);
         hn::StoreU(hn::Mul(hn::LoadU(d, t.im + i), sum), d, mim + i);
     }
-    if (!t.point_spread) {
-        std::memcpy(t.out_re, mre, sizeof(float) * static_cast<std::size_t>(t.lines));
-        std::memcpy(t.out_im, mim, sizeof(float) * static_cast<std::size_t>(t.lines));
-        return;
-    }
-    for (int j = 0; j < t.reach; ++j) {  // mirrored at the sector's edges
+    const int reach = t.point_spread ? t.reach : 0;
+    for (int j = 0; j < reach; ++j) {  // mirrored at the sector's edges
         const int left = std::min(j, t.scanlines - 1), right = std::max(t.scanlines - 1 - j, 0);
         mre[-1 - j] = mre[left];
         mim[-1 - j] = mim[left];
         mre[t.scanlines + j] = mre[right];
         mim[t.scanlines + j] = mim[right];
     }
+    const auto centre = hn::Set(d, t.point_spread ? t.lateral[0] : 1.0f);
+    const auto near = hn::Set(d, t.near_field * t.near_field);
+    const auto half = hn::Set(d, 0.5f);
+    const auto unit = hn::Set(d, t.inverse_gain / 32);
+    const auto noise_level = hn::Set(d, t.noise);
     for (int i = 0; i < t.lines; i += lanes) {
-        const auto centre = hn::Set(d, t.lateral[0]);
         auto re = hn::Mul(hn::LoadU(d, mre + i), centre),
              im = hn::Mul(hn::LoadU(d, mim + i), centre);
-        for (int j = 1; j <= t.reach; ++j) {
+        for (int j = 1; j <= reach; ++j) {
             const auto tap = hn::Set(d, t.lateral[j]);
             re = hn::Add(
                 re, hn::Mul(hn::Add(hn::LoadU(d, mre + i - j), hn::LoadU(d, mre + i + j)), tap));
             im = hn::Add(
                 im, hn::Mul(hn::Add(hn::LoadU(d, mim + i - j), hn::LoadU(d, mim + i + j)), tap));
         }
+        auto power = near;
+        if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock])
+            power = hn::Add(power, hn::LoadU(d, t.tail + i));
+        const auto level = hn::Mul(hn::Sqrt(hn::Mul(half, power)), unit);
+        re = hn::Add(re, hn::Mul(level, noise_of(d, t.clutter_re + i)));
+        im = hn::Add(im, hn::Mul(level, noise_of(d, t.clutter_im + i)));
+        if (t.noise_rows > 0) {
+            auto n_re = hn::Zero(d), n_im = hn::Zero(d);
+            for (int j = 0; j < t.noise_rows; ++j) {
+                const auto w = hn::Set(d, t.noise_weight[j]);
+                n_re = hn::Add(n_re, hn::Mul(w, noise_of(d, t.noise_re[j] + i)));
+                n_im = hn::Add(n_im, hn::Mul(w, noise_of(d, t.noise_im[j] + i)));
+            }
+            re = hn::Add(re, hn::Mul(noise_level, n_re));
+            im = hn::Add(im, hn::Mul(noise_level, n_im));
+        }
         hn::StoreU(re, d, t.out_re + i);
         hn::StoreU(im, d, t.out_im + i);
     }
 }
 
-// Point spread along the beam, gain, clutter and noise; the envelope's power.
+// Point spread along the beam and gain; the envelope's power.
 void make_power(const PhysicalPowerTask& t) {
-    const hn::CappedTag<float, kBeamBlock> d;
+    const hn::ScalableTag<float> d;
     const int lanes = static_cast<int>(hn::Lanes(d));
     const auto gain = hn::Set(d, t.gain);
-    const auto near = hn::Set(d, t.near_field * t.near_field);
-    const auto half = hn::Set(d, 0.5f);
-    const auto unit = hn::Set(d, 1.0f / 32);
     for (int i = 0; i < t.lines; i += lanes) {
         auto re = hn::Zero(d), im = hn::Zero(d);
         for (int j = 0; j < t.axial_count; ++j) {
@@ -540,30 +655,12 @@ void make_power(const PhysicalPowerTask& t) {
         }
         re = hn::Mul(re, gain);
         im = hn::Mul(im, gain);
-        if (t.want_mean) {
-            const auto envelope = hn::Sqrt(hn::Add(hn::Mul(re, re), hn::Mul(im, im)));
-            hn::StoreU(hn::Add(hn::LoadU(d, t.envelope_sum + i), envelope), d, t.envelope_sum + i);
+        const auto power = hn::Add(hn::Mul(re, re), hn::Mul(im, im));
+        if (t.envelope_sum != nullptr) {
+            hn::StoreU(hn::Add(hn::LoadU(d, t.envelope_sum + i), hn::Sqrt(power)), d,
+                       t.envelope_sum + i);
         }
-        if (t.clutter) {
-            auto power = near;
-            if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock])
-                power = hn::Add(power, hn::LoadU(d, t.tail + i));
-            const auto level = hn::Mul(hn::Sqrt(hn::Mul(half, power)), unit);
-            re = hn::Add(re, hn::Mul(level, noise_of(d, t.clutter_re + i)));
-            im = hn::Add(im, hn::Mul(level, noise_of(d, t.clutter_im + i)));
-        }
-        if (t.noise_rows > 0) {
-            auto n_re = hn::Zero(d), n_im = hn::Zero(d);
-            for (int j = 0; j < t.noise_rows; ++j) {
-                const auto w = hn::Set(d, t.noise_weight[j]);
-                n_re = hn::Add(n_re, hn::Mul(w, noise_of(d, t.noise_re[j] + i)));
-                n_im = hn::Add(n_im, hn::Mul(w, noise_of(d, t.noise_im[j] + i)));
-            }
-            const auto level = hn::Set(d, t.noise);
-            re = hn::Add(re, hn::Mul(level, n_re));
-            im = hn::Add(im, hn::Mul(level, n_im));
-        }
-        hn::StoreU(hn::Add(hn::Mul(re, re), hn::Mul(im, im)), d, t.power + i);
+        hn::StoreU(power, d, t.power + i);
     }
 }
 
@@ -580,7 +677,11 @@ void make_grey_row(const PhysicalGreyTask& t) {
             const auto above = hn::LoadU(d, t.haze_above + i);
             const auto haze = hn::Add(above, hn::Mul(hn::Sub(hn::LoadU(d, t.haze_below + i), above),
                                                      hn::Set(d, t.haze_mix)));
-            const auto a = noise_of(d, t.haze_re + i), b = noise_of(d, t.haze_im + i);
+            const auto blend = [&](const std::int8_t* const* rows) HWY_ATTR {
+                return hn::Add(hn::Mul(noise_of(d, rows[0] + i), hn::Set(d, t.haze_first)),
+                               hn::Mul(noise_of(d, rows[1] + i), hn::Set(d, t.haze_second)));
+            };
+            const auto a = blend(t.haze_re), b = blend(t.haze_im);
             const auto draw =
                 hn::Mul(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), hn::Set(d, 0.5f / 1024));
             power = hn::Add(power, hn::Mul(hn::Mul(haze, haze), draw));
@@ -719,6 +820,23 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     for (const LabelLook& look : scene.looks)
         looks_.push_back(pack_look(look, tables.frequency_mhz));
     looks_.resize(256, 0);
+    fine_frames_.assign(10 * 256, 0.0f);
+    for (std::size_t l = 0; l < scene.fine.frames.size() && l < 256; ++l) {
+        const FineFrame& frame = scene.fine.frames[l];
+        if (frame.cube < 0) continue;
+        looks_[l] |= kLookFine;
+        std::copy(frame.cube_from_voxel.begin(), frame.cube_from_voxel.end(),
+                  fine_frames_.begin() + static_cast<std::ptrdiff_t>(10 * l));
+        fine_frames_[10 * l + 9] =
+            static_cast<float>(frame.cube * kFineEdge * kFineEdge * kFineEdge);
+    }
+    for (const TargetBall& t : scene.targets) {
+        targets_.push_back({static_cast<float>(t.centre_vx.x), static_cast<float>(t.centre_vx.y),
+                            static_cast<float>(t.centre_vx.z), static_cast<float>(t.radius_mm),
+                            looks_[static_cast<std::size_t>(t.look)], static_cast<float>(t.wall),
+                            t.fluid});
+    }
+    near_targets_.reserve(targets_.size());
     for (const PairEcho& pair : scene.pairs) pairs_word_.push_back(pack_pair(pair));
     for (const Row& row : tables.rows) {
         r_.push_back(static_cast<float>(row.r_mm));
@@ -844,6 +962,26 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f, bool keep_all) {
     base.pairs = pairs_word_.data();
     base.rough = reinterpret_cast<const std::int32_t*>(scene_.rough.data());
     base.speckle = reinterpret_cast<const std::int32_t*>(bundle.speckle.voxels.data());
+    base.fine = f.effects.fine_structure ? scene_.fine.cubes.data() : nullptr;
+    base.fine_frames = fine_frames_.data();
+    near_targets_.clear();
+    if (f.effects.targets) {
+        // Out of reach of the slab: four deviations of the thickest row, roughness and the
+        // look-up's reach.
+        const double thick = 4.5 * tables_.rows.back().elevation_mm +
+                             4.5 * tables_.rows.front().elevation_mm + kTargetReachMm + 2 +
+                             norm(f.motion.breathing_mm);
+        const Vector3 normal = f.volume_from_probe.rotation * Vector3{0, 1, 0};
+        const Point3 origin = f.volume_from_probe * Point3{0, 0, 0};
+        for (std::size_t t = 0; t < targets_.size(); ++t) {
+            const Point3 centre = scene_.grid.point_from_voxel(scene_.targets[t].centre_vx);
+            if (keep_all ||
+                std::abs(dot(normal, centre - origin)) < thick + scene_.targets[t].radius_mm)
+                near_targets_.push_back(targets_[t]);
+        }
+    }
+    base.targets = near_targets_.data();
+    base.target_count = static_cast<int>(near_targets_.size());
     base.size = scene_.grid.size;
     base.bricks_x = scene_.bricks.x;
     base.bricks_xy = scene_.bricks.x * scene_.bricks.y;
@@ -866,7 +1004,8 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f, bool keep_all) {
     const NeedleStrip strip = needle ? NeedleStrip(*f.needle) : NeedleStrip();
     const auto sample = HWY_DYNAMIC_DISPATCH(sample_physical);
     const auto draw = HWY_DYNAMIC_DISPATCH(needle_physical);
-    std::atomic<bool> boundary{false}, refraction{false}, hard{false}, needle_met{false};
+    std::atomic<bool> boundary{false}, refraction{false}, hard{false}, needle_met{false},
+        fine{false}, target{false};
     const int blocks = lines_ / kBeamBlock;
     std::atomic<int> next{0};
     workers_.run([&](int, int) {
@@ -884,6 +1023,8 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f, bool keep_all) {
             if (b.boundary_met) boundary.store(true, std::memory_order_relaxed);
             if (b.refraction_met) refraction.store(true, std::memory_order_relaxed);
             if (b.hard_met) hard.store(true, std::memory_order_relaxed);
+            if (b.fine_met) fine.store(true, std::memory_order_relaxed);
+            if (b.target_met) target.store(true, std::memory_order_relaxed);
             if (needle) {
                 NeedleRow row;
                 int k0 = 0, k1 = 0;
@@ -912,6 +1053,8 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f, bool keep_all) {
     passes_.boundary_met = boundary.load();
     passes_.refraction_met = refraction.load();
     passes_.hard_met = hard.load();
+    passes_.fine_met = fine.load();
+    passes_.target_met = target.load();
     passes_.needle_met = needle_met.load();
 }
 
@@ -937,6 +1080,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
         PhysicalRowTask row_task;
         row_task.lines = lines_;
         row_task.scanlines = g.scanlines;
+        row_task.tail_from = tail_from_.data();
         row_task.point_spread = f.effects.point_spread;
         row_task.work_re = work + kMargin;
         row_task.work_im = work + stride_ + kMargin;
@@ -946,6 +1090,27 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             row_task.re = re_.data() + at;
             row_task.im = im_.data() + at;
             row_task.light = light_.data() + at;
+            row_task.inverse_gain = static_cast<float>(1 / row.gain);
+            row_task.near_field = f.effects.near_field ? static_cast<float>(row.near_field) : 0;
+            row_task.tail = tails ? tail_.data() + at : nullptr;
+            row_task.sample = k;
+            row_task.clutter_re =
+                noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
+            row_task.clutter_im =
+                noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
+            row_task.noise = static_cast<float>(row.noise / row.gain * std::sqrt(0.5) / 32);
+            row_task.noise_rows = f.effects.noise ? persisted : 0;
+            for (int j = 0; j < row_task.noise_rows; ++j) {
+                const std::uint32_t frame = f.frame - static_cast<std::uint32_t>(j);
+                row_task.noise_re[j] =
+                    noise_.fine.data() + noise_start(f.seed, NoiseUse::electronic_re, frame, k);
+                row_task.noise_im[j] =
+                    noise_.fine.data() + noise_start(f.seed, NoiseUse::electronic_im, frame, k);
+                row_task.noise_weight[j] =
+                    f.effects.persistence
+                        ? static_cast<float>(kPersistence[static_cast<std::size_t>(j)])
+                        : 1;
+            }
             row_task.lateral = row.lateral.data() + kMaxLateral;
             row_task.reach = row.reach;
             row_task.out_re = ring_re(k);
@@ -963,9 +1128,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
         t.axial =
             f.effects.point_spread ? tables_.axial.data() + kMaxAxial - reach : kOneTap.data();
         t.axial_count = 2 * reach + 1;
-        t.want_mean = f.effects.haze;
-        t.envelope_sum = envelope;
-        t.tail_from = tail_from_.data();
+        t.envelope_sum = f.effects.haze ? envelope : nullptr;
         for (int k = begin; k < end; ++k) {
             if (k % kHazeCell == 0) std::fill_n(envelope, lines_, 0.0f);
             if (k + reach < g.samples) fill(k + reach);
@@ -977,24 +1140,6 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             const Row& row = tables_.rows[static_cast<std::size_t>(k)];
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * stride_ + kMargin;
             t.gain = static_cast<float>(row.gain);
-            t.near_field = f.effects.near_field ? static_cast<float>(row.near_field) : 0;
-            t.tail = tails ? tail_.data() + at : nullptr;
-            t.sample = k;
-            t.clutter_re = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
-            t.clutter_im = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
-            t.noise = static_cast<float>(row.noise * std::sqrt(0.5) / 32);
-            t.noise_rows = f.effects.noise ? persisted : 0;
-            for (int j = 0; j < t.noise_rows; ++j) {
-                const std::uint32_t frame = f.frame - static_cast<std::uint32_t>(j);
-                t.noise_re[j] =
-                    noise_.fine.data() + noise_start(f.seed, NoiseUse::electronic_re, frame, k);
-                t.noise_im[j] =
-                    noise_.fine.data() + noise_start(f.seed, NoiseUse::electronic_im, frame, k);
-                t.noise_weight[j] =
-                    f.effects.persistence
-                        ? static_cast<float>(kPersistence[static_cast<std::size_t>(j)])
-                        : 1;
-            }
             t.power = power_.data() + at;
             power(t);
             if (f.effects.haze && (k % kHazeCell == kHazeCell - 1 || k == g.samples - 1)) {
@@ -1077,8 +1222,16 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
                 t.haze_above = wide_.data() + static_cast<std::ptrdiff_t>(k0) * stride_;
                 t.haze_below = wide_.data() + static_cast<std::ptrdiff_t>(k1) * stride_;
                 t.haze_mix = static_cast<float>(at - k0);
-                t.haze_re = noise_.streak.data() + noise_start(f.seed, NoiseUse::haze_re, 0, k);
-                t.haze_im = noise_.streak.data() + noise_start(f.seed, NoiseUse::haze_im, 0, k);
+                for (int j = 0; j < 2; ++j) {
+                    t.haze_re[j] = noise_.streak.data() +
+                                   noise_start(f.seed, NoiseUse::haze_re, 0, k / kHazeGrain + j);
+                    t.haze_im[j] = noise_.streak.data() +
+                                   noise_start(f.seed, NoiseUse::haze_im, 0, k / kHazeGrain + j);
+                }
+                const double mix = static_cast<double>(k % kHazeGrain) / kHazeGrain;
+                const double level = 1 / std::sqrt(mix * mix + (1 - mix) * (1 - mix));
+                t.haze_first = static_cast<float>(level * (1 - mix));
+                t.haze_second = static_cast<float>(level * mix);
             }
             t.offset = static_cast<float>(
                 kGreyOfUnit +

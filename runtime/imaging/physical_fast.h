@@ -16,7 +16,7 @@ namespace sonocase::runtime {
 struct PhysicalPasses {
     double contact_ms = 0, beams_ms = 0, needle_ms = 0, filter_ms = 0, grey_ms = 0, convert_ms = 0;
     bool boundary_met = false, refraction_met = false, hard_met = false, needle_met = false,
-         gap_met = false;
+         gap_met = false, fine_met = false, target_met = false;
     int beams_in_contact = 0;
 };
 
@@ -53,7 +53,8 @@ class PhysicalFast {
 
     std::vector<std::int32_t> looks_, pairs_word_;  // packed
     std::vector<float> r_, contact_, elevation_, interface_scale_, gain_;
-    std::vector<float> elevation_off_;
+    std::vector<float> elevation_off_, fine_frames_;
+    std::vector<PhysicalTarget> targets_, near_targets_;
     std::vector<std::uint32_t> elevation_start_, lookup_start_, clutter_start_, haze_start_,
         noise_start_;
 

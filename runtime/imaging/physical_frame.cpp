@@ -38,7 +38,7 @@ std::vector<std::int8_t> smoothed_tile(double sigma, std::uint32_t seed, int ove
 }  // namespace
 
 PhysicalNoise make_physical_noise(std::uint32_t seed, int overhang) {
-    return {smoothed_tile(0.8, seed + 1, overhang), smoothed_tile(4.5, seed + 2, overhang),
+    return {smoothed_tile(0.8, seed + 1, overhang), smoothed_tile(2.5, seed + 2, overhang),
             smoothed_tile(0, seed + 3, overhang)};
 }
 

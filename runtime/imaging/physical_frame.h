@@ -18,9 +18,11 @@ struct PhysicalEffects {
     bool contact = true;  // gel gap closed, air gap dark
     bool breathing = true;
     bool pulsation = true;
-    bool elevation = true;   // beam thickness across the plane
-    bool boundaries = true;  // sub-voxel planes between labels
-    bool structure = true;   // echo offsets inside organs
+    bool elevation = true;       // beam thickness across the plane
+    bool boundaries = true;      // sub-voxel planes between labels
+    bool structure = true;       // echo offsets inside organs
+    bool fine_structure = true;  // fibres and septa below the voxel
+    bool targets = true;         // balls of the exercise
     bool speckle = true;
     bool interfaces = true;
     bool edge_shadow = true;

@@ -9,7 +9,7 @@
 namespace sonocase::runtime {
 
 // Labels' looks in one word: attenuation (bits 0-15, log2 of amplitude per mm there and back,
-// 1/4096), kind (16-19), echo (20-31, signed, 1/16 dB).
+// 1/4096), kind (16-18), fine structure (19), echo (20-31, signed, 1/16 dB).
 enum PackedKind : std::uint32_t {
     kPackedOutside,
     kPackedSoft,
@@ -17,6 +17,8 @@ enum PackedKind : std::uint32_t {
     kPackedGas,
     kPackedBone
 };
+
+inline constexpr int kLookFine = 1 << 19;
 
 // A pair's echo in one word: log2 of the amplitude (bits 0-11, 1/128, + 2048; 0: none), thickness
 // (12-19, 1/200 mm), hard (20), refracts (21), own label pulses (22), second label pulses (23).
@@ -36,6 +38,13 @@ enum BeamNumber {
 
 inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
 
+struct PhysicalTarget {
+    float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels
+    std::int32_t look = 0;                     // packed
+    float wall = 0;
+    bool fluid = false;
+};
+
 struct PhysicalBlock {
     const float* beams = nullptr;
     int lines = 0, samples = 0;
@@ -52,6 +61,10 @@ struct PhysicalBlock {
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
     const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr, *speckle = nullptr;
+    const std::int8_t* fine = nullptr;   // null: off. Two cubes
+    const float* fine_frames = nullptr;  // ten a label: rows of the frame, offset of its cube
+    const PhysicalTarget* targets = nullptr;
+    int target_count = 0;
     Int3 size;
     int bricks_x = 0, bricks_xy = 0, label_count = 0, speckle_log2 = 0;
     float voxel_mm = 1, rough_per_voxel = 2, step_mm = 0.3f;
@@ -64,10 +77,11 @@ struct PhysicalBlock {
           *tail = nullptr;  // at the block's first beam
     int stride = 0;
     int tail_from = 0;  // out: first sample with a tail; samples if none
-    bool boundary_met = false, refraction_met = false, hard_met = false;  // out
+    bool boundary_met = false, refraction_met = false, hard_met = false, fine_met = false,
+         target_met = false;  // out
 };
 
-// A part of a row's filters.
+// A row's filter across the beams, and the noise that reaches the receiver with it.
 struct PhysicalRowTask {
     int lines = 0, scanlines = 0;
     const float *re = nullptr, *im = nullptr, *light = nullptr;
@@ -76,26 +90,27 @@ struct PhysicalRowTask {
     bool point_spread = true;
     float *work_re = nullptr, *work_im = nullptr;  // with margins
     float *out_re = nullptr, *out_im = nullptr;
-};
 
-struct PhysicalPowerTask {
-    int lines = 0;
-    const float* const* re = nullptr;  // 2 * axial_reach + 1 rows; null rows count as zero
-    const float* const* im = nullptr;
-    const float* axial = nullptr;  // first tap
-    int axial_count = 1;
-    float gain = 1, near_field = 0, noise = 0;
-    const float* tail = nullptr;              // null: none in this row
+    float inverse_gain = 1, near_field = 0, noise = 0;
+    const float* tail = nullptr;              // null: none
     const std::int32_t* tail_from = nullptr;  // per block
     int sample = 0;
-    bool clutter = true;
     const std::int8_t *clutter_re = nullptr, *clutter_im = nullptr;
     int noise_rows = 0;  // 0: none
     const std::int8_t* noise_re[4] = {nullptr, nullptr, nullptr, nullptr};
     const std::int8_t* noise_im[4] = {nullptr, nullptr, nullptr, nullptr};
     float noise_weight[4] = {0, 0, 0, 0};
-    bool want_mean = true;
-    float* envelope_sum = nullptr;  // accumulates the envelope
+};
+
+// A row's filter along the beams; the envelope's power.
+struct PhysicalPowerTask {
+    int lines = 0;
+    const float* const* re = nullptr;  // rows of the filter; null rows count as zero
+    const float* const* im = nullptr;
+    const float* axial = nullptr;  // first tap
+    int axial_count = 1;
+    float gain = 1;
+    float* envelope_sum = nullptr;  // accumulates the envelope; null: not wanted
     float* power = nullptr;
 };
 
@@ -104,7 +119,9 @@ struct PhysicalGreyTask {
     const float* power = nullptr;
     const float *haze_above = nullptr, *haze_below = nullptr;  // null: none
     float haze_mix = 0;
-    const std::int8_t *haze_re = nullptr, *haze_im = nullptr;
+    const std::int8_t* haze_re[2] = {nullptr, nullptr};  // rows to blend
+    const std::int8_t* haze_im[2] = {nullptr, nullptr};
+    float haze_first = 1, haze_second = 0;
     float offset = 0, per_log2 = 0;
     bool post_filter = true;
     float* work = nullptr;  // with margins

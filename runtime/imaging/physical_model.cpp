@@ -48,7 +48,8 @@ Tables make_tables(const Probe& probe, const ScanGeometry& g) {
         Row& row = t.rows[static_cast<std::size_t>(k)];
         const double r = (k + 0.5) * g.step_mm;
         row.r_mm = r;
-        row.gain = std::pow(10.0, 2 * kGainSlope * probe.frequency_mhz * r / 200);
+        row.gain = std::pow(
+            10.0, 2 * (g.fan ? kGainSlopeFan : kGainSlopeLinear) * probe.frequency_mhz * r / 200);
         row.contact = std::exp(-r / kGapReachMm);
         const double off = r - probe.focus_mm;
         const double lateral_fwhm = g.fan ? 1.05 * wavelength * std::max(2.2, r / 22) *

@@ -22,9 +22,9 @@ inline constexpr double kGapReachMm = 45;
 inline constexpr double kGapStepMm = 0.5;
 
 // Boundary roughness (mm) and the texture that carries it.
-inline constexpr double kRoughnessMm = 0.45;
+inline constexpr double kRoughnessMm = 0.28;
 inline constexpr int kRoughEdge = 64;
-inline constexpr double kRoughVoxelMm = 0.5;
+inline constexpr double kRoughVoxelMm = 0.7;
 
 // Interfaces: amplitude 60 R^0.85 with R at most 0.5; share of specular and diffuse by angle.
 inline constexpr double kInterfaceGain = 60;
@@ -40,6 +40,8 @@ inline constexpr double kEdgeReachMm = 1.0;
 // Tails behind bone and gas.
 inline constexpr double kBoneTail = 6, kBoneTailMm = 0.75, kBoneTailSlow = 0.1,
                         kBoneTailSlowMm = 4.5;
+// What side lobes and reverberation leave in a bone's shadow: 15 to 22 grey in living bone.
+inline constexpr double kBoneFloor = 0.075, kBoneFloorMm = 90;
 inline constexpr double kGasTail = 2.4, kGasTailMm = 22;
 
 // Haze: side lobes and reverberation, this far below the mean envelope nearby.
@@ -47,7 +49,10 @@ inline constexpr double kHazeDb = -24;
 inline constexpr int kHazeCell = 8;   // samples and beams of a cell of the mean
 inline constexpr int kHazeReach = 3;  // cells to each side
 
-inline constexpr double kGainSlope = 0.56;  // TGC, dB/cm/MHz
+inline constexpr int kHazeGrain = 3;  // samples along the beam
+
+// TGC, dB/cm/MHz: abdominal organs for a fan, muscle and fat for a linear probe.
+inline constexpr double kGainSlopeFan = 0.56, kGainSlopeLinear = 0.72;
 inline constexpr double kMaxNoiseGainDb = 48;
 inline constexpr double kNoiseDb = -70;
 inline constexpr double kGreyOfUnit = 130;
@@ -65,9 +70,19 @@ inline constexpr int kMaxAxial = 10;
 // Needle: a mirror of steel. Amplitude by the angle between beam and shaft.
 inline constexpr double kNeedleGain = 60;
 inline constexpr double kNeedleDiffuse = 0.035;
-inline constexpr double kNeedleShadowLog2 = 1.6;  // behind a needle that fills the slab
+inline constexpr double kNeedleShadowLog2 = 0.9;  // behind a needle that fills the slab
 inline constexpr double kNeedleTail = 0.09, kNeedleTailMm = 9;
 inline constexpr double kTipGlintMm = 1.0;
+
+// Fine structure, below the size of a voxel: fibres of muscle, septa of fat. Periodic cubes of echo
+// offsets in quarter dB; a label's frame gives the cube's coordinates.
+inline constexpr int kFineEdge = 64;
+inline constexpr double kFibreAlongMm = 1.6, kFibreAcrossMm = 0.16;  // a cube's voxel
+inline constexpr double kSeptaMm = 0.45;
+
+// Targets of an exercise are balls in the anatomy; their surface is as rough as any.
+inline constexpr double kTargetReachMm = 2;
+inline constexpr int kMaxTargets = 8;
 
 // What one depth needs, the same for every beam.
 struct Row {

@@ -48,6 +48,23 @@ double echo_offset_db(const PhysicalScene& s, Point3 v) {
            4.0;
 }
 
+double fine_offset_db(const PhysicalScene& s, int label, Point3 v) {
+    if (label >= static_cast<int>(s.fine.frames.size())) return 0;
+    const FineFrame& f = s.fine.frames[static_cast<std::size_t>(label)];
+    if (f.cube < 0) return 0;
+    std::size_t cell = 0;
+    for (int r = 2; r >= 0; --r) {
+        const auto m = [&](int c) {
+            return static_cast<double>(f.cube_from_voxel[static_cast<std::size_t>(3 * r + c)]);
+        };
+        const double u = m(0) * v.x + m(1) * v.y + m(2) * v.z;
+        cell = cell * kFineEdge + static_cast<std::size_t>(nearest(u) & (kFineEdge - 1));
+    }
+    return s.fine
+               .cubes[cell + static_cast<std::size_t>(f.cube) * kFineEdge * kFineEdge * kFineEdge] /
+           4.0;
+}
+
 struct Roughness {
     double shift = 0, log2_glint = 0, re = 1, im = 0;
 };
@@ -81,7 +98,7 @@ Place place_at(const PhysicalScene& s, const PhysicalFrame& f, Point3 v, Point3 
     p.own = p.label = label_at(s, i, j, k);
     if (!f.effects.boundaries || !s.has_boundary || !s.grid.contains(i, j, k)) return p;
     const std::uint32_t bits = pool_value(s, 2, s.bundle->boundary, i, j, k, kNoBoundary);
-    if (bits == kNoBoundary || (bits & 0xFF) >= s.looks.size()) return p;
+    if (bits == kNoBoundary || static_cast<int>(bits & 0xFF) >= s.labels()) return p;
     const BoundaryRecord r = unpack_boundary(bits);
     p.second = r.second_label;
     p.normal = r.normal;
@@ -134,12 +151,14 @@ void render_physical_reference(const PhysicalScene& s,
         const Vector3 across = f.volume_from_probe.rotation * Vector3{0, 1, 0};
         const Vector3 sideways = f.volume_from_probe.rotation * Vector3{1, 0, 0};
         const double gap = static_cast<double>(gaps[static_cast<std::size_t>(l)]);
-        double log2_light = 0, needle_light = 0, bone = 0, bone_slow = 0, gas = 0, needle_tail = 0;
+        double log2_light = 0, needle_light = 0, bone = 0, bone_slow = 0, bone_floor = 0, gas = 0,
+               needle_tail = 0;
         TissueKind before = TissueKind::soft;
         for (int k = 0; k < samples; ++k) {
             const Row& row = tables.rows[static_cast<std::size_t>(k)];
             bone *= std::exp(-g.step_mm / kBoneTailMm);
             bone_slow *= std::exp(-g.step_mm / kBoneTailSlowMm);
+            bone_floor *= std::exp(-g.step_mm / kBoneFloorMm);
             gas *= std::exp(-g.step_mm / kGasTailMm);
             needle_tail *= std::exp(-g.step_mm / kNeedleTailMm);
             if (gap < 0) {  // air: nothing comes back
@@ -158,10 +177,29 @@ void render_physical_reference(const PhysicalScene& s,
             const Point3 h = s.grid.voxel_from_point(
                 slab + (kLookupJitter * s.voxel_mm) * (jitter2 * sideways + jitter * beam));
             const Place place = place_at(s, f, v, h);
-            const LabelLook& look = s.looks[static_cast<std::size_t>(place.label)];
+            const TargetBall* ball = nullptr;  // whose surface is near
+            double ball_mm = 0, ball_cosine = 0;
+            int look_index = place.label;
+            if (on.targets) {
+                for (const TargetBall& t : s.targets) {
+                    const Vector3 from_centre = s.voxel_mm * (v - t.centre_vx);
+                    const double away = norm(from_centre);
+                    if (away - t.radius_mm > kTargetReachMm ||
+                        s.looks[static_cast<std::size_t>(place.label)].kind != TissueKind::soft)
+                        continue;
+                    ball = &t;
+                    ball_mm = away - t.radius_mm + kRoughnessMm * roughness_at(s, v).shift;
+                    ball_cosine = std::abs(dot(from_centre, beam)) / std::max(away, 1e-3);
+                    if (ball_mm < 0) look_index = t.look;
+                }
+            }
+            const LabelLook& look = s.looks[static_cast<std::size_t>(look_index)];
 
             double echo_db = look.echo_db;
-            if (on.structure) echo_db += echo_offset_db(s, h);
+            if (look_index == place.label) {
+                if (on.structure) echo_db += echo_offset_db(s, h);
+                if (on.fine_structure) echo_db += fine_offset_db(s, place.label, v);
+            }
             double amplitude =
                 look.kind == TissueKind::outside ? 0 : std::exp2(echo_db / kDbPerLog2);
             double re = amplitude, im = 0;
@@ -202,11 +240,30 @@ void render_physical_reference(const PhysicalScene& s,
                 }
             }
 
+            if (ball != nullptr) {
+                const Roughness rough = roughness_at(s, v);
+                if (on.interfaces) {
+                    const double u = ball_mm / 0.16;
+                    const double c2 = ball_cosine * ball_cosine;
+                    const double i = ball->wall * (0.08 * ball_cosine + 0.92 * c2 * c2 * c2) *
+                                     std::exp2(rough.log2_glint) * std::exp(-0.5 * u * u) *
+                                     row.interface_scale;
+                    re += i * rough.re;
+                    im += i * rough.im;
+                }
+                if (on.edge_shadow && ball->fluid) {
+                    const double graze = std::max(1 - ball_cosine / kEdgeCos, 0.0);
+                    const double near = std::max(1 - std::abs(ball_mm) / kEdgeReachMm, 0.0);
+                    loss += kEdgeLossLog2PerMm * graze * graze * near * g.step_mm;
+                }
+            }
+
             const double here = std::exp2(log2_light);
             if (look.kind == TissueKind::bone && before != TissueKind::bone) {
                 bone = std::max(bone, kBoneTail * kMaxReflection * facing * here * row.gain);
                 bone_slow = std::max(bone_slow, kBoneTailSlow * kBoneTail * kMaxReflection *
                                                     facing * here * row.gain);
+                bone_floor = std::max(bone_floor, kBoneFloor * std::min(here * row.gain, 1.0));
             }
             if (look.kind == TissueKind::gas && before != TissueKind::gas)
                 gas = std::max(gas, kGasTail * here * row.gain);
@@ -238,7 +295,8 @@ void render_physical_reference(const PhysicalScene& s,
             q_im[at(k, l)] = im;
             light[at(k, l)] = here * std::exp2(needle_light);
             double power = 0;
-            if (on.bone_tail) power += bone * bone + bone_slow * bone_slow;
+            if (on.bone_tail)
+                power += bone * bone + bone_slow * bone_slow + bone_floor * bone_floor;
             if (on.gas_ring_down) power += gas * gas;
             tail[at(k, l)] = power + needle_tail * needle_tail;
             log2_light -= loss;
@@ -260,8 +318,9 @@ void render_physical_reference(const PhysicalScene& s,
         }
     }
 
-    // 3. Point spread, across then along.
+    // 3. Point spread across the beams.
     if (on.point_spread) {
+        const std::vector<double> in_re = f_re, in_im = f_im;
         for (int k = 0; k < samples; ++k) {
             const Row& row = tables.rows[static_cast<std::size_t>(k)];
             for (int l = 0; l < lines; ++l) {
@@ -269,22 +328,8 @@ void render_physical_reference(const PhysicalScene& s,
                 for (int j = -row.reach; j <= row.reach; ++j) {
                     const double tap =
                         static_cast<double>(row.lateral[static_cast<std::size_t>(kMaxLateral + j)]);
-                    re += tap * f_re[at(k, reflect(l + j, lines))];
-                    im += tap * f_im[at(k, reflect(l + j, lines))];
-                }
-                q_re[at(k, l)] = re;
-                q_im[at(k, l)] = im;
-            }
-        }
-        for (int k = 0; k < samples; ++k) {
-            for (int l = 0; l < lines; ++l) {
-                double re = 0, im = 0;
-                for (int j = -tables.axial_reach; j <= tables.axial_reach; ++j) {
-                    if (k + j < 0 || k + j >= samples) continue;
-                    const double tap =
-                        static_cast<double>(tables.axial[static_cast<std::size_t>(kMaxAxial + j)]);
-                    re += tap * q_re[at(k + j, l)];
-                    im += tap * q_im[at(k + j, l)];
+                    re += tap * in_re[at(k, reflect(l + j, lines))];
+                    im += tap * in_im[at(k, reflect(l + j, lines))];
                 }
                 f_re[at(k, l)] = re;
                 f_im[at(k, l)] = im;
@@ -292,7 +337,29 @@ void render_physical_reference(const PhysicalScene& s,
         }
     }
 
-    // 4. Gain, clutter and electronic noise; power of the envelope, and its mean nearby for the
+    // 4. Clutter and electronic noise, as they reach the receiver: before the gain and its filter.
+    for (int k = 0; k < samples; ++k) {
+        const Row& row = tables.rows[static_cast<std::size_t>(k)];
+        for (int l = 0; l < lines; ++l) {
+            const double near = on.near_field ? row.near_field * row.near_field : 0;
+            const double clutter = std::sqrt(0.5 * (tail[at(k, l)] + near)) / row.gain;
+            f_re[at(k, l)] += clutter * tile(noise.streak, NoiseUse::clutter_re, 0, k, l);
+            f_im[at(k, l)] += clutter * tile(noise.streak, NoiseUse::clutter_im, 0, k, l);
+            if (!on.noise) continue;
+            double n_re = 0, n_im = 0;
+            for (int j = 0; j < (on.persistence ? kPersistedFrames : 1); ++j) {
+                const double w = on.persistence ? kPersistence[static_cast<std::size_t>(j)] : 1;
+                n_re += w * tile(noise.fine, NoiseUse::electronic_re,
+                                 f.frame - static_cast<std::uint32_t>(j), k, l);
+                n_im += w * tile(noise.fine, NoiseUse::electronic_im,
+                                 f.frame - static_cast<std::uint32_t>(j), k, l);
+            }
+            f_re[at(k, l)] += row.noise / row.gain * std::sqrt(0.5) * n_re;
+            f_im[at(k, l)] += row.noise / row.gain * std::sqrt(0.5) * n_im;
+        }
+    }
+
+    // 5. Point spread along the beam, gain; power of the envelope, and its mean nearby for the
     // haze.
     std::vector<double> power(count);
     const int cells_k = (samples + kHazeCell - 1) / kHazeCell,
@@ -302,27 +369,21 @@ void render_physical_reference(const PhysicalScene& s,
     for (int k = 0; k < samples; ++k) {
         const Row& row = tables.rows[static_cast<std::size_t>(k)];
         for (int l = 0; l < lines; ++l) {
-            double re = f_re[at(k, l)] * row.gain, im = f_im[at(k, l)] * row.gain;
-            const auto cell = static_cast<std::size_t>(k / kHazeCell * cells_l + l / kHazeCell);
-            mean[cell] += std::sqrt(re * re + im * im);
-            cell_n[cell] += 1;
-            const double near = on.near_field ? row.near_field * row.near_field : 0;
-            const double clutter = std::sqrt(0.5 * (tail[at(k, l)] + near));
-            re += clutter * tile(noise.streak, NoiseUse::clutter_re, 0, k, l);
-            im += clutter * tile(noise.streak, NoiseUse::clutter_im, 0, k, l);
-            if (on.noise) {
-                double n_re = 0, n_im = 0;
-                for (int j = 0; j < (on.persistence ? kPersistedFrames : 1); ++j) {
-                    const double w = on.persistence ? kPersistence[static_cast<std::size_t>(j)] : 1;
-                    n_re += w * tile(noise.fine, NoiseUse::electronic_re,
-                                     f.frame - static_cast<std::uint32_t>(j), k, l);
-                    n_im += w * tile(noise.fine, NoiseUse::electronic_im,
-                                     f.frame - static_cast<std::uint32_t>(j), k, l);
+            double re = f_re[at(k, l)], im = f_im[at(k, l)];
+            if (on.point_spread) {
+                re = im = 0;
+                for (int j = -tables.axial_reach; j <= tables.axial_reach; ++j) {
+                    if (k + j < 0 || k + j >= samples) continue;
+                    const double tap =
+                        static_cast<double>(tables.axial[static_cast<std::size_t>(kMaxAxial + j)]);
+                    re += tap * f_re[at(k + j, l)];
+                    im += tap * f_im[at(k + j, l)];
                 }
-                re += row.noise * std::sqrt(0.5) * n_re;
-                im += row.noise * std::sqrt(0.5) * n_im;
             }
-            power[at(k, l)] = re * re + im * im;
+            power[at(k, l)] = (re * re + im * im) * row.gain * row.gain;
+            const auto cell = static_cast<std::size_t>(k / kHazeCell * cells_l + l / kHazeCell);
+            mean[cell] += std::sqrt(power[at(k, l)]);
+            cell_n[cell] += 1;
         }
     }
     if (on.haze) {
@@ -352,14 +413,19 @@ void render_physical_reference(const PhysicalScene& s,
                 const double haze =
                     (w(k0, l0) * (1 - (cl - l0)) + w(k0, l1) * (cl - l0)) * (1 - (ck - k0)) +
                     (w(k1, l0) * (1 - (cl - l0)) + w(k1, l1) * (cl - l0)) * (ck - k0);
-                const double a = tile(noise.streak, NoiseUse::haze_re, 0, k, l),
-                             b = tile(noise.streak, NoiseUse::haze_im, 0, k, l);
+                const double mix = static_cast<double>(k % kHazeGrain) / kHazeGrain;
+                const double unit = 1 / std::sqrt(mix * mix + (1 - mix) * (1 - mix));
+                const auto draw = [&](NoiseUse use) {
+                    return unit * ((1 - mix) * tile(noise.streak, use, 0, k / kHazeGrain, l) +
+                                   mix * tile(noise.streak, use, 0, k / kHazeGrain + 1, l));
+                };
+                const double a = draw(NoiseUse::haze_re), b = draw(NoiseUse::haze_im);
                 power[at(k, l)] += haze * haze * 0.5 * (a * a + b * b);
             }
         }
     }
 
-    // 5. Log compression, post-filter, grey map.
+    // 6. Log compression, post-filter, grey map.
     std::vector<double> grey(count);
     for (int k = 0; k < samples; ++k) {
         for (int l = 0; l < lines; ++l) {
@@ -391,7 +457,7 @@ void render_physical_reference(const PhysicalScene& s,
         shade[i] = std::nearbyint(255 * t);
     }
 
-    // 6. Scan conversion.
+    // 7. Scan conversion.
     for (int r = 0; r < g.height_px; ++r) {
         for (int c = 0; c < g.width_px; ++c) {
             double line = 0, sample = 0, value = 0;

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "formats/boundary_record.h"
-#include "runtime/imaging/noise.h"
+#include "runtime/imaging/periodic_noise.h"
 #include "runtime/imaging/physical_model.h"
 
 namespace sonocase::runtime {
@@ -40,56 +40,21 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
     e.refracts = !e.hard && fluid(a) != fluid(b);
     double reflection =
         std::abs(a.impedance_mrayl - b.impedance_mrayl) / (a.impedance_mrayl + b.impedance_mrayl);
-    e.sigma_mm = e.hard ? 0.28 : 0.22;
+    e.sigma_mm = e.hard ? 0.24 : 0.16;
     // Between muscles, and between muscle and fat, lies a sheet of connective tissue that the label
     // volume does not show.
     if (is_muscle(a) && is_muscle(b) && la.name != lb.name) {
         reflection = std::max(reflection, 0.045);
-        e.sigma_mm = 0.34;
+        e.sigma_mm = 0.20;
     } else if ((is_muscle(a) && is_fat(b)) || (is_fat(a) && is_muscle(b))) {
         reflection = std::max(reflection, 0.09);
-        e.sigma_mm = 0.38;
+        e.sigma_mm = 0.24;
     }
     if (reflection > 1e-4) {
         e.amplitude =
             kInterfaceGain * std::pow(std::min(reflection, kMaxReflection), kInterfacePower);
     }
     return e;
-}
-
-// Smooth periodic noise of unit deviation: three passes of a box in each axis.
-std::vector<float> smooth_noise(int edge, int reach, std::uint32_t seed) {
-    const std::size_t n = static_cast<std::size_t>(edge);
-    std::vector<float> a(n * n * n), b(a.size());
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        a[i] = static_cast<float>(hash32(seed + static_cast<std::uint32_t>(i) * 2654435761u) >> 8) *
-                   0x1p-24f -
-               0.5f;
-    }
-    const std::array<std::size_t, 3> stride{1, n, n * n};
-    for (int pass = 0; pass < 2; ++pass) {
-        for (int axis = 0; axis < 3; ++axis) {
-            const std::size_t s = stride[static_cast<std::size_t>(axis)];
-            for (std::size_t i = 0; i < a.size(); ++i) {
-                const std::size_t at = i / s % n, base = i - at * s;
-                if (at != 0) continue;
-                float sum = 0;
-                for (int j = -reach; j <= reach; ++j)
-                    sum += a[base + (static_cast<std::size_t>(j + edge) % n) * s];
-                for (std::size_t j = 0; j < n; ++j) {
-                    b[base + j * s] = sum;
-                    sum += a[base + (j + static_cast<std::size_t>(reach) + 1) % n * s] -
-                           a[base + (j + n - static_cast<std::size_t>(reach)) % n * s];
-                }
-            }
-            std::swap(a, b);
-        }
-    }
-    double square = 0;
-    for (const float v : a) square += static_cast<double>(v) * static_cast<double>(v);
-    const auto scale = static_cast<float>(1 / std::sqrt(square / static_cast<double>(a.size())));
-    for (float& v : a) v *= scale;
-    return a;
 }
 
 std::uint32_t signed_byte(double v) {
@@ -100,7 +65,8 @@ std::uint32_t signed_byte(double v) {
 
 }  // namespace
 
-Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle) {
+Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
+                                          const std::vector<Target>& targets) {
     PhysicalScene s;
     s.bundle = &bundle;
     s.grid = bundle.grid;
@@ -128,6 +94,39 @@ Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle) {
         const Tissue& t = tissue(l);
         s.looks.push_back(
             {t.echo_db, t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind});
+    }
+    for (const Target& t : targets) {
+        if (t.look == TargetLook::none || !(t.radius_mm > 0) || s.targets.size() >= kMaxTargets ||
+            s.looks.size() >= 255)
+            continue;
+        TargetBall ball;
+        ball.centre_vx = s.grid.voxel_from_point(t.centre);
+        ball.radius_mm = t.radius_mm;
+        ball.look = static_cast<int>(s.looks.size());
+        LabelLook look{-8, 0.6, TissueKind::soft};
+        ball.wall = 0.5;
+        switch (t.look) {
+            case TargetLook::lesion:
+                break;
+            case TargetLook::marker:
+                look = {12, 0.5, TissueKind::soft};
+                ball.wall = 12;
+                break;
+            case TargetLook::abscess:
+                look = {-17, 0.2, TissueKind::fluid};
+                ball.wall = 4;
+                break;
+            case TargetLook::cyst:
+            case TargetLook::calyx:
+                look = {-58, 0.02, TissueKind::fluid};
+                ball.wall = 3;
+                break;
+            case TargetLook::none:
+                break;
+        }
+        ball.fluid = look.kind == TissueKind::fluid;
+        s.looks.push_back(look);
+        s.targets.push_back(ball);
     }
     s.pairs.resize(count * count);
     for (std::size_t a = 0; a < count; ++a) {
@@ -169,17 +168,18 @@ Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle) {
         }
     }
 
-    const std::vector<float> rough = smooth_noise(kRoughEdge, 2, 11),
-                             glint = smooth_noise(kRoughEdge, 2, 12),
-                             phase = smooth_noise(kRoughEdge, 2, 13);
+    const std::vector<float> rough = smooth_periodic_noise(kRoughEdge, 2, 11),
+                             glint = smooth_periodic_noise(kRoughEdge, 2, 12),
+                             phase = smooth_periodic_noise(kRoughEdge, 2, 13);
     s.rough.resize(rough.size());
     for (std::size_t i = 0; i < rough.size(); ++i) {
         const double p = 0.9 * static_cast<double>(phase[i]);
         s.rough[i] = signed_byte(32 * static_cast<double>(rough[i])) |
-                     signed_byte(32 * 0.55 * 1.4426950408889634 * static_cast<double>(glint[i]))
+                     signed_byte(32 * 0.75 * 1.4426950408889634 * static_cast<double>(glint[i]))
                          << 8 |
                      signed_byte(127 * std::cos(p)) << 16 | signed_byte(127 * std::sin(p)) << 24;
     }
+    s.fine = make_fine_structure(bundle);
     return s;
 }
 

@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "formats/case_bundle.h"
+#include "formats/exercise.h"
 #include "formats/result.h"
+#include "runtime/imaging/fine_structure.h"
 
 namespace sonocase::runtime {
 
@@ -30,6 +32,15 @@ struct LabelLook {
 inline constexpr std::uint32_t kBoundaryFlag =
     0x40000000u;  // in a brick's label word: it holds surfaces
 
+// A ball of the exercise, put into the anatomy.
+struct TargetBall {
+    Point3 centre_vx;  // voxel coordinates
+    double radius_mm = 5;
+    int look = 0;     // index into looks
+    double wall = 0;  // amplitude of its surface
+    bool fluid = false;
+};
+
 struct PhysicalScene {
     const CaseBundle* bundle = nullptr;
     Grid grid;
@@ -48,10 +59,15 @@ struct PhysicalScene {
     // (/ 32), bytes 2 and 3 cosine and sine of its phase (/ 127); all signed.
     std::vector<std::uint32_t> rough;
     int speckle_mask = 0, speckle_log2 = 0;
+    FineStructure fine;
 
-    int labels() const { return static_cast<int>(looks.size()); }
+    std::vector<TargetBall> targets;
+
+    int labels() const { return static_cast<int>(bundle->labels.size()); }
 };
 
-Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle);
+// targets: of the exercise; those that only mark a place leave no trace in the tissue.
+Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
+                                          const std::vector<Target>& targets = {});
 
 }  // namespace sonocase::runtime

@@ -131,7 +131,7 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
         m.paper_scene = std::move(*scene);
         m.paper = std::make_unique<PaperFast>(m.paper_scene, m.geometry, options.seed, m.workers);
     } else {
-        Result<PhysicalScene> scene = make_physical_scene(bundle);
+        Result<PhysicalScene> scene = make_physical_scene(bundle, exercise.targets);
         if (!scene) return scene.error();
         m.physical_scene = std::move(*scene);
         m.tables = physical::make_tables(exercise.probe, m.geometry);
@@ -256,6 +256,8 @@ FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
             return "no bone or gas crossed";
         if (e.physical == &Y::needle && needle == nullptr) return "no needle";
         if (e.physical == &Y::needle && !p.needle_met) return "needle outside the slab";
+        if (e.physical == &Y::fine_structure && !p.fine_met) return "no muscle or fat crossed";
+        if (e.physical == &Y::targets && !p.target_met) return "no target near the slab";
         if (e.physical == &Y::contact && !p.gap_met) return "the probe touches everywhere";
         if (e.physical == &Y::structure && !physical_scene.has_echo)
             return "the bundle holds no structure";

@@ -27,6 +27,13 @@ TEST(PhysicalModel, AgreesWithTheSlowRendererEffectByEffect) {
     }
     Exercise exercise = phantom_exercise();
     exercise.pulsation.amplitude_mm = 1;
+    for (const TargetLook look :
+         {TargetLook::lesion, TargetLook::cyst, TargetLook::abscess, TargetLook::marker}) {
+        Target target;
+        target.centre = {-30 + 15.0 * static_cast<double>(exercise.targets.size()), 1, 60};
+        target.look = look;
+        exercise.targets.push_back(target);
+    }
     FrameInput input = needle_input();
     input.time_s = 1.3;
     for (const auto& effects : rows) {
@@ -131,6 +138,43 @@ TEST(PhysicalModel, SkippingWhatCannotShowNeverChangesAPixel) {
                     draw(phantom_exercise(), all, input))
             << seed;
     }
+}
+
+TEST(PhysicalModel, TargetsShowWhereTheyAreAndNowhereElse) {
+    Exercise exercise = phantom_exercise();
+    FrameInput input;
+    const auto without = draw(exercise, physical_options(), input);
+    Target cyst;
+    cyst.centre = {20, 0, 50};
+    cyst.radius_mm = 9;
+    cyst.look = TargetLook::cyst;
+    exercise.targets = {cyst};
+    auto renderer = Renderer::create(phantom(), exercise, physical_options());
+    ASSERT_TRUE(renderer.has_value());
+    std::vector<std::uint8_t> with(256 * 256);
+    renderer->render(input, with);
+    const auto layout = renderer->layout();
+    double inside = 0, before = 0;
+    int n = 0;
+    for (int row = 0; row < 256; ++row) {
+        for (int column = 0; column < 256; ++column) {
+            const double x = (column - layout.origin_x_px) * layout.mm_per_px,
+                         z = (row - layout.origin_y_px) * layout.mm_per_px;
+            const std::size_t i = static_cast<std::size_t>(row * 256 + column);
+            if (std::hypot(x - 20, z - 50) < 6) {
+                inside += with[i];
+                before += without[i];
+                ++n;
+            }
+            // Above it, out of the point spread's and the haze's reach, nothing changes.
+            if (z < 25) ASSERT_EQ(with[i], without[i]);
+        }
+    }
+    EXPECT_LT(inside / n, 35);
+    EXPECT_GT(before / n, 60);
+    // Far from the slab it is pruned, and the picture is the plain one.
+    exercise.targets[0].centre.y = 25;
+    EXPECT_TRUE(draw(exercise, physical_options(), input) == without);
 }
 
 TEST(PhysicalModel, PicturesForTheEye) {

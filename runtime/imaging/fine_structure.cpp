@@ -1,0 +1,161 @@
+#include "runtime/imaging/fine_structure.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/imaging/paper_scene.h"
+#include "runtime/imaging/periodic_noise.h"
+#include "runtime/imaging/physical_model.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using namespace physical;
+
+struct Moments {
+    double count = 0;
+    Vector3 sum;
+    std::array<double, 6> square{};  // xx yy zz xy xz yz
+};
+
+void add(Moments& m, Vector3 p, double weight) {
+    m.count += weight;
+    m.sum = m.sum + weight * p;
+    const std::array<double, 6> s{p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.x * p.z, p.y * p.z};
+    for (std::size_t i = 0; i < 6; ++i) m.square[i] += weight * s[i];
+}
+
+struct Axis {
+    Vector3 direction{0, 0, 1};
+    double elongation = 1;  // spread along it over the next
+};
+
+// Longest axis by power iteration on the covariance, then the next one by deflation.
+Axis longest_axis(const Moments& m) {
+    if (m.count < 8) return {};
+    const Vector3 c = m.sum / m.count;
+    const auto q = [&](std::size_t i) { return m.square[i] / m.count; };
+    Matrix3 v;
+    v(0, 0) = q(0) - c.x * c.x;
+    v(1, 1) = q(1) - c.y * c.y;
+    v(2, 2) = q(2) - c.z * c.z;
+    v(0, 1) = v(1, 0) = q(3) - c.x * c.y;
+    v(0, 2) = v(2, 0) = q(4) - c.x * c.z;
+    v(1, 2) = v(2, 1) = q(5) - c.y * c.z;
+    const auto top = [](const Matrix3& a, Vector3 start) {
+        Vector3 x = start;
+        for (int i = 0; i < 60; ++i) {
+            const Vector3 y = a * x;
+            if (!(norm(y) > 1e-12)) break;
+            x = normalized(y);
+        }
+        return x;
+    };
+    const Vector3 first = top(v, normalized(Vector3{0.31, 0.52, 0.79}));
+    const double l1 = dot(first, v * first);
+    Matrix3 rest = v;
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) rest(i, j) -= l1 * first[i] * first[j];
+    }
+    const Vector3 second = top(rest, normalized(cross(first, Vector3{0.79, -0.31, 0.52})));
+    const double l2 = dot(second, v * second);
+    return {first, l2 > 1e-9 ? std::sqrt(l1 / l2) : 10.0};
+}
+
+// Mean power 1, as quarter dB.
+void store(const std::vector<double>& db, std::int8_t* out) {
+    double power = 0;
+    for (const double v : db) power += std::pow(10.0, v / 10);
+    const double mean = 10 * std::log10(power / static_cast<double>(db.size()));
+    for (std::size_t i = 0; i < db.size(); ++i) {
+        out[i] =
+            static_cast<std::int8_t>(std::lround(std::clamp(4 * (db[i] - mean), -127.0, 127.0)));
+    }
+}
+
+}  // namespace
+
+FineStructure make_fine_structure(const CaseBundle& bundle) {
+    FineStructure f;
+    const std::size_t cube = static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge;
+    f.cubes.resize(2 * cube + kGatherSlack);
+    f.frames.resize(bundle.labels.size());
+    const std::vector<int> tissue_of = tissue_of_label(bundle);
+    std::vector<int> kind(bundle.labels.size(), -1);
+    std::vector<bool> spine(bundle.labels.size(), false);
+    bool any = false;
+    for (std::size_t l = 1; l < kind.size(); ++l) {
+        if (tissue_of[l] < 0) continue;
+        const std::string& tissue = bundle.tissues[static_cast<std::size_t>(tissue_of[l])].name;
+        kind[l] = tissue == "muscle" ? 0 : tissue == "fat" ? 1 : -1;
+        any = any || kind[l] >= 0;
+        spine[l] = bundle.labels[l].name.rfind("vertebra", 0) == 0;
+    }
+    if (!any) return f;
+
+    // One voxel of a brick speaks for it.
+    std::vector<Moments> moments(bundle.labels.size());
+    Moments all_spine;
+    const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
+    const Int3 n = brick_count(labels.size);
+    std::size_t index = 0;
+    for (int k = 0; k < n.z; ++k) {
+        for (int j = 0; j < n.y; ++j) {
+            for (int i = 0; i < n.x; ++i, ++index) {
+                const std::uint32_t entry = labels.table[index];
+                const std::size_t label =
+                    entry & kUniformBrick
+                        ? labels.uniform[entry & ~kUniformBrick]
+                        : labels.pool[static_cast<std::size_t>(entry) * kBrickVoxels + 42];
+                if (kind[label] != 0 && !spine[label]) continue;
+                const Vector3 p{4.0 * i, 4.0 * j, 4.0 * k};
+                add(spine[label] ? all_spine : moments[label], p, 1);
+            }
+        }
+    }
+    const Vector3 up = longest_axis(all_spine).direction;
+    const double voxel = bundle.grid.spacing_mm.x;
+    for (std::size_t l = 1; l < kind.size(); ++l) {
+        if (kind[l] < 0) continue;
+        FineFrame& frame = f.frames[l];
+        frame.cube = kind[l];
+        Vector3 along = up;
+        if (kind[l] == 0) {
+            const Axis own = longest_axis(moments[l]);
+            if (own.elongation > 1.6) along = own.direction;
+        }
+        const Vector3 a =
+            normalized(cross(along, std::abs(along.x) < 0.7 ? Vector3{1, 0, 0} : Vector3{0, 1, 0}));
+        const Vector3 b = cross(along, a);
+        const double across_mm = kind[l] == 0 ? kFibreAcrossMm : kSeptaMm;
+        const double along_mm = kind[l] == 0 ? kFibreAlongMm : kSeptaMm;
+        const std::array<Vector3, 3> rows{(voxel / along_mm) * along, (voxel / across_mm) * a,
+                                          (voxel / across_mm) * b};
+        for (int r = 0; r < 3; ++r) {
+            for (int c = 0; c < 3; ++c)
+                frame.cube_from_voxel[static_cast<std::size_t>(3 * r + c)] =
+                    static_cast<float>(rows[static_cast<std::size_t>(r)][c]);
+        }
+    }
+
+    const std::vector<float> a = smooth_periodic_noise(kFineEdge, 2, 21),
+                             b = smooth_periodic_noise(kFineEdge, 3, 22),
+                             c = smooth_periodic_noise(kFineEdge, 5, 23);
+    std::vector<double> db(cube);
+    // Fibres: sparse bright strands on dark ground.
+    for (std::size_t i = 0; i < cube; ++i) {
+        const double strand = static_cast<double>(a[i]) + 0.3 * static_cast<double>(c[i]);
+        db[i] = -6 + 9.5 * std::clamp(strand + 0.2, 0.0, 2.2);
+    }
+    store(db, f.cubes.data());
+    // Septa: thin sheets where a smooth field crosses zero, torn here and there.
+    for (std::size_t i = 0; i < cube; ++i) {
+        const double off = static_cast<double>(b[i]) / 0.16;
+        db[i] = -2 + 13 * std::exp(-off * off) *
+                         std::clamp(0.45 + 0.7 * static_cast<double>(c[i]), 0.0, 1.3);
+    }
+    store(db, f.cubes.data() + cube);
+    return f;
+}
+
+}  // namespace sonocase::runtime

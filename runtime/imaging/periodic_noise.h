@@ -1,0 +1,14 @@
+// Smooth periodic noise of unit deviation on a cube: the raw material of roughness and fine
+// structure.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace sonocase::runtime {
+
+// edge^3 values, x fastest; white noise after two box filters of 2 * reach + 1 voxels in each axis.
+std::vector<float> smooth_periodic_noise(int edge, int reach, std::uint32_t seed);
+
+}  // namespace sonocase::runtime
