@@ -41,6 +41,18 @@ std::vector<std::string> cells_of(std::string_view line, char separator) {
     return cells;
 }
 
+char separator_of(std::string_view line) {
+    if (line.find(';') != std::string_view::npos) return ';';
+    if (line.find('\t') != std::string_view::npos) {
+        // Numbers in columns may be set apart by blanks here and tabs there.
+        bool blanks_within = false;
+        for (const std::string& cell : cells_of(line, '\t'))
+            blanks_within = blanks_within || cell.find(' ') != std::string::npos;
+        if (!blanks_within) return '\t';
+    }
+    return line.find(',') != std::string_view::npos ? ',' : ' ';
+}
+
 }  // namespace
 
 std::vector<TextRow> split_rows(std::string_view text) {
@@ -61,13 +73,7 @@ std::vector<TextRow> split_rows(std::string_view text) {
         line = trimmed(line);
         if (line.empty() || line.front() == '#' || line.starts_with("//")) continue;
         if (separator == 0) {
-            separator = ' ';
-            for (const char candidate : {';', '\t', ','}) {
-                if (line.find(candidate) != std::string_view::npos) {
-                    separator = candidate;
-                    break;
-                }
-            }
+            separator = separator_of(line);
         }
         TextRow row{number, cells_of(line, separator)};
         if (separator == ';' || separator == '\t') {

@@ -13,7 +13,8 @@ struct TextRow {
     std::vector<std::string> cells;
 };
 
-// Splits at ';', tab or ',' (the first of these that the first row has), else at blanks. Quotes and
+// Splits at ';', tab or ',' (the first of these that the first row has; no tab where cells would hold
+// blanks), else at blanks and tabs. Quotes and
 // a byte order mark are taken off, empty lines and lines that start with '#' or "//" left out. With
 // ';' or a tab, a comma between digits is a decimal comma.
 std::vector<TextRow> split_rows(std::string_view text);

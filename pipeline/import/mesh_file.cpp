@@ -7,7 +7,6 @@
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
-#include <vtkPolyDataNormals.h>
 #include <vtkSTLReader.h>
 #include <vtkTriangleFilter.h>
 #include <vtkXMLPolyDataReader.h>
@@ -151,14 +150,8 @@ Result<Surface> read_mesh_file(const std::string& path) {
         clean->SetAbsoluteTolerance(0);
         clean->ConvertPolysToLinesOff();
         clean->ConvertLinesToPointsOff();
-        vtkNew<vtkPolyDataNormals> consistent;
-        consistent->SetInputConnection(clean->GetOutputPort());
-        consistent->SplittingOff();
-        consistent->ConsistencyOn();
-        consistent->AutoOrientNormalsOff();
-        consistent->ComputePointNormalsOff();
-        consistent->Update();
-        return surface_of(*consistent->GetOutput());
+        clean->Update();
+        return surface_of(*clean->GetOutput());
     } catch (const std::exception& exception) {
         return Error{std::string("cannot be read as a mesh (") + exception.what() + ")", path,
                      todo};

@@ -30,6 +30,8 @@ Result<NativeVolume> read_dicom_series(const std::string& folder);  // the folde
 // An Error where a NIfTI file holds fewer than `voxel_bytes` after its header, or is damaged gzip: the
 // library below ITK fills what is missing with zeros and says nothing. Done for any other file.
 Status check_nifti_length(const std::string& path, std::uint64_t voxel_bytes);
+// Likewise for MetaImage.
+Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes);
 
 // How to turn and flip the axes of a grid so that they lie nearest to those of its frame.
 struct AxisOrder {

@@ -1,8 +1,10 @@
 #include "pipeline/import/surface_file.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <tuple>
 
 #include "pipeline/import/delimited_text.h"
 #include "pipeline/import/plausible_size.h"
@@ -13,20 +15,76 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Sum over the triangles of the volume towards the points' middle: positive where they face
-// outwards. The middle is inside a torso, so that a mesh open at its cuts is told as well as a
-// closed one.
-double signed_volume(const Surface& surface) {
+// Turns triangles until each agrees with its neighbours and every connected part faces outwards:
+// away from the points' middle, on the whole. The middle is inside a torso, so that a mesh open at
+// its cuts is told as well as a closed one. Edges of more than two triangles do not bind them.
+// Returns how many were turned.
+std::size_t orient_outwards(Surface& surface) {
+    const std::size_t count = surface.triangles.size();
+    struct Side {
+        std::uint32_t low, high, triangle;
+        bool rising;  // the triangle runs along it from low to high
+    };
+    std::vector<Side> sides;
+    for (std::uint32_t t = 0; t < count; ++t) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            const std::uint32_t from = surface.triangles[t][c],
+                                to = surface.triangles[t][(c + 1) % 3];
+            sides.push_back({std::min(from, to), std::max(from, to), t, from < to});
+        }
+    }
+    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+        return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+    });
+    struct Link {
+        std::uint32_t other;
+        bool same_sense;  // both wound alike as they stand
+    };
+    std::vector<std::vector<Link>> links(count);
+    for (std::size_t i = 0; i < sides.size();) {
+        std::size_t end = i + 1;
+        while (end < sides.size() && sides[end].low == sides[i].low &&
+               sides[end].high == sides[i].high)
+            ++end;
+        if (end - i == 2) {
+            const bool same = sides[i].rising != sides[i + 1].rising;
+            links[sides[i].triangle].push_back({sides[i + 1].triangle, same});
+            links[sides[i + 1].triangle].push_back({sides[i].triangle, same});
+        }
+        i = end;
+    }
     Vector3 sum;
     for (const Point3 p : surface.points) sum = sum + (p - Point3{});
     const Point3 middle = Point3{} + sum / static_cast<double>(surface.points.size());
-    double volume = 0;
-    for (const auto& t : surface.triangles) {
-        const Vector3 a = surface.points[t[0]] - middle, b = surface.points[t[1]] - middle,
-                      c = surface.points[t[2]] - middle;
-        volume += dot(a, cross(b, c)) / 6;
+    const auto volume = [&](std::uint32_t t) {
+        const auto& corner = surface.triangles[t];
+        return dot(surface.points[corner[0]] - middle,
+                   cross(surface.points[corner[1]] - middle, surface.points[corner[2]] - middle));
+    };
+    std::vector<std::int8_t> sense(count, 0);  // 1: as it stands, -1: turned, 0: not yet seen
+    std::size_t turned = 0;
+    for (std::uint32_t seed = 0; seed < count; ++seed) {
+        if (sense[seed] != 0) continue;
+        std::vector<std::uint32_t> part{seed};
+        sense[seed] = 1;
+        double outward = 0;
+        for (std::size_t next = 0; next < part.size(); ++next) {
+            const std::uint32_t t = part[next];
+            outward += sense[t] * volume(t);
+            for (const Link& link : links[t]) {
+                if (sense[link.other] != 0) continue;
+                sense[link.other] =
+                    static_cast<std::int8_t>(link.same_sense ? sense[t] : -sense[t]);
+                part.push_back(link.other);
+            }
+        }
+        for (const std::uint32_t t : part) {
+            if ((sense[t] > 0) == (outward >= 0)) continue;
+            std::swap(surface.triangles[t][1], surface.triangles[t][2]);
+            ++turned;
+        }
     }
-    return volume;
+    return turned;
 }
 
 void add_vertex_normals(Surface& surface) {
@@ -77,10 +135,9 @@ Result<Surface> import_surface(const std::string& path,
         return *error;
 
     if (!surface->triangles.empty()) {
-        if (signed_volume(*surface) < 0) {
-            for (auto& t : surface->triangles) std::swap(t[1], t[2]);
-            own.warnings.push_back("the triangles face inwards and were turned");
-        }
+        if (const std::size_t turned = orient_outwards(*surface); turned > 0)
+            own.warnings.push_back(std::to_string(turned) +
+                                   " triangles faced inwards and were turned");
         add_vertex_normals(*surface);
     }
     own.measures = {{"points", static_cast<double>(surface->points.size())},

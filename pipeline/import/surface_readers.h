@@ -9,7 +9,7 @@
 
 namespace sonocase::pipeline {
 
-// PLY, STL, OBJ, VTP; triangles agree with their neighbours, outside is not yet decided.
+// PLY, STL, OBJ, VTP; polygons are triangles, vertices that coincide are one.
 Result<Surface> read_mesh_file(const std::string& path);
 // CSV, TXT, XYZ, PTS, ASC.
 Result<Surface> read_point_file(const std::string& path, std::vector<std::string>* warnings);

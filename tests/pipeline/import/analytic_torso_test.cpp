@@ -24,9 +24,11 @@ TEST(AnalyticTorso, SignOfTheDistanceAgreesWithTheLabel) {
     sonocase::testing::Random random(21);
     const auto labels = analytic_torso_labels();
     for (int i = 0; i < 120; ++i) {
-        const Point3 p{random.uniform(-160, 160), random.uniform(-110, 110), random.uniform(-140, 140)};
+        const Point3 p{random.uniform(-160, 160), random.uniform(-110, 110),
+                       random.uniform(-140, 140)};
         const int own = analytic_torso_label(p);
-        EXPECT_LE(analytic_torso_signed_distance(own, p), 1e-6) << labels[static_cast<std::size_t>(own)].name;
+        EXPECT_LE(analytic_torso_signed_distance(own, p), 1e-6)
+            << labels[static_cast<std::size_t>(own)].name;
         const int other = (own + 7) % static_cast<int>(labels.size());
         EXPECT_GE(analytic_torso_signed_distance(other, p), -1e-6);
     }

@@ -1,0 +1,287 @@
+#include "pipeline/import/surface_file.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <sstream>
+
+#include "support/scratch_folder.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using test::ScratchFolder;
+
+// An ellipsoid of half axes 150, 100 and 200 mm about (10, 20, 30): vertices and triangles with the
+// outside counter-clockwise.
+struct Mesh {
+    std::vector<Point3> points;
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+Mesh ellipsoid() {
+    constexpr int kRings = 16, kSides = 24;
+    Mesh mesh;
+    mesh.points.push_back({10, 20, 230});
+    for (int r = 1; r < kRings; ++r)
+        for (int s = 0; s < kSides; ++s) {
+            const double theta = M_PI * r / kRings, phi = 2 * M_PI * s / kSides;
+            mesh.points.push_back({10 + 150 * std::sin(theta) * std::cos(phi),
+                                   20 + 100 * std::sin(theta) * std::sin(phi),
+                                   30 + 200 * std::cos(theta)});
+        }
+    mesh.points.push_back({10, 20, -170});
+    const auto at = [](int r, int s) {
+        return static_cast<std::uint32_t>(1 + (r - 1) * kSides + s % kSides);
+    };
+    const auto last = static_cast<std::uint32_t>(mesh.points.size() - 1);
+    for (int s = 0; s < kSides; ++s) {
+        mesh.triangles.push_back({0, at(1, s), at(1, s + 1)});
+        for (int r = 1; r + 1 < kRings; ++r) {
+            mesh.triangles.push_back({at(r, s), at(r + 1, s), at(r + 1, s + 1)});
+            mesh.triangles.push_back({at(r, s), at(r + 1, s + 1), at(r, s + 1)});
+        }
+        mesh.triangles.push_back({at(kRings - 1, s), last, at(kRings - 1, s + 1)});
+    }
+    return mesh;
+}
+
+template <class T>
+void append(std::string& bytes, T value, bool big = false) {
+    char raw[sizeof value];
+    std::memcpy(raw, &value, sizeof value);
+    if (big) std::reverse(raw, raw + sizeof value);
+    bytes.append(raw, sizeof value);
+}
+
+std::string ply_ascii(const Mesh& mesh) {
+    std::ostringstream out;
+    out << "ply\nformat ascii 1.0\nelement vertex " << mesh.points.size()
+        << "\nproperty float x\nproperty float y\nproperty float z\nelement face "
+        << mesh.triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
+    for (const Point3 p : mesh.points) out << p.x << " " << p.y << " " << p.z << "\n";
+    for (const auto& t : mesh.triangles) out << "3 " << t[0] << " " << t[1] << " " << t[2] << "\n";
+    return out.str();
+}
+
+std::string ply_binary(const Mesh& mesh, bool big) {
+    std::ostringstream out;
+    out << "ply\nformat binary_" << (big ? "big" : "little") << "_endian 1.0\ncomment units mm\n"
+        << "element vertex " << mesh.points.size()
+        << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\nelement "
+           "face "
+        << mesh.triangles.size() << "\nproperty list uchar uint vertex_index\nend_header\n";
+    std::string bytes = out.str();
+    for (const Point3 p : mesh.points) {
+        append(bytes, p.x, big);
+        append(bytes, p.y, big);
+        append(bytes, p.z, big);
+        append(bytes, std::uint8_t{7});
+    }
+    for (const auto& t : mesh.triangles) {
+        append(bytes, std::uint8_t{3});
+        for (const std::uint32_t corner : t) append(bytes, corner, big);
+    }
+    return bytes;
+}
+
+std::string stl_binary(const Mesh& mesh) {
+    std::string bytes(80, 'x');
+    append(bytes, static_cast<std::uint32_t>(mesh.triangles.size()));
+    for (const auto& t : mesh.triangles) {
+        for (int axis = 0; axis < 3; ++axis) append(bytes, 0.0f);
+        for (const std::uint32_t corner : t)
+            for (int axis = 0; axis < 3; ++axis)
+                append(bytes, static_cast<float>(mesh.points[corner][axis]));
+        append(bytes, std::uint16_t{0});
+    }
+    return bytes;
+}
+
+std::string obj_text(const Mesh& mesh) {
+    std::ostringstream out;
+    for (const Point3 p : mesh.points) out << "v " << p.x << " " << p.y << " " << p.z << "\n";
+    for (const auto& t : mesh.triangles)
+        out << "f " << t[0] + 1 << " " << t[1] + 1 << " " << t[2] + 1 << "\n";
+    return out.str();
+}
+
+std::string vtp_text(const Mesh& mesh) {
+    std::ostringstream out;
+    out << "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" "
+           "byte_order=\"LittleEndian\">"
+        << "<PolyData><Piece NumberOfPoints=\"" << mesh.points.size()
+        << "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\""
+        << mesh.triangles.size()
+        << "\"><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">\n";
+    for (const Point3 p : mesh.points) out << p.x << " " << p.y << " " << p.z << "\n";
+    out << "</DataArray></Points><Polys><DataArray type=\"Int32\" Name=\"connectivity\" "
+           "format=\"ascii\">\n";
+    for (const auto& t : mesh.triangles) out << t[0] << " " << t[1] << " " << t[2] << "\n";
+    out << "</DataArray><DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">\n";
+    for (std::size_t n = 1; n <= mesh.triangles.size(); ++n) out << 3 * n << " ";
+    out << "</DataArray></Polys></Piece></PolyData></VTKFile>\n";
+    return out.str();
+}
+
+void expect_ellipsoid(const Result<Surface>& surface, const std::string& name) {
+    ASSERT_TRUE(surface.has_value()) << name << ": " << surface.error().message();
+    const Mesh mesh = ellipsoid();
+    EXPECT_EQ(surface->points.size(), mesh.points.size()) << name;
+    EXPECT_EQ(surface->triangles.size(), mesh.triangles.size()) << name;
+    ASSERT_EQ(surface->normals.size(), surface->points.size()) << name;
+    for (std::size_t i = 0; i < surface->points.size(); ++i) {
+        const Vector3 d = surface->points[i] - Point3{10, 20, 30};
+        const Vector3 gradient{d.x / (150.0 * 150), d.y / (100.0 * 100), d.z / (200.0 * 200)};
+        // A mesh of 24 sides turns 15 degrees from face to face.
+        EXPECT_GT(dot(surface->normals[i], normalized(gradient)), std::cos(0.27))
+            << name << " point " << i;
+        const double on = d.x * gradient.x + d.y * gradient.y + d.z * gradient.z;
+        EXPECT_NEAR(on, 1, 1e-4) << name;  // six digits in the text formats
+    }
+}
+
+TEST(ImportSurface, EveryMeshFormatGivesTheSameSurfaceWithOutwardNormals) {
+    const ScratchFolder folder;
+    const Mesh mesh = ellipsoid();
+    for (const auto& [name, bytes] : {std::pair<const char*, std::string>{"a.ply", ply_ascii(mesh)},
+                                      {"l.ply", ply_binary(mesh, false)},
+                                      {"b.ply", ply_binary(mesh, true)},
+                                      {"a.stl", stl_binary(mesh)},
+                                      {"A.STL", stl_binary(mesh)},
+                                      {"a.obj", obj_text(mesh)},
+                                      {"a.vtp", vtp_text(mesh)}})
+        expect_ellipsoid(import_surface(folder.write(name, bytes)), name);
+}
+
+TEST(ImportSurface, TurnsAMeshThatFacesInwardsAndTrianglesThatDisagree) {
+    const ScratchFolder folder;
+    Mesh inward = ellipsoid(), mixed = ellipsoid();
+    for (auto& t : inward.triangles) std::swap(t[0], t[1]);
+    for (std::size_t n = 0; n < mixed.triangles.size(); n += 3)
+        std::swap(mixed.triangles[n][0], mixed.triangles[n][1]);
+    StageReport report;
+    expect_ellipsoid(import_surface(folder.write("i.ply", ply_ascii(inward)), {}, &report),
+                     "inward");
+    EXPECT_EQ(report.warnings.size(), 1u);
+    expect_ellipsoid(import_surface(folder.write("m.ply", ply_ascii(mixed))), "mixed");
+}
+
+TEST(ImportSurface, ReadsCloudsInEveryDialect) {
+    const ScratchFolder folder;
+    const Mesh mesh = ellipsoid();
+    std::string comma = "X,Y,Z\n", blanks, excel = "name;x;y;z\r\n",
+                pose = "frame,timestamp_s,status,tx,ty,tz,r00\n";
+    for (const Point3 p : mesh.points) {
+        char row[128];
+        std::snprintf(row, sizeof row, "%.3f,%.3f,%.3f\n", p.x, p.y, p.z);
+        comma += row;
+        std::snprintf(row, sizeof row, "  %.3f %.3f\t%.3f\n", p.x, p.y, p.z);
+        blanks += row;
+        std::snprintf(row, sizeof row, "p;%.3f;%.3f;%.3f\r\n", p.x, p.y, p.z);
+        for (char* c = row; *c; ++c)
+            if (*c == '.') *c = ',';
+        excel += row;
+        std::snprintf(row, sizeof row, "1,0.5,OK,%.3f,%.3f,%.3f,1\n", p.x, p.y, p.z);
+        pose += row;
+    }
+    pose += "2,0.6,MISSING,0,0,0,1\n3,0.7,OK,nan,nan,nan,1\n";
+    for (const auto& [name, text] : {std::pair<const char*, std::string>{"c.csv", comma},
+                                     {"c.xyz", blanks},
+                                     {"n.xyz", std::to_string(mesh.points.size()) + "\n" + blanks},
+                                     {"e.csv", excel},
+                                     {"p.csv", pose}}) {
+        StageReport report;
+        const auto surface = import_surface(folder.write(name, text), {}, &report);
+        ASSERT_TRUE(surface.has_value()) << name << ": " << surface.error().message();
+        ASSERT_EQ(surface->points.size(), mesh.points.size()) << name;
+        EXPECT_TRUE(surface->triangles.empty());
+        for (std::size_t i = 0; i < mesh.points.size(); ++i)
+            EXPECT_LT(distance(surface->points[i], mesh.points[i]), 1e-3) << name;
+        EXPECT_EQ(report.warnings.size(), std::string(name) == "p.csv" ? 1u : 0u) << name;
+    }
+}
+
+TEST(ImportSurface, ScaleTurnsMetresIntoMillimetres) {
+    const ScratchFolder folder;
+    Mesh mesh = ellipsoid();
+    for (Point3& p : mesh.points) p = {p.x / 1000, p.y / 1000, p.z / 1000};
+    const std::string path = folder.write("m.ply", ply_binary(mesh, false));
+    const auto refused = import_surface(path);
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_NE(refused.error().expected.find("--scale 1000"), std::string::npos)
+        << refused.error().message();
+    SurfaceFileOptions options;
+    options.scale = 1000;
+    expect_ellipsoid(import_surface(path, options), "scaled");
+}
+
+TEST(ImportSurfaceRefuses, TooFewPointsNoneAndWhatIsNotThere) {
+    const ScratchFolder folder;
+    std::string few = "x,y,z\n";
+    for (int n = 0; n < 99; ++n)
+        few += std::to_string(n) + "," + std::to_string(n * n % 97) + ",0\n";
+    const std::pair<std::string, const char*> cases[] = {
+        {folder.write("few.csv", few), "surface of 99 points"},
+        {folder.write("none.csv", "x,y,z\n"), "no points"},
+        {folder.write("none.ply",
+                      "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n"
+                      "property float y\nproperty float z\nend_header\n"),
+         "no points"},
+        {folder.write("empty.stl", ""), "empty"},
+        {folder / "missing.ply", "no such file"},
+        {folder.write("a.doc", "x"), "not a known surface"},
+        {folder.write("words.csv", "alpha,beta\n1,2\n"), "no columns x, y, z"},
+        {folder.write("hole.csv", "x,y,z\n1,2,3\n1,,3\n"), "row without three numbers"},
+    };
+    for (const auto& [path, what] : cases) {
+        const auto surface = import_surface(path);
+        ASSERT_FALSE(surface.has_value()) << path;
+        EXPECT_NE(surface.error().what.find(what), std::string::npos) << surface.error().message();
+        EXPECT_NE(surface.error().where.find(path), std::string::npos) << surface.error().message();
+        EXPECT_FALSE(surface.error().expected.empty()) << surface.error().message();
+    }
+}
+
+TEST(ImportSurfaceRefuses, EveryTruncationOfFormatsThatSayTheirLength) {
+    const ScratchFolder folder;
+    const Mesh mesh = ellipsoid();
+    for (const auto& [name, bytes] : {std::pair<const char*, std::string>{"a.ply", ply_ascii(mesh)},
+                                      {"l.ply", ply_binary(mesh, false)},
+                                      {"b.ply", ply_binary(mesh, true)},
+                                      {"a.stl", stl_binary(mesh)},
+                                      {"a.vtp", vtp_text(mesh)}}) {
+        for (std::size_t n = 0; n < 100; ++n) {
+            const std::size_t length = bytes.size() * n / 100;
+            EXPECT_FALSE(import_surface(folder.write(name, bytes.substr(0, length))).has_value())
+                << name << " cut to " << length;
+        }
+        // A text may lose its last newline and digits of its last number unnoticed.
+        EXPECT_FALSE(
+            import_surface(folder.write(name, bytes.substr(0, bytes.size() - 9))).has_value())
+            << name;
+    }
+}
+
+TEST(ImportSurfaceRefuses, FacesThatNameNoVertexAndHugeCounts) {
+    const ScratchFolder folder;
+    const std::string head =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+        "float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n";
+    EXPECT_FALSE(import_surface(folder.write("f.ply", head + "3 0 1 3\n")).has_value());
+    EXPECT_FALSE(import_surface(folder.write("g.ply", head + "3 0 1 -1\n")).has_value());
+    EXPECT_FALSE(import_surface(folder.write("h.ply", head + "2000000000 0 1 2\n")).has_value());
+    EXPECT_FALSE(
+        import_surface(folder.write("i.ply",
+                                    "ply\nformat binary_little_endian 1.0\n"
+                                    "element vertex 99999999999\nproperty float x\nend_header\n"))
+            .has_value());
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline

@@ -1,0 +1,239 @@
+#include "pipeline/import/volume_files.h"
+
+#include <zlib.h>
+
+#include <cmath>
+#include <cstring>
+#include <sstream>
+
+namespace sonocase::test {
+namespace {
+
+template <class T>
+void put(std::string& bytes, std::size_t at, T value) {
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+
+std::string voxels_of(const TinyVolume& volume) {
+    return {volume.voxels.begin(), volume.voxels.end()};
+}
+
+std::string numbers(std::initializer_list<double> values, const char* separator) {
+    std::ostringstream out;
+    out.precision(17);
+    const char* between = "";
+    for (const double value : values) {
+        out << between << value;
+        between = separator;
+    }
+    return out.str();
+}
+
+// An element in explicit little-endian; the value is padded to even length.
+std::string element(std::uint16_t group,
+                    std::uint16_t number,
+                    const char* kind,
+                    std::string value) {
+    const std::string type(kind, 2);
+    if (value.size() % 2) value += type == "UI" ? '\0' : ' ';
+    std::string bytes(8, '\0');
+    put(bytes, 0, group);
+    put(bytes, 2, number);
+    std::memcpy(bytes.data() + 4, kind, 2);
+    if (type == "OW" || type == "OB" || type == "SQ") {
+        bytes.resize(12);
+        put(bytes, 8, static_cast<std::uint32_t>(value.size()));
+    } else {
+        put(bytes, 6, static_cast<std::uint16_t>(value.size()));
+    }
+    return bytes + value;
+}
+
+std::string us(std::uint16_t value) {
+    std::string bytes(2, '\0');
+    put(bytes, 0, value);
+    return bytes;
+}
+
+}  // namespace
+
+TinyVolume sample(Int3 size,
+                  const Matrix3& columns,
+                  Point3 origin,
+                  const std::function<int(Point3)>& label) {
+    TinyVolume volume{size, columns, origin, {}, 1};
+    for (int k = 0; k < size.z; ++k)
+        for (int j = 0; j < size.y; ++j)
+            for (int i = 0; i < size.x; ++i)
+                volume.voxels.push_back(static_cast<std::uint8_t>(label(volume.position(i, j, k))));
+    return volume;
+}
+
+TinyVolume sample_in_order(const int (&order)[3],
+                           const bool (&flip)[3],
+                           Vector3 extent_mm,
+                           Vector3 spacing_mm,
+                           Point3 corner,
+                           const std::function<int(Point3)>& label) {
+    Int3 size;
+    Matrix3 columns = Matrix3::diagonal({0, 0, 0});
+    Point3 origin = corner;
+    for (int axis = 0; axis < 3; ++axis) {
+        const int world = order[axis];
+        size[axis] = static_cast<int>(std::lround(extent_mm[world] / spacing_mm[world]));
+        columns(world, axis) = flip[axis] ? -spacing_mm[world] : spacing_mm[world];
+        if (flip[axis]) origin[world] += (size[axis] - 1) * spacing_mm[world];
+    }
+    return sample(size, columns, origin, label);
+}
+
+std::string nifti_bytes(const TinyVolume& volume, const std::string& extension_xml) {
+    std::string extension;
+    if (!extension_xml.empty()) {
+        const std::size_t padded = (extension_xml.size() + 8 + 15) / 16 * 16;
+        extension.assign(padded, '\0');
+        put(extension, 0, static_cast<std::int32_t>(padded));
+        put(extension, 4, std::int32_t{0});
+        extension.replace(8, extension_xml.size(), extension_xml);
+    }
+    std::string bytes(352, '\0');
+    put(bytes, 0, std::int32_t{348});
+    const std::int16_t dim[8] = {3,
+                                 static_cast<std::int16_t>(volume.size.x),
+                                 static_cast<std::int16_t>(volume.size.y),
+                                 static_cast<std::int16_t>(volume.size.z),
+                                 1,
+                                 1,
+                                 1,
+                                 1};
+    std::memcpy(bytes.data() + 40, dim, sizeof dim);
+    put(bytes, 70, std::int16_t{2});  // unsigned char
+    put(bytes, 72, std::int16_t{8});
+    put(bytes, 76, 1.0f);
+    for (int axis = 0; axis < 3; ++axis)
+        put(bytes, 80 + 4 * static_cast<std::size_t>(axis),
+            static_cast<float>(norm(volume.columns.column(axis))));
+    put(bytes, 108, 352.0f + static_cast<float>(extension.size()));
+    put(bytes, 112, 1.0f);
+    bytes[123] = 2;  // mm
+    put(bytes, 252, std::int16_t{0});
+    put(bytes, 254, std::int16_t{1});
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column)
+            put(bytes,
+                280 + 16 * static_cast<std::size_t>(row) + 4 * static_cast<std::size_t>(column),
+                static_cast<float>(volume.columns(row, column)));
+        put(bytes, 292 + 16 * static_cast<std::size_t>(row),
+            static_cast<float>(volume.origin[row]));
+    }
+    std::memcpy(bytes.data() + 344, "n+1", 4);
+    if (!extension.empty()) bytes[348] = 1;
+    return bytes + extension + voxels_of(volume);
+}
+
+std::string nrrd_bytes(const TinyVolume& volume, const std::string& fields, bool lps, bool gzip) {
+    std::ostringstream out;
+    const double sign = lps ? -1 : 1;
+    out << "NRRD0004\ntype: unsigned char\ndimension: " << (volume.layers > 1 ? 4 : 3)
+        << "\nspace: " << (lps ? "left-posterior-superior" : "right-anterior-superior")
+        << "\nsizes: ";
+    if (volume.layers > 1) out << volume.layers << " ";
+    out << volume.size.x << " " << volume.size.y << " " << volume.size.z << "\nspace directions:";
+    if (volume.layers > 1) out << " none";
+    for (int axis = 0; axis < 3; ++axis) {
+        const Vector3 c = volume.columns.column(axis);
+        out << " (" << numbers({sign * c.x, sign * c.y, c.z}, ",") << ")";
+    }
+    out << "\nkinds:" << (volume.layers > 1 ? " list" : "")
+        << " domain domain domain\nencoding: " << (gzip ? "gzip" : "raw") << "\n"
+        << "space origin: ("
+        << numbers({sign * volume.origin.x, sign * volume.origin.y, volume.origin.z}, ",") << ")\n"
+        << fields << "\n";
+    return out.str() + (gzip ? gzip_bytes(voxels_of(volume)) : voxels_of(volume));
+}
+
+std::string mha_bytes(const TinyVolume& volume, bool compressed) {
+    std::ostringstream out;
+    std::string data = voxels_of(volume);
+    if (compressed) {
+        uLongf size = compressBound(data.size());
+        std::string packed(size, '\0');
+        compress(reinterpret_cast<Bytef*>(packed.data()), &size,
+                 reinterpret_cast<const Bytef*>(data.data()), data.size());
+        packed.resize(size);
+        data = packed;
+    }
+    Matrix3 direction;
+    double spacing[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        const Vector3 c = volume.columns.column(axis);
+        spacing[axis] = norm(c);
+        for (int row = 0; row < 3; ++row)  // LPS
+            direction(row, axis) = (row < 2 ? -1 : 1) * c[row] / spacing[axis];
+    }
+    out << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
+        << (compressed ? "CompressedData = True\nCompressedDataSize = " +
+                             std::to_string(data.size()) + "\n"
+                       : std::string())
+        << "TransformMatrix =";
+    for (int axis = 0; axis < 3; ++axis)
+        for (int row = 0; row < 3; ++row) out << " " << direction(row, axis);
+    out << "\nOffset = " << numbers({-volume.origin.x, -volume.origin.y, volume.origin.z}, " ")
+        << "\nElementSpacing = " << numbers({spacing[0], spacing[1], spacing[2]}, " ")
+        << "\nDimSize = " << volume.size.x << " " << volume.size.y << " " << volume.size.z
+        << "\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+    return out.str() + data;
+}
+
+std::string gzip_bytes(const std::string& bytes) {
+    z_stream stream{};
+    deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+    std::string out(deflateBound(&stream, bytes.size()), '\0');
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+    stream.avail_in = static_cast<uInt>(bytes.size());
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = static_cast<uInt>(out.size());
+    deflate(&stream, Z_FINISH);
+    out.resize(stream.total_out);
+    deflateEnd(&stream);
+    return out;
+}
+
+std::string dicom_slice(const TinyVolume& volume, int k, const std::string& series) {
+    const std::string instance = series + "." + std::to_string(k + 1);
+    const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
+    std::string meta = element(2, 1, "OB", std::string("\0\1", 2)) + element(2, 2, "UI", ct) +
+                       element(2, 3, "UI", instance) +
+                       element(2, 0x10, "UI", "1.2.840.10008.1.2.1") +
+                       element(2, 0x12, "UI", "1.2.3.4");
+    std::string length(4, '\0');
+    put(length, 0, static_cast<std::uint32_t>(meta.size()));
+    std::string bytes(128, '\0');
+    bytes += "DICM" + element(2, 0, "UL", length) + meta;
+    const Vector3 x = volume.columns.column(0), y = volume.columns.column(1);
+    const Point3 at = volume.position(0, 0, k);
+    const double sx = norm(x), sy = norm(y);
+    bytes += element(8, 0x16, "UI", ct) + element(8, 0x18, "UI", instance) +
+             element(8, 0x60, "CS", "CT");
+    bytes += element(0x18, 0x50, "DS", numbers({norm(volume.columns.column(2))}, ""));
+    bytes += element(0x20, 0xd, "UI", "1.2.3.9") + element(0x20, 0xe, "UI", series);
+    bytes += element(0x20, 0x13, "IS", std::to_string(k + 1));
+    bytes += element(0x20, 0x32, "DS", numbers({-at.x, -at.y, at.z}, "\\"));
+    bytes +=
+        element(0x20, 0x37, "DS",
+                numbers({-x.x / sx, -x.y / sx, x.z / sx, -y.x / sy, -y.y / sy, y.z / sy}, "\\"));
+    bytes += element(0x28, 2, "US", us(1)) + element(0x28, 4, "CS", "MONOCHROME2");
+    bytes += element(0x28, 0x10, "US", us(static_cast<std::uint16_t>(volume.size.y))) +
+             element(0x28, 0x11, "US", us(static_cast<std::uint16_t>(volume.size.x)));
+    bytes += element(0x28, 0x30, "DS", numbers({sy, sx}, "\\"));
+    bytes += element(0x28, 0x100, "US", us(16)) + element(0x28, 0x101, "US", us(16)) +
+             element(0x28, 0x102, "US", us(15)) + element(0x28, 0x103, "US", us(0));
+    std::string pixels;
+    const std::size_t slice =
+        static_cast<std::size_t>(volume.size.x) * static_cast<std::size_t>(volume.size.y);
+    for (std::size_t n = 0; n < slice; ++n)
+        pixels += us(volume.voxels[static_cast<std::size_t>(k) * slice + n]);
+    return bytes + element(0x7fe0, 0x10, "OW", pixels);
+}
+
+}  // namespace sonocase::test

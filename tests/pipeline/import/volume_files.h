@@ -1,0 +1,53 @@
+// Small label maps written byte by byte in every format that import reads, so that the reader is
+// tested against the formats' own definitions and not against the library that it uses.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "formats/grid.h"
+
+namespace sonocase::test {
+
+// A voxel array of 8 bits, x fastest, with the RAS+ position of voxel (i, j, k):
+// origin + columns * (i, j, k).
+struct TinyVolume {
+    Int3 size{0, 0, 0};
+    Matrix3 columns;  // voxel steps in RAS+, mm
+    Point3 origin;    // RAS+, mm
+    std::vector<std::uint8_t> voxels;
+    int layers = 1;  // fastest
+
+    Point3 position(int i, int j, int k) const {
+        return origin + columns * Vector3{double(i), double(j), double(k)};
+    }
+};
+
+// Labels as a function of the RAS+ position, sampled.
+TinyVolume sample(Int3 size,
+                  const Matrix3& columns,
+                  Point3 origin,
+                  const std::function<int(Point3)>& label);
+
+// Columns with axes permuted and flipped: axis a of the volume runs along world axis order[a],
+// against it where flip[a]; origin such that the volume covers the same box [0, extent].
+TinyVolume sample_in_order(const int (&order)[3],
+                           const bool (&flip)[3],
+                           Vector3 extent_mm,
+                           Vector3 spacing_mm,
+                           Point3 corner,
+                           const std::function<int(Point3)>& label);
+
+std::string nifti_bytes(const TinyVolume& volume, const std::string& extension_xml = "");
+std::string nrrd_bytes(const TinyVolume& volume,
+                       const std::string& fields = "",
+                       bool lps = true,
+                       bool gzip = false);
+std::string mha_bytes(const TinyVolume& volume, bool compressed = false);
+std::string gzip_bytes(const std::string& bytes);
+// One slice of an uncompressed DICOM series of unsigned 16-bit values, explicit little-endian.
+std::string dicom_slice(const TinyVolume& volume, int k, const std::string& series);
+
+}  // namespace sonocase::test
