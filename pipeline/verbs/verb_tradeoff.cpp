@@ -52,11 +52,9 @@ struct NamedSuite {
 
 std::vector<NamedSuite> suites() {
     return {
-        {"warp", warp_suite},
-        {"smooth", smooth_suite},
-        {"texture", texture_suite},
-        {"calibrate", calibrate_suite},
-        {"case", [] { return case_suite({}, "demo-torso"); }},
+        {"register", register_suite},   {"warp", warp_suite},
+        {"smooth", smooth_suite},       {"texture", texture_suite},
+        {"calibrate", calibrate_suite}, {"case", [] { return case_suite({}, "demo-torso"); }},
     };
 }
 

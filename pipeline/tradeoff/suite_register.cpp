@@ -1,0 +1,120 @@
+#include <cmath>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "pipeline/registration/register_surfaces.h"
+#include "pipeline/tradeoff/suites.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+struct KnownFit {
+    LabelVolume ct = sample_analytic_torso(analytic_torso_grid({3, 3, 3}));
+    Registration truth = analytic_torso_truth();
+    std::vector<Point3> targets;  // inside the body, `ct`
+
+    KnownFit() {
+        std::mt19937_64 engine(5);
+        const auto uniform = [&](double half) {
+            return half * (static_cast<double>(engine() >> 11) * 0x1p-52 - 1);
+        };
+        while (targets.size() < 2000) {
+            const double x = uniform(160), y = uniform(120), z = uniform(150);
+            if (analytic_torso_label({x, y, z}) != 0) targets.push_back({x, y, z});
+        }
+    }
+};
+
+Result<Measured> measure_fit(const KnownFit& known, const Settings& settings) {
+    StageOptions options;
+    Settings stage_settings;
+    AnalyticMannequinOptions readings;
+    for (const Setting& s : settings) {
+        if (s.key == "mannequin.points") {
+            readings.points = std::stoi(s.value);
+        } else {
+            stage_settings.push_back(s);
+        }
+    }
+    if (const Status s = apply_settings(stage_settings, options); !s) return s.error();
+    const auto skin = extract_skin_surface(known.ct, options.surface);
+    if (!skin) return skin.error();
+    const Surface mannequin = analytic_torso_mannequin(readings);
+    const auto fitted = register_surfaces({*skin, mannequin}, options.fit);
+    if (!fitted) return fitted.error();
+    double sum = 0;
+    for (const Point3 target : known.targets) {
+        sum += distance(mannequin_from_ct(fitted->registration, target),
+                        mannequin_from_ct(known.truth, target));
+    }
+    Measured measured;
+    measured.error = sum / static_cast<double>(known.targets.size());
+    measured.seconds = skin->report.seconds + fitted->report.seconds;
+    if (!fitted->report.warnings.empty()) measured.note = fitted->report.warnings.front();
+    return measured;
+}
+
+}  // namespace
+
+Suite register_suite() {
+    auto known = std::make_shared<KnownFit>();
+    Suite suite;
+    suite.name = "register";
+    suite.title = "Fit of the patient to the mannequin";
+    suite.body = "demo-torso";
+    suite.error_name = "interior target error, mean";
+    suite.error_unit = "mm";
+    suite.truth =
+        "The demo torso's skin, from labels at 3 mm, is fitted to 2,000 readings (0.7 mm noise) of "
+        "a mannequin made "
+        "from it by a known rigid motion and a known quadratic warp of 9 mm; the error is the mean "
+        "distance of 2,000 "
+        "points inside the body from where the known map puts them. Motion along the skin cannot "
+        "be seen by any fit "
+        "of surfaces, which is the floor of the curve.";
+    suite.knobs = {
+        {"mannequin.points",
+         {"200", "500", "1000", "2000", "4000"},
+         "2000",
+         "",
+         "readings of the mannequin",
+         "noise of the readings",
+         ""},
+        {"surface.working_mm",
+         {"8", "5", "3", "2"},
+         "3",
+         "mm",
+         "voxel to which the body is averaged for its skin",
+         "where the skin is",
+         "the labels themselves are sampled at 3 mm"},
+        {"align.starts",
+         {"10", "30", "60", "120", "240"},
+         std::to_string(StageOptions{}.fit.rigid.starts),
+         "",
+         "rotations to start from",
+         "the chance of a wrong pose",
+         "once one start falls into the right valley, more of them end in the same place"},
+        {"warp.trials",
+         {"10", "30", "100", "300"},
+         std::to_string(StageOptions{}.fit.ransac.trials),
+         "",
+         "of the random consensus",
+         "the start of the refinement",
+         "the point-to-surface refinement that follows ends in the same place"},
+        {"warp.spacing_mm",
+         {"80", "60", "40", "30", "20"},
+         "30",
+         "mm",
+         "of the residual's control points",
+         "bumps of the skin",
+         "finer than the readings lie, control points follow their noise"},
+    };
+    suite.pairs = {{"mannequin.points", "warp.spacing_mm"}, {"align.starts", "warp.trials"}};
+    suite.named = {{TrialRole::paper, "paper, eqs. (3)-(9)", {{"warp.paper", "true"}}},
+                   {TrialRole::peer, "quadratic without residual", {{"warp.residual", "false"}}}};
+    suite.measure = [known](const Settings& settings) { return measure_fit(*known, settings); };
+    return suite;
+}
+
+}  // namespace sonocase::pipeline
