@@ -21,8 +21,8 @@ Error cut_off(std::uint64_t found, std::uint64_t needed, const std::string& path
             path, "the file is cut off or damaged; copy or export it again"};
 }
 
-// Bytes that a zlib or gzip stream unpacks to, up to `enough`; a damaged stream ends where it
-// breaks.
+// Bytes that a zlib or gzip stream unpacks to; less than `enough` where its end or its checksum is
+// missing.
 std::uint64_t inflated_bytes(const std::vector<std::uint8_t>& packed,
                              std::size_t at,
                              std::uint64_t enough) {
@@ -31,7 +31,7 @@ std::uint64_t inflated_bytes(const std::vector<std::uint8_t>& packed,
     std::vector<std::uint8_t> out(1 << 20);
     std::uint64_t total = 0;
     int status = Z_OK;
-    while (status == Z_OK && total < enough) {
+    while (status == Z_OK) {
         if (stream.avail_in == 0) {
             const std::size_t piece = std::min<std::size_t>(packed.size() - at, 1u << 30);
             if (piece == 0) break;
@@ -45,7 +45,7 @@ std::uint64_t inflated_bytes(const std::vector<std::uint8_t>& packed,
         total += out.size() - stream.avail_out;
     }
     inflateEnd(&stream);
-    return total;
+    return status == Z_STREAM_END ? total : std::min(total, enough - 1);
 }
 
 }  // namespace
