@@ -100,4 +100,28 @@ Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes) {
     return Done{};
 }
 
+Status check_nrrd_length(const std::string& path, std::uint64_t voxel_bytes) {
+    if (!path.ends_with(".nrrd")) return Done{};
+    const auto bytes = sonocase::read_file(path);
+    if (!bytes) return bytes.error();
+    // Lines up to an empty one; "data file" means that the voxels are elsewhere.
+    bool gzip = false;
+    for (std::size_t at = 0; at < bytes->size();) {
+        const auto end = std::find(bytes->begin() + static_cast<std::ptrdiff_t>(at), bytes->end(),
+                                   std::uint8_t{'\n'});
+        std::string line(bytes->begin() + static_cast<std::ptrdiff_t>(at), end);
+        at = static_cast<std::size_t>(end - bytes->begin()) + 1;
+        if (!line.empty() && line.back() == '\r') line.pop_back();
+        if (line.starts_with("data file:") || line.starts_with("datafile:")) return Done{};
+        if (line == "encoding: gzip" || line == "encoding: gz") gzip = true;
+        if (!line.empty()) continue;
+        if (!gzip) return Done{};  // the reader counts raw bytes itself
+        const std::uint64_t found =
+            inflated_bytes(*bytes, std::min(at, bytes->size()), voxel_bytes);
+        if (found < voxel_bytes) return cut_off(found, voxel_bytes, path);
+        return Done{};
+    }
+    return Done{};
+}
+
 }  // namespace sonocase::pipeline

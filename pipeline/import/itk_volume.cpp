@@ -155,6 +155,7 @@ Result<NativeVolume> read_itk_volume(const std::string& path) {
         volume.bytes.resize(bytes);
         if (auto status = check_nifti_length(path, bytes); !status) return status.error();
         if (auto status = check_meta_length(path, bytes); !status) return status.error();
+        if (auto status = check_nrrd_length(path, bytes); !status) return status.error();
         itk::ImageIORegion region(dimensions);
         for (unsigned d = 0; d < dimensions; ++d) region.SetSize(d, io->GetDimensions(d));
         io->SetIORegion(region);

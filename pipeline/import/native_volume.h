@@ -32,6 +32,8 @@ Result<NativeVolume> read_dicom_series(const std::string& folder);  // the folde
 Status check_nifti_length(const std::string& path, std::uint64_t voxel_bytes);
 // Likewise for MetaImage.
 Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes);
+// Likewise for compressed NRRD, whose reader does not miss the end of the stream.
+Status check_nrrd_length(const std::string& path, std::uint64_t voxel_bytes);
 
 // How to turn and flip the axes of a grid so that they lie nearest to those of its frame.
 struct AxisOrder {
