@@ -184,6 +184,25 @@ void toggle_needle(App& app, bool in_plane) {
     }
 }
 
+namespace {
+
+// Each live frame goes to the attempt and to the server, as far as there are any.
+void watch_frames(App& app) {
+    if (!app.attempt && !app.server) {
+        app.scan->set_observer({});
+        return;
+    }
+    app.scan->set_observer([attempt = app.attempt, server = app.server](const ScanFrame& frame) {
+        if (attempt) attempt->observe(frame.record, frame.width_px, frame.height_px, frame.pixels);
+        if (server) {
+            serve_frame(*server, frame.record, frame.layout, frame.width_px, frame.height_px,
+                        unix_seconds(), frame.pixels);
+        }
+    });
+}
+
+}  // namespace
+
 void start_attempt(App& app, const std::string& path) {
     if (app.attempt || !app.open) return;
     std::string file = path;
@@ -206,22 +225,21 @@ void start_attempt(App& app, const std::string& path) {
     app.attempt = std::make_shared<Attempt>(*app.open, app.current(), std::move(*run));
     app.score.reset();
     app.hits.assign(app.hits.size(), false);
-    app.scan->set_observer([attempt = app.attempt](const ScanFrame& frame) {
-        attempt->observe(frame.record, frame.width_px, frame.height_px, frame.pixels);
-    });
+    watch_frames(app);
 }
 
 void finish_attempt(App& app) {
     if (!app.attempt) return;
-    app.scan->set_observer({});  // returns when the thread has let go of the attempt
-    Result<SessionScore> score = app.attempt->finish();
+    const std::shared_ptr<Attempt> attempt = std::move(app.attempt);
+    watch_frames(app);  // returns when the scan thread has let go of the attempt
+    Result<SessionScore> score = attempt->finish();
     if (score) {
         app.score = std::move(*score);
-        app.score_file = app.attempt->path();
+        app.score_file = attempt->path();
+        app.show_score = true;
     } else {
         notify(app, Notice::Kind::error, score.error().message());
     }
-    app.attempt.reset();
 }
 
 Status save_screenshot(App& app, const std::string& path) {
@@ -314,6 +332,15 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
     app.scan->set_first_frame_origin_s(start_s - clock_start_s);
     app.scan->set_calibrations(app.calibrations);
     app.tracker_spec = arguments.tracker.empty() ? "mouse" : arguments.tracker;
+    if (!arguments.serve.empty()) {
+        Result<std::unique_ptr<IgtlServer>> server = IgtlServer::start(arguments.serve);
+        if (server) {
+            app.server = std::move(*server);
+            watch_frames(app);
+        } else {
+            notify(app, Notice::Kind::error, server.error().message());
+        }
+    }
     if (!warning.empty()) notify(app, Notice::Kind::warning, warning);
     app.bundles = find_bundles(app.settings);
     if (!arguments.bundle.empty() && open_bundle(app, arguments.bundle, arguments.exercise) &&

@@ -15,6 +15,7 @@
 #include "runtime/player/input_script.h"
 #include "runtime/player/open_case.h"
 #include "runtime/player/scan_thread.h"
+#include "runtime/player/serve.h"
 #include "runtime/player/settings.h"
 #include "runtime/tracking/mouse_tracker.h"
 #include "runtime/tracking/push_tracker.h"
@@ -56,9 +57,11 @@ struct App {
     ScanControls controls;
 
     // An attempt at the exercise, and the scores of the last one.
-    std::shared_ptr<Attempt> attempt;  // shared with the scan thread
+    std::shared_ptr<Attempt> attempt;    // shared with the scan thread
+    std::shared_ptr<IgtlServer> server;  // --serve
     std::optional<SessionScore> score;
     std::string score_file;
+    bool show_score = false;
 
     // Of the picture
     std::unique_ptr<ImageTexture> texture;

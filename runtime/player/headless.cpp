@@ -15,6 +15,7 @@
 #include "runtime/player/open_case.h"
 #include "runtime/player/png_file.h"
 #include "runtime/player/scan_engine.h"
+#include "runtime/player/serve.h"
 #include "runtime/player/session_run.h"
 #include "runtime/session/settings_text.h"
 #include "runtime/tracking/make_tracker.h"
@@ -156,6 +157,12 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
         if (!started) return started.error();
         session = std::move(*started);
     }
+    std::unique_ptr<IgtlServer> server;
+    if (!arguments.serve.empty()) {
+        auto started = IgtlServer::start(arguments.serve);
+        if (!started) return started.error();
+        server = std::move(*started);
+    }
     const int frames = frame_count(arguments, tracker);
     ContactSheet sheet(frames, std::max(render.width_px, 2), std::max(render.height_px, 2));
     const bool has_sheet = !arguments.out.empty() && render.width_px > 1 && render.height_px > 1;
@@ -189,6 +196,14 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
         stats.add((after_s - before_s) * 1e3, engine->renderer().costs());
         if (tracker.is_device()) pose_to_pixel.add((context.clock() - reading.time_s) * 1e3);
         if (session) session->observe(engine->last(), pixels, !tracker.is_device());
+        if (server) {
+            serve_frame(*server, engine->last(), engine->renderer().layout(), render.width_px,
+                        render.height_px, unix_seconds(), pixels);
+            // Guests follow in real time; without them a headless run is as fast as it can be.
+            if (!tracker.is_device()) {
+                std::this_thread::sleep_for(std::chrono::duration<double>(1 / kFrameRate));
+            }
+        }
         if (i == 0) stats.set_first_frame_ms((after_s - start_s) * 1e3);
         if (!arguments.out.empty()) {
             char name[32];

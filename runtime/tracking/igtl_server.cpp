@@ -48,6 +48,16 @@ Result<std::unique_ptr<IgtlServer>> IgtlServer::start(const std::string& address
     return std::unique_ptr<IgtlServer>(new IgtlServer(std::move(*listener)));
 }
 
+Result<std::unique_ptr<IgtlServer>> IgtlServer::start(const std::string& address_and_port) {
+    std::string host = "127.0.0.1";
+    int port = 0;
+    if (!split_address(address_and_port, host, port)) {
+        return Error{"not an address: " + address_and_port, "--serve",
+                     "use PORT or ADDRESS:PORT, e.g. 18945"};
+    }
+    return start(host, port);
+}
+
 IgtlServer::IgtlServer(Socket listener) : listener_(std::move(listener)) {
     thread_ = std::thread([this] { run(); });
 }
@@ -61,9 +71,10 @@ void IgtlServer::run() {
     std::vector<Guest> guests;
     std::array<std::uint8_t, 4096> ignored;
     while (!stop_) {
-        Socket newcomer = listener_.accept(guests.empty() ? 0.05 : 0.002);
-        if (newcomer.open() && guests.size() < kMostGuests)
-            guests.push_back({std::move(newcomer), {}, 0});
+        for (Socket newcomer = listener_.accept(guests.empty() ? 0.05 : 0.002); newcomer.open();
+             newcomer = listener_.accept(0)) {
+            if (guests.size() < kMostGuests) guests.push_back({std::move(newcomer), {}, 0});
+        }
         if (box_.refresh() && !guests.empty()) {
             const std::vector<std::uint8_t> messages = messages_of(box_.value());
             for (Guest& guest : guests) {

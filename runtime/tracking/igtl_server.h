@@ -34,6 +34,9 @@ class IgtlServer {
     IgtlServer(const IgtlServer&) = delete;
     IgtlServer& operator=(const IgtlServer&) = delete;
 
+    // "[ADDRESS:]PORT"; loopback unless an address is given.
+    static Result<std::unique_ptr<IgtlServer>> start(const std::string& address_and_port);
+
     int port() const { return listener_.port(); }
     int guests() const { return guests_.load(); }
     // From the frame loop: fill slot(), publish(). Allocates only when the picture's size grows.

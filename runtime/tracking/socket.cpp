@@ -37,7 +37,10 @@ struct Addresses {
 }  // namespace
 
 Socket& Socket::operator=(Socket&& other) noexcept {
-    std::swap(descriptor_, other.descriptor_);
+    if (this != &other) {
+        close();
+        std::swap(descriptor_, other.descriptor_);
+    }
     return *this;
 }
 
@@ -93,7 +96,7 @@ Result<Socket> Socket::listen(const std::string& address, int port) {
         const int on = 1;
         ::setsockopt(s.descriptor_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
         if (::bind(s.descriptor_, found.first->ai_addr, found.first->ai_addrlen) == 0 &&
-            ::listen(s.descriptor_, 64) == 0) {
+            ::listen(s.descriptor_, SOMAXCONN) == 0) {
             return s;
         }
     }

@@ -1,0 +1,291 @@
+// OpenIGTLink: the codec by itself, then both ways against Debian's library in another process, and
+// against peers that mean harm.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "runtime/tracking/igtl_message.h"
+#include "runtime/tracking/igtl_server.h"
+#include "runtime/tracking/igtl_tracker.h"
+#include "support/random.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Bytes = std::vector<std::uint8_t>;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// Looks until it is so, at most for so long: no fixed waits.
+template <class Predicate>
+bool eventually(Predicate predicate, double seconds = 15) {
+    const auto start = Clock::now();
+    while (!predicate()) {
+        if (seconds_since(start) > seconds) return false;
+        std::this_thread::yield();
+    }
+    return true;
+}
+
+SessionClock clock_from_now() {
+    return [start = Clock::now()] { return seconds_since(start); };
+}
+
+TEST(IgtlMessage, CrcOfTheCheckString) {
+    // CRC-64 of ECMA-182 with this polynomial.
+    const std::string check = "123456789";
+    EXPECT_EQ(igtl::crc64({reinterpret_cast<const std::uint8_t*>(check.data()), 9}),
+              0x6C40DF5F0B497347ull);
+}
+
+TEST(IgtlMessage, TransformComesBack) {
+    sonocase::testing::Random random(5);
+    for (int i = 0; i < 50; ++i) {
+        const Rigid pose = random.rigid(500);
+        igtl::MessageReader reader;
+        reader.add(igtl::encode_transform("ProbeToTracker", 1700000000.25, pose));
+        ASSERT_EQ(reader.next(), igtl::MessageReader::Event::message);
+        EXPECT_EQ(reader.header().time_s, 1700000000.25);
+        const auto poses = igtl::parse_poses(reader.header(), reader.body());
+        ASSERT_EQ(poses.size(), 1u);
+        EXPECT_EQ(poses[0].name, "ProbeToTracker");
+        // Floats of 24 bits.
+        EXPECT_LT(norm(poses[0].to_from.translation - pose.translation), 1e-4);
+        EXPECT_LT(rotation_angle(transpose(poses[0].to_from.rotation) * pose.rotation), 1e-6);
+    }
+}
+
+TEST(IgtlMessage, ReadsEverySplit) {
+    Bytes stream;
+    for (int i = 0; i < 3; ++i) {
+        for (const Bytes& m :
+             {igtl::encode_transform("A", 1, {}), igtl::encode("STATUS", "B", 1, Bytes(31, 7))}) {
+            stream.insert(stream.end(), m.begin(), m.end());
+        }
+    }
+    for (std::size_t chunk = 1; chunk < stream.size(); chunk += 3) {
+        igtl::MessageReader reader;
+        int messages = 0, poses = 0;
+        for (std::size_t at = 0; at < stream.size(); at += chunk) {
+            reader.add(std::span(stream).subspan(at, std::min(chunk, stream.size() - at)));
+            while (reader.next() == igtl::MessageReader::Event::message) {
+                ++messages;
+                poses += static_cast<int>(igtl::parse_poses(reader.header(), reader.body()).size());
+            }
+        }
+        EXPECT_EQ(messages, 6) << chunk;
+        EXPECT_EQ(poses, 3) << chunk;
+    }
+}
+
+TEST(IgtlMessage, DamageGivesNoPose) {
+    const Bytes good = igtl::encode_transform("ProbeToTracker", 1, {});
+    for (std::size_t i = 58; i < good.size(); ++i) {
+        Bytes damaged = good;
+        damaged[i] ^= 1;
+        igtl::MessageReader reader;
+        reader.add(damaged);
+        EXPECT_EQ(reader.next(), igtl::MessageReader::Event::bad_crc) << i;
+    }
+    igtl::Header header;
+    for (const char* type : {"TRANSFORM", "TDATA", "QTDATA", "POSITION", "NONSENSE"}) {
+        header.type = type;
+        for (std::size_t n = 0; n < 160; ++n) {
+            for (const std::uint8_t fill : Bytes{0, 255}) {
+                for (const auto& pose : igtl::parse_poses(header, Bytes(n, fill))) {
+                    EXPECT_TRUE(is_finite(pose.to_from));
+                }
+            }
+        }
+    }
+    for (int version : {2, 3}) {
+        header.version = static_cast<std::uint16_t>(version);
+        header.type = "TRANSFORM";
+        for (std::size_t n = 0; n < 90; ++n) igtl::parse_poses(header, Bytes(n, 255));
+    }
+}
+
+class Peer {
+  public:
+    Peer(const char* verb, int port, int n) {
+        const std::string command = std::string(SONOCASE_BIN "/igtl_peer ") + verb + " " +
+                                    std::to_string(port) + " " + std::to_string(n) + " 2>/dev/null";
+        pipe_ = popen(command.c_str(), "r");
+    }
+    std::string line() {
+        char text[1024] = "";
+        return std::fgets(text, sizeof text, pipe_) ? text : "";
+    }
+    int close() {
+        const int status = pclose(pipe_);
+        pipe_ = nullptr;
+        return WEXITSTATUS(status);
+    }
+
+  private:
+    FILE* pipe_;
+};
+
+int free_port() {
+    Result<Socket> socket = Socket::listen("127.0.0.1", 0);
+    return socket ? socket->port() : 0;
+}
+
+std::unique_ptr<Tracker> start_tracker(int port, bool listening) {
+    IgtlTrackerOptions options;
+    options.port = port;
+    options.listening = listening;
+    options.retry_s = 0.05;
+    Result<std::unique_ptr<Tracker>> tracker = IgtlTracker::start(options, clock_from_now());
+    EXPECT_TRUE(tracker);
+    return std::move(*tracker);
+}
+
+void expect_pose(const SensorReading& sensor, double x) {
+    EXPECT_EQ(sensor.state, SensorState::ok);
+    EXPECT_LT(norm(sensor.world_from_sensor.translation - Vector3{x, -5, 7}), 1e-4);
+    EXPECT_LT(norm(sensor.world_from_sensor.rotation * Vector3{1, 0, 0} - Vector3{0, 1, 0}), 1e-6);
+}
+
+TEST(IgtlTracker, FollowsAServerOfTheLibrary) {
+    const int port = free_port();
+    auto tracker = start_tracker(port, false);
+    Peer peer("serve", port, 400);
+    EXPECT_EQ(peer.line(), "ready\n");
+    TrackerReading reading;
+    ASSERT_TRUE(eventually([&] { return tracker->poll(0, reading) && reading.sensor_count == 4; }));
+    expect_pose(reading.sensors[kProbeSensor], 100);
+    expect_pose(reading.sensors[kNeedleSensor], 200);
+    expect_pose(reading.sensors[2], 300);
+    expect_pose(reading.sensors[3], 400);
+    EXPECT_EQ(tracker->health().phase, TrackerPhase::streaming);
+    EXPECT_EQ(tracker->health().bad_frames, 0u);
+    EXPECT_EQ(peer.close(), 0);
+    ASSERT_TRUE(eventually([&] { return tracker->health().phase == TrackerPhase::searching; }));
+}
+
+TEST(IgtlTracker, ConnectsAgainAfterTheServerWentAway) {
+    Result<Socket> server = Socket::listen("127.0.0.1", 0);
+    ASSERT_TRUE(server);
+    auto tracker = start_tracker(server->port(), false);
+    for (int round = 0; round < 3; ++round) {
+        Socket guest = server->accept(15);
+        ASSERT_TRUE(guest.open()) << round;
+        guest.write(igtl::encode_transform("ProbeToTracker", 1, {}));
+        const auto readings = static_cast<std::uint64_t>(round + 1);
+        ASSERT_TRUE(eventually([&] { return tracker->health().readings >= readings; }));
+    }
+    EXPECT_EQ(tracker->health().connects, 3u);
+}
+
+TEST(IgtlTracker, ListensToAClientOfTheLibrary) {
+    auto tracker = start_tracker(0, true);
+    const int port = static_cast<IgtlTracker&>(*tracker).port();
+    Peer peer("send", port, 50);
+    TrackerReading reading;
+    ASSERT_TRUE(eventually([&] { return tracker->poll(0, reading) && reading.sensor_count == 2; }));
+    expect_pose(reading.sensors[kProbeSensor], 100);
+    EXPECT_EQ(peer.close(), 0);
+}
+
+TEST(IgtlServer, IsFollowedByAClientOfTheLibrary) {
+    Result<std::unique_ptr<IgtlServer>> server = IgtlServer::start("127.0.0.1", 0);
+    ASSERT_TRUE(server) << server.error().message();
+    Peer peer("follow", (*server)->port(), 5);
+    std::atomic<bool> stop{false};
+    std::thread sender([&] {
+        while (!stop) {
+            ServedFrame& frame = (*server)->slot();
+            frame.width_px = 64;
+            frame.height_px = 48;
+            frame.mm_per_px = 0.5;
+            frame.has_probe = frame.has_needle = true;
+            frame.mannequin_from_probe.translation = {1, 2, 33.5};
+            frame.pixels.assign(64 * 48, 9);
+            (*server)->publish();
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        }
+    });
+    const auto seen = nlohmann::json::parse(peer.line(), nullptr, false);
+    EXPECT_EQ(peer.close(), 0);
+    stop = true;
+    sender.join();
+    ASSERT_TRUE(seen.is_object());
+    EXPECT_EQ(seen["bad"], 0);
+    EXPECT_EQ(seen["width"], 64);
+    EXPECT_EQ(seen["height"], 48);
+    EXPECT_EQ(seen["sum"], 64 * 48 * 9);
+    EXPECT_NEAR(seen["spacing"].get<double>(), 0.5, 1e-4);
+    EXPECT_NEAR(seen["z"].get<double>(), 33.5, 1e-3);
+    EXPECT_GE(seen["transforms"].get<int>(), 8);
+}
+
+// What a listening tracker must survive; after each the next honest client is served.
+TEST(IgtlTracker, SurvivesHostilePeers) {
+    auto tracker = start_tracker(0, true);
+    const int port = static_cast<IgtlTracker&>(*tracker).port();
+    const Bytes good = igtl::encode_transform("ProbeToTracker", 1, {});
+    Bytes bad_crc = good, bad_version = good, huge = good, huge_unknown = good;
+    bad_crc[57] ^= 1;
+    bad_version[1] = 99;
+    for (std::size_t i = 42; i < 50; ++i) huge[i] = huge_unknown[i] = 0xFF;
+    huge_unknown[2] = 'X';
+    const Bytes half(good.begin(), good.begin() + 70);
+    sonocase::testing::Random random(17);
+    Bytes noise(20000);
+    for (auto& b : noise) b = static_cast<std::uint8_t>(random.uniform(0, 256));
+    for (const Bytes& attack : {bad_crc, bad_version, huge, huge_unknown, half, noise, Bytes{}}) {
+        {
+            Result<Socket> socket = Socket::connect("127.0.0.1", port, 5);
+            ASSERT_TRUE(socket);
+            if (!attack.empty()) socket->write(attack);
+        }
+        const std::uint64_t before = tracker->health().readings;
+        Result<Socket> honest = Socket::connect("127.0.0.1", port, 5);
+        ASSERT_TRUE(honest);
+        ASSERT_TRUE(eventually([&] {
+            honest->write(good);
+            return tracker->health().readings > before;
+        }));
+    }
+    EXPECT_GE(tracker->health().bad_frames, 3u);
+}
+
+TEST(IgtlServer, SurvivesAThousandConnects) {
+    Result<std::unique_ptr<IgtlServer>> server = IgtlServer::start("127.0.0.1", 0);
+    ASSERT_TRUE(server);
+    for (int i = 0; i < 1000; ++i) {
+        Result<Socket> socket = Socket::connect("127.0.0.1", (*server)->port(), 5);
+        ASSERT_TRUE(socket) << i << " " << socket.error().message();
+        if (i % 3 == 0) socket->write(Bytes(100, 0xFF));
+    }
+    EXPECT_TRUE(eventually([&] { return (*server)->guests() == 0; }));
+    auto tracker = start_tracker(0, true);
+    for (int i = 0; i < 200; ++i) {
+        Result<Socket> socket =
+            Socket::connect("127.0.0.1", static_cast<IgtlTracker&>(*tracker).port(), 5);
+        ASSERT_TRUE(socket) << i;
+    }
+}
+
+TEST(IgtlAddress, IsReadAndRefused) {
+    std::string host = "127.0.0.1";
+    int port = 0;
+    EXPECT_TRUE(split_address("18944", host, port));
+    EXPECT_EQ(host, "127.0.0.1");
+    EXPECT_EQ(port, 18944);
+    EXPECT_TRUE(split_address("scanner.local:5", host, port));
+    EXPECT_EQ(host, "scanner.local");
+    for (const char* bad : {"", "a:b", "1:", "host:99999", "host:-1", "host:1x"}) {
+        EXPECT_FALSE(split_address(bad, host, port)) << bad;
+    }
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
