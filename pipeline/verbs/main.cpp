@@ -41,6 +41,9 @@ const std::vector<Verb>& verbs() {
         {kStage, "map", "carry points through a fitted map", verb_map},
         {kStage, "pack", "put the stages' files into a bundle", verb_pack},
         {kSession, "calibrate", "find tips, axes and frames of tracked tools", verb_calibrate},
+        {kSession, "review", "make a page of a recorded session", verb_review},
+        {kSession, "score", "score a recording of this or another trainer", verb_score},
+        {kSession, "progress", "list, export or remove what trainees have done", verb_progress},
     };
     return table;
 }

@@ -1,0 +1,115 @@
+#include "pipeline/review/review_input.h"
+
+#include <filesystem>
+
+#include "formats/atomic_file.h"
+#include "formats/digest.h"
+#include "formats/nearest_name.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+std::string pictures_of(const std::string& session_path) {
+    const std::string ending = ".igs.mha";
+    if (session_path.size() <= ending.size() ||
+        session_path.compare(session_path.size() - ending.size(), ending.size(), ending) != 0) {
+        return "";
+    }
+    return session_path.substr(0, session_path.size() - ending.size()) + ".frames.igs.mha";
+}
+
+}  // namespace
+
+Result<Exercise> find_review_exercise(const CaseBundle& bundle,
+                                      const std::string& wanted,
+                                      const std::string& named_by_session,
+                                      std::vector<std::string>& warnings) {
+    if (wanted.find(".toml") != std::string::npos) {
+        const auto text = read_text_file(wanted);
+        if (!text) return text.error();
+        return parse_exercise(*text, wanted);
+    }
+    const std::string name = wanted.empty() ? named_by_session : wanted;
+    std::vector<std::string> names;
+    for (const EmbeddedExercise& embedded : bundle.exercises) {
+        if (embedded.name == name) return parse_exercise(embedded.toml, "exercise " + name);
+        names.push_back(embedded.name);
+    }
+    if (!wanted.empty()) {
+        return Error{"the case has no exercise '" + wanted + "'", "", suggest_name(wanted, names)};
+    }
+    if (!name.empty()) {
+        warnings.push_back("The case has no exercise '" + name +
+                           "': the session is shown without targets and pass marks.");
+    }
+    Exercise free_scan;
+    free_scan.name = name;
+    free_scan.title = "Free scan";
+    free_scan.kind = "scan";
+    return free_scan;
+}
+
+Result<ReviewInput> load_review(const std::string& session_path,
+                                const std::string& bundle_path,
+                                const ReviewOptions& options) {
+    ReviewInput input;
+    input.session_path = session_path;
+    const auto sequence = load_recording_file(session_path);
+    if (!sequence) return sequence.error();
+    auto session = session_from_sequence(*sequence, guess_names(*sequence), session_path);
+    if (!session) return session.error();
+    input.session = std::move(*session);
+    if (input.session.samples.empty()) {
+        return Error{"holds no reading", session_path, "record a session with sonoplay --record"};
+    }
+    auto bundle = load_bundle(bundle_path);
+    if (!bundle) return bundle.error();
+    input.bundle = std::move(*bundle);
+    const SessionHeader& header = input.session.header;
+    if (!header.case_name.empty() && header.case_name != input.bundle.manifest.case_name) {
+        input.warnings.push_back("The session was recorded on the case '" + header.case_name +
+                                 "' and not on '" + input.bundle.manifest.case_name + "'.");
+    }
+    auto exercise =
+        find_review_exercise(input.bundle, options.exercise, header.exercise, input.warnings);
+    if (!exercise) return exercise.error();
+    input.exercise = std::move(*exercise);
+    if (options.exercise.empty() && !header.exercise_digest.empty()) {
+        for (const EmbeddedExercise& embedded : input.bundle.exercises) {
+            if (embedded.name == header.exercise &&
+                digest_of(embedded.toml) != header.exercise_digest) {
+                input.warnings.push_back(
+                    "The exercise was changed after this session: the marks are today's.");
+            }
+        }
+    }
+    const CaseAnatomy anatomy(input.bundle);
+    ScoreOptions score;
+    score.threads = options.threads;
+    input.score =
+        score_session(input.session, input.exercise, &anatomy, input.bundle.labels, score);
+    const std::string pictures = pictures_of(session_path);
+    if (!pictures.empty() && std::filesystem::exists(pictures)) {
+        auto kept = load_sequence(pictures);
+        if (kept && kept->element == "MET_UCHAR" && kept->channels == 1 && kept->depth == 1) {
+            input.pictures = std::move(*kept);
+        } else {
+            input.warnings.push_back(
+                "The kept frames could not be read" +
+                (kept ? std::string(".") : ": " + kept.error().message() + "."));
+        }
+    }
+    if (!options.progress_path.empty() && !header.trainee.empty() &&
+        std::filesystem::exists(options.progress_path)) {
+        const auto book = ProgressBook::open(options.progress_path);
+        if (!book) return book.error();
+        const auto all = book->sessions(header.trainee, header.exercise);
+        if (!all) return all.error();
+        for (const ProgressEntry& entry : *all) {
+            if (entry.started < header.started) input.earlier.push_back(entry);
+        }
+    }
+    return input;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,45 @@
+// What a review is made from, loaded and scored.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/case_bundle.h"
+#include "formats/exercise.h"
+#include "formats/progress/progress_book.h"
+#include "formats/result.h"
+#include "formats/sequence.h"
+#include "formats/session/session.h"
+#include "formats/session/session_score.h"
+
+namespace sonocase::pipeline {
+
+struct ReviewOptions {
+    std::string exercise;  // name in the bundle, or a TOML file; empty: the one the session names
+    std::string progress_path;            // empty: no comparison with earlier sessions
+    int width_px = 640, height_px = 480;  // of a 3-D view
+    int threads = 0;
+};
+
+struct ReviewInput {
+    std::string session_path;
+    Session session;
+    CaseBundle bundle;
+    Exercise exercise;
+    SessionScore score;
+    Sequence pictures;                   // frames that the player kept; none: no frames
+    std::vector<ProgressEntry> earlier;  // of this trainee and exercise, before this session
+    std::vector<std::string> warnings;   // whole sentences
+};
+
+Result<ReviewInput> load_review(const std::string& session_path,
+                                const std::string& bundle_path,
+                                const ReviewOptions& options);
+
+// The exercise of a bundle by name, a TOML file's, or a free scan where neither is there.
+Result<Exercise> find_review_exercise(const CaseBundle& bundle,
+                                      const std::string& wanted,
+                                      const std::string& named_by_session,
+                                      std::vector<std::string>& warnings);
+
+}  // namespace sonocase::pipeline

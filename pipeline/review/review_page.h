@@ -1,0 +1,21 @@
+// The review as one HTML page that needs nothing but itself: pictures and plots are inside.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipeline/review/review_input.h"
+#include "pipeline/review/session_views.h"
+
+namespace sonocase::pipeline {
+
+std::string review_page(const ReviewInput& input, const std::vector<SessionView>& views);
+
+// Loads, scores, renders and writes DIR/review.html and DIR/scores.json. Views that could not be
+// rendered (no display) are left out with a warning in the page.
+Result<StageReport> make_review(const std::string& session_path,
+                                const std::string& bundle_path,
+                                const std::string& folder,
+                                const ReviewOptions& options);
+
+}  // namespace sonocase::pipeline

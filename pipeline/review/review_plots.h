@@ -1,0 +1,20 @@
+// The plots of a review as inline SVG: one time axis, a lane a subject.
+#pragma once
+
+#include <string>
+
+#include "pipeline/review/review_input.h"
+
+namespace sonocase::pipeline {
+
+// Bars for probe on skin, needle in tissue and contact with spared structures; marks for events;
+// below, inserted length, tip to target, tip to plane and the part of the needle in the beam.
+std::string timeline_svg(const ReviewInput& input);
+
+// A score over this trainee's sessions of the exercise, this one last; empty without earlier ones.
+std::string progress_svg(const ReviewInput& input, const std::string& metric);
+
+// Text made safe for HTML.
+std::string escaped_html(std::string_view text);
+
+}  // namespace sonocase::pipeline

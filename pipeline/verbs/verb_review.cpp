@@ -1,0 +1,178 @@
+// sonocase review and sonocase score: what a session was worth.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "formats/atomic_file.h"
+#include "pipeline/review/review_page.h"
+#include "pipeline/verbs/command_line.h"
+#include "pipeline/verbs/verbs.h"
+
+namespace sonocase::pipeline {
+
+int verb_review(int argc, char** argv) {
+    CLI::App app(
+        "Make a page of a recorded session: time line, frames, views in space, scores, progress");
+    std::string session, bundle, out;
+    ReviewOptions options;
+    options.progress_path = default_progress_path();
+    CommonOptions common;
+    bool no_progress = false, keep = false;
+    app.add_option("SESSION", session, "The recording (.igs.mha, .igs.nrrd)")->required();
+    app.add_option("--case", bundle, "The bundle that it was recorded on")
+        ->type_name("BUNDLE")
+        ->required();
+    app.add_option("-o,--output", out, "Folder for review.html and scores.json")
+        ->type_name("DIR")
+        ->required();
+    app.add_option("--exercise", options.exercise,
+                   "Name in the bundle, or a TOML file; default: the session's own");
+    app.add_option("--progress", options.progress_path, "Progress book to compare with")
+        ->type_name("FILE")
+        ->capture_default_str();
+    app.add_flag("--no-progress", no_progress, "Compare with nothing");
+    app.add_flag("--keep", keep, "Put the session into the progress book");
+    add_common_options(app, common);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    if (no_progress) options.progress_path.clear();
+    options.threads = common.threads;
+    const auto report = make_review(session, bundle, out, options);
+    if (!report) return fail("review", report.error());
+    print_warnings("review", *report);
+    if (keep && !options.progress_path.empty()) {
+        const auto input = load_review(session, bundle, options);
+        if (!input) return fail("review", input.error());
+        auto book = ProgressBook::open(options.progress_path);
+        if (!book) return fail("review", book.error());
+        const Status added =
+            book->add(progress_entry(input->session.header, input->score, session));
+        if (!added) return fail("review", added.error());
+    }
+    if (auto s = write_report(common, *report); !s) return fail("review", s.error());
+    return kDone;
+}
+
+namespace {
+
+struct ScoreArguments {
+    std::string session, bundle, mesh, exercise, probe, needle, drawn, axis = "0,0,1";
+    bool json = false;
+};
+
+std::optional<Vector3> axis_of(const std::string& text) {
+    Vector3 v;
+    char end = 0;
+    if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &end) != 3 || !(norm(v) > 0))
+        return {};
+    return v;
+}
+
+void print_scores(const SessionScore& score) {
+    for (const Metric& metric : score.metrics) {
+        if (std::isfinite(metric.value))
+            std::printf("%-34s %.9g\n", metric.name.c_str(), metric.value);
+    }
+    for (const std::string& warning : score.warnings) std::printf("note: %s\n", warning.c_str());
+}
+
+}  // namespace
+
+int verb_score(int argc, char** argv) {
+    CLI::App app(
+        "Score a recording of this or another trainer: IGSIO sequence or PerkTutor transform log");
+    ScoreArguments a;
+    CommonOptions common;
+    app.add_option("SESSION", a.session, "The recording")->required();
+    app.add_option("--case", a.bundle, "Bundle that gives body and exercise")->type_name("BUNDLE");
+    app.add_option("--exercise", a.exercise, "Name in the bundle, or a TOML file");
+    app.add_option("--probe", a.probe,
+                   "Transform of the probe, e.g. ProbeToReference; default: guessed");
+    app.add_option("--needle", a.needle, "Transform of the needle; default: guessed");
+    app.add_option("--needle-axis", a.axis, "From hub to tip in the needle's frame")
+        ->capture_default_str();
+    app.add_flag("--json", a.json, "As JSON, in the documented form");
+    add_common_options(app, common);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    const auto axis = axis_of(a.axis);
+    if (!axis) return wrong_usage("score", "--needle-axis is no direction x,y,z");
+    const auto sequence = load_recording_file(a.session);
+    if (!sequence) return fail("score", sequence.error());
+    SessionNames names = guess_names(*sequence);
+    names.needle_axis = *axis;
+    if (!a.probe.empty()) names.probe = a.probe;
+    if (!a.needle.empty()) names.needle = names.drawn = a.needle;
+    const auto session = session_from_sequence(*sequence, names, a.session);
+    if (!session) return fail("score", session.error());
+    CaseBundle bundle;
+    std::vector<std::string> warnings;
+    std::unique_ptr<CaseAnatomy> anatomy;
+    if (!a.bundle.empty()) {
+        auto loaded = load_bundle(a.bundle);
+        if (!loaded) return fail("score", loaded.error());
+        bundle = std::move(*loaded);
+        anatomy = std::make_unique<CaseAnatomy>(bundle);
+    }
+    const auto exercise =
+        find_review_exercise(bundle, a.exercise, session->header.exercise, warnings);
+    if (!exercise) return fail("score", exercise.error());
+    ScoreOptions options;
+    options.threads = common.threads;
+    const SessionScore score =
+        score_session(*session, *exercise, anatomy.get(), bundle.labels, options);
+    const std::string json = score_json(score, *exercise);
+    if (a.json) {
+        std::fputs(json.c_str(), stdout);
+    } else {
+        print_scores(score);
+    }
+    if (!common.report_path.empty()) {
+        if (auto s = write_file(common.report_path, json); !s) return fail("score", s.error());
+    }
+    return kDone;
+}
+
+int verb_progress(int argc, char** argv) {
+    CLI::App app("What trainees have done so far: list, export, remove");
+    std::string path = default_progress_path(), trainee, exercise, csv, remove;
+    CommonOptions common;
+    app.add_option("--progress", path, "The progress book")
+        ->type_name("FILE")
+        ->capture_default_str();
+    app.add_option("--trainee", trainee, "Only this one");
+    app.add_option("--exercise", exercise, "Only this one");
+    app.add_option("--csv", csv, "Write the sessions with all scores")->type_name("FILE.csv");
+    app.add_option("--remove", remove, "Remove a trainee with all sessions and recordings")
+        ->type_name("NAME");
+    add_common_options(app, common);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    auto book = ProgressBook::open(path);
+    if (!book) return fail("progress", book.error());
+    if (!remove.empty()) {
+        std::vector<std::string> left;
+        if (auto s = book->remove_trainee(remove, &left); !s) return fail("progress", s.error());
+        for (const std::string& file : left) {
+            std::fprintf(stderr, "sonocase progress: warning: could not delete %s\n", file.c_str());
+        }
+        return kDone;
+    }
+    if (!csv.empty()) {
+        const auto text = book->csv(trainee, exercise);
+        if (!text) return fail("progress", text.error());
+        if (auto s = write_file(csv, *text); !s) return fail("progress", s.error());
+        return kDone;
+    }
+    const auto sessions = book->sessions(trainee, exercise);
+    if (!sessions) return fail("progress", sessions.error());
+    for (const ProgressEntry& e : *sessions) {
+        double error = NAN;
+        for (const Metric& m : e.metrics) {
+            if (m.name == "final_tip_to_target_mm") error = m.value;
+        }
+        std::printf("%s  %-20s %-24s %-10s", e.started.c_str(), e.trainee.c_str(),
+                    e.exercise.c_str(), e.passed ? "passed" : "not passed");
+        if (std::isfinite(error)) std::printf("  tip to target %.1f mm", error);
+        std::printf("\n");
+    }
+    return kDone;
+}
+
+}  // namespace sonocase::pipeline
