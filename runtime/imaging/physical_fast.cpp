@@ -72,7 +72,7 @@ void sample_physical(PhysicalBlock& b) {
                sz = hn::Set(du, static_cast<std::uint32_t>(b.size.z));
     const auto step = hn::Set(d, b.step_mm);
     const auto per_log2 = hn::Set(d, 1.0f / (16.0f * 6.0205999f));
-    const auto speckle_mask = hn::Set(di, (1 << b.speckle_log2) - 1);
+    const auto speckle_mask = hn::Set(di, (1 << kSpeckleLog2) - 1);
     const auto speckle_unit = hn::Set(d, 0.70710678f / 32);
     const float bone_decay = std::exp(-b.step_mm / static_cast<float>(kBoneTailMm));
     const float bone_slow_decay = std::exp(-b.step_mm / static_cast<float>(kBoneTailSlowMm));
@@ -182,7 +182,12 @@ void sample_physical(PhysicalBlock& b) {
                     hn::IfThenElseZero(with_surface, hn::Or(hn::ShiftLeft<6>(base), cell));
                 const auto record = hn::GatherIndex(di, b.boundary, address);
                 const auto second = hn::And(record, byte);
-                const auto near = hn::And(with_surface, hn::Lt(second, hn::Set(di, b.label_count)));
+                const auto steps =
+                    hn::Abs(hn::ShiftRight<24>(hn::ShiftLeft<16>(record)));  // of distance
+                const auto near = hn::And(
+                    hn::And(with_surface, hn::Lt(second, hn::Set(di, b.label_count))),
+                    hn::Lt(steps,
+                           hn::Set(di, static_cast<std::int32_t>(48 * kSurfaceReachVx) + 1)));
                 if (!hn::AllFalse(di, near)) {
                     const auto near_f = hn::RebindMask(d, near);
                     // Normal: octahedron unfolded, as formats/boundary_record.cpp.
@@ -297,7 +302,11 @@ void sample_physical(PhysicalBlock& b) {
                 }
             }
 
-            I look = hn::GatherIndex(di, b.looks, label);
+            // In most places all beams are in one label: no look-up is needed then.
+            const std::int32_t first_label = hn::GetLane(label);
+            I look = hn::Set(di, b.looks[first_label]);
+            if (!hn::AllTrue(di, hn::Eq(label, hn::Set(di, first_label))))
+                look = hn::GatherIndex(di, b.looks, label);
             auto replaced = hn::MaskFromVec(hn::Zero(di));
             if (b.target_count > 0) {
                 const auto soft =
@@ -414,12 +423,20 @@ void sample_physical(PhysicalBlock& b) {
                                              exp2_of(d, hn::Mul(hn::ConvertTo(d, echo), per_log2)));
             V re = amplitude, im = zero;
             if (b.speckled) {
-                const auto ci = hn::And(hn::NearestInt(cx), speckle_mask),
-                           cj = hn::And(hn::NearestInt(cy), speckle_mask),
-                           cl = hn::And(hn::NearestInt(cz), speckle_mask);
-                const auto at =
-                    hn::Or(ci, hn::ShiftLeftSame(hn::Or(cj, hn::ShiftLeftSame(cl, b.speckle_log2)),
-                                                 b.speckle_log2));
+                const auto ci = hn::NearestInt(cx), cj = hn::NearestInt(cy),
+                           cl = hn::NearestInt(cz);
+                const auto period = [&](I c, std::uint32_t factor) HWY_ATTR {
+                    return hn::Mul(hn::ShiftRight<kSpeckleLog2>(c),
+                                   hn::Set(di, static_cast<std::int32_t>(factor)));
+                };
+                const auto hash =
+                    hn::Xor(period(ci, 0x9E3779B1u),
+                            hn::Xor(period(cj, 0x85EBCA77u), period(cl, 0xC2B2AE3Du)));
+                const auto wi = hn::And(hn::Xor(ci, hn::ShiftRight<kShuffleX>(hash)), speckle_mask);
+                const auto wj = hn::And(hn::Xor(cj, hn::ShiftRight<kShuffleY>(hash)), speckle_mask);
+                const auto wl = hn::And(hn::Xor(cl, hn::ShiftRight<kShuffleZ>(hash)), speckle_mask);
+                const auto at = hn::Or(wi, hn::Or(hn::ShiftLeft<kSpeckleLog2>(wj),
+                                                  hn::ShiftLeft<2 * kSpeckleLog2>(wl)));
                 // Two pairs a word: the half that is asked for comes to the top.
                 const auto word = hn::GatherIndex(di, b.speckle, hn::ShiftRight<1>(at));
                 const auto odd = hn::TestBit(at, hn::Set(di, 1));
@@ -431,7 +448,10 @@ void sample_physical(PhysicalBlock& b) {
             }
             re = hn::Add(re, add_re);
             im = hn::Add(im, add_im);
-            V light = exp2_of(d, light_log2);
+            const auto dead = hn::Lt(light_log2, hn::Set(d, static_cast<float>(kDeadLog2)));
+            V light = hn::IfThenZeroElse(dead, exp2_of(d, light_log2));
+            re = hn::IfThenZeroElse(dead, re);
+            im = hn::IfThenZeroElse(dead, im);
             if (any_air) light = hn::IfThenZeroElse(air, light);
 
             const auto hard = hn::Gt(kind, hn::Set(di, static_cast<std::int32_t>(kPackedFluid)));
@@ -486,6 +506,28 @@ void sample_physical(PhysicalBlock& b) {
                 loss = hn::Add(loss, hn::Mul(hn::ConvertTo(d, hn::And(look, hn::Set(di, 0xFFFF))),
                                              hn::Set(d, 1.0f / 4096)));
             light_log2 = hn::Sub(light_log2, hn::Mul(loss, step));
+            if (!b.keep_all && b.attenuation &&
+                hn::AllTrue(d, hn::Lt(light_log2, hn::Set(d, static_cast<float>(kDeadLog2))))) {
+                // All beams are dead: only their tails go on.
+                for (int r = k + 1; r < b.samples; ++r) {
+                    const std::ptrdiff_t to = static_cast<std::ptrdiff_t>(r) * b.stride + v;
+                    hn::StoreU(zero, d, b.re + to);
+                    hn::StoreU(zero, d, b.im + to);
+                    hn::StoreU(zero, d, b.light + to);
+                    if (!tails) continue;
+                    bone = hn::Mul(bone, hn::Set(d, bone_decay));
+                    bone_slow = hn::Mul(bone_slow, hn::Set(d, bone_slow_decay));
+                    bone_floor = hn::Mul(bone_floor, hn::Set(d, bone_floor_decay));
+                    gas = hn::Mul(gas, hn::Set(d, gas_decay));
+                    V power = zero;
+                    if (b.bone_tail)
+                        power = hn::Add(hn::Add(hn::Mul(bone, bone), hn::Mul(bone_slow, bone_slow)),
+                                        hn::Mul(bone_floor, bone_floor));
+                    if (b.gas_tail) power = hn::Add(power, hn::Mul(gas, gas));
+                    hn::StoreU(power, d, b.tail + to);
+                }
+                break;
+            }
         }
     }
     b.tail_from = b.samples;
@@ -961,7 +1003,7 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f, bool keep_all) {
     base.looks = looks_.data();
     base.pairs = pairs_word_.data();
     base.rough = reinterpret_cast<const std::int32_t*>(scene_.rough.data());
-    base.speckle = reinterpret_cast<const std::int32_t*>(bundle.speckle.voxels.data());
+    base.speckle = reinterpret_cast<const std::int32_t*>(scene_.speckle.data());
     base.fine = f.effects.fine_structure ? scene_.fine.cubes.data() : nullptr;
     base.fine_frames = fine_frames_.data();
     near_targets_.clear();
@@ -986,7 +1028,6 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f, bool keep_all) {
     base.bricks_x = scene_.bricks.x;
     base.bricks_xy = scene_.bricks.x * scene_.bricks.y;
     base.label_count = scene_.labels();
-    base.speckle_log2 = scene_.speckle_log2;
     base.voxel_mm = static_cast<float>(scene_.voxel_mm);
     base.rough_per_voxel = static_cast<float>(scene_.voxel_mm / kRoughVoxelMm);
     base.step_mm = static_cast<float>(g.step_mm);

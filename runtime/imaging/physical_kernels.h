@@ -66,7 +66,7 @@ struct PhysicalBlock {
     const PhysicalTarget* targets = nullptr;
     int target_count = 0;
     Int3 size;
-    int bricks_x = 0, bricks_xy = 0, label_count = 0, speckle_log2 = 0;
+    int bricks_x = 0, bricks_xy = 0, label_count = 0;
     float voxel_mm = 1, rough_per_voxel = 2, step_mm = 0.3f;
     bool structure = true, speckled = true, interfaces = true, edge_shadow = true,
          attenuation = true;

@@ -21,6 +21,27 @@ inline constexpr double kMaxGapMm = 25;
 inline constexpr double kGapReachMm = 45;
 inline constexpr double kGapStepMm = 0.5;
 
+// A beam that is this dark (log2 of its amplitude: -96 dB) is taken for dead: it lights nothing
+// more.
+inline constexpr double kDeadLog2 = -16;
+
+// Scatterers: a cube of this edge out of the bundle's speckle. Every period of it in each direction
+// is shuffled by a hash of its place (exclusive or on the cell's coordinates), so that nothing
+// repeats.
+inline constexpr int kSpeckleLog2 = 6;
+inline std::uint32_t speckle_hash(std::int32_t x,
+                                  std::int32_t y,
+                                  std::int32_t z) {  // cell coordinates
+    return static_cast<std::uint32_t>(x >> kSpeckleLog2) * 0x9E3779B1u ^
+           static_cast<std::uint32_t>(y >> kSpeckleLog2) * 0x85EBCA77u ^
+           static_cast<std::uint32_t>(z >> kSpeckleLog2) * 0xC2B2AE3Du;
+}
+inline constexpr int kShuffleX = 8, kShuffleY = 14,
+                     kShuffleZ = 20;  // bits of the hash for each axis
+
+// Surfaces further than this from a voxel's centre do not reach it.
+inline constexpr double kSurfaceReachVx = 2.0;
+
 // Boundary roughness (mm) and the texture that carries it.
 inline constexpr double kRoughnessMm = 0.28;
 inline constexpr int kRoughEdge = 64;
@@ -55,7 +76,7 @@ inline constexpr int kHazeGrain = 3;  // samples along the beam
 inline constexpr double kGainSlopeFan = 0.56, kGainSlopeLinear = 0.72;
 inline constexpr double kMaxNoiseGainDb = 48;
 inline constexpr double kNoiseDb = -70;
-inline constexpr double kGreyOfUnit = 130;
+inline constexpr double kGreyOfUnit = 136;
 inline constexpr double kGreyFloor = -25, kGreyCeiling = 290;  // before the post-filter
 inline constexpr double kGreyMap =
     0.31;  // t - kGreyMap t (1 - t)(1 - 2t): 0.03 sin(2 pi t) without the sine

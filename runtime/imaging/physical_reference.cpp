@@ -100,6 +100,7 @@ Place place_at(const PhysicalScene& s, const PhysicalFrame& f, Point3 v, Point3 
     const std::uint32_t bits = pool_value(s, 2, s.bundle->boundary, i, j, k, kNoBoundary);
     if (bits == kNoBoundary || static_cast<int>(bits & 0xFF) >= s.labels()) return p;
     const BoundaryRecord r = unpack_boundary(bits);
+    if (std::abs(r.distance_vx) > kSurfaceReachVx) return p;
     p.second = r.second_label;
     p.normal = r.normal;
     p.rough = roughness_at(s, v);
@@ -205,14 +206,18 @@ void render_physical_reference(const PhysicalScene& s,
             double re = amplitude, im = 0;
             if (on.speckle) {
                 const Vector3 c = (1 / tables.scatter_mm) * (turn * from_origin);
-                const auto wrap = [&](double u) {
-                    return static_cast<std::size_t>(nearest(u) & s.speckle_mask);
+                const std::int32_t i = nearest(c.x), j = nearest(c.y), m = nearest(c.z);
+                const std::uint32_t hash = speckle_hash(i, j, m);
+                const auto wrap = [&](std::int32_t u, int shift) {
+                    return (static_cast<std::uint32_t>(u) ^ hash >> shift) &
+                           ((1u << kSpeckleLog2) - 1);
                 };
                 const std::size_t cell =
-                    wrap(c.x) + ((wrap(c.y) + (wrap(c.z) << s.speckle_log2)) << s.speckle_log2);
+                    wrap(i, kShuffleX) +
+                    ((wrap(j, kShuffleY) + (wrap(m, kShuffleZ) << kSpeckleLog2)) << kSpeckleLog2);
                 const double unit = 1 / (32 * std::sqrt(2.0));
-                re = amplitude * s.bundle->speckle.voxels[2 * cell] * unit;
-                im = amplitude * s.bundle->speckle.voxels[2 * cell + 1] * unit;
+                re = amplitude * s.speckle[2 * cell] * unit;
+                im = amplitude * s.speckle[2 * cell + 1] * unit;
             }
 
             double facing = 1;
@@ -258,7 +263,9 @@ void render_physical_reference(const PhysicalScene& s,
                 }
             }
 
-            const double here = std::exp2(log2_light);
+            const bool dead = log2_light < kDeadLog2;
+            const double here = dead ? 0 : std::exp2(log2_light);
+            if (dead) re = im = 0;
             if (look.kind == TissueKind::bone && before != TissueKind::bone) {
                 bone = std::max(bone, kBoneTail * kMaxReflection * facing * here * row.gain);
                 bone_slow = std::max(bone_slow, kBoneTailSlow * kBoneTail * kMaxReflection *

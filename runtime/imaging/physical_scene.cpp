@@ -81,8 +81,19 @@ Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
         return Error{"the bundle holds no speckle volume", "",
                      "build the case again, or use --model paper"};
     }
-    while ((1 << s.speckle_log2) < edge) ++s.speckle_log2;
-    s.speckle_mask = edge - 1;
+    const auto cube = static_cast<std::size_t>(1 << kSpeckleLog2),
+               given = static_cast<std::size_t>(edge);
+    s.speckle.resize(2 * cube * cube * cube);
+    for (std::size_t z = 0; z < cube; ++z) {
+        for (std::size_t y = 0; y < cube; ++y) {
+            for (std::size_t x = 0; x < cube; ++x) {
+                const std::size_t from = x % given + given * (y % given + given * (z % given));
+                const std::size_t to = x + cube * (y + cube * z);
+                s.speckle[2 * to] = bundle.speckle.voxels[2 * from];
+                s.speckle[2 * to + 1] = bundle.speckle.voxels[2 * from + 1];
+            }
+        }
+    }
 
     const std::vector<int> tissue_of = tissue_of_label(bundle);
     const Tissue nothing{};

@@ -58,7 +58,7 @@ struct PhysicalScene {
     // Boundary roughness and glint, kRoughEdge^3: byte 0 roughness (/ 32), byte 1 log2 of the glint
     // (/ 32), bytes 2 and 3 cosine and sine of its phase (/ 127); all signed.
     std::vector<std::uint32_t> rough;
-    int speckle_mask = 0, speckle_log2 = 0;
+    std::vector<std::int8_t> speckle;  // pairs, edge 2^kSpeckleLog2
     FineStructure fine;
 
     std::vector<TargetBall> targets;
