@@ -167,7 +167,9 @@ TEST(PhysicalModel, TargetsShowWhereTheyAreAndNowhereElse) {
                 ++n;
             }
             // Above it, out of the point spread's and the haze's reach, nothing changes.
-            if (z < 25) ASSERT_EQ(with[i], without[i]);
+            if (z < 25) {
+                ASSERT_EQ(with[i], without[i]);
+            }
         }
     }
     EXPECT_LT(inside / n, 35);
