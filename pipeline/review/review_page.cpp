@@ -222,7 +222,7 @@ std::string review_page(const ReviewInput& input, const std::vector<SessionView>
             "plane</span><span><i "
             "style=\"background:linear-gradient(90deg,#451a8c,#bd2985,#f5734d,#fdd933)\"></i>tip's "
             "way, early to "
-            "late</span><span><i style=\"background:#bfc7d1\"></i>needle at its end</span></p><div "
+            "late</span><span><i style=\"background:#4d596b\"></i>needle at its end</span></p><div "
             "class=views>\n";
         for (const SessionView& view : views) page += figure(view.png, view.title);
         page += "</div>\n";

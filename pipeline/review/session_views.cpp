@@ -39,7 +39,7 @@ namespace {
 
 using Colour = std::array<double, 3>;
 constexpr Colour kSkin{0.93, 0.78, 0.68}, kSpared{0.86, 0.22, 0.18}, kOrgan{0.62, 0.36, 0.30};
-constexpr Colour kTarget{0.98, 0.78, 0.10}, kHit{0.20, 0.72, 0.32}, kNeedle{0.75, 0.78, 0.82};
+constexpr Colour kTarget{0.98, 0.78, 0.10}, kHit{0.20, 0.72, 0.32}, kNeedle{0.30, 0.35, 0.42};
 constexpr Colour kProbe{0.16, 0.47, 0.85}, kPlane{0.35, 0.62, 0.95};
 
 std::vector<std::uint8_t> png_of(vtkImageData* image) {
