@@ -288,6 +288,29 @@ void set_axis(vtkAxis* axis, const std::string& title, Range range, bool log_sca
     axis->SetRange(range.low, range.high);
 }
 
+// The picture of a chart, enlarged and centred in a cell whose lower left corner is (x, y).
+void paint_picture(const Chart& given, Canvas& canvas, double x, double y, int width, int height) {
+    constexpr int kTitlePx = 36, kMarginPx = 8;
+    const int w = given.picture_width, h = given.picture_height;
+    const int factor =
+        std::max(1, std::min((width - 2 * kMarginPx) / w, (height - kTitlePx - kMarginPx) / h));
+    const double left = x + (width - factor * w) / 2;
+    for (int row = 0; row < h; ++row) {
+        const std::uint8_t* grey =
+            given.picture.data() + static_cast<std::size_t>(w) * static_cast<std::size_t>(row);
+        const double bottom = y + kMarginPx + factor * (h - 1 - row);
+        for (int i = 0; i < w;) {  // runs of one grey
+            int end = i + 1;
+            while (end < w && grey[end] == grey[i]) ++end;
+            const double a = left + factor * i, b = left + factor * end;
+            const std::array<CanvasPoint, 4> box{
+                {{a, bottom}, {b, bottom}, {b, bottom + factor}, {a, bottom + factor}}};
+            canvas.fill(box, CanvasColour{grey[i], grey[i], grey[i], 255});
+            i = end;
+        }
+    }
+}
+
 void paint(const Chart& given, Canvas& canvas, double x, double y, int width, int height) {
     vtkNew<vtkContextScene> scene;
     scene->SetGeometry(width, height);
@@ -400,6 +423,10 @@ void paint(const Chart& given, Canvas& canvas, double x, double y, int width, in
     chart->GetLegend()->GetPen()->SetColor(200, 200, 200);
     chart->GetLegend()->SetLabelSize(12);
     chart->SetRenderEmpty(true);
+    if (!given.picture.empty()) {
+        for (const int axis : {vtkAxis::LEFT, vtkAxis::BOTTOM, vtkAxis::RIGHT, vtkAxis::TOP})
+            chart->GetAxis(axis)->SetVisible(false);
+    }
 
     vtkNew<CanvasDevice> device;
     device->size(width, height);
@@ -416,6 +443,7 @@ void paint(const Chart& given, Canvas& canvas, double x, double y, int width, in
         context->End();
     }
     canvas.clip();
+    if (!given.picture.empty()) paint_picture(given, canvas, x, y, width, height);
 }
 
 Canvas painted(const ChartSheet& sheet) {

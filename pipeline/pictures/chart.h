@@ -30,6 +30,11 @@ struct Chart {
     bool y_log = false;
     std::vector<Series> series;
     bool equal_axes = false;  // one unit is as long in x as in y
+    // A grey picture in place of the plot, under the title: row by row from the top, enlarged by a
+    // whole factor to fill the cell.
+    std::vector<std::uint8_t> picture{};  // # picture_width * picture_height; empty: none
+    int picture_width = 0;
+    int picture_height = 0;
 };
 
 // Charts side by side, row by row, `columns` to a row; each cell is width_px x height_px.

@@ -84,7 +84,9 @@ Autocorrelation autocorrelation(std::span<const ExampleImage> examples, int reac
         }
     }
     const double zero = product[product.size() / 2] / std::max(pairs[pairs.size() / 2], 1.0);
+    out.overlap.resize(pairs.size());
     for (std::size_t i = 0; i < out.value.size(); ++i) {
+        out.overlap[i] = used > 0 ? pairs[i] / used : 0;
         if (pairs[i] >= used / 20 && pairs[i] > 0 && zero > 0) {
             out.value[i] = std::clamp(product[i] / pairs[i] / zero, -1.0, 1.0);
         }
@@ -200,9 +202,32 @@ Autocorrelation at_stride(const Autocorrelation& autocorrelation, int stride) {
     Autocorrelation out;
     out.reach = autocorrelation.reach / stride;
     out.value.resize(static_cast<std::size_t>((2 * out.reach + 1) * (2 * out.reach + 1)));
+    if (!autocorrelation.overlap.empty()) out.overlap.resize(out.value.size());
+    std::size_t to = 0;
+    for (int y = -out.reach; y <= out.reach; ++y) {
+        for (int x = -out.reach; x <= out.reach; ++x, ++to) {
+            out.value[to] = autocorrelation.at(stride * x, stride * y);
+            if (out.overlap.empty()) continue;
+            const int side = 2 * autocorrelation.reach + 1;
+            out.overlap[to] = autocorrelation.overlap[static_cast<std::size_t>(
+                (stride * y + autocorrelation.reach) * side + stride * x + autocorrelation.reach)];
+        }
+    }
+    return out;
+}
+
+Autocorrelation through_window(const Autocorrelation& autocorrelation,
+                               const Autocorrelation& window) {
+    assert(!window.overlap.empty());
+    Autocorrelation out;
+    out.reach = std::min(autocorrelation.reach, window.reach);
+    out.value.resize(static_cast<std::size_t>((2 * out.reach + 1) * (2 * out.reach + 1)));
     for (int y = -out.reach; y <= out.reach; ++y) {
         for (int x = -out.reach; x <= out.reach; ++x) {
-            out.at(x, y) = autocorrelation.at(stride * x, stride * y);
+            const int side = 2 * window.reach + 1;
+            out.at(x, y) =
+                autocorrelation.at(x, y) * window.overlap[static_cast<std::size_t>(
+                                               (y + window.reach) * side + x + window.reach)];
         }
     }
     return out;

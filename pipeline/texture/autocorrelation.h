@@ -12,13 +12,19 @@ namespace sonocase::pipeline {
 // Point-symmetric: at(-x, -y) = at(x, y).
 struct Autocorrelation {
     int reach = 0;
-    std::vector<double> value;  // # (2 reach + 1)^2
+    std::vector<double> value;    // # (2 reach + 1)^2
+    std::vector<double> overlap;  // # same: share of pixel pairs at the lag; empty: all (a cube)
 
     double at(int x, int y) const {
         return value[static_cast<std::size_t>((y + reach) * (2 * reach + 1) + x + reach)];
     }
     double& at(int x, int y) {
         return value[static_cast<std::size_t>((y + reach) * (2 * reach + 1) + x + reach)];
+    }
+    double window(int x, int y) const {
+        return overlap.empty()
+                   ? 1
+                   : overlap[static_cast<std::size_t>((y + reach) * (2 * reach + 1) + x + reach)];
     }
     // Bilinear; 0 beyond the reach.
     double between(double x, double y) const;
@@ -38,6 +44,13 @@ Autocorrelation plane_autocorrelation(std::span<const float> cube, int edge, int
 ExampleImage without_local_trend(const ExampleImage& image, double sigma_px);
 std::vector<float> without_local_trend(std::span<const float> cube, int edge, double sigma_px);
 inline constexpr double kGrainTrendPx = 12;  // as in the published table of the real patches
+
+// The correlation as a window of the example's size shows it: each lag times its share of pixel
+// pairs, the usual estimate from one image. Long lags of a small patch are mostly chance, and half
+// heights read from them would be chance too. Widths of an example and of a texture are compared
+// through the example's window.
+Autocorrelation through_window(const Autocorrelation& autocorrelation,
+                               const Autocorrelation& window);
 
 // Full widths at half height, in pixels, along the direction in which the correlation reaches
 // furthest and at right angles to it.

@@ -102,15 +102,41 @@ void cut_negative(std::vector<double>& power) {  // and mean 1
     for (double& p : power) p *= static_cast<double>(power.size()) / sum;
 }
 
-std::vector<double> line_spectrum(const std::vector<double>& rho) {  // # edge, wrapped
-    const int edge = static_cast<int>(rho.size());
-    std::vector<std::complex<double>> line(rho.begin(), rho.end());
-    fourier_plane(line, edge, 1, false);
-    std::vector<double> power(rho.size());
-    double sum = 0;
-    for (std::size_t i = 0; i < rho.size(); ++i) sum += power[i] = std::max(line[i].real(), 0.0);
-    for (double& p : power) p *= static_cast<double>(edge) / sum;
-    return power;
+// How the power of each wave in the picture is spread over waves out of the picture: a share for
+// every (kx, ky, kz) whose sum over kz is edge, so that planes z = const keep the picture's
+// autocorrelation exactly, whatever the shares are. Chosen so that the profile across (or along)
+// the main direction and the depth look alike from any side: isotropic in that plane, with the tail
+// of the Matern family of the profile's width (exponential for fibres, smoother for speckle). A
+// mere product of profiles would weave a plaid.
+std::vector<float> depth_spectrum(const CorrelationWidths& widths, bool across, int edge) {
+    const auto n = static_cast<std::size_t>(edge);
+    const double angle = widths.angle_rad + (across ? kPi / 2 : 0.0);
+    // correlation length from the full width at half height: exp(-r / l), or (1 + r / l) exp(-r /
+    // l)
+    const double width = std::max(across ? widths.across : widths.along, 0.8);
+    const double length = across ? width / 1.386 : width / 3.357;
+    const auto lowest = static_cast<float>(1 / (length * length));
+    std::vector<float> share(n * n * n);
+    const auto wave = [&](std::size_t k) {
+        const int signed_k = static_cast<int>(k) - (k > n / 2 ? edge : 0);
+        return 2 * kPi * signed_k / edge;
+    };
+    std::vector<float> kz2(n);
+    for (std::size_t z = 0; z < n; ++z) kz2[z] = static_cast<float>(wave(z) * wave(z));
+    for (std::size_t i = 0; i < n * n; ++i) {
+        const double k = wave(i % n) * std::cos(angle) + wave(i / n) * std::sin(angle);
+        const float base = lowest + static_cast<float>(k * k);
+        float sum = 0;
+        for (std::size_t z = 0; z < n; ++z) {
+            const float q = base + kz2[z];
+            const float s = 1 / (q * (across ? 1.f : q) * std::sqrt(q));
+            share[z * n * n + i] = s;
+            sum += s;
+        }
+        const float scale = static_cast<float>(edge) / sum;
+        for (std::size_t z = 0; z < n; ++z) share[z * n * n + i] *= scale;
+    }
+    return share;
 }
 
 // Moves the cube round so that its outer faces lie where neighbouring planes differ as they do on
@@ -183,10 +209,10 @@ MatchedTexture synthesise_matched(std::span<const ExampleImage> examples,
     constexpr int kMostPixels = 4;
     Autocorrelation grain = autocorrelation(local, kMostPixels * half);
     MatchedTexture out;
-    // ... so that the grain fits along its length, and is still two voxels thick.
-    const CorrelationWidths full = correlation_widths(grain);
-    while (out.pixels_per_voxel < kMostPixels && full.along > 0.42 * edge * out.pixels_per_voxel &&
-           full.across >= 2 * (out.pixels_per_voxel + 1)) {
+    // ... so that the grain fits along its length, and is still 1.8 voxels thick.
+    const CorrelationWidths full = correlation_widths(through_window(grain, grain));
+    while (out.pixels_per_voxel < kMostPixels && full.along > 0.5 * edge * out.pixels_per_voxel &&
+           full.across >= 1.8 * (out.pixels_per_voxel + 1)) {
         ++out.pixels_per_voxel;
     }
     const int stride = out.pixels_per_voxel;
@@ -200,7 +226,7 @@ MatchedTexture synthesise_matched(std::span<const ExampleImage> examples,
     }
     grain = at_stride(grain, stride);
     const Autocorrelation grey = at_stride(autocorrelation(whole, half * stride), stride);
-    const CorrelationWidths widths = correlation_widths(grain);
+    const CorrelationWidths widths = correlation_widths(through_window(grain, grain));
     const GreyToGaussian to_gaussian(sorted);
     const double share = whole_power > 0 ? local_power / whole_power : 0;
     const std::vector<double> wanted = torus_transform(
@@ -208,15 +234,8 @@ MatchedTexture synthesise_matched(std::span<const ExampleImage> examples,
     std::vector<double> rho(wanted.size());
     for (std::size_t i = 0; i < rho.size(); ++i) rho[i] = to_gaussian(wanted[i]);
 
-    // the profile out of the picture
-    const double angle =
-        widths.angle_rad + (options.third_axis == ThirdAxis::across ? kPi / 2 : 0.0);
-    std::vector<double> depth(n);
-    for (int z = -half; z < half; ++z) {
-        depth[static_cast<std::size_t>((z + edge) % edge)] =
-            to_gaussian(grey.between(z * std::cos(angle), z * std::sin(angle)));
-    }
-    const std::vector<double> power_z = line_spectrum(depth);
+    const std::vector<float> depth_share =
+        depth_spectrum(widths, options.third_axis == ThirdAxis::across, edge);
 
     // the phases of white noise
     const std::size_t count = n * n * n;
@@ -242,7 +261,8 @@ MatchedTexture synthesise_matched(std::span<const ExampleImage> examples,
         for (std::size_t z = 0; z < n; ++z) {
             for (std::size_t i = 0; i < n * n; ++i) {
                 field[z * n * n + i] =
-                    noise[z * n * n + i] * static_cast<float>(std::sqrt(power[i] * power_z[z]));
+                    noise[z * n * n + i] *
+                    std::sqrt(static_cast<float>(power[i]) * depth_share[z * n * n + i]);
             }
         }
         field[0] = 0;  // a mean has no place in a histogram that is matched by rank

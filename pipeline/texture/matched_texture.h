@@ -2,17 +2,17 @@
 //
 // The grey of the example is seen as q(g), a rising function of a Gaussian field g: q carries the
 // histogram, the field's autocorrelation rho carries the grain. rho is what gives the grey values
-// their own autocorrelation R after q (Hermite expansion, R = sum c_k^2 k! rho^k). The picture's
-// rho(x, y) is made three-dimensional as rho(x, y) * rho_z(z), with rho_z the picture's own profile
-// across or along its main direction; a product of two autocorrelations is one. The field is white
-// noise with every Fourier amplitude set to what rho wants: the cube's own autocorrelation is then
-// exact rather than right on average, and it wraps at its faces. Direction survives: fibres stay
-// fibres.
+// their own autocorrelation R after q (Hermite expansion, R = sum c_k^2 k! rho^k). The power of
+// each wave of the picture is spread over waves out of it so that fibres are round and speckle is
+// as wide in elevation as sideways; planes parallel to the picture keep its autocorrelation
+// exactly. The field is white noise with every Fourier amplitude set to what rho wants: the cube's
+// own autocorrelation is then exact rather than right on average, and it wraps at its faces.
+// Direction survives: fibres stay fibres.
 //
 // Correlation is followed to half an edge. Where the example's grain is too long for that, a voxel
 // takes the place of several pixels: the field is sampled more coarsely, not smoothed.
-// Source: heightmap-free relative of translation of marginals in Gaussian fields (M. Grigoriu,
-// Applied Non-Gaussian Processes, 1995); measured against the paper's pyramid in docs/accuracy.md.
+// Source: translation of Gaussian fields (M. Grigoriu, Applied Non-Gaussian Processes, 1995);
+// measured against the paper's pyramid in docs/accuracy.md.
 #pragma once
 
 #include <cstdint>
@@ -28,12 +28,12 @@ namespace sonocase::pipeline {
 
 struct MatchedOptions {
     ThirdAxis third_axis = ThirdAxis::across;
-    int corrections = 2;  // rounds of measuring the cube's autocorrelation and mending the spectrum
+    int corrections = 3;  // rounds of measuring the cube's autocorrelation and mending the spectrum
 };
 
 struct MatchedTexture {
     std::vector<float> grey;   // # edge^3, x fastest, tessellating
-    int pixels_per_voxel = 1;  // 1 unless the grain is longer than 0.42 of the edge
+    int pixels_per_voxel = 1;  // 1 unless the grain is longer than half the edge
 };
 
 // examples: prepared (prepare_example.h), >= 1. edge: power of two in 8..128.

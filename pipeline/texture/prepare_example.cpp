@@ -316,7 +316,11 @@ Result<PreparedExample> prepare_example(const ExampleImage& example) {
         out.warnings.push_back(example.name + ": only " + std::to_string(distinct) +
                                " grey levels; the texture will have no more.");
     }
-    if (distinct >= 8) remove_trend(out);  // a few levels would be smeared by a ramp
+    // A ramp would smear a few levels into many, and tear apart what clipping has put together.
+    if (distinct >= 8 && out.saturated <= 0.05) {
+        remove_trend(out);
+        for (float& grey : image.grey) grey = std::clamp(grey, 0.f, 255.f);
+    }
     m = moments(image);
     if (m.sd < 1e-6) {
         return Error{"nothing but a depth trend", example.name,

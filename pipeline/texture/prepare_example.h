@@ -19,13 +19,13 @@ struct PreparedExample {
     std::vector<std::string> warnings;  // whole sentences
 };
 
-// Depth trend: a line through the row means, always; a parabola where the example is at least 16
-// grains deep and it explains more than chance would. Where mean and spread rise together by half
-// or more, the gain is taken to multiply (a linear display) and the spread is evened out with it;
-// log compression makes a gain additive. Only in depth: sideways changes belong to the tissue. Left
-// out of use: pixels that are not finite, straight runs of one bright value (frames, rulers), and
-// strokes of one exact bright value that the histogram shows as a spike (text). Error: fewer than
-// 64 used pixels, or no variation at all.
+// Depth trend (not where the patch is clipped, or has a few levels only): a line through the row
+// means; a parabola where the example is at least 16 grains deep and it explains more than chance
+// would. Where mean and spread rise together by half or more, the gain is taken to multiply (a
+// linear display) and the spread is evened out with it; log compression makes a gain additive. Only
+// in depth: sideways changes belong to the tissue. Left out of use: pixels that are not finite,
+// straight runs of one bright value (frames, rulers), and strokes of one exact bright value that
+// the histogram shows as a spike (text). Error: fewer than 64 used pixels, or no variation at all.
 Result<PreparedExample> prepare_example(const ExampleImage& example);
 
 }  // namespace sonocase::pipeline

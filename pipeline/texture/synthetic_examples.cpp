@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <complex>
+#include <vector>
 
 #include "pipeline/texture/counter_random.h"
 
@@ -40,47 +41,54 @@ constexpr Look kLooks[] = {
     {"kidney_sinus", 135, 28, 3.2, 8.0, 0.3, 0.4, 14, 5.0, 0.6},
 };
 
-// Gaussian field at (x, y) with correlation widths along and across a direction: white noise on the
+// Complex Gaussian field with correlation widths along and across a direction: white noise on the
 // pixels smoothed by a Gaussian. The autocorrelation of a kernel of deviation s has width 3.33 s.
-class SmoothField {
-  public:
-    SmoothField(double along_width, double across_width, double slant_rad, std::uint64_t seed)
-        : seed_(seed) {
-        const double sa = along_width / 3.33, sc = across_width / 3.33;
-        const double c = std::cos(slant_rad), s = std::sin(slant_rad);
-        reach_ = static_cast<int>(std::ceil(3 * std::max(sa, sc)));
-        double power = 0;
-        for (int y = -reach_; y <= reach_; ++y) {
-            for (int x = -reach_; x <= reach_; ++x) {
-                const double a = (c * x + s * y) / sa, b = (c * y - s * x) / sc;
-                const double w = std::exp(-0.5 * (a * a + b * b));
-                if (w < 1e-3) continue;
-                taps_.push_back({x, y, w});
-                power += w * w;
-            }
-        }
-        for (Tap& tap : taps_) tap.weight /= std::sqrt(power);
-    }
-    std::complex<double> at(int x, int y) const {
-        std::complex<double> sum = 0;
-        for (const Tap& tap : taps_) {
-            const auto u = static_cast<std::uint64_t>(x + tap.x + 4096);
-            const auto v = static_cast<std::uint64_t>(y + tap.y + 4096);
-            const GaussianPair z = gaussian_pair_at(seed_, u << 20 | v);
-            sum += tap.weight * std::complex<double>(z.a, z.b);
-        }
-        return sum;
-    }
-
-  private:
+std::vector<std::complex<double>> smooth_field(int width,
+                                               int height,
+                                               double along_width,
+                                               double across_width,
+                                               double slant_rad,
+                                               std::uint64_t seed) {
+    const double sa = along_width / 3.33, sc = across_width / 3.33;
+    const double c = std::cos(slant_rad), s = std::sin(slant_rad);
+    const int reach = static_cast<int>(std::ceil(3 * std::max(sa, sc)));
     struct Tap {
         int x, y;
         double weight;
     };
-    std::uint64_t seed_;
-    int reach_ = 0;
-    std::vector<Tap> taps_;
-};
+    std::vector<Tap> taps;
+    double power = 0;
+    for (int y = -reach; y <= reach; ++y) {
+        for (int x = -reach; x <= reach; ++x) {
+            const double a = (c * x + s * y) / sa, b = (c * y - s * x) / sc;
+            const double w = std::exp(-0.5 * (a * a + b * b));
+            if (w < 5e-3) continue;
+            taps.push_back({x, y, w});
+            power += w * w;
+        }
+    }
+    const int row = width + 2 * reach;
+    std::vector<std::complex<double>> noise(static_cast<std::size_t>(row) *
+                                            static_cast<std::size_t>(height + 2 * reach));
+    for (std::size_t i = 0; i < noise.size(); ++i) {
+        const GaussianPair z = gaussian_pair_at(seed, i);
+        noise[i] = {z.a, z.b};
+    }
+    std::vector<std::complex<double>> field(static_cast<std::size_t>(width) *
+                                            static_cast<std::size_t>(height));
+    for (const Tap& tap : taps) {
+        const double w = tap.weight / std::sqrt(power);
+        for (int y = 0; y < height; ++y) {
+            const auto* from =
+                noise.data() +
+                static_cast<std::size_t>(y + reach + tap.y) * static_cast<std::size_t>(row) +
+                static_cast<std::size_t>(reach + tap.x);
+            auto* to = field.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
+            for (int x = 0; x < width; ++x) to[x] += w * from[x];
+        }
+    }
+    return field;
+}
 
 // FNV-1a: std::hash differs between standard libraries.
 std::uint64_t name_hash(std::string_view name) {
@@ -101,9 +109,13 @@ ExampleImage synthetic_example(std::string_view texture,
         if (known.texture == texture) look = known;
     }
     const std::uint64_t own = derive_seed(seed, name_hash(texture));
-    const SmoothField speckle(look.lateral, look.axial, 0, derive_seed(own, 1));
-    const SmoothField fibres(look.fibre_length, look.fibre_thickness, look.slant_rad,
-                             derive_seed(own, 2));
+    const auto speckle =
+        smooth_field(width, height, look.lateral, look.axial, 0, derive_seed(own, 1));
+    std::vector<std::complex<double>> fibres;
+    if (look.fibre > 0) {
+        fibres = smooth_field(width, height, look.fibre_length, look.fibre_thickness,
+                              look.slant_rad, derive_seed(own, 2));
+    }
 
     ExampleImage image;
     image.name = "synthetic " + std::string(texture);
@@ -113,10 +125,10 @@ ExampleImage synthetic_example(std::string_view texture,
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             // log of a Rayleigh envelope, standardised: mean -2.51 dB, sd 5.57 dB re its power
-            const double db = 10 * std::log10(0.5 * std::norm(speckle.at(x, y)) + 1e-4);
+            const double db = 10 * std::log10(0.5 * std::norm(speckle[image.index(x, y)]) + 1e-4);
             double value = std::max((db + 2.51) / 5.57, -3.0);
             if (look.fibre > 0) {
-                const double g = fibres.at(x, y).real();
+                const double g = fibres[image.index(x, y)].real();
                 // exponential of a Gaussian, standardised: bright fibres on dark ground
                 const double k = look.fibre_skew * 0.45;
                 const double f = (std::exp(k * g) - std::exp(k * k / 2)) /

@@ -121,7 +121,7 @@ Result<SolidTextureResult> make_solid_texture(const TextureSpec& spec) {
     out.grey_sd = std::sqrt(std::max(square / count - out.grey_mean * out.grey_mean, 1e-12));
     std::vector<float> grey;
     if (spec.mode == TextureMode::pyramid) {
-        const PyramidStatistics statistics = learn_pyramid(prepared);
+        const PyramidStatistics statistics = learn_pyramid(prepared, spec.pyramid);
         out.warnings.insert(out.warnings.end(), statistics.warnings.begin(),
                             statistics.warnings.end());
         grey = synthesise_pyramid(statistics, spec.edge, spec.seed);
@@ -137,18 +137,21 @@ Result<SolidTextureResult> make_solid_texture(const TextureSpec& spec) {
     out.texture.voxel_mm = spec.pixel_mm * out.pixels_per_voxel;
     out.texture.voxels.resize(grey.size());
     for (std::size_t i = 0; i < grey.size(); ++i) {
-        const double v = 128 + 32 * (grey[i] - out.grey_mean) / out.grey_sd;
-        out.texture.voxels[i] = static_cast<std::uint8_t>(std::clamp(std::lround(v), 0l, 255l));
+        double v = std::round(128 + 32 * (grey[i] - out.grey_mean) / out.grey_sd);
+        // What is saturated in the example stays so: a step of the code may be two levels of grey.
+        if (grey[i] >= 255 && out.grey_mean + (v - 128) / 32 * out.grey_sd < 255) v += 1;
+        if (grey[i] <= 0 && out.grey_mean + (v - 128) / 32 * out.grey_sd > 0) v -= 1;
+        out.texture.voxels[i] = static_cast<std::uint8_t>(std::clamp(v, 0.0, 255.0));
     }
     return out;
 }
 
-Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
-                                             const TextureBankOptions& options,
-                                             const Progress& progress) {
-    const auto start = std::chrono::steady_clock::now();
-    TextureBankResult out;
-    out.report.stage = "texture";
+Result<std::vector<TextureSpec>> plan_texture_bank(std::span<const Tissue> tissues,
+                                                   const TextureBankOptions& options,
+                                                   std::vector<std::string>* notes) {
+    const auto note = [&](std::string text) {
+        if (notes) notes->push_back(std::move(text));
+    };
     std::map<std::string, std::vector<std::string>> patches;
     if (!options.example_folder.empty()) {
         auto table = read_patch_table(options.example_folder);
@@ -156,15 +159,16 @@ Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
         patches = std::move(*table);
     }
     std::vector<TextureSpec> specs;
-    int from_files = 0;
+    const auto planned = [&](const std::string& name) {
+        return std::any_of(specs.begin(), specs.end(),
+                           [&](const TextureSpec& s) { return s.name == name; });
+    };
     for (const Tissue& tissue : tissues) {
-        if (tissue.texture.empty()) continue;
-        if (std::any_of(specs.begin(), specs.end(),
-                        [&](const TextureSpec& s) { return s.name == tissue.texture; }))
-            continue;
+        if (tissue.texture.empty() || planned(tissue.texture)) continue;
         TextureSpec spec;
         spec.name = tissue.texture;
         spec.mode = options.mode;
+        spec.pyramid = options.pyramid;
         spec.edge = options.edge;
         spec.pixel_mm = options.pixel_mm;
         spec.seed = name_seed(tissue.texture, options.seed);
@@ -186,43 +190,51 @@ Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
             }
         }
         for (const std::string& file : files) {
-            auto example = read_example(file, {}, &out.report.warnings);
+            auto example = read_example(file, {}, notes);
             if (!example) return example.error();
             spec.examples.push_back(std::move(*example));
         }
         if (spec.examples.empty()) {
             spec.examples.push_back(synthetic_example(spec.name, 160, 128, options.seed));
             if (!options.example_folder.empty()) {
-                out.report.warnings.push_back("Texture " + spec.name +
-                                              " has no example image; a synthetic one is used.");
+                note("Texture " + spec.name + " has no example image; a synthetic one is used.");
             }
-        } else {
-            ++from_files;
         }
         specs.push_back(std::move(spec));
     }
     for (const TextureExample& example : options.examples) {
-        if (std::none_of(specs.begin(), specs.end(),
-                         [&](const TextureSpec& s) { return s.name == example.texture; })) {
-            out.report.warnings.push_back("No tissue uses the texture " + example.texture +
-                                          "; its example was not read.");
+        if (!planned(example.texture)) {
+            note("No tissue uses the texture " + example.texture + "; its example was not read.");
         }
     }
-    std::vector<std::optional<Result<SolidTextureResult>>> made(specs.size());
+    return specs;
+}
+
+Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
+                                             const TextureBankOptions& options,
+                                             const Progress& progress) {
+    const auto start = std::chrono::steady_clock::now();
+    TextureBankResult out;
+    out.report.stage = "texture";
+    auto specs = plan_texture_bank(tissues, options, &out.report.warnings);
+    if (!specs) return specs.error();
+    std::vector<std::optional<Result<SolidTextureResult>>> made(specs->size());
     tell(progress, 0.1, "learning textures");
-    parallel_for(specs.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) made[i].emplace(make_solid_texture(specs[i]));
+    parallel_for(made.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) made[i].emplace(make_solid_texture((*specs)[i]));
     });
-    for (std::size_t i = 0; i < specs.size(); ++i) {
+    double synthetic = 0;
+    for (std::size_t i = 0; i < made.size(); ++i) {
         if (!*made[i]) return made[i]->error();
         SolidTextureResult& result = **made[i];
         out.textures.push_back(std::move(result.texture));
         out.report.warnings.insert(out.report.warnings.end(), result.warnings.begin(),
                                    result.warnings.end());
+        synthetic += (*specs)[i].examples[0].name.rfind("synthetic ", 0) == 0;
     }
     tell(progress, 1, "learning textures");
-    out.report.measures = {{"textures", static_cast<double>(specs.size())},
-                           {"from_example_images", static_cast<double>(from_files)},
+    out.report.measures = {{"textures", static_cast<double>(made.size())},
+                           {"synthetic_examples", synthetic},
                            {"edge_voxels", static_cast<double>(options.edge)}};
     out.report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

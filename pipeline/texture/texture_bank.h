@@ -13,6 +13,7 @@
 #include "formats/tissue.h"
 #include "pipeline/progress.h"
 #include "pipeline/texture/example_image.h"
+#include "pipeline/texture/pyramid_texture.h"
 
 namespace sonocase::pipeline {
 
@@ -31,6 +32,7 @@ struct TextureSpec {
     std::string name;
     std::vector<ExampleImage> examples;  // >= 1
     TextureMode mode = TextureMode::matched;
+    PyramidOptions pyramid;  // of mode pyramid
     ThirdAxis third_axis = ThirdAxis::across;
     int edge = 64;          // power of two in 8..128
     double pixel_mm = 0.5;  // size that a pixel of the example has in tissue
@@ -61,6 +63,7 @@ struct TextureBankOptions {
     std::string example_folder;
     std::vector<TextureExample> examples;  // these win over the folder
     TextureMode mode = TextureMode::matched;
+    PyramidOptions pyramid;  // of mode pyramid
     int edge = 64;
     double pixel_mm = 0.5;  // size that a pixel of the examples has in tissue
     std::uint64_t seed = 1;
@@ -70,6 +73,12 @@ struct TextureBankResult {
     std::vector<SolidTexture> textures;  // in the order in which the tissues name them
     StageReport report;                  // stage "texture"
 };
+
+// What the bank will be made from: every texture that `tissues` name, each once, with its examples
+// read. `notes` gets a sentence on each oddity of a file. Errors are those of the files.
+Result<std::vector<TextureSpec>> plan_texture_bank(std::span<const Tissue> tissues,
+                                                   const TextureBankOptions& options,
+                                                   std::vector<std::string>* notes);
 
 // Every texture that `tissues` name, each once. Names without an example get a synthetic one
 // (synthetic_examples.h), and the report's warnings say so when a folder was given.

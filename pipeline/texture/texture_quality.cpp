@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+
+#include "pipeline/texture/prepare_example.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -17,7 +20,8 @@ std::vector<float> used_grey(const ExampleImage& image) {
 
 // rms difference over the lags within the wider of the two grains, at most the shared reach
 double grain_distance(const Autocorrelation& a, const Autocorrelation& b) {
-    const double radius = std::max(correlation_widths(a).along, correlation_widths(b).along);
+    const double radius = std::max(correlation_widths(through_window(a, b)).along,
+                                   correlation_widths(through_window(b, b)).along);
     const int reach = std::min({a.reach, b.reach, static_cast<int>(std::ceil(radius))});
     double sum = 0, count = 0;
     for (int y = -reach; y <= reach; ++y) {
@@ -154,8 +158,13 @@ TextureQuality measure_texture(const SolidTextureResult& made, const ExampleImag
     const std::array<ExampleImage, 2> halves = split_example(example);
     q.floor = distance_between(halves[0], halves[1]);
     const std::vector<float> grey = texture_grey(made.texture, made.grey_mean, made.grey_sd);
-    q.example = correlation_widths(grain_of(example, kWidthReach));
-    q.texture = correlation_widths(grain_of(grey, made));
+    const Autocorrelation grain = grain_of(example, kWidthReach);
+    // on the texture's own lattice, so that interpolation between lags does the same to both
+    const Autocorrelation seen = at_stride(grain, made.pixels_per_voxel);
+    q.example = correlation_widths(through_window(seen, seen));
+    q.texture = correlation_widths(through_window(grain_of(grey, made), seen));
+    q.example.along *= made.pixels_per_voxel;
+    q.example.across *= made.pixels_per_voxel;
     q.texture.along *= made.pixels_per_voxel;
     q.texture.across *= made.pixels_per_voxel;
     double sum = 0, square = 0;
@@ -168,6 +177,57 @@ TextureQuality measure_texture(const SolidTextureResult& made, const ExampleImag
         q.seam_score = std::max(q.seam_score, std::abs(z));
     }
     return q;
+}
+
+std::vector<Measure> TextureAssessment::measures() const {
+    const std::string n = made.texture.name + ".";
+    std::vector<Measure> out = {{n + "ks", quality.distance.ks},
+                                {n + "ks_floor", quality.floor.ks},
+                                {n + "earth_mover_grey", quality.distance.earth_mover_grey},
+                                {n + "earth_mover_floor_grey", quality.floor.earth_mover_grey},
+                                {n + "grain", quality.distance.grain},
+                                {n + "grain_floor", quality.floor.grain},
+                                {n + "along_px", quality.texture.along},
+                                {n + "along_example_px", quality.example.along},
+                                {n + "across_px", quality.texture.across},
+                                {n + "across_example_px", quality.example.across},
+                                {n + "anisotropy", quality.texture.ratio()},
+                                {n + "anisotropy_example", quality.example.ratio()},
+                                {n + "contrast", quality.texture_contrast},
+                                {n + "contrast_example", quality.example_contrast},
+                                {n + "seam_score", quality.seam_score}};
+    if (has_held_back) {
+        out.push_back({n + "held_back_ks", held_back.ks});
+        out.push_back({n + "held_back_earth_mover_grey", held_back.earth_mover_grey});
+        out.push_back({n + "held_back_grain", held_back.grain});
+    }
+    out.push_back({n + "pixels_per_voxel", static_cast<double>(made.pixels_per_voxel)});
+    out.push_back({n + "seconds", seconds});
+    return out;
+}
+
+Result<TextureAssessment> assess_texture(const TextureSpec& spec) {
+    TextureAssessment out;
+    const auto start = std::chrono::steady_clock::now();
+    auto made = make_solid_texture(spec);
+    if (!made) return made.error();
+    out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    out.made = std::move(*made);
+    const auto largest = std::max_element(
+        spec.examples.begin(), spec.examples.end(),
+        [](const ExampleImage& a, const ExampleImage& b) { return a.count() < b.count(); });
+    auto prepared = prepare_example(*largest);
+    if (!prepared) return prepared.error();
+    out.example = std::move(prepared->image);
+    out.quality = measure_texture(out.made, out.example);
+    const std::array<ExampleImage, 2> halves = split_example(out.example);
+    TextureSpec half = spec;
+    half.examples = {halves[0]};
+    if (auto from_half = make_solid_texture(half)) {
+        out.has_held_back = true;
+        out.held_back = distance_between(*from_half, halves[1]);
+    }
+    return out;
 }
 
 }  // namespace sonocase::pipeline

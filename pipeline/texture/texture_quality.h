@@ -6,7 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "formats/result.h"
 #include "formats/solid_texture.h"
+#include "formats/stage_report.h"
 #include "pipeline/texture/autocorrelation.h"
 #include "pipeline/texture/example_image.h"
 #include "pipeline/texture/texture_bank.h"
@@ -49,5 +51,21 @@ TextureDistance distance_between(const SolidTextureResult& made, const ExampleIm
 // made: by make_solid_texture; example: prepared (prepare_example.h). Cost: about that of making
 // the texture.
 TextureQuality measure_texture(const SolidTextureResult& made, const ExampleImage& example);
+
+// A texture, how good it is, and how well it would have foretold the half that it did not see.
+struct TextureAssessment {
+    SolidTextureResult made;
+    ExampleImage example;        // the largest one, prepared
+    TextureQuality quality;      // against that one
+    bool has_held_back = false;  // false: a half has too few pixels
+    TextureDistance held_back;   // texture learned from the first half against the second half
+    double seconds = 0;          // of make_solid_texture alone
+    // Names start with "NAME.": ks, earth_mover_grey, grain and their *_floor, widths and contrast
+    // of example and texture, seam_score, held_back_*, seconds.
+    std::vector<Measure> measures() const;
+};
+
+// Errors are those of make_solid_texture. Cost: three times that of making the texture.
+Result<TextureAssessment> assess_texture(const TextureSpec& spec);
 
 }  // namespace sonocase::pipeline

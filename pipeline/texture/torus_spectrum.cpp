@@ -12,6 +12,7 @@ namespace {
 constexpr double kPi = 3.141592653589793238463;
 
 constexpr double kContour = 7;
+constexpr double kZeroLag = 60;
 
 struct Term {
     std::vector<double> wanted, weight;  // per lag on the torus
@@ -30,10 +31,17 @@ Term term_of(const Autocorrelation& wanted, double scale, double strength, int e
             const bool known = std::abs(x) <= wanted.reach && std::abs(y) <= wanted.reach;
             term.wanted[i] = known ? scale * wanted.at(x, y) : 0;
             const double r = std::hypot(x, y) / radius;
-            term.weight[i] =
-                strength * (r < 1 ? 1 : std::max(std::exp(-4 * (r - 1) * (r - 1)), 0.02));
+            // Seen through the example's window, like the widths; the half-height contour is what
+            // they are read from.
+            const double window = known ? wanted.window(x, y) : 0;
+            const double near_half = known ? (window * wanted.at(x, y) - 0.5) / 0.1 : 9;
+            const double contour = 1 + kContour * std::exp(-near_half * near_half);
+            term.weight[i] = strength * std::max(window * window, 0.003) *
+                             (r < 1 ? contour : std::max(std::exp(-4 * (r - 1) * (r - 1)), 0.02));
         }
     }
+    // Variance put in as white noise would cost one lag only, and lower all correlations.
+    term.weight[0] = strength * kZeroLag;
     return term;
 }
 
@@ -63,7 +71,7 @@ std::vector<double> fit_torus_spectrum(const Autocorrelation& whole,
     std::vector<double> s(count, 1), before = s, leap = s;
     std::vector<std::complex<double>> plane(count);
     double momentum = 1;
-    const double step = 1.0 / (3.03 * (1 + kContour));  // 1 / (greatest weight of a + of b)
+    const double step = 1.0 / (3.03 * kZeroLag);  // 1 / (greatest weight of a + of b)
     for (int iteration = 0; iteration < iterations; ++iteration) {
         for (std::size_t i = 0; i < count; ++i) plane[i] = {leap[i], leap[i] * gain[i]};
         fourier_plane(plane, edge, edge, true);

@@ -20,12 +20,12 @@ namespace sonocase::pipeline {
 // share  variance of the local image over that of the whole
 //
 // A convex problem, solved by accelerated projected gradients (FISTA); `iterations` >= 1.
-// returns  S, # edge^2, mean 1 (variance 1), x fastest. Cost: 64 x 64, 120 iterations 50 ms.
+// returns  S, # edge^2, mean 1 (variance 1), x fastest. Cost: 64 x 64, 200 iterations 50 ms.
 std::vector<double> fit_torus_spectrum(const Autocorrelation& whole,
                                        const Autocorrelation& local,
                                        double share,
                                        double trend_vx,
                                        int edge,
-                                       int iterations = 120);
+                                       int iterations = 200);
 
 }  // namespace sonocase::pipeline

@@ -34,6 +34,7 @@ const std::vector<Verb>& verbs() {
         {kStage, "import", "read a label map of any kind", verb_import},
         {kStage, "resample", "carry labels through the fit into cubic voxels", verb_resample},
         {kStage, "smooth", "take the steps out of labels", verb_smooth},
+        {kStage, "texture", "learn solid textures from example images", verb_texture},
         {kStage, "surface", "extract the patient's skin from a label map", verb_surface},
         {kStage, "align", "lay the skin on the mannequin rigidly", verb_align},
         {kStage, "warp", "fit the quadratic and residual warps", verb_warp},

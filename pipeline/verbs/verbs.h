@@ -41,6 +41,7 @@ int verb_score(int argc, char** argv);
 int verb_smooth(int argc, char** argv);
 int verb_warp(int argc, char** argv);
 int verb_surface(int argc, char** argv);
+int verb_texture(int argc, char** argv);
 int verb_register(int argc, char** argv);
 int verb_map(int argc, char** argv);
 int verb_align(int argc, char** argv);
