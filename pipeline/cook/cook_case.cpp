@@ -173,6 +173,15 @@ std::vector<Tissue> used_tissues(const std::vector<Tissue>& all, const std::vect
 
 }  // namespace
 
+Result<double> cooked_volume_mm3(const Recipe& recipe) {
+    auto mannequin = mannequin_of(recipe, nullptr);
+    if (!mannequin) return mannequin.error();
+    Box3 box;
+    for (const Point3 p : mannequin->points) box.include(p);
+    const Vector3 e = box.extent();
+    return e.x * e.y * e.z;
+}
+
 Result<CookResult> cook_case(const Recipe& recipe,
                              const CookOptions& options,
                              const Progress& progress) {

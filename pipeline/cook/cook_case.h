@@ -35,6 +35,9 @@ struct CookResult {
     std::vector<StageRun> stages;
 };
 
+// Volume of the grid that cooking would fill, from the mannequin's extent alone.
+Result<double> cooked_volume_mm3(const Recipe& recipe);
+
 Result<CookResult> cook_case(const Recipe& recipe,
                              const CookOptions& options = {},
                              const Progress& progress = {});

@@ -10,8 +10,10 @@
 #include <cstdint>
 
 #include "formats/brick_volume.h"
+#include "formats/case_bundle.h"
 #include "formats/label_volume.h"
 #include "formats/registration.h"
+#include "pipeline/cook/stage_options.h"
 #include "pipeline/import/analytic_torso.h"
 
 namespace sonocase::pipeline {
@@ -30,6 +32,9 @@ BoundaryError measure_boundary_error(const LabelVolume& cooked,
                                      const Registration& truth,
                                      const AnalyticBody& body = {},
                                      int points = 200000);
+
+// Of a cooked analytic torso.
+BoundaryError measure_boundary_error(const CaseBundle& bundle, const AnalyticInput& torso);
 
 // Palette index at a point of `mannequin`, surfaces placed by the boundary records; 0 outside the
 // grid.

@@ -87,9 +87,7 @@ Suite case_suite(const AnalyticBody& body, const std::string& body_name) {
         if (const Status s = apply_settings(settings, recipe->options); !s) return s.error();
         const auto cooked = cook_case(*recipe);
         if (!cooked) return cooked.error();
-        const BoundaryError error = measure_boundary_error(
-            labels_of(cooked->bundle), cooked->bundle.boundary,
-            analytic_torso_truth(recipe->inputs.torso.mannequin.strength), body);
+        const BoundaryError error = measure_boundary_error(cooked->bundle, recipe->inputs.torso);
         return Measured{error.displaced_mm, seconds_of(*cooked),
                         std::to_string(error.lost_labels) + " labels lost"};
     };

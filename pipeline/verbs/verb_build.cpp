@@ -3,12 +3,16 @@
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "formats/atomic_file.h"
 #include "formats/digest.h"
 #include "pipeline/cook/cook_case.h"
 #include "pipeline/files.h"
 #include "pipeline/parallel.h"
+#include "pipeline/tradeoff/boundary_error.h"
+#include "pipeline/tradeoff/choose_settings.h"
+#include "pipeline/tradeoff/suites.h"
 #include "pipeline/verbs/build_facts.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/verbs.h"
@@ -22,6 +26,7 @@ struct BuildOptions {
     std::string cache;
     double cache_limit_mb = 0;
     bool list_keys = false;
+    Wish wish;
     RecipeOverrides overrides;
     CommonOptions common;
 };
@@ -43,17 +48,42 @@ void print_keys() {
     }
 }
 
+double seconds_of(const CookResult& cooked) {
+    double sum = 0;
+    for (const StageRun& run : cooked.stages) sum += run.report.seconds;
+    return sum;
+}
+
+// Settings for the accuracy or the time that was asked for, put into the recipe.
+Result<Choice> choose_for(const Wish& wish, Recipe& recipe) {
+    auto size = cooked_volume_mm3(recipe);
+    if (!size) return size.error();
+    const FrontTable& front = measured_front();
+    Choice choice = choose_settings(front, wish, *size, probe_seconds() / front.probe_seconds);
+    if (const Status s = apply_settings(choice.settings, recipe.options); !s) return s.error();
+    return choice;
+}
+
 // What a build reports: the stages as they ran, and which of them came from the cache.
 std::string build_report(const CookResult& cooked,
                          const std::string& out,
                          const std::string& digest,
                          std::size_t bytes,
-                         double seconds) {
+                         double seconds,
+                         const std::optional<Choice>& choice,
+                         const std::optional<double>& achieved_error_mm) {
     nlohmann::ordered_json json;
     json["bundle"] = out;
     json["digest"] = digest;
     json["bytes"] = bytes;
     json["seconds"] = seconds;
+    if (choice) {
+        json["choice"] = {{"settings", settings_text(choice->settings)},
+                          {"predicted_error_mm", choice->predicted_error_mm},
+                          {"predicted_seconds", choice->predicted_seconds},
+                          {"achieved_seconds", seconds_of(cooked)}};
+        if (achieved_error_mm) json["choice"]["achieved_error_mm"] = *achieved_error_mm;
+    }
     json["stages"] = nlohmann::ordered_json::array();
     json["warnings"] = nlohmann::ordered_json::array();
     for (const StageRun& run : cooked.stages) {
@@ -73,6 +103,17 @@ int build(const BuildOptions& options) {
     auto recipe = options.recipe.empty() ? embedded_recipe(options.overrides)
                                          : load_recipe(options.recipe, options.overrides);
     if (!recipe) return fail("build", recipe.error());
+    std::optional<Choice> choice;
+    if (options.wish.tolerance_mm > 0 || options.wish.time_budget_s > 0) {
+        auto chosen = choose_for(options.wish, *recipe);
+        if (!chosen) return fail("build", chosen.error());
+        choice = *chosen;
+        std::printf("chosen: %s, about %.2g mm in %.2g s\n",
+                    settings_text(choice->settings).c_str(), choice->predicted_error_mm,
+                    choice->predicted_seconds);
+        if (!choice->warning.empty())
+            std::fprintf(stderr, "sonocase build: warning: %s\n", choice->warning.c_str());
+    }
     const std::string out = options.out.empty() ? recipe->name + ".sonocase" : options.out;
     CookOptions cook;
     cook.cache_folder = options.cache;
@@ -84,12 +125,17 @@ int build(const BuildOptions& options) {
         cooked = cook_case(*recipe, cook, bar.progress());
     }
     if (!cooked) return fail("build", cooked.error());
+    // Only the analytic torso's truth is known.
+    std::optional<double> achieved_error_mm;
+    if (choice && recipe->inputs.analytic)
+        achieved_error_mm =
+            measure_boundary_error(cooked->bundle, recipe->inputs.torso).displaced_mm;
     const std::vector<std::uint8_t> bytes = write_bundle(cooked->bundle);
     if (auto status = pipeline::write_file(out, bytes); !status)
         return fail("build", status.error());
     for (const StageRun& run : cooked->stages) print_warnings("build", run.report);
-    const std::string report =
-        build_report(*cooked, out, digest_of(bytes), bytes.size(), watch.seconds());
+    const std::string report = build_report(*cooked, out, digest_of(bytes), bytes.size(),
+                                            watch.seconds(), choice, achieved_error_mm);
     // Beside the bundle, for inspect: the seconds are no part of the bundle, whose bytes they would
     // change from run to run.
     for (const std::string& path : {out + ".report.json", options.common.report_path})
@@ -130,6 +176,14 @@ int verb_build(int argc, char** argv) {
                    "Bound of the cache folder; 0 means none")
         ->check(CLI::NonNegativeNumber)
         ->type_name("MB");
+    app.add_option("--tolerance-mm", options.wish.tolerance_mm,
+                   "Take the cheapest settings whose measured error is within X")
+        ->check(CLI::PositiveNumber)
+        ->type_name("X");
+    app.add_option("--time-budget-s", options.wish.time_budget_s,
+                   "Take the best settings that this machine manages in T seconds")
+        ->check(CLI::PositiveNumber)
+        ->type_name("T");
     app.add_flag("--list-options", options.list_keys,
                  "Print every option key with default and range");
     add_common_options(app, options.common);

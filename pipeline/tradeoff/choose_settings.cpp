@@ -1,0 +1,118 @@
+#include "pipeline/tradeoff/choose_settings.h"
+
+#include <algorithm>
+#include <cassert>
+#include <chrono>
+#include <cmath>
+
+#include "formats/number_text.h"
+#include "pipeline/import/analytic_torso.h"
+#include "pipeline/segmentation/resample_labels.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+double voxel_mm_of(const Settings& settings) {
+    for (const Setting& s : settings) {
+        double value = 0;
+        if (s.key == "resample.voxel_mm" && parse_number(s.value, value)) return value;
+    }
+    return ResampleOptions{}.voxel_mm;
+}
+
+double voxels(double volume_mm3, const Settings& settings) {
+    const double h = voxel_mm_of(settings);
+    return volume_mm3 / (h * h * h);
+}
+
+}  // namespace
+
+const FrontTable& measured_front() {
+    static const FrontTable table = [] {
+        FrontTable t;
+        const auto row = [&](const char* settings, double error_mm, double seconds) {
+            t.rows.push_back({parse_settings(settings), error_mm, seconds});
+        };
+#include "pipeline/tradeoff/measured_front.inc"
+        return t;
+    }();
+    return table;
+}
+
+CostModel fit_cost_model(const FrontTable& table) {
+    // Relative errors count alike, so each row is weighted by one over its seconds squared.
+    double sw = 0, sx = 0, sxx = 0, sy = 0, sxy = 0;
+    for (const FrontRow& row : table.rows) {
+        const double x = voxels(table.volume_mm3, row.settings),
+                     w = 1 / (row.seconds * row.seconds);
+        sw += w;
+        sx += w * x;
+        sxx += w * x * x;
+        sy += w * row.seconds;
+        sxy += w * x * row.seconds;
+    }
+    const double det = sw * sxx - sx * sx;
+    CostModel model;
+    if (det > 1e-12 * sw * sxx) {
+        model.per_voxel_s = std::max(0.0, (sw * sxy - sx * sy) / det);
+    }
+    model.fixed_s = std::max(0.0, (sy - model.per_voxel_s * sx) / sw);
+    return model;
+}
+
+double probe_seconds() {
+    // The stages that a build spends its time in, on a small torso.
+    const auto start = std::chrono::steady_clock::now();
+    const LabelVolume ct = sample_analytic_torso(analytic_torso_grid({4, 4, 4}));
+    ResampleOptions options;
+    options.voxel_mm = 2;
+    const Registration truth = analytic_torso_truth();
+    (void)resample_labels({ct, truth}, options);
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+Choice choose_settings(const FrontTable& table, const Wish& wish, double volume_mm3, double speed) {
+    assert(!table.rows.empty());
+    const CostModel model = fit_cost_model(table);
+    const auto seconds = [&](const FrontRow& row) {
+        return speed * (model.fixed_s + model.per_voxel_s * voxels(volume_mm3, row.settings));
+    };
+    std::vector<FrontRow> rows = table.rows;
+    std::stable_sort(rows.begin(), rows.end(),
+                     [&](const FrontRow& a, const FrontRow& b) { return seconds(a) < seconds(b); });
+    const auto best = *std::min_element(
+        rows.begin(), rows.end(),
+        [](const FrontRow& a, const FrontRow& b) { return a.error_mm < b.error_mm; });
+    const FrontRow* chosen = nullptr;
+    Choice choice;
+    if (wish.tolerance_mm > 0) {
+        for (const FrontRow& row : rows) {
+            if (chosen == nullptr && row.error_mm <= wish.tolerance_mm) chosen = &row;
+        }
+        if (chosen == nullptr) {
+            chosen = &best;
+            choice.warning =
+                "no setting measured comes within " + number_text(wish.tolerance_mm, 3) +
+                " mm; the best, " + number_text(best.error_mm, 3) +
+                " mm, was taken (more readings of the mannequin and thinner CT slices lower it)";
+        }
+    } else {
+        for (const FrontRow& row : rows) {
+            if (seconds(row) > wish.time_budget_s) continue;
+            if (chosen == nullptr || row.error_mm < chosen->error_mm) chosen = &row;
+        }
+        if (chosen == nullptr) chosen = &rows.front();
+    }
+    if (wish.time_budget_s > 0 && seconds(*chosen) > wish.time_budget_s) {
+        choice.warning += (choice.warning.empty() ? "" : "; ") +
+                          std::string("the settings chosen take about ") +
+                          number_text(seconds(*chosen), 2) + " s, more than the " +
+                          number_text(wish.time_budget_s, 3) + " s given";
+    }
+    choice.settings = chosen->settings;
+    choice.predicted_error_mm = chosen->error_mm;
+    choice.predicted_seconds = seconds(*chosen);
+    return choice;
+}
+
+}  // namespace sonocase::pipeline

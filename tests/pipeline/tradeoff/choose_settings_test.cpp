@@ -1,0 +1,63 @@
+#include "pipeline/tradeoff/choose_settings.h"
+
+#include <gtest/gtest.h>
+
+namespace sonocase::pipeline {
+namespace {
+
+// Seconds of the rows follow 2 + 1e-6 a voxel of a litre of grid.
+FrontTable table() {
+    FrontTable t;
+    t.volume_mm3 = 8e6;
+    t.rows = {{{{"resample.voxel_mm", "2"}}, 1.5, 3},
+              {{{"resample.voxel_mm", "1"}}, 0.8, 10},
+              {{{"resample.voxel_mm", "0.5"}}, 0.4, 66}};
+    return t;
+}
+
+TEST(CostModel, RecoversTheLawThatMadeTheRows) {
+    const CostModel model = fit_cost_model(table());
+    EXPECT_NEAR(model.fixed_s, 2, 1e-9);
+    EXPECT_NEAR(model.per_voxel_s, 1e-6, 1e-15);
+}
+
+TEST(ChooseSettings, CheapestWithinTheTolerance) {
+    const Choice choice = choose_settings(table(), {.tolerance_mm = 1}, 8e6, 1);
+    EXPECT_EQ(choice.settings, (Settings{{"resample.voxel_mm", "1"}}));
+    EXPECT_NEAR(choice.predicted_seconds, 10, 1e-9);
+    EXPECT_TRUE(choice.warning.empty());
+}
+
+TEST(ChooseSettings, TimeFollowsVolumeAndSpeed) {
+    const Choice choice = choose_settings(table(), {.tolerance_mm = 1}, 16e6, 2);
+    EXPECT_NEAR(choice.predicted_seconds, 2 * (2 + 16), 1e-9);
+}
+
+TEST(ChooseSettings, BestWithinTheBudget) {
+    EXPECT_EQ(choose_settings(table(), {.time_budget_s = 20}, 8e6, 1).predicted_error_mm, 0.8);
+    EXPECT_EQ(choose_settings(table(), {.time_budget_s = 5}, 8e6, 1).predicted_error_mm, 1.5);
+}
+
+TEST(ChooseSettings, SaysWhatCannotBeHad) {
+    EXPECT_NE(choose_settings(table(), {.tolerance_mm = 0.1}, 8e6, 1).warning.find("0.4 mm"),
+              std::string::npos);
+    EXPECT_FALSE(choose_settings(table(), {.time_budget_s = 1}, 8e6, 1).warning.empty());
+    EXPECT_FALSE(choose_settings(table(), {.tolerance_mm = 0.5, .time_budget_s = 5}, 8e6, 1)
+                     .warning.empty());
+}
+
+TEST(MeasuredFront, HasRowsWhoseSettingsAreKnownToTheRecipe) {
+    ASSERT_FALSE(measured_front().rows.empty());
+    for (const FrontRow& row : measured_front().rows) {
+        EXPECT_GT(row.error_mm, 0);
+        EXPECT_GT(row.seconds, 0);
+        for (const Setting& s : row.settings) {
+            const std::size_t dot = s.key.find('.');
+            EXPECT_NE(find_option_key(s.key.substr(0, dot), s.key.substr(dot + 1)), nullptr)
+                << s.key;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
