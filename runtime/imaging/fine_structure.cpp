@@ -145,7 +145,7 @@ FineStructure make_fine_structure(const CaseBundle& bundle) {
     // Fibres: sparse bright strands on dark ground.
     for (std::size_t i = 0; i < cube; ++i) {
         const double strand = static_cast<double>(a[i]) + 0.3 * static_cast<double>(c[i]);
-        db[i] = -5 + 11.5 * std::clamp(strand - 0.15, 0.0, 2.0);
+        db[i] = -5 + 13 * std::clamp(strand - 0.35, 0.0, 1.9);
     }
     store(db, f.cubes.data());
     // Septa: thin sheets where a smooth field crosses zero, torn here and there.

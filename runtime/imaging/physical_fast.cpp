@@ -910,6 +910,16 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     pairs_.assign(samples * static_cast<std::size_t>(pair_stride_) + kSlack, 0);
 }
 
+const float* PhysicalFast::power_row(int sample) const {
+    return power_.data() + static_cast<std::ptrdiff_t>(sample) * stride_ + kMargin;
+}
+
+int PhysicalFast::shade(int sample, int line) const {
+    return pairs_[static_cast<std::size_t>(sample) * static_cast<std::size_t>(pair_stride_) +
+                  static_cast<std::size_t>(line)] &
+           0xFF;
+}
+
 void PhysicalFast::place_beams(const PhysicalFrame& f, const BreathingField& breathing) {
     const ScanGeometry& g = geometry_;
     const Matrix3 turn = speckle_rotation();

@@ -36,6 +36,11 @@ class PhysicalFast {
                 std::span<std::uint8_t> pixels);
     const PhysicalPasses& passes() const { return passes_; }
 
+    // Of the last frame, in beam space: envelope power of a sample's row (# scanlines), grey of a
+    // sample.
+    const float* power_row(int sample) const;
+    int shade(int sample, int line) const;
+
   private:
     void place_beams(const PhysicalFrame& frame, const BreathingField& breathing);
     void sample_beams(const PhysicalFrame& frame, bool keep_all);

@@ -47,10 +47,10 @@ inline constexpr double kRoughnessMm = 0.28;
 inline constexpr int kRoughEdge = 64;
 inline constexpr double kRoughVoxelMm = 0.7;
 
-// Interfaces: amplitude 60 R^0.85 with R at most 0.5; share of specular and diffuse by angle.
+// Interfaces: amplitude 60 R^0.85 with R at most 0.3; share of specular and diffuse by angle.
 inline constexpr double kInterfaceGain = 60;
 inline constexpr double kInterfacePower = 0.85;
-inline constexpr double kMaxReflection = 0.5;
+inline constexpr double kMaxReflection = 0.3;
 
 // Refraction at fluid: a beam that grazes within kEdgeCos of the tangent loses energy along the
 // wall.
@@ -59,7 +59,7 @@ inline constexpr double kEdgeLossLog2PerMm = 0.55;
 inline constexpr double kEdgeReachMm = 1.0;
 
 // Tails behind bone and gas.
-inline constexpr double kBoneTail = 6, kBoneTailMm = 0.75, kBoneTailSlow = 0.1,
+inline constexpr double kBoneTail = 4, kBoneTailMm = 0.6, kBoneTailSlow = 0.1,
                         kBoneTailSlowMm = 4.5;
 // What side lobes and reverberation leave in a bone's shadow: 15 to 22 grey in living bone.
 inline constexpr double kBoneFloor = 0.075, kBoneFloorMm = 90;
