@@ -9,7 +9,7 @@ namespace {
 
 struct Samples {
     Int3 n;
-    std::vector<std::uint8_t> body;
+    std::vector<float> body;  // share of body round each sample, [0, 1]
     std::size_t index(int i, int j, int k) const {
         return static_cast<std::size_t>(i) +
                static_cast<std::size_t>(n.x) *
@@ -55,9 +55,18 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
     for (int k = 0; k < s.n.z; ++k) {
         for (int j = 0; j < s.n.y; ++j) {
             for (int i = 0; i < s.n.x; ++i) {
-                s.body[s.index(i, j, k)] =
-                    bundle.label_bricks.at(static_cast<int>(i * step), static_cast<int>(j * step),
-                                           static_cast<int>(k * step)) != 0;
+                // Eight look-ups a quarter step off: slanted skin gets slanted, not stepped.
+                float share = 0;
+                for (int c = 0; c < 8; ++c) {
+                    const auto at = [&](int n, int axis, int side) {
+                        const double v = (n + (side ? 0.25 : -0.25)) * step;
+                        return std::clamp(static_cast<int>(v + 0.5), 0, size[axis] - 1);
+                    };
+                    const int label = bundle.label_bricks.at(at(i, 0, c & 1), at(j, 1, c >> 1 & 1),
+                                                             at(k, 2, c >> 2));
+                    if (label != 0) share += 0.125f;
+                }
+                s.body[s.index(i, j, k)] = share;
             }
         }
     }
@@ -74,12 +83,12 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
                         if (p[a] == 1) continue;
                         Int3 q = p;
                         q[a] = 1;
-                        if (s.body[s.index(i + p.x, j + p.y, k + p.z)] ==
-                            s.body[s.index(i + q.x, j + q.y, k + q.z)]) {
-                            continue;
-                        }
-                        sum = sum + 0.5 * Vector3{double(p.x + q.x), double(p.y + q.y),
-                                                  double(p.z + q.z)};
+                        const float from = s.body[s.index(i + p.x, j + p.y, k + p.z)];
+                        const float to = s.body[s.index(i + q.x, j + q.y, k + q.z)];
+                        if ((from > 0.5f) == (to > 0.5f)) continue;
+                        Vector3 at{double(p.x), double(p.y), double(p.z)};
+                        at[a] += (0.5 - from) / (to - from);
+                        sum = sum + at;
                         ++crossings;
                     }
                 }
@@ -95,13 +104,12 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
     for (int k = 1; k + 1 < s.n.z; ++k) {
         for (int j = 1; j + 1 < s.n.y; ++j) {
             for (int i = 1; i + 1 < s.n.x; ++i) {
-                const bool here = s.body[s.index(i, j, k)];
+                const bool here = s.body[s.index(i, j, k)] > 0.5f;
                 const Int3 at{i, j, k};
                 for (int a = 0; a < 3; ++a) {
                     Int3 next = at;
                     ++next[a];
-                    if (here == static_cast<bool>(s.body[s.index(next.x, next.y, next.z)]))
-                        continue;
+                    if (here == (s.body[s.index(next.x, next.y, next.z)] > 0.5f)) continue;
                     const int u = (a + 1) % 3, v = (a + 2) % 3;
                     std::uint32_t quad[4];
                     bool whole = true;

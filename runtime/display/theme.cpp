@@ -71,6 +71,7 @@ void apply_theme(float scale) {
     g_fonts.body = load(body, 14);
     g_fonts.heading = load(bold.empty() ? body : bold, 15);
     g_fonts.small = load(body, 12);
+    g_fonts.title = load(bold.empty() ? body : bold, 27);
 
     ImGuiStyle style;
     ImGui::StyleColorsDark(&style);

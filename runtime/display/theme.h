@@ -10,6 +10,7 @@ struct Fonts {
     ImFont* body = nullptr;
     ImFont* heading = nullptr;
     ImFont* small = nullptr;
+    ImFont* title = nullptr;
 };
 
 // Rebuilds style and fonts for a scale; call between pictures. Fonts come from the system

@@ -83,7 +83,7 @@ void main() {
     vec3 n = normalize(view_normal);
     vec3 to_eye = normalize(-view_position);
     float facing = abs(dot(n, to_eye));
-    float light = 0.42 + 0.58 * abs(dot(n, normalize(vec3(0.35, 0.75, 0.6))));
+    float light = 0.5 + 0.5 * abs(dot(n, normalize(vec3(0.35, 0.75, 0.6))));
     if (mode == 1) {
         float rim = pow(1.0 - facing, 2.0);
         result = vec4(colour.rgb * light + 0.25 * rim, mix(colour.a, 0.92, rim));
@@ -324,9 +324,9 @@ void View3d::set_exercise(const Exercise& exercise) {
     Vector3 right = along - dot(along, up) * up;
     right = norm(right) > 0.3 ? normalized(right) : any_perpendicular(up);
     d.home = Matrix3::from_columns(right, up, cross(right, up));
-    d.interest = d.box.centre();
+    d.interest = d.box.centre() + 0.3 * (exercise.start_probe - d.box.centre());
     orbit_ = {};
-    orbit_.distance_mm = 1.55 * std::max({extent.x, extent.y, extent.z, 100.0});
+    orbit_.distance_mm = 1.4 * std::max({extent.x, extent.y, extent.z, 100.0});
     d.build_probe();
     d.plane_layout = {};
 
@@ -490,7 +490,7 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
     glDepthFunc(GL_LEQUAL);
     glEnable(GL_BLEND);
     glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
-    d.draw_mesh(d.skin, identity, 1, 0xC99A80, 0.34f, 1);
+    d.draw_mesh(d.skin, identity, 1, 0xE8C0A8, 0.42f, 1);
     glDepthFunc(GL_LESS);
     glDisable(GL_DEPTH_TEST);
     glBindVertexArray(0);

@@ -63,6 +63,7 @@ void close_bundle(App& app) {
         app.scan->set_tracker(nullptr);
         app.scan->set_engine(nullptr);
     }
+    app.guide.reset();
     app.mouse.reset();
     app.mouse_feed.reset();
     app.skin.reset();
@@ -285,7 +286,8 @@ void draw(App& app) {
     }
     ImGui::End();
     if (app.show_help) draw_help(app);
-    if (app.show_setup && app.open) draw_setup(app);
+    if (app.show_setup && app.open && app.page == Page::scan) draw_setup(app);
+    if (app.show_score && app.score && app.page == Page::scan) draw_score_window(app);
     draw_notices(app);
 }
 
@@ -312,9 +314,23 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
         if (!script) return script.error();
         app.script = std::move(*script);
     }
-    const Result<Calibrations> calibrations = load_calibrations(arguments.calibrations);
-    if (!calibrations) return calibrations.error();
-    app.calibrations = *calibrations;
+    if (arguments.calibrations.empty()) {
+        // Saved ones that cannot be read any more are no reason not to start.
+        for (const std::string& file : app.settings.calibrations) {
+            const Result<Calibrations> saved = load_calibrations({file});
+            if (!saved) {
+                notify(app, Notice::Kind::warning, saved.error().message());
+                continue;
+            }
+            if (saved->probe) app.calibrations.probe = saved->probe;
+            if (saved->needle) app.calibrations.needle = saved->needle;
+            if (saved->mannequin) app.calibrations.mannequin = saved->mannequin;
+        }
+    } else {
+        const Result<Calibrations> calibrations = load_calibrations(arguments.calibrations);
+        if (!calibrations) return calibrations.error();
+        app.calibrations = *calibrations;
+    }
     apply_settings(app);
     WindowOptions options;
     options.width_px = arguments.width_px > 0 ? arguments.width_px : app.settings.window_width_px;

@@ -17,6 +17,7 @@
 #include "runtime/player/scan_thread.h"
 #include "runtime/player/serve.h"
 #include "runtime/player/settings.h"
+#include "runtime/player/setup_guide.h"
 #include "runtime/tracking/mouse_tracker.h"
 #include "runtime/tracking/push_tracker.h"
 
@@ -77,6 +78,7 @@ struct App {
     double screen_ms = 0;  // pose to the picture handed to the display, of the last frame shown
     double ui_rate = 0;
 
+    std::unique_ptr<SetupGuide> guide;  // of the open case
     bool show_help = false, show_setup = false;
     std::vector<Notice> notices;
     InputScript script;
@@ -114,6 +116,7 @@ void draw_view3d_panel(App& app, float height);
 void draw_help(App& app);
 void draw_notices(App& app);
 void draw_setup(App& app);
+void draw_score_window(App& app);
 
 // Mouse on the picture and keys everywhere.
 void handle_keys(App& app, double seconds);

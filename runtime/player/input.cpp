@@ -94,6 +94,8 @@ void handle_keys(App& app, double seconds) {
     if (pressed(GLFW_KEY_ESCAPE)) {
         if (app.show_help) {
             app.show_help = false;
+        } else if (app.show_score) {
+            app.show_score = false;
         } else if (app.show_setup) {
             app.show_setup = false;
         } else if (app.measuring) {

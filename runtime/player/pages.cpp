@@ -45,9 +45,9 @@ unsigned phase_colour(TrackerPhase phase) {
 void dot(unsigned packed) {
     const float r = 0.27f * ImGui::GetTextLineHeight();
     const ImVec2 at = ImGui::GetCursorScreenPos();
-    ImGui::GetWindowDrawList()->AddCircleFilled(
-        {at.x + r, at.y + 0.5f * ImGui::GetTextLineHeight()}, r, packed, 16);
-    ImGui::Dummy({2.6f * r, ImGui::GetTextLineHeight()});
+    ImGui::GetWindowDrawList()->AddCircleFilled({at.x + r, at.y + 0.5f * ImGui::GetFrameHeight()},
+                                                r, packed, 16);
+    ImGui::Dummy({3.2f * r, ImGui::GetFrameHeight()});
     ImGui::SameLine(0, 0);
 }
 
@@ -59,10 +59,8 @@ void draw_bundle_page(App& app) {
     const float width = std::min(size.x, 760 * s);
     ImGui::SetCursorPos({0.5f * (ImGui::GetWindowWidth() - width), 0.09f * size.y});
     ImGui::BeginChild("start", {width, 0.84f * size.y}, false, ImGuiWindowFlags_NoBackground);
-    ImGui::PushFont(fonts().heading);
-    ImGui::SetWindowFontScale(1.9f);
+    ImGui::PushFont(fonts().title);
     ImGui::TextUnformatted("sonocase");
-    ImGui::SetWindowFontScale(1);
     ImGui::PopFont();
     ImGui::TextDisabled("Ultrasound-guided needle placement. Choose a case.");
     ImGui::Dummy({0, 8 * s});
@@ -239,9 +237,7 @@ void draw_scan_page(App& app) {
     input.left_lines = {
         app.open->bundle.manifest.case_name,
         std::string(shape_name(probe.shape)) + text("  %.1f MHz", probe.frequency_mhz),
-        text("Depth %.0f cm", app.depth_mm / 10).substr(0, 0) +
-            text("Depth %.1f cm", app.depth_mm / 10),
-        text("Focus %.1f cm", app.focus_mm / 10)};
+        text("Depth %.1f cm", app.depth_mm / 10), text("Focus %.1f cm", app.focus_mm / 10)};
     input.right_lines = {text("Gain %+.0f dB", image.gain_db),
                          text("DR %.0f dB", image.dynamic_range_db),
                          text("%.0f frames/s", app.frame().frames_per_s)};

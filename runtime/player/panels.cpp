@@ -27,8 +27,7 @@ void coloured(unsigned packed, const std::string& words) {
 // A name on the left and a value at the right edge.
 void row(const char* name, const char* value, unsigned packed = colour::kText) {
     ImGui::TextDisabled("%s", name);
-    ImGui::SameLine(ImGui::GetWindowWidth() - ImGui::GetStyle().WindowPadding.x -
-                    ImGui::CalcTextSize(value).x);
+    ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(value).x);
     ImGui::PushStyleColor(ImGuiCol_Text, packed);
     ImGui::TextUnformatted(value);
     ImGui::PopStyleColor();
@@ -50,15 +49,19 @@ bool slider(
     ImGui::AlignTextToFramePadding();
     ImGui::TextDisabled("%s", name);
     ImGui::SameLine(58 * s);
-    ImGui::SetNextItemWidth(-1);
+    char text[24];
+    std::snprintf(text, sizeof text, format, value);
+    ImGui::SetNextItemWidth(-52 * s);
     float shown = static_cast<float>(value);
     const bool moved =
-        ImGui::SliderFloat(id, &shown, static_cast<float>(low), static_cast<float>(high), format);
-    if (moved) value = shown;
+        ImGui::SliderFloat(id, &shown, static_cast<float>(low), static_cast<float>(high), "");
     if (ImGui::IsItemClicked(1)) {
         value = 0.5 * (low + high);
         return true;
     }
+    ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(text).x);
+    ImGui::TextUnformatted(text);
+    if (moved) value = shown;
     return moved;
 }
 
@@ -142,49 +145,6 @@ void draw_attempt(const AttemptView& view) {
     if (!view.problem.empty()) coloured(colour::kBad, view.problem);
 }
 
-void draw_score(const App& app) {
-    const SessionScore& score = *app.score;
-    ImGui::Separator();
-    if (!score.pass_marks.empty()) {
-        coloured(score.passed ? colour::kGood : colour::kWarn,
-                 score.passed ? "Passed" : "Not passed yet");
-    } else {
-        heading("Scores");
-    }
-    const auto number = [](double value) {
-        char text[32];
-        std::snprintf(text, sizeof text, std::abs(value) >= 100 ? "%.0f" : "%.2f", value);
-        return std::string(text);
-    };
-    const auto title = [](const std::string& name) {
-        const MetricInfo* info = find_metric(name);
-        return std::string(info ? info->title : name.c_str());
-    };
-    ImGui::PushFont(fonts().small);
-    for (const PassResult& mark : score.pass_marks) {
-        const std::string limit =
-            std::isfinite(mark.at_most)    ? " (at most " + number(mark.at_most) + ")"
-            : std::isfinite(mark.at_least) ? " (at least " + number(mark.at_least) + ")"
-                                           : "";
-        row(title(mark.metric).c_str(),
-            std::isfinite(mark.value) ? number(mark.value).c_str() : "-",
-            mark.passed ? colour::kGood : colour::kBad);
-        if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s%s", mark.metric.c_str(), limit.c_str());
-    }
-    if (!score.pass_marks.empty()) ImGui::Separator();
-    for (const Metric& metric : score.metrics) {
-        if (!std::isfinite(metric.value)) continue;
-        const std::string name = title(metric.name);
-        const std::string value =
-            number(metric.value) + " " + std::string(metric_unit(metric.name));
-        row(name.c_str(), value.c_str());
-    }
-    for (const std::string& warning : score.warnings) coloured(colour::kWarn, warning);
-    ImGui::TextDisabled("Kept in");
-    ImGui::TextWrapped("%s", app.score_file.c_str());
-    ImGui::PopFont();
-}
-
 }  // namespace
 
 void draw_exercise_panel(App& app) {
@@ -230,7 +190,13 @@ void draw_exercise_panel(App& app) {
     if (app.attempt) {
         draw_attempt(app.attempt->view());
     } else if (app.score) {
-        draw_score(app);
+        ImGui::Separator();
+        if (!app.score->pass_marks.empty()) {
+            coloured(app.score->passed ? colour::kGood : colour::kWarn,
+                     app.score->passed ? "The last attempt passed."
+                                       : "The last attempt did not pass yet.");
+        }
+        if (ImGui::Button("Show scores", {wide, 0})) app.show_score = true;
     }
     if (app.mouse) {
         ImGui::Separator();
@@ -340,10 +306,10 @@ void draw_console_panel(App& app) {
     if (ImGui::Button("+##focus", {step, 0})) change_focus(app, 5);
     ImGui::SameLine();
     ImGui::Text("%.1f cm", app.focus_mm / 10);
-    ImGui::SameLine(ImGui::GetWindowWidth() - ImGui::GetStyle().WindowPadding.x - 52 * s);
+    ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - 52 * s);
     if (ImGui::Button("Flip", {52 * s, 0})) image.flip_left_right = !image.flip_left_right;
     ImGui::TextDisabled("TGC");
-    ImGui::SameLine(ImGui::GetWindowWidth() - ImGui::GetStyle().WindowPadding.x - 52 * s);
+    ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - 52 * s);
     if (ImGui::SmallButton("Level")) image.tgc_db = {};
     ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {7 * s, 2 * s});
     ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {7 * s, 0});
@@ -354,11 +320,15 @@ void draw_console_panel(App& app) {
         ImGui::AlignTextToFramePadding();
         ImGui::TextDisabled("%.0f cm", app.depth_mm / 80 * (i + 0.5));
         ImGui::SameLine(58 * s);
-        ImGui::SetNextItemWidth(-1);
-        if (ImGui::SliderFloat("##tgc", &value, -20, 20, "%+.0f")) {
+        ImGui::SetNextItemWidth(-30 * s);
+        if (ImGui::SliderFloat("##tgc", &value, -20, 20, "")) {
             image.tgc_db[static_cast<std::size_t>(i)] = value;
         }
         if (ImGui::IsItemClicked(1)) image.tgc_db[static_cast<std::size_t>(i)] = 0;
+        char text[16];
+        std::snprintf(text, sizeof text, "%+.0f", value);
+        ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(text).x);
+        ImGui::TextDisabled("%s", value == 0 ? "0" : text);
         ImGui::PopID();
     }
     ImGui::PopFont();
@@ -370,11 +340,10 @@ void draw_effects_panel(App& app) {
     heading("Effects");
     char total[48];
     std::snprintf(total, sizeof total, "%.2f ms a frame", frame.frame_ms);
-    ImGui::SameLine(ImGui::GetWindowWidth() - ImGui::GetStyle().WindowPadding.x -
-                    ImGui::CalcTextSize(total).x);
+    ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(total).x);
     ImGui::TextDisabled("%s", total);
     ImGui::PushFont(fonts().small);
-    const float right = ImGui::GetWindowWidth() - ImGui::GetStyle().WindowPadding.x;
+    const float right = ImGui::GetWindowContentRegionMax().x;
     for (int i = 0; i < frame.cost_count; ++i) {
         const EffectCost& cost = frame.costs[static_cast<std::size_t>(i)];
         const ImVec2 at = ImGui::GetCursorScreenPos();

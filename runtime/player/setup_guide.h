@@ -1,0 +1,86 @@
+// The guided set-up without its window: what is asked for, what has been collected, how good it is.
+//
+//   trackers > probe tip > probe depth > probe lateral > needle > mannequin > done
+//
+// Readings come in as they arrive; every step is fitted again as it grows, so that residuals and
+// coverage are live. The fits are those of formats/calibrate.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "formats/calibrate/direction.h"
+#include "formats/calibrate/landmarks.h"
+#include "formats/calibrate/needle.h"
+#include "formats/calibrate/point.h"
+#include "runtime/player/scan_engine.h"
+
+namespace sonocase::runtime {
+
+enum class SetupStep { trackers, probe_tip, probe_depth, probe_lateral, needle, mannequin, done };
+inline constexpr int kSetupSteps = 7;
+
+const char* setup_title(SetupStep step);
+const char* setup_instruction(SetupStep step);
+
+// What the screen shows of the step at hand.
+struct SetupView {
+    int readings = 0;      // collected in this step
+    int recordings = 0;    // of the needle: depths so far
+    double rms_mm = -1;    // negative: no fit yet
+    double sigma_mm = -1;  // one standard deviation of what the step finds
+    double coverage = 0;   // [0, 1]: 1 is as much movement as the fit can use
+    bool good_enough = false;
+    std::string sentence;             // what is missing, or that it is done
+    std::vector<float> residuals_mm;  // of the last readings
+};
+
+class SetupGuide {
+  public:
+    explicit SetupGuide(const CaseBundle& bundle) : bundle_(&bundle) {}
+
+    SetupStep step() const { return step_; }
+    void go_to(SetupStep step);
+    void next() {
+        go_to(static_cast<SetupStep>(std::min(static_cast<int>(step_) + 1, kSetupSteps - 1)));
+    }
+
+    bool recording() const { return recording_; }
+    void record(bool on);
+    void clear_step();
+    // A reading of the tracker; taken while recording. Costs a fit (10 ms) twice a second at most.
+    void observe(const TrackerReading& reading, const SensorAssignment& assignment, double now_s);
+
+    const SetupView& view() const { return view_; }
+    // What has been found so far; `kind`s that are not finished are absent. date and sensor are
+    // the caller's.
+    Calibrations calibrations(const std::string& sensor, const std::string& date) const;
+    bool probe_ready() const { return tip_.determined && frame_.determined; }
+
+  private:
+    void fit();
+    std::vector<Pose>& poses_of(SetupStep step) { return poses_[static_cast<std::size_t>(step)]; }
+
+    const CaseBundle* bundle_;
+    SetupStep step_ = SetupStep::trackers;
+    bool recording_ = false;
+    std::array<std::vector<Pose>, kSetupSteps> poses_;
+    std::vector<std::vector<Pose>> depths_;  // finished recordings of the needle
+    std::uint64_t last_sequence_ = 0;
+    double fitted_s_ = -1;
+    SetupView view_;
+    PointFit tip_;
+    DirectionFit depth_, lateral_;
+    ProbeFrame frame_;
+    NeedleFit needle_;
+    RigidFit mannequin_;
+};
+
+// One sentence for each doubt about a calibration in use: age, accuracy, another sensor.
+std::vector<std::string> doubts(const Calibrations& calibrations,
+                                const std::string& device,
+                                const std::string& now);
+
+}  // namespace sonocase::runtime
