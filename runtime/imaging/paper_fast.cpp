@@ -13,12 +13,15 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "runtime/imaging/paper_fast.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int kPrefetchStep = 8;  // samples: shorter than a brick
 
 // Material and grey of one block of beams. Returns the union of all stage values.
 template <bool kTexture, bool kInside>
@@ -45,7 +48,23 @@ std::uint32_t sample_block_as(const PaperBlock& b) {
         const auto dtx = hn::BitCast(du, load(b.step, 3)), dty = hn::BitCast(du, load(b.step, 4)),
                    dtz = hn::BitCast(du, load(b.step, 5));
         std::uint16_t* out = b.stage + v;
+        HWY_ALIGN std::int32_t ahead[kPaperBlock] = {};  // bricks that a later sample will ask
         for (int k = 0; k < b.samples; ++k, out += kPaperBlock) {
+            if (kInside && k % kPrefetchStep == 0) {
+                // Words of the bricks two steps ahead, voxels one step ahead.
+                for (int lane = 0; lane < lanes && k > 0; ++lane) {
+                    const std::int32_t entry = b.table[ahead[lane]];
+                    if (entry >= 0) hwy::Prefetch(b.pool + 16 * entry);
+                }
+                const auto reach = hn::Set(d, std::min(2 * kPrefetchStep, b.samples - 1 - k));
+                const auto at = [&](decltype(x) p, decltype(x) step) HWY_ATTR {
+                    return hn::ShiftRight<18>(hn::Add(p, hn::Mul(step, reach)));
+                };
+                hn::Store(
+                    hn::Add(at(x, dx), hn::Add(hn::Mul(at(y, dy), bx), hn::Mul(at(z, dz), bxy))), d,
+                    ahead);
+                for (int lane = 0; lane < lanes; ++lane) hwy::Prefetch(b.table + ahead[lane]);
+            }
             const auto i = hn::ShiftRight<16>(x), j = hn::ShiftRight<16>(y),
                        l = hn::ShiftRight<16>(z);
             auto brick = hn::Add(hn::ShiftRight<2>(i), hn::Add(hn::Mul(hn::ShiftRight<2>(j), bx),

@@ -10,6 +10,7 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "runtime/imaging/physical_fast.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -17,6 +18,8 @@ HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using namespace physical;
+
+constexpr int kPrefetchStep = 8;  // samples: shorter than a brick
 
 // 2^x for |x| <= 120, relative error 4e-6.
 template <class D, class V>
@@ -85,7 +88,7 @@ void sample_physical(PhysicalBlock& b) {
                        hn::BitCast(du, hn::ShiftLeft<3>(hn::And(address, three))));
     };
 
-    static_assert(kRoughEdge == 64 && kFineEdge == 64);
+    static_assert(kRoughEdge == 32 && kFineEdge == 64);
     const auto rough_at = [&](V px, V py, V pz) HWY_ATTR {
         const auto mask = hn::Set(di, kRoughEdge - 1);
         const auto scale = hn::Set(d, b.rough_per_voxel);
@@ -93,7 +96,7 @@ void sample_physical(PhysicalBlock& b) {
         const auto j = hn::And(hn::NearestInt(hn::Mul(py, scale)), mask);
         const auto l = hn::And(hn::NearestInt(hn::Mul(pz, scale)), mask);
         return hn::GatherIndex(di, b.rough,
-                               hn::Or(i, hn::Or(hn::ShiftLeft<6>(j), hn::ShiftLeft<12>(l))));
+                               hn::Or(i, hn::Or(hn::ShiftLeft<5>(j), hn::ShiftLeft<10>(l))));
     };
     int from[kBeamBlock];
     for (int v = 0; v < kBeamBlock; v += lanes) {
@@ -115,8 +118,34 @@ void sample_physical(PhysicalBlock& b) {
         I before = hn::Zero(di);
         bool tails = false;
         from[v] = b.samples;
+        HWY_ALIGN std::int32_t ahead[kBeamBlock] = {};  // bricks that a later sample will ask
         for (int k = 0; k < b.samples; ++k) {
             const std::ptrdiff_t out = static_cast<std::ptrdiff_t>(k) * b.stride + v;
+            if (k % kPrefetchStep == 0) {
+                // A jumping probe finds nothing in cache, and each look-up waits for the one
+                // before: fetch the bricks' words two steps ahead and their voxels one step ahead.
+                for (int lane = 0; lane < lanes && k > 0; ++lane) {
+                    const std::int32_t* words = b.table + ahead[lane];
+                    if (words[0] >= 0) hwy::Prefetch(b.labels + 16 * (words[0] & 0x01FFFFFF));
+                    if (b.structure && words[1] >= 0) hwy::Prefetch(b.echo + 16 * words[1]);
+                    if (b.boundary != nullptr && words[2] >= 0) {
+                        const std::int32_t* records =
+                            b.boundary + 64 * static_cast<std::ptrdiff_t>(words[2]);
+                        for (int line = 0; line < 4; ++line) hwy::Prefetch(records + 16 * line);
+                    }
+                }
+                const auto r = hn::Set(d, b.r[std::min(k + 2 * kPrefetchStep, b.samples - 1)]);
+                const auto limit = [&](V p, int size) HWY_ATTR {
+                    return hn::ShiftRight<2>(hn::NearestInt(
+                        hn::Min(hn::Max(p, zero), hn::Set(d, static_cast<float>(size - 1)))));
+                };
+                const auto i = limit(hn::Add(ox, hn::Mul(vx, r)), b.size.x),
+                           j = limit(hn::Add(oy, hn::Mul(vy, r)), b.size.y),
+                           l = limit(hn::Add(oz, hn::Mul(vz, r)), b.size.z);
+                hn::Store(hn::ShiftLeft<2>(hn::Add(i, hn::Add(hn::Mul(j, bx), hn::Mul(l, bxy)))),
+                          di, ahead);
+                for (int lane = 0; lane < lanes; ++lane) hwy::Prefetch(b.table + ahead[lane]);
+            }
             const auto s = hn::Add(hn::Set(d, b.r[k]), hn::Mul(gap, hn::Set(d, b.contact[k])));
             V px = hn::Add(ox, hn::Mul(vx, s)), py = hn::Add(oy, hn::Mul(vy, s)),
               pz = hn::Add(oz, hn::Mul(vz, s));
