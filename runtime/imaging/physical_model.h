@@ -47,10 +47,10 @@ inline constexpr double kRoughnessMm = 0.28;
 inline constexpr int kRoughEdge = 32;  // 128 kB: it stays in the second cache
 inline constexpr double kRoughVoxelMm = 0.7;
 
-// Interfaces: amplitude 60 R^0.85 with R at most 0.3; share of specular and diffuse by angle.
+// Interfaces: amplitude 60 R^0.85 with R at most 0.22; share of specular and diffuse by angle.
 inline constexpr double kInterfaceGain = 60;
 inline constexpr double kInterfacePower = 0.85;
-inline constexpr double kMaxReflection = 0.3;
+inline constexpr double kMaxReflection = 0.22;
 
 // Refraction at fluid: a beam that grazes within kEdgeCos of the tangent loses energy along the
 // wall.

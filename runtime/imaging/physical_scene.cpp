@@ -40,7 +40,7 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
     e.refracts = !e.hard && fluid(a) != fluid(b);
     double reflection =
         std::abs(a.impedance_mrayl - b.impedance_mrayl) / (a.impedance_mrayl + b.impedance_mrayl);
-    e.sigma_mm = e.hard ? 0.24 : 0.16;
+    e.sigma_mm = e.hard ? 0.20 : 0.16;
     // Between muscles, and between muscle and fat, lies a sheet of connective tissue that the label
     // volume does not show.
     if (is_muscle(a) && is_muscle(b) && la.name != lb.name) {
