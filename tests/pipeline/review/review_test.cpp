@@ -1,0 +1,167 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "formats/atomic_file.h"
+#include "formats/session/metric_table.h"
+#include "pipeline/review/review_page.h"
+#include "pipeline/review/review_plots.h"
+#include "support/small_case.h"
+#include "support/temporary_folder.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Down to 40 mm above the middle and out again, the probe on top.
+Session insertion(int samples) {
+    Session s;
+    s.header.case_name = "cylinder";
+    s.header.exercise = "scan";
+    s.header.trainee = "Eve <script>alert(1)</script>";
+    s.header.started = "2026-01-02T00:00:00Z";
+    s.header.program = "sonoplay";
+    for (int i = 0; i < samples; ++i) {
+        SessionSample sample;
+        sample.time_s = i / 30.0;
+        sample.frame = i;
+        sample.probe_ok = sample.needle_ok = true;
+        sample.mannequin_from_probe = {Matrix3::from_columns({1, 0, 0}, {0, -1, 0}, {0, 0, -1}),
+                                       {0, 0, 59}};
+        const double way = std::abs(2.0 * i / samples - 1);  // 1, 0, 1
+        const Vector3 z = normalized({-1, 0, -1}), x = normalized({1, 0, -1});
+        sample.mannequin_from_needle = {Matrix3::from_columns(x, cross(z, x), z),
+                                        Vector3{0, 0, 25} - (way * 90) * z};
+        sample.mannequin_from_drawn = sample.mannequin_from_needle;
+        s.samples.push_back(sample);
+    }
+    s.events = {{s.samples[static_cast<std::size_t>(samples / 3)].time_s, samples / 3,
+                 "needle_entry", "insertion=1"},
+                {s.samples[static_cast<std::size_t>(samples / 2)].time_s, samples / 2, "target_hit",
+                 "name=<b>x</b>"}};
+    return s;
+}
+
+struct Files {
+    testing::TemporaryFolder folder;
+    std::string session = folder.path() + "/s.igs.mha", bundle = folder.path() + "/small.sonocase";
+    explicit Files(int samples = 90) {
+        EXPECT_TRUE(save_bundle(testing::small_case(), bundle));
+        EXPECT_TRUE(save_sequence(sequence_from_session(insertion(samples)), session));
+    }
+    void add_pictures() {
+        Sequence p;
+        p.width = 16;
+        p.height = 12;
+        for (int i = 0; i < 2; ++i) {
+            SequenceFrame f;
+            f.timestamp_s = 1 + i;
+            f.fields = {{"Event", "needle_entry"}};
+            p.frames.push_back(f);
+        }
+        p.pixels.assign(2 * 16 * 12, 90);
+        EXPECT_TRUE(save_sequence(p, folder.path() + "/s.frames.igs.mha", true));
+    }
+};
+
+std::size_t count(const std::string& text, const std::string& what) {
+    std::size_t n = 0;
+    for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
+        ++n;
+    return n;
+}
+
+TEST(Review, ThePageHasEverythingAndNeedsNothing) {
+    Files files;
+    files.add_pictures();
+    ReviewOptions options;
+    options.width_px = 160;
+    options.height_px = 120;
+    const std::string out = files.folder.path() + "/review";
+    const auto report = make_review(files.session, files.bundle, out, options);
+    ASSERT_TRUE(report) << report.error().message();
+    const std::string page = *read_text_file(out + "/review.html");
+    EXPECT_EQ(page.find("http:"), std::string::npos);
+    EXPECT_EQ(page.find("https:"), std::string::npos);
+    EXPECT_EQ(page.find("<script"),
+              std::string::npos);  // a trainee's name is text, and there is no other
+    EXPECT_NE(page.find("Eve &lt;script&gt;"), std::string::npos);
+    EXPECT_EQ(page.find("<b>x</b>"), std::string::npos);
+    EXPECT_EQ(count(page, "data:image/png;base64,iVBORw0KGgo"), 2 + 4u);  // frames and views
+    EXPECT_NE(page.find("target hit"), std::string::npos);
+    for (const MetricInfo& info : metric_table()) {
+        EXPECT_NE(page.find(std::string("title=\"") + info.name), std::string::npos) << info.name;
+    }
+    EXPECT_NE(read_text_file(out + "/scores.json")->find("\"targets_hit\": 1"), std::string::npos);
+    EXPECT_TRUE(report->warnings.empty());
+}
+
+TEST(Review, ComparesWithEarlierSessionsOfTheSameTrainee) {
+    Files files;
+    const std::string path = files.folder.path() + "/progress.sqlite";
+    {
+        auto book = ProgressBook::open(path);
+        ASSERT_TRUE(book);
+        ProgressEntry e;
+        e.trainee = "Eve <script>alert(1)</script>";
+        e.exercise = "scan";
+        e.started = "2026-01-01T00:00:00Z";
+        e.metrics = {{"elapsed_time_s", 77}};
+        ASSERT_TRUE(book->add(e));
+        e.trainee = "somebody else";
+        e.metrics = {{"elapsed_time_s", 55555}};
+        ASSERT_TRUE(book->add(e));
+        e.trainee = "Eve <script>alert(1)</script>";
+        e.started = "2026-03-01T00:00:00Z";  // after this session
+        e.metrics = {{"elapsed_time_s", 44444}};
+        ASSERT_TRUE(book->add(e));
+    }
+    ReviewOptions options;
+    options.progress_path = path;
+    const auto input = load_review(files.session, files.bundle, options);
+    ASSERT_TRUE(input) << input.error().message();
+    ASSERT_EQ(input->earlier.size(), 1u);
+    const std::string page = review_page(*input, {});
+    EXPECT_NE(page.find("77 s"), std::string::npos);
+    EXPECT_EQ(page.find("55555"), std::string::npos);
+    EXPECT_EQ(page.find("44444"), std::string::npos);
+    EXPECT_NE(progress_svg(*input, "elapsed_time_s"), "");
+}
+
+TEST(Review, OddSessionsStillGiveAPage) {
+    for (const int samples : {1, 2}) {
+        Files files(samples == 1 ? 1 : 2);
+        const auto input = load_review(files.session, files.bundle, {});
+        ASSERT_TRUE(input) << input.error().message();
+        EXPECT_NE(review_page(*input, {}).find("</html>"), std::string::npos);
+    }
+    Files files;
+    Session lost = insertion(60);
+    for (SessionSample& s : lost.samples) s.needle_ok = s.probe_ok = false;
+    ASSERT_TRUE(save_sequence(sequence_from_session(lost), files.session));
+    const auto input = load_review(files.session, files.bundle, {});
+    ASSERT_TRUE(input) << input.error().message();
+    EXPECT_NE(review_page(*input, {}).find("</html>"), std::string::npos);
+}
+
+TEST(Review, AnotherCaseAndAMissingExerciseAreSaid) {
+    Files files;
+    Session s = insertion(30);
+    s.header.case_name = "another";
+    s.header.exercise = "gone";
+    ASSERT_TRUE(save_sequence(sequence_from_session(s), files.session));
+    const auto input = load_review(files.session, files.bundle, {});
+    ASSERT_TRUE(input);
+    EXPECT_EQ(input->warnings.size(), 2u);
+    ReviewOptions options;
+    options.exercise = "scam";
+    const auto wrong = load_review(files.session, files.bundle, options);
+    ASSERT_FALSE(wrong);
+    EXPECT_NE(wrong.error().message().find("scan"), std::string::npos);
+    EXPECT_FALSE(load_review(files.bundle, files.bundle, {}));
+    EXPECT_FALSE(load_review(files.session, files.session, {}));
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
