@@ -22,6 +22,8 @@ Suite smooth_suite();
 Suite texture_suite();
 // Probe point from synthetic recordings with a known tip.
 Suite calibrate_suite();
+// Frames of the player beside this program, against its finest sampling.
+Suite render_suite();
 // The whole chain on the demo torso, or another body of the same family.
 Suite case_suite(const AnalyticBody& body, const std::string& body_name);
 // The whole chain on a user's case, against its own finest setting.

@@ -38,6 +38,8 @@ void rebuild_engine(App& app, bool goes_on) {
     render.kind =
         app.arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
     render.threads = app.arguments.threads;
+    render.scanlines = app.arguments.scanlines;
+    render.samples = app.arguments.samples;
     render.effects = app.arguments.effects.empty() ? app.current().effects : app.arguments.effects;
     options.depth_mm = app.depth_mm;
     options.focus_mm = app.focus_mm;

@@ -48,6 +48,12 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     app.add_option("--renderer", arguments.renderer, "fast | reference")
         ->check(CLI::IsMember({"fast", "reference"}))
         ->group("Picture");
+    app.add_option("--scanlines", arguments.scanlines, "Beams; default: the model's")
+        ->check(CLI::Range(8, 2048))
+        ->group("Picture");
+    app.add_option("--samples", arguments.samples, "Samples along a beam; default: the model's")
+        ->check(CLI::Range(16, 4096))
+        ->group("Picture");
     app.add_option("--threads", arguments.threads, "Rendering threads")
         ->check(CLI::Range(1, 256))
         ->group("Picture");

@@ -20,6 +20,7 @@ struct PlayerArguments {
     std::vector<std::string> effects;
     std::string renderer = "fast";
     int threads = 1;
+    int scanlines = 0, samples = 0;  // 0: the model's own
     std::vector<std::string> calibrations;
     std::string serve;       // [ADDRESS:]PORT of the OpenIGTLink server; empty: none
     double ui_scale = 0;     // 0: the settings' or the monitor's

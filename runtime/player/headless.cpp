@@ -117,6 +117,8 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     render.model = model == "paper" ? ImageModel::paper : ImageModel::physical;
     render.kind = arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
     render.threads = arguments.threads;
+    render.scanlines = arguments.scanlines;
+    render.samples = arguments.samples;
     render.effects = arguments.effects.empty() ? exercise.effects : arguments.effects;
     Result<ScanEngine> engine = ScanEngine::create(open.bundle, exercise, options);
     if (!engine) return engine.error();

@@ -1,0 +1,148 @@
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "formats/atomic_file.h"
+#include "pipeline/cook/cook_case.h"
+#include "pipeline/texture/read_example.h"
+#include "pipeline/tradeoff/suites.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr int kFrames = 12;
+
+// The player runs as a program of its own: the two libraries do not see each other.
+struct Player {
+    std::string program, folder, bundle;
+    std::vector<ExampleImage> finest;
+
+    ~Player() {
+        std::error_code ignored;
+        if (!folder.empty()) std::filesystem::remove_all(folder, ignored);
+    }
+};
+
+std::string quoted(const std::string& text) {
+    std::string out = "'";
+    for (char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return out + "'";
+}
+
+Status start(Player& player) {
+    std::error_code failed;
+    const auto self = std::filesystem::read_symlink("/proc/self/exe", failed);
+    player.program = (self.parent_path() / "sonoplay").string();
+    if (failed || !std::filesystem::exists(player.program)) {
+        return Error{"the player is not beside this program", player.program,
+                     "build or install sonoplay, or leave --suite render out"};
+    }
+    player.folder = std::filesystem::temp_directory_path() / ("sonocase-render-" + std::to_string(std::random_device{}()));
+    std::filesystem::create_directories(player.folder, failed);
+    if (failed) return Error{failed.message(), player.folder, "check the folder for temporary files"};
+    auto recipe = embedded_recipe();
+    if (!recipe) return recipe.error();
+    auto cooked = cook_case(*recipe);
+    if (!cooked) return cooked.error();
+    player.bundle = player.folder + "/demo.sonocase";
+    return save_bundle(cooked->bundle, player.bundle);
+}
+
+// Frames of a sweep under the settings, and the median time of one.
+Result<std::vector<ExampleImage>> play(const Player& player, const Settings& settings, double* seconds) {
+    const std::string out = player.folder + "/frames", stats = player.folder + "/stats.json";
+    std::string command = quoted(player.program) + " " + quoted(player.bundle) +
+                          " --headless --tracker sweep:tour --frames " + std::to_string(kFrames) + " --out " +
+                          quoted(out) + " --stats " + quoted(stats);
+    for (const Setting& s : settings) {
+        const std::string name = s.key.substr(s.key.find('.') + 1);
+        command += " --" + name + " " + quoted(s.value);
+    }
+    if (std::system((command + " >/dev/null 2>&1").c_str()) != 0) {
+        return Error{"the player failed", command, "run it to see why"};
+    }
+    const auto text = read_text_file(stats);
+    if (!text) return text.error();
+    const auto json = nlohmann::json::parse(*text, nullptr, false);
+    if (json.is_discarded()) return Error{"no JSON", stats, ""};
+    *seconds = json["frame_ms"].value("median", 0.0) * 1e-3;
+    std::vector<ExampleImage> frames;
+    for (int i = 0; i < kFrames; ++i) {
+        char name[32];
+        std::snprintf(name, sizeof name, "/frame_%05d.png", i);
+        auto frame = read_example(out + name);
+        if (!frame) return frame.error();
+        frames.push_back(std::move(*frame));
+    }
+    return frames;
+}
+
+// Root mean square difference in grey after averaging over 8 x 8 pixels: what is where and how bright, and not
+// the place of each grain of speckle, which any change of sampling moves.
+double rms_grey(const std::vector<ExampleImage>& a, const std::vector<ExampleImage>& b) {
+    constexpr int kBlock = 8;
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t f = 0; f < a.size(); ++f) {
+        for (int y = 0; y + kBlock <= a[f].height; y += kBlock) {
+            for (int x = 0; x + kBlock <= a[f].width; x += kBlock) {
+                double difference = 0;
+                for (int v = 0; v < kBlock; ++v) {
+                    for (int u = 0; u < kBlock; ++u) {
+                        const std::size_t i = a[f].index(x + u, y + v);
+                        difference += static_cast<double>(a[f].grey[i]) - static_cast<double>(b[f].grey[i]);
+                    }
+                }
+                difference /= kBlock * kBlock;
+                sum += difference * difference;
+                ++count;
+            }
+        }
+    }
+    return std::sqrt(sum / static_cast<double>(count));
+}
+
+}  // namespace
+
+Suite render_suite() {
+    auto player = std::make_shared<Player>();
+    Suite suite;
+    suite.name = "render";
+    suite.title = "A frame of the physical model";
+    suite.body = "demo-torso";
+    suite.error_name = "rms difference";
+    suite.error_unit = "grey, 8 x 8 pixels averaged";
+    suite.truth =
+        "Twelve frames of a sweep over the demo torso are compared with the same frames at 768 beams of 1024 "
+        "samples; seconds are the median of a frame on one thread.";
+    suite.knobs = {
+        {"render.scanlines", {"64", "96", "128", "192", "256", "384"}, "192", "", "beams of the sector",
+         "detail across the beams", "the lateral filter spans a number of beams, so few beams also change the grain"},
+        {"render.samples", {"128", "256", "512", "768"}, "512", "", "samples along a beam",
+         "detail along the beam", "the speckle's grain is met by about 512 samples"},
+    };
+    suite.pairs = {{"render.scanlines", "render.samples"}};
+    suite.named = {{TrialRole::paper, "model paper", {{"render.model", "paper"}}},
+                   {TrialRole::peer, "reference renderer", {{"render.renderer", "reference"}}}};
+    suite.measure = [player](const Settings& settings) -> Result<Measured> {
+        if (player->bundle.empty()) {
+            if (const Status s = start(*player); !s) return s.error();
+        }
+        double seconds = 0;
+        const Settings finest{{"render.scanlines", "768"}, {"render.samples", "1024"}};
+        if (player->finest.empty()) {
+            auto frames = play(*player, finest, &seconds);
+            if (!frames) return frames.error();
+            player->finest = std::move(*frames);
+        }
+        const auto frames = play(*player, settings, &seconds);
+        if (!frames) return frames.error();
+        return Measured{rms_grey(*frames, player->finest), seconds, ""};
+    };
+    return suite;
+}
+
+}  // namespace sonocase::pipeline
