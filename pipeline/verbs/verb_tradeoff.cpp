@@ -54,7 +54,8 @@ std::vector<NamedSuite> suites() {
     return {
         {"register", register_suite},   {"warp", warp_suite},
         {"smooth", smooth_suite},       {"texture", texture_suite},
-        {"calibrate", calibrate_suite}, {"case", [] { return case_suite({}, "demo-torso"); }},
+        {"calibrate", calibrate_suite},
+        {"render", render_suite}, {"case", [] { return case_suite({}, "demo-torso"); }},
     };
 }
 
