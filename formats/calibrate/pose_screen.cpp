@@ -94,7 +94,10 @@ PoseScreen screen_poses(std::span<const Pose> poses) {
             ++screen.not_ok;
             continue;
         }
-        if (!is_finite(pose.tracker_from_tool)) {
+        // Beyond ten kilometres from the tracker a number is no position, and its square no number.
+        const Vector3 t = pose.tracker_from_tool.translation;
+        const bool far = std::abs(t.x) > 1e7 || std::abs(t.y) > 1e7 || std::abs(t.z) > 1e7;
+        if (!is_finite(pose.tracker_from_tool) || far) {
             ++screen.not_finite;
             continue;
         }
@@ -136,7 +139,8 @@ PoseScreen screen_poses(std::span<const Pose> poses) {
     }
     if (screen.not_finite > 0) {
         say(rows_of(screen.not_finite, screen.rows) +
-            " hold NaN or infinite numbers and are left out; check the tracker's export.");
+            " hold NaN, infinite or impossibly large numbers and are left out; check the "
+            "tracker's export.");
     }
     if (screen.not_rotation > 0) {
         say(rows_of(screen.not_rotation, screen.rows) +

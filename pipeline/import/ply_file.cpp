@@ -187,7 +187,8 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
                          path, "check that the file is complete; export it again"};
         };
         // Every entry has at least one byte in either form.
-        if (!element.properties.empty() && element.count > body.left()) return cut_off(0);
+        // An entry takes a byte or more; one without properties can only be damage.
+        if (element.count > body.left()) return cut_off(0);
         for (std::uint64_t n = 0; n < element.count; ++n) {
             Point3 point{NAN, NAN, NAN};
             Vector3 normal;

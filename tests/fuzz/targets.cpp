@@ -1,0 +1,289 @@
+#include "fuzz/targets.h"
+
+#include <sys/mman.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "formats/calibrate/point.h"
+#include "formats/calibrate/quality.h"
+#include "formats/calibration.h"
+#include "formats/case_bundle.h"
+#include "formats/exercise.h"
+#include "formats/poses.h"
+#include "formats/registration_file.h"
+#include "formats/sequence.h"
+#include "formats/stage_files.h"
+#include "pipeline/import/label_table.h"
+#include "pipeline/import/ply_file.h"
+#include "runtime/tracking/guidance_protocol.h"
+#include "runtime/tracking/liberty_protocol.h"
+#include "runtime/tracking/viper_protocol.h"
+#if __has_include("runtime/tracking/igtl_message.h")
+#include "runtime/tracking/igtl_message.h"
+#define SONOCASE_HAS_IGTL 1
+#endif
+
+namespace sonocase::fuzz {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+std::string_view text_of(Bytes bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+void demand(bool truth) {
+    if (!truth) std::abort();
+}
+
+// An error must be one line that says something.
+template <class T>
+void check_error(const Result<T>& result) {
+    if (result) return;
+    const std::string message = result.error().message();
+    demand(!message.empty());
+    demand(message.find('\n') == std::string::npos);
+}
+
+// For readers that take a path: the bytes as a file that is on no disk.
+class MemoryFile {
+  public:
+    explicit MemoryFile(Bytes bytes) : descriptor_(memfd_create("fuzz", 0)) {
+        demand(descriptor_ >= 0);
+        demand(write(descriptor_, bytes.data(), bytes.size()) ==
+               static_cast<ssize_t>(bytes.size()));
+    }
+    ~MemoryFile() { close(descriptor_); }
+    std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+  private:
+    int descriptor_;
+};
+
+// Damage mostly stops at the first checksum. Here sizes and checksums are made to match, so that
+// what lies behind them is reached: header 64 bytes, table entries of 64 bytes (docs/format.md).
+std::vector<std::uint8_t> resealed(Bytes bytes) {
+    std::vector<std::uint8_t> out(bytes.begin(), bytes.end());
+    if (out.size() < 128) return out;
+    const auto put = [&](std::size_t at, std::uint64_t value) { std::memcpy(&out[at], &value, 8); };
+    const auto get = [&](std::size_t at) {
+        std::uint64_t value;
+        std::memcpy(&value, &out[at], 8);
+        return value;
+    };
+    put(16, out.size());
+    std::uint32_t count;
+    std::memcpy(&count, &out[24], 4);
+    const std::size_t room = (out.size() - 64) / 64;
+    for (std::size_t i = 0; i < std::min<std::size_t>(count, room); ++i) {
+        const std::uint64_t offset = get(80 + 64 * i), stored = get(88 + 64 * i);
+        if (offset > out.size() || stored > out.size() - offset) continue;
+        put(104 + 64 * i, XXH3_64bits(out.data() + offset, stored));
+    }
+    if (count <= room) put(48, XXH3_64bits(out.data() + 64, 64 * std::size_t{count}));
+    put(56, XXH3_64bits(out.data(), 56));
+    return out;
+}
+
+void bundle_as_is(Bytes bytes) {
+    const auto read = read_bundle(bytes, "fuzz");
+    check_error(read);
+    if (!read) return;
+    // What was read can be written, and read again as the same bytes.
+    const std::vector<std::uint8_t> first = write_bundle(*read);
+    const auto again = read_bundle(first, "fuzz");
+    demand(again.has_value());
+    demand(write_bundle(*again) == first);
+    // Every voxel can be looked at.
+    const Int3 n = read->label_bricks.size;
+    if (read->label_bricks.table.empty()) return;
+    for (int k = 0; k < n.z; k += 3) {
+        for (int j = 0; j < n.y; j += 3) {
+            for (int i = 0; i < n.x; i += 3)
+                demand(read->label_bricks.at(i, j, k) < read->labels.size());
+        }
+    }
+}
+
+void bundle(Bytes bytes) {
+    bundle_as_is(bytes);
+    bundle_as_is(resealed(bytes));
+}
+
+void stage_files(Bytes given) {
+    const std::vector<std::uint8_t> bytes = resealed(given);
+    check_error(read_label_file(given, "fuzz"));
+    check_error(read_label_file(bytes, "fuzz"));
+    check_error(read_texture_file(bytes, "fuzz"));
+    check_error(read_surface_file(bytes, "fuzz"));
+}
+
+void exercise(Bytes bytes) {
+    check_error(parse_exercise(text_of(bytes), "fuzz"));
+}
+
+void poses(Bytes bytes) {
+    const auto read = parse_poses(text_of(bytes), "fuzz");
+    check_error(read);
+    if (!read) return;
+    const std::string text = format_poses(*read);
+    const auto again = parse_poses(text, "fuzz");
+    demand(again.has_value() && again->size() == read->size());
+    // What a file can hold, the fit must survive, and never with a quiet NaN.
+    if (read->size() > 300) return;
+    const PointFit fit = fit_point(*read, {.trials = 20});
+    demand(std::isfinite(fit.tip_mm.x) && std::isfinite(fit.tip_mm.y) &&
+           std::isfinite(fit.tip_mm.z));
+    demand(fit.determined || !fit.problem.empty());
+}
+
+void sequence(Bytes bytes) {
+    const auto read = read_sequence(bytes, "fuzz");
+    check_error(read);
+    if (!read) return;
+    for (const SequenceFrame& frame : read->frames) {
+        demand(frame.poses.size() == read->transforms.size());
+        for (const SequencePose& pose : frame.poses) rigid_from_matrix(pose.to_from);
+    }
+    check_error(read_sequence(write_sequence(*read, SequenceForm::mha), "fuzz"));
+}
+
+void calibration(Bytes bytes) {
+    const auto read = parse_calibration(text_of(bytes), "fuzz");
+    check_error(read);
+    if (!read) return;
+    calibration_concerns(*read, "2026-11-21T00:00:00Z");
+    demand(parse_calibration(format_calibration(*read), "fuzz").has_value());
+}
+
+void registration(Bytes bytes) {
+    const auto read = parse_registration(text_of(bytes), "fuzz");
+    check_error(read);
+    if (read) mannequin_from_ct(*read, {10, 20, 30});
+}
+
+void stage_report(Bytes bytes) {
+    check_error(parse_stage_report(text_of(bytes), "fuzz"));
+}
+
+void nifti_extension(Bytes bytes) {
+    const MemoryFile file(bytes);
+    check_error(pipeline::load_nifti_label_table(file.path()));
+}
+
+void label_tables(Bytes bytes) {
+    check_error(pipeline::parse_label_csv(text_of(bytes), "fuzz"));
+    check_error(pipeline::parse_label_xml(text_of(bytes), "fuzz"));
+}
+
+void ply(Bytes bytes) {
+    const MemoryFile file(bytes);
+    check_error(pipeline::read_ply_file(file.path()));
+}
+
+// Device streams come in pieces: the first byte says how large.
+template <class Reader, class Item, class Use>
+void in_pieces(Bytes bytes, Use use) {
+    if (bytes.empty()) return;
+    const std::size_t piece = 1 + bytes[0];
+    bytes = bytes.subspan(1);
+    Reader reader;
+    Item item;
+    while (!bytes.empty()) {
+        const std::size_t n = std::min(piece, bytes.size());
+        reader.add(bytes.first(n));
+        bytes = bytes.subspan(n);
+        while (reader.next(item)) use(item);
+    }
+}
+
+void viper(Bytes bytes) {
+    namespace v = runtime::viper;
+    const auto use = [](const v::Frame& frame) {
+        v::Reply reply;
+        if (v::parse_reply(frame.body, reply)) v::nak_text(reply.payload);
+        runtime::TrackerReading reading;
+        std::uint32_t number = 0;
+        v::parse_positions(frame.body, reading, number);
+    };
+    in_pieces<v::FrameReader, v::Frame>(bytes, use);
+    // The bodies without the frame's checksum in the way.
+    use({v::Frame::Kind::position, {bytes.begin(), bytes.end()}});
+    v::nak_text(bytes);
+}
+
+void liberty(Bytes bytes) {
+    namespace l = runtime::liberty;
+    in_pieces<l::RecordReader, l::Record>(bytes, [](const l::Record&) {});
+}
+
+void guidance(Bytes bytes) {
+    const auto pose = runtime::guidance::parse_angles(bytes, 36);
+    if (pose) demand(orthonormality_error(pose->rotation) < 1e-9 && is_finite(*pose));
+    bool fatal = false;
+    if (!bytes.empty()) runtime::guidance::error_text(bytes[0], fatal);
+}
+
+#ifdef SONOCASE_HAS_IGTL
+void openigtlink(Bytes bytes) {
+    namespace g = runtime::igtl;
+    if (bytes.empty()) return;
+    const std::size_t piece = 1 + bytes[0];
+    Bytes rest = bytes.subspan(1);
+    // The stream as it comes, then the body alone behind every type of header.
+    g::MessageReader reader;
+    bool broken = false;
+    while (!rest.empty() && !broken) {
+        const std::size_t n = std::min(piece, rest.size());
+        reader.add(rest.first(n));
+        rest = rest.subspan(n);
+        for (auto event = reader.next(); event != g::MessageReader::Event::need_more;
+             event = reader.next()) {
+            if (event == g::MessageReader::Event::broken) {
+                broken = true;
+                break;
+            }
+            if (event == g::MessageReader::Event::message)
+                g::parse_poses(reader.header(), reader.body());
+        }
+    }
+    for (const char* type : {"TRANSFORM", "TDATA", "QTDATA", "POSITION", "QTRANS"}) {
+        g::Header header;
+        header.type = type;
+        header.body_size = bytes.size() - 1;
+        for (const g::NamedPose& pose : g::parse_poses(header, bytes.subspan(1)))
+            demand(is_finite(pose.to_from));
+    }
+}
+#endif
+
+}  // namespace
+
+const std::vector<Target>& targets() {
+    static const std::vector<Target> table{
+        {"bundle", bundle},
+        {"stage_files", stage_files},
+        {"exercise", exercise},
+        {"poses", poses},
+        {"sequence", sequence},
+        {"calibration", calibration},
+        {"registration", registration},
+        {"stage_report", stage_report},
+        {"nifti_extension", nifti_extension},
+        {"label_tables", label_tables},
+        {"ply", ply},
+        {"viper", viper},
+        {"liberty", liberty},
+        {"guidance", guidance},
+#ifdef SONOCASE_HAS_IGTL
+        {"openigtlink", openigtlink},
+#endif
+    };
+    return table;
+}
+
+}  // namespace sonocase::fuzz

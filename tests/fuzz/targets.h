@@ -1,0 +1,19 @@
+// One function a reader: takes any bytes, must come back. Coverage-guided fuzzing (scripts/fuzz)
+// and the test of the kept corpora call the same.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace sonocase::fuzz {
+
+struct Target {
+    const char* name;  // and folder of the corpus
+    void (*run)(std::span<const std::uint8_t> bytes);
+};
+
+const std::vector<Target>& targets();
+
+}  // namespace sonocase::fuzz
