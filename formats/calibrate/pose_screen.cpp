@@ -33,6 +33,12 @@ std::vector<bool> rows_in_other_units(const std::vector<Pose>& poses, double* fa
         middle[c] = component_median(values);
     }
     const double far = norm(middle);
+    // Only where the recording as a whole is far from the origin for its extent: about the origin
+    // every length occurs.
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+        values[i] = norm(poses[i].tracker_from_tool.translation - middle);
+    }
+    if (!(component_median(values) < 0.25 * far)) return marked;
     constexpr std::array<double, 8> kFactors{1000, 1e-3, 100, 1e-2, 25.4, 1 / 25.4, 10, 0.1};
     for (std::size_t i = 0; i < poses.size(); ++i) {
         const Vector3 t = poses[i].tracker_from_tool.translation;
@@ -53,6 +59,13 @@ std::vector<bool> rows_in_other_units(const std::vector<Pose>& poses, double* fa
 // part of a quaternion was lost. The lesser part is marked.
 std::vector<bool> rows_with_inverse_orientation(const std::vector<Pose>& poses) {
     std::vector<bool> marked(poses.size(), false);
+    // Only in a recording of a hand that moves: between poses taken singly every jump occurs.
+    std::vector<double> jumps;
+    for (std::size_t i = 1; i < poses.size(); ++i) {
+        jumps.push_back(rotation_angle(relative(poses[i - 1].tracker_from_tool.rotation,
+                                                poses[i].tracker_from_tool.rotation)));
+    }
+    if (jumps.empty() || !(component_median(jumps) < 0.1)) return marked;
     bool now = false;
     std::size_t count = 0;
     for (std::size_t i = 1; i < poses.size(); ++i) {

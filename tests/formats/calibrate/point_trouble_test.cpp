@@ -134,6 +134,18 @@ TEST(PointTrouble, EveryKindOfBadRowIsNamedAndLeftOut) {
     }
 }
 
+TEST(PointTrouble, TrackerAmidTheMotionIsNoMixOfUnits) {
+    Random random(19);
+    for (int draw = 0; draw < 20; ++draw) {
+        PivotMotion motion;
+        motion.poses = 200;
+        motion.pivot_mm = random.point(120);
+        const PointFit fit = fit_point(pivot_recording(motion, random));
+        EXPECT_EQ(fit.poses, 200);
+        EXPECT_TRUE(fit.warnings.empty());
+    }
+}
+
 TEST(PointTrouble, RoundedRotationsAreStraightenedAndSaidSo) {
     Random random(12);
     PivotMotion motion;
