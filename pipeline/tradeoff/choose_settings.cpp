@@ -60,6 +60,25 @@ CostModel fit_cost_model(const FrontTable& table) {
     return model;
 }
 
+std::string format_front(const std::vector<Trial>& trials,
+                         double volume_mm3,
+                         double probe_seconds) {
+    std::string text =
+        "// Written by scripts/accuracy; do not edit. Error in mm and seconds of the suite "
+        "\"case\" on the demo\n"
+        "// torso, the volume of its grid, and the seconds of the probe on the machine of the "
+        "sweep.\n";
+    text += "t.volume_mm3 = " + number_text(volume_mm3, 6) +
+            ";\nt.probe_seconds = " + number_text(probe_seconds, 4) + ";\n";
+    for (const Trial& trial : trials) {
+        const bool of_knobs = trial.role == TrialRole::knob || trial.role == TrialRole::pair;
+        if (trial.suite != "case" || !of_knobs || !std::isfinite(trial.error)) continue;
+        text += "row(\"" + settings_text(trial.settings) + "\", " + number_text(trial.error, 4) +
+                ", " + number_text(trial.seconds, 4) + ");\n";
+    }
+    return text;
+}
+
 double probe_seconds() {
     // The stages that a build spends its time in, on a small torso.
     const auto start = std::chrono::steady_clock::now();

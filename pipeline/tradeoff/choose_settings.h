@@ -36,6 +36,9 @@ struct CostModel {
 };
 CostModel fit_cost_model(const FrontTable& table);
 
+// measured_front.inc from a sweep of the suite "case" on the demo torso.
+std::string format_front(const std::vector<Trial>& trials, double volume_mm3, double probe_seconds);
+
 // Seconds of a fixed piece of the pipeline's own work on this machine, with the threads now
 // allowed.
 double probe_seconds();

@@ -7,7 +7,9 @@
 #include <thread>
 
 #include "formats/atomic_file.h"
+#include "pipeline/cook/cook_case.h"
 #include "pipeline/parallel.h"
+#include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/tradeoff/suites.h"
 #include "pipeline/tradeoff/sweep.h"
 #include "pipeline/tradeoff/tradeoff_page.h"
@@ -27,6 +29,7 @@ struct TradeoffOptions {
     std::string recipe;
     std::string data;
     std::string markdown;
+    std::string front;
     CommonOptions common;
 };
 
@@ -52,10 +55,13 @@ struct NamedSuite {
 
 std::vector<NamedSuite> suites() {
     return {
-        {"register", register_suite},   {"warp", warp_suite},
-        {"smooth", smooth_suite},       {"texture", texture_suite},
+        {"register", register_suite},
+        {"warp", warp_suite},
+        {"smooth", smooth_suite},
+        {"texture", texture_suite},
         {"calibrate", calibrate_suite},
-        {"render", render_suite}, {"case", [] { return case_suite({}, "demo-torso"); }},
+        {"render", render_suite},
+        {"case", [] { return case_suite({}, "demo-torso"); }},
     };
 }
 
@@ -130,6 +136,15 @@ int tradeoff(const TradeoffOptions& options) {
         const Status s = write_file(options.markdown, format_accuracy_markdown(page));
         if (!s) return fail("tradeoff", s.error());
     }
+    if (!options.front.empty()) {
+        const auto recipe = embedded_recipe();
+        if (!recipe) return fail("tradeoff", recipe.error());
+        const auto volume = cooked_volume_mm3(*recipe);
+        if (!volume) return fail("tradeoff", volume.error());
+        const Status s =
+            write_file(options.front, format_front(page.trials, *volume, probe_seconds()));
+        if (!s) return fail("tradeoff", s.error());
+    }
     std::printf("%s/index.html  %zu settings of %zu suites\n", options.out.c_str(),
                 page.trials.size(), page.suites.size());
     return kDone;
@@ -162,6 +177,9 @@ int verb_tradeoff(int argc, char** argv) {
         ->type_name("DIR");
     app.add_option("--markdown", options.markdown,
                    "Also write the tables as Markdown (docs/accuracy.md)")
+        ->type_name("FILE");
+    app.add_option("--front", options.front,
+                   "Also write the table that --tolerance-mm chooses from")
         ->type_name("FILE");
     add_common_options(app, options.common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;

@@ -46,6 +46,20 @@ TEST(ChooseSettings, SaysWhatCannotBeHad) {
                      .warning.empty());
 }
 
+TEST(MeasuredFront, IsWrittenFromTheKnobsOfTheCaseAlone) {
+    Trial knob;
+    knob.suite = "case";
+    knob.settings = {{"resample.voxel_mm", "2"}};
+    knob.error = 0.5;
+    knob.seconds = 4;
+    Trial other = knob;
+    other.role = TrialRole::paper;
+    const std::string text = format_front({knob, other}, 8e6, 0.9);
+    const std::size_t first = text.find("row(\"resample.voxel_mm=2\", 0.5, 4);");
+    ASSERT_NE(first, std::string::npos);
+    EXPECT_EQ(text.find("row(", first + 1), std::string::npos);
+}
+
 TEST(MeasuredFront, HasRowsWhoseSettingsAreKnownToTheRecipe) {
     ASSERT_FALSE(measured_front().rows.empty());
     for (const FrontRow& row : measured_front().rows) {
