@@ -154,7 +154,8 @@ void Window::end_frame(bool capture) {
     glfwGetFramebufferSize(impl_->window, &width, &height);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glViewport(0, 0, width, height);
-    glClearColor(0.03f, 0.04f, 0.05f, 1);
+    // The page's colour: cheaper than a page-sized rectangle where the processor paints.
+    glClearColor(12 / 255.0f, 15 / 255.0f, 19 / 255.0f, 1);
     glClear(GL_COLOR_BUFFER_BIT);
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
     if (capture) {

@@ -280,7 +280,8 @@ void draw(App& app) {
     ImGui::SetNextWindowSize(io.DisplaySize);
     ImGui::Begin("sonocase", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNav |
-                     ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoSavedSettings);
+                     ImGuiWindowFlags_NoBackground | ImGuiWindowFlags_NoBringToFrontOnFocus |
+                     ImGuiWindowFlags_NoSavedSettings);
     if (app.page == Page::bundles || !app.open) {
         draw_bundle_page(app);
     } else {

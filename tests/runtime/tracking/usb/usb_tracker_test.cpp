@@ -3,11 +3,15 @@
 
 #include <cmath>
 #include <cstring>
+#include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "formats/calibration.h"
 #include "runtime/tracking/byte_fields.h"
 #include "runtime/tracking/usb/emulated_device.h"
 #include "runtime/tracking/viper_protocol.h"
+#include "support/small_case.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -287,6 +291,35 @@ TEST(ViperOverUsb, ComesBackWhenPluggedInAgain) {
     EXPECT_GE(seen["readings"].get<int>(), 70);
     EXPECT_EQ(seen["connects"], 2);
     expect_poses(seen);
+}
+
+// Device, driver, calibration, renderer, file: the whole way. The printed times are for the
+// accuracy pages; nothing is asserted of them.
+TEST(ViperOverUsb, DrivesThePlayer) {
+    const sonocase::testing::TemporaryFolder folder;
+    ASSERT_TRUE(save_bundle(sonocase::testing::small_case(), folder / "cylinder.sonocase"));
+    // The probe stands still at (100, -50, 0) with a quarter turn: the mannequin is put under it.
+    const Rigid world_from_probe{rotation_about({0, 0, 1}, 0.5 * 3.14159265358979), {100, -50, 0}};
+    const Rigid mannequin_from_probe{rotation_about({1, 0, 0}, 3.14159265358979), {0, 0, 59}};
+    Calibration mannequin;
+    mannequin.kind = "mannequin";
+    mannequin.sensor_from_tool = world_from_probe * inverse(mannequin_from_probe);
+    ASSERT_TRUE(save_calibration(mannequin, folder / "mannequin.json"));
+    DeviceSpec device;
+    device.vendor = 0x0F44;
+    device.product = 0xBF01;
+    const ClientResult result = run_with_device(
+        device, [] { return std::make_unique<ViperFirmware>(Trouble{.hz = 120}); },
+        {SONOCASE_BIN "/sonoplay", folder / "cylinder.sonocase", "--headless", "--tracker", "viper",
+         "--model", "paper", "--frames", "240", "--calibration", folder / "mannequin.json",
+         "--stats", "-", "--out", folder / "frames"});
+    ASSERT_EQ(result.status, 0) << result.out;
+    const auto stats = nlohmann::json::parse(result.out, nullptr, false);
+    ASSERT_TRUE(stats.is_object()) << result.out;
+    EXPECT_EQ(stats["frames"], 240);
+    std::cout << "pose to pixels, ms: " << stats["pose_to_pixel_ms"] << "\n";
+    // A picture of tissue and not of air.
+    EXPECT_GT(sonocase::testing::read_text(folder / "frames/frame_00239.png").size(), 20000u);
 }
 
 TEST(ViperOverUsb, TellsOfTwoAlike) {
