@@ -19,7 +19,7 @@ constexpr const char* kStyle = R"(
 *{box-sizing:border-box}body{margin:0;background:var(--paper);color:var(--ink);font:15px/1.5 system-ui,sans-serif}
 main{max-width:1120px;margin:0 auto;padding:28px 24px 64px}h1{font-size:26px;margin:0 0 2px}h2{font-size:18px;margin:36px 0 10px}
 .sub{color:var(--soft);margin:0 0 16px}.verdict{display:inline-block;padding:3px 12px;border-radius:14px;font-weight:600;color:#fff}
-.verdict.good{background:var(--good)}.verdict.bad{background:var(--bad)}.warn{border-left:3px solid var(--gold);padding:2px 12px;color:var(--soft);margin:6px 0}
+.verdict.good{background:#1e8a4c;color:#fff}.verdict.bad{background:#c3372b;color:#fff}.warn{border-left:3px solid var(--gold);padding:2px 12px;color:var(--soft);margin:6px 0}
 .cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(170px,1fr));gap:12px}.card{background:var(--band);border-radius:10px;padding:12px 14px}
 .card b{display:block;font-size:24px;font-variant-numeric:tabular-nums}.card span{color:var(--soft);font-size:13px}
 .views{display:grid;grid-template-columns:repeat(auto-fit,minmax(440px,1fr));gap:14px}figure{margin:0;background:var(--band);border-radius:10px;overflow:hidden}

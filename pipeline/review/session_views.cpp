@@ -270,7 +270,7 @@ void add_body(Scene& scene, const ReviewInput& input) {
         return std::find(spared.begin(), spared.end(), name) != spared.end();
     });
     if (auto mesh = surface_of_labels(bundle, no_go, step))
-        scene.renderer->AddActor(actor_of(mesh, kSpared, 0.55));
+        scene.renderer->AddActor(actor_of(mesh, kSpared, 0.4));
     const auto organs = labels_named([&](const std::string& name) {
         return std::any_of(input.exercise.targets.begin(), input.exercise.targets.end(),
                            [&](const Target& t) { return t.inside == name; });

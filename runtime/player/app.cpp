@@ -219,7 +219,8 @@ void start_attempt(App& app, const std::string& path) {
     Result<std::unique_ptr<SessionRun>> run = Error{"there is no picture to record", file, ""};
     const double now_s = steady_seconds() - app.clock_start_s;
     app.scan->with_engine([&](ScanEngine& engine) {
-        run = SessionRun::start(file, *app.open, engine, "", utc_now(), now_s);
+        run = SessionRun::start(file, *app.open, engine, app.arguments.trainee, utc_now(),
+                                now_s);
     });
     if (!run) {
         notify(app, Notice::Kind::error, run.error().message());

@@ -41,6 +41,8 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     app.add_option("--stats", arguments.stats,
                    "Write times and costs as JSON; - for standard output");
     app.add_option("--record", arguments.record, "Record the session to FILE.igs.mha");
+    app.add_option("--trainee", arguments.trainee,
+                   "With --record: a chosen name, under which the scores are kept on this machine");
     app.add_option("--model", arguments.model, "Image model; default: the exercise's")
         ->check(CLI::IsMember({"physical", "paper"}))
         ->group("Picture");

@@ -16,6 +16,7 @@ struct PlayerArguments {
     std::string out;                  // folder for frames
     std::string stats;                // JSON file, "-" for standard output
     std::string record;
+    std::string trainee;  // a chosen name for the progress book; empty: keep no progress
     std::string model;  // "", "paper", "physical"
     std::vector<std::string> effects;
     std::string renderer = "fast";

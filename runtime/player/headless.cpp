@@ -155,7 +155,8 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     if (spec.compare(0, 7, "replay:") == 0) replay = session_replay(spec.substr(7));
     std::unique_ptr<SessionRun> session;
     if (!arguments.record.empty()) {
-        auto started = SessionRun::start(arguments.record, open, *engine, "", utc_now(), 0);
+        auto started = SessionRun::start(arguments.record, open, *engine, arguments.trainee,
+                                         utc_now(), 0);
         if (!started) return started.error();
         session = std::move(*started);
     }

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cstring>
 #include <ctime>
+#include <filesystem>
 
 #include "formats/digest.h"
+#include "formats/progress/progress_book.h"
 #include "runtime/session/settings_text.h"
 
 namespace sonocase::runtime {
@@ -125,7 +127,21 @@ Result<SessionScore> SessionRun::finish() {
     if (!sequence) return sequence.error();
     const auto session = session_from_sequence(*sequence, guess_names(*sequence), path_);
     if (!session) return session.error();
-    return score_session(*session, exercise_, anatomy_.get(), open_.bundle.labels);
+    SessionScore score = score_session(*session, exercise_, anatomy_.get(), open_.bundle.labels);
+    if (!session->header.trainee.empty()) {
+        // A session that cannot be kept is still a session: the trainee sees its scores, and why.
+        std::error_code failed;
+        const std::string recording = std::filesystem::absolute(path_, failed).string();
+        auto book = ProgressBook::open(default_progress_path());
+        Status kept = Done{};
+        if (book)
+            kept = book->add(progress_entry(session->header, score, failed ? path_ : recording));
+        if (!book || !kept) {
+            score.warnings.push_back("The session was not put into the progress book: " +
+                                     (book ? kept.error() : book.error()).message() + ".");
+        }
+    }
+    return score;
 }
 
 std::optional<SessionReplay> session_replay(const std::string& path) {

@@ -41,7 +41,8 @@ class SessionRun {
     RecorderStatus recorder_status() const { return recorder_->status(); }
     const std::string& path() const { return path_; }
 
-    // Ends the recording and scores it. The recording is whole even where scoring fails.
+    // Ends the recording, scores it and, where the trainee has a name, puts it into the progress
+    // book of this machine. The recording is whole even where scoring fails.
     Result<SessionScore> finish();
 
   private:
