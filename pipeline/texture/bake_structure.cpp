@@ -78,7 +78,7 @@ CoarseField distance_through_fat(const LabelVolume& labels, const std::vector<La
     const std::size_t count = static_cast<std::size_t>(field.size.x) *
                               static_cast<std::size_t>(field.size.y) *
                               static_cast<std::size_t>(field.size.z);
-    constexpr float kFar = 1e6f;
+    constexpr float kFar = 250;  // mm; finite, as neighbours are mixed
     field.value.assign(count, kFar);
     std::vector<std::uint8_t> open(count, 0);
     std::vector<std::array<std::int16_t, 3>> front, next;
@@ -117,6 +117,27 @@ CoarseField distance_through_fat(const LabelVolume& labels, const std::vector<La
         }
         front.swap(next);
     }
+    // Two samples into what is not fat, so that fat at its edge does not mix with the far value.
+    for (int ring = 0; ring < 2; ++ring) {
+        const std::vector<float> before = field.value;
+        for (int k = 0; k < field.size.z; ++k) {
+            for (int j = 0; j < field.size.y; ++j) {
+                for (int i = 0; i < field.size.x; ++i) {
+                    float& value = field.value[field.index(i, j, k)];
+                    if (value < kFar) continue;
+                    if (i > 0) value = std::min(value, before[field.index(i - 1, j, k)] + reach);
+                    if (j > 0) value = std::min(value, before[field.index(i, j - 1, k)] + reach);
+                    if (k > 0) value = std::min(value, before[field.index(i, j, k - 1)] + reach);
+                    if (i + 1 < field.size.x)
+                        value = std::min(value, before[field.index(i + 1, j, k)] + reach);
+                    if (j + 1 < field.size.y)
+                        value = std::min(value, before[field.index(i, j + 1, k)] + reach);
+                    if (k + 1 < field.size.z)
+                        value = std::min(value, before[field.index(i, j, k + 1)] + reach);
+                }
+            }
+        }
+    }
     return field;
 }
 
@@ -147,12 +168,18 @@ struct Bake {
         const auto fi = static_cast<float>(i), fj = static_cast<float>(j),
                    fk = static_cast<float>(k);
         const float depth = skin_depth.at(fi, fj, fk) * voxel_mm;
-        const std::size_t coarse =
-            through_fat.index(i / through_fat.step, j / through_fat.step, k / through_fat.step);
-        // steps along the axes make paths up to sqrt(3) longer than the straight line
-        const bool under_skin = depth < 60 && through_fat.value[coarse] < 1.8f * depth + 12;
-        if (!under_skin)
-            return 9 + 2.5f * grain5.at(x, y, z);  // round the organs: echogenic, mixed
+        // Steps along the axes make paths up to sqrt(3) longer than the straight line. The change
+        // from one kind of fat to the other is soft: nothing in the label volume marks it.
+        const float detour = 1.8f * depth + 12 - through_fat.at(fi, fj, fk);
+        const float under_skin =
+            std::clamp(detour / 10 + 0.5f, 0.f, 1.f) * std::clamp((64 - depth) / 12, 0.f, 1.f);
+        // round the organs: echogenic, mixed
+        const float inner = under_skin < 1 ? 9 + 2.5f * grain5.at(x, y, z) : 0.f;
+        if (under_skin <= 0) return inner;
+        return inner + under_skin * (sheets(depth, x, y, z) - inner);
+    }
+
+    float sheets(float depth, float x, float y, float z) const {
         // Sheets 6 mm apart, wavy, torn, of varying strength.
         const float wave = depth + 2.2f * grain14.at(x, y, z) + 1.6f * grain30.at(x, y, z);
         const float sheet = wave / 6.2f;
@@ -167,6 +194,14 @@ struct Bake {
         return 17 * cover * strength;
     }
 
+    bool in_hilum(int i, int j, int k) const {
+        for (const Kidney& kidney : kidneys) {
+            if (kidney.depth.contains(i, j, k) && kidney.depth.at(i, j, k) * voxel_mm > 1.5f)
+                return true;
+        }
+        return false;
+    }
+
     float at(std::uint8_t label, int i, int j, int k) const {
         const LabelFacts& f = facts[label];
         const float x = static_cast<float>(i) * voxel_mm, y = static_cast<float>(j) * voxel_mm,
@@ -176,22 +211,19 @@ struct Bake {
             case StructureRole::none:
                 return 0;
             case StructureRole::muscle:
+                // What segmentations call muscle in the hilum is vessels and fat.
+                if (in_hilum(i, j, k)) return 9 + 3 * grain3.at(x, y, z);
                 if (!options.muscle_fibres) break;
                 return std::clamp(sd * sparse(fibres.at(x, y, z,
                                                         directions.at(label, static_cast<float>(i),
                                                                       static_cast<float>(j),
                                                                       static_cast<float>(k)))),
                                   -14.f, 16.f);
-            case StructureRole::fat: {
-                for (const Kidney& kidney : kidneys) {
-                    // fat in the hilum is the sinus: its own echo, not that of fat round organs
-                    if (kidney.depth.contains(i, j, k) &&
-                        kidney.depth.at(i, j, k) * voxel_mm > 1.5f)
-                        return 14 + 2 * grain3.at(x, y, z);
-                }
+            case StructureRole::fat:
+                // fat in the hilum is the sinus: its own echo, not that of fat round organs
+                if (in_hilum(i, j, k)) return 14 + 2 * grain3.at(x, y, z);
                 if (!options.fat_septa) break;
                 return fat(i, j, k, x, y, z);
-            }
             case StructureRole::kidney: {
                 const float noise = options.parenchyma ? sd * grain3.at(x, y, z) : 0;
                 for (const Kidney& kidney : kidneys) {

@@ -18,7 +18,7 @@
 //
 // Nothing is added where the label volume has the thing already (liver vessel labels, a renal sinus
 // label). The mean of the offsets over each label is 0 dB, so that the tissue table keeps its
-// meaning. Fluid, gas, bone and the outside get none. Source: figures of docs/accuracy.md, measured
+// meaning. Fluid, gas, bone and the outside get none. Source: figures of docs/textures.md, measured
 // on real images; radii after Murray (1926), r^3 adds.
 #pragma once
 

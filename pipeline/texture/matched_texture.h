@@ -12,7 +12,7 @@
 // Correlation is followed to half an edge. Where the example's grain is too long for that, a voxel
 // takes the place of several pixels: the field is sampled more coarsely, not smoothed.
 // Source: translation of Gaussian fields (M. Grigoriu, Applied Non-Gaussian Processes, 1995);
-// measured against the paper's pyramid in docs/accuracy.md.
+// measured against the paper's pyramid in docs/textures.md.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // Example images made by a formula, for cases that come without real ones (the analytic torso).
 //
 // Organs: log-compressed Rayleigh speckle with the axial and lateral widths measured on real images
-// (docs/accuracy.md). Muscle: thin bright fibres along a slant. Fat: septa along the skin. They
+// (docs/textures.md). Muscle: thin bright fibres along a slant. Fat: septa along the skin. They
 // carry no licence, need no file, and are not a substitute for real ultrasound.
 #pragma once
 

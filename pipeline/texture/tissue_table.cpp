@@ -8,7 +8,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-// Where the figures come from. S-numbers as in the literature list of docs/accuracy.md.
+// Where the figures come from. S-numbers as in the literature list of docs/textures.md.
 #define S1 "PMC10001275 table 4"
 #define S2 "PMC10346919 table A2"
 #define S3 "PMC3233242 table 3"

@@ -292,8 +292,7 @@ TEST(SharedPatches, MeetTheBars) {
         ASSERT_TRUE(a) << spec.name;
         const TextureQuality& q = a->quality;
         EXPECT_LE(q.distance.ks, 0.03) << spec.name;
-        // Reflectors are one structure each, not a texture: their widths are those of that one.
-        const double width = spec.name.rfind("bone_surface", 0) == 0 ? 0.15 : 0.10;
+        constexpr double width = 0.10;
         EXPECT_NEAR(q.texture.along / q.example.along, 1, width) << spec.name;
         EXPECT_NEAR(q.texture.across / q.example.across, 1, width) << spec.name;
         EXPECT_NEAR(q.texture.ratio() / q.example.ratio(), 1, 0.15) << spec.name;
