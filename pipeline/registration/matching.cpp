@@ -109,6 +109,7 @@ Matches find_matches(const SkinModel& skin,
     parallel_for(asked, 128, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n) {
             const std::size_t i = n * skin_stride;
+            if (skin.on_rim[i]) continue;
             double d2 = 0;
             const std::uint32_t j = target.index.nearest(mapped[i], &d2);
             if (d2 > farthest2 || target.lifted[j]) continue;

@@ -85,7 +85,7 @@ struct RefineOptions {
     int iterations = 6;
     int skin_askers = 2500;
     std::vector<Correspondence> landmarks;  // each as a soft row beside the gaps
-    double landmark_weight = 0.05;  // times its squared distance, beside the mean squared gap
+    double landmark_weight = 0.02;  // times its squared distance, beside the mean squared gap
 };
 
 struct RefineResult {

@@ -16,6 +16,9 @@ constexpr double kFineSkin_mm = 6, kCoarseSkin_mm = 13;
 // Candidates are judged after a quadratic of this stiffness, by gaps with this Cauchy scale; what
 // has no counterpart costs as much as this gap.
 constexpr double kJudgeConstraint_mm = 10, kJudgeScale_mm = 5, kNoCounterpart_mm = 12;
+// A constraint weight is tried only while it is at least this many robust spreads of the gaps: a
+// lighter one would only bend to what no quadratic can follow.
+constexpr double kFreedom = 1.0;
 constexpr double kCloseScore = 1.10;
 
 std::string text(const char* format, auto... values) {
@@ -92,7 +95,8 @@ double penalty(double gap) {
            std::log1p(gap * gap / (kJudgeScale_mm * kJudgeScale_mm));
 }
 
-// A candidate after a stiff quadratic: gaps, missing counterparts, deformation and hints together.
+// A candidate after a stiff quadratic and a coarse field: gaps, missing counterparts, deformation
+// and hints together.
 Judged judge(const Setting& s, const TargetSurface& target, const RigidCandidate& rigid) {
     Judged judged;
     judged.rigid = rigid;
@@ -117,12 +121,16 @@ Judged judge(const Setting& s, const TargetSurface& target, const RigidCandidate
         deformation = refined.constraint_cost;
         options.first_loss_mm = 5;
     }
-    const MappedSkin mapped = map_skin(s.coarse, judged.quadratic);
-    MatchOptions gates;
-    gates.farthest_mm = 40;
-    gates.side_step_mm = 1.2 * target.spacing_mm;
-    const Matches matches = find_matches(s.coarse, mapped.points, mapped.normals, mapped.index,
-                                         target, readings, 1, gates);
+    // What it would still cost to bend the skin all the way: a coarse residual field.
+    ResidualOptions field;
+    field.spacing_mm = 45;
+    field.rounds = 3;
+    field.tolerance = 1e-2;
+    field.skin_askers = 900;
+    Registration map;
+    map.quadratic = in_frames(judged.quadratic, s.coarse.origin, target.origin);
+    map.ct_box = s.skin.box;
+    const FieldFit fit = fit_field(s.coarse, target, readings, field, &map);
     const auto mean = [](const std::vector<Match>& list, std::size_t asked) {
         double sum = 0;
         for (const Match& m : list) sum += penalty(m.gap_mm);
@@ -130,6 +138,7 @@ Judged judge(const Setting& s, const TargetSurface& target, const RigidCandidate
         return (sum + (count - static_cast<double>(list.size())) * penalty(kNoCounterpart_mm)) /
                count;
     };
+    const Matches& matches = fit.matches;
     const double gaps = 0.5 * mean(matches.from_target, matches.target_asked) +
                         0.5 * mean(matches.from_skin, matches.skin_asked);
     double hints = 0;
@@ -141,7 +150,7 @@ Judged judge(const Setting& s, const TargetSurface& target, const RigidCandidate
         const Vector3 r = rigid.target_from_skin.rotation.column(2) - *s.hints.up;
         hints += s.hints.up_weight_mm2 * dot(r, r);
     }
-    judged.score_mm = std::sqrt(gaps + 0.5 * deformation + hints);
+    judged.score_mm = std::sqrt(gaps + 0.5 * deformation + fit.energy_mm2 + hints);
     judged.coverage = static_cast<double>(matches.from_target.size()) /
                       static_cast<double>(std::max<std::size_t>(1, matches.target_asked));
     return judged;
@@ -317,13 +326,14 @@ Warped warp(const Setting& s,
             tell(progress, 0.55, "quadratic warp: point to surface");
             // Freedom is earned: a weight below the gaps themselves only fits what no quadratic
             // can.
-            if (!first && constraint < 1.4 * spread.sigma_mm) break;
+            if (!first && constraint < kFreedom * spread.sigma_mm) break;
             refine.constraint_mm = constraint;
             refine.iterations = first ? 7 : 6;
             const RefineResult refined = refine_quadratic(s.fine, s.target, s.readings, q, refine);
             const double det = proven_min_det(refined.map, s.box);
             const GapSpread next = spread_of(s, refined.map);
-            if (!(det >= options.wanted_det) || !(next.cost < spread.cost)) break;
+            if (!(det >= options.wanted_det)) break;
+            if (!first && !(next.cost < 1.02 * spread.cost)) break;
             q = refined.map;
             spread = next;
             w.constraint_mm = constraint;

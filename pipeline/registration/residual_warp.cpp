@@ -65,10 +65,13 @@ struct DataRow {
     double wish, weight;
 };
 
-// Jacobi-preconditioned conjugate gradients on (M + rows) d = rhs, from the d given.
+// Jacobi-preconditioned conjugate gradients on (M + rows) d = rhs, from the d given. Single
+// precision is ample for a tolerance of a thousandth; sums over all control points are taken in
+// double.
 int solve(const SplinePenalty& penalty,
           const DisplacementGrid& grid,
           const std::vector<DataRow>& rows,
+          double tolerance,
           std::vector<Lanes>* d) {
     const std::size_t count = d->size();
     const Lanes zero = {0, 0, 0, 0};
@@ -76,62 +79,69 @@ int solve(const SplinePenalty& penalty,
     for (int n = 0; n < 64; ++n) offset[n] = footprint_offset(grid, n);
     std::vector<Lanes> right(count, zero), diagonal(count);
     for (std::size_t i = 0; i < count; ++i) {
-        const double m = penalty.diagonal(i) + 1e-12;
+        const float m = static_cast<float>(penalty.diagonal(i)) + 1e-12f;
         diagonal[i] = Lanes{m, m, m, 1};
     }
+    struct Row {
+        const SplineFootprint* at;
+        Lanes normal;  // times the root of the weight
+    };
+    std::vector<Row> scaled;
+    scaled.reserve(rows.size());
     for (const DataRow& row : rows) {
-        const Lanes n = {row.normal.x, row.normal.y, row.normal.z, 0};
+        const double root = std::sqrt(row.weight);
+        const Lanes n = {static_cast<float>(root * row.normal.x),
+                         static_cast<float>(root * row.normal.y),
+                         static_cast<float>(root * row.normal.z), 0};
+        const auto wish = static_cast<float>(root * row.wish);
+        scaled.push_back({&row.at, n});
         for (std::size_t w = 0; w < 64; ++w) {
-            const double f = static_cast<double>(row.at.weight[w]);
-            right[row.at.first + offset[w]] += row.weight * row.wish * f * n;
-            diagonal[row.at.first + offset[w]] += row.weight * f * f * n * n;
+            const float f = row.at.weight[w];
+            right[row.at.first + offset[w]] += wish * f * n;
+            diagonal[row.at.first + offset[w]] += f * f * n * n;
         }
     }
     const auto apply = [&](const std::vector<Lanes>& in, std::vector<Lanes>& out) {
         penalty.apply(in, out);
-        for (const DataRow& row : rows) {
-            const Lanes* from = in.data() + row.at.first;
+        for (const Row& row : scaled) {
+            const Lanes* from = in.data() + row.at->first;
             Lanes sum = zero;
-            for (std::size_t w = 0; w < 64; ++w) {
-                sum += static_cast<double>(row.at.weight[w]) * from[offset[w]];
-            }
-            const double along = row.weight * (sum[0] * row.normal.x + sum[1] * row.normal.y +
-                                               sum[2] * row.normal.z);
-            const Lanes push = {along * row.normal.x, along * row.normal.y, along * row.normal.z,
-                                0};
-            Lanes* to = out.data() + row.at.first;
-            for (std::size_t w = 0; w < 64; ++w) {
-                to[offset[w]] += static_cast<double>(row.at.weight[w]) * push;
-            }
+            for (std::size_t w = 0; w < 64; ++w) sum += row.at->weight[w] * from[offset[w]];
+            const Lanes along = sum * row.normal;
+            const Lanes push = (along[0] + along[1] + along[2]) * row.normal;
+            Lanes* to = out.data() + row.at->first;
+            for (std::size_t w = 0; w < 64; ++w) to[offset[w]] += row.at->weight[w] * push;
         }
     };
     const auto dot_of = [&](const std::vector<Lanes>& a, const std::vector<Lanes>& b) {
-        Lanes sum = zero;
-        for (std::size_t i = 0; i < count; ++i) sum += a[i] * b[i];
-        return sum[0] + sum[1] + sum[2];
+        double sum = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            const Lanes p = a[i] * b[i];
+            sum += static_cast<double>(p[0] + p[1] + p[2]);
+        }
+        return sum;
     };
     std::vector<Lanes> r(count), z(count), p(count), ap(count);
     apply(*d, ap);
     for (std::size_t i = 0; i < count; ++i) {
         r[i] = right[i] - ap[i];
         z[i] = r[i] / diagonal[i];
+        ap[i] = right[i] / diagonal[i];
     }
     p = z;
     double rz = dot_of(r, z);
-    double first = 0;
-    for (std::size_t i = 0; i < count; ++i) ap[i] = right[i] / diagonal[i];
-    first = dot_of(right, ap);
+    const double enough = tolerance * tolerance * dot_of(right, ap);
     int n = 0;
-    for (; n < 200 && rz > 1e-6 * first; ++n) {
+    for (; n < 200 && rz > enough; ++n) {
         apply(p, ap);
-        const double alpha = rz / dot_of(p, ap);
+        const auto alpha = static_cast<float>(rz / dot_of(p, ap));
         for (std::size_t i = 0; i < count; ++i) {
             (*d)[i] += alpha * p[i];
             r[i] -= alpha * ap[i];
             z[i] = r[i] / diagonal[i];
         }
         const double next = dot_of(r, z);
-        const double beta = next / rz;
+        const auto beta = static_cast<float>(next / rz);
         rz = next;
         for (std::size_t i = 0; i < count; ++i) p[i] = z[i] + beta * p[i];
     }
@@ -175,6 +185,70 @@ double robust_rms(const Matches& matches) {
 
 }  // namespace
 
+FieldFit fit_field(const SkinModel& skin,
+                   const TargetSurface& target,
+                   std::span<const std::uint32_t> readings,
+                   const ResidualOptions& options,
+                   Registration* registration,
+                   const Progress& progress) {
+    FieldFit fit;
+    Registration& r = *registration;
+    r.residual = grid_over(r.ct_box, options.spacing_mm);
+    const DisplacementGrid shape = r.residual;
+    const std::size_t count = static_cast<std::size_t>(shape.size.x) *
+                              static_cast<std::size_t>(shape.size.y) *
+                              static_cast<std::size_t>(shape.size.z);
+    const std::size_t stride = std::max<std::size_t>(
+        1, skin.points.size() / static_cast<std::size_t>(std::max(1, options.skin_askers)));
+    SplinePenalty penalty(shape, options.bending * 50 * 50 * 50 * 50, options.stretching * 50 * 50);
+    add_depth_penalty(skin, r.ct_box, options, &penalty);
+    std::vector<Lanes> d(count, Lanes{0, 0, 0, 0});
+    r.residual.control_mm.assign(count, Vector3{});
+    for (int round = 0; round <= options.rounds; ++round) {
+        tell(progress, 0.7 + 0.2 * round / (options.rounds + 1.0), "residual warp");
+        const double t = options.rounds > 1
+                             ? std::min(1.0, static_cast<double>(round) / (options.rounds - 1))
+                             : 1;
+        const double loss = 5 * std::pow(2.0 / 5, t);
+        MatchOptions gates;
+        gates.farthest_mm = 40 - 15 * t;
+        gates.side_step_mm = 1.2 * target.spacing_mm;
+        const MappedBySpline mapped = map_all(skin, target, r);
+        fit.matches = find_matches(skin, mapped.points, mapped.normals, PointIndex(mapped.points),
+                                   target, readings, stride, gates);
+        const Matches& matches = fit.matches;
+        if (matches.from_target.size() + matches.from_skin.size() < 30) break;
+        fit.rms_after_mm = robust_rms(matches);
+        if (round == 0) fit.rms_before_mm = fit.rms_after_mm;
+        if (round == options.rounds) break;
+        std::vector<DataRow> rows;
+        const auto add = [&](const std::vector<Match>& list) {
+            for (const Match& m : list) {
+                const Point3 x = skin.origin + (skin.points[m.skin] - Point3{});
+                // The gap that the displacement as a whole must close.
+                const double wish = dot(m.normal, displacement(r.residual, x)) - m.gap_mm;
+                const double w = 0.5 / static_cast<double>(list.size()) /
+                                 (1 + m.gap_mm * m.gap_mm / (loss * loss));
+                rows.push_back({spline_footprint(shape, x), m.normal, wish, w});
+            }
+        };
+        add(matches.from_target);
+        add(matches.from_skin);
+        fit.iterations += solve(penalty, shape, rows, options.tolerance, &d);
+        for (std::size_t i = 0; i < count; ++i) {
+            r.residual.control_mm[i] = {static_cast<double>(d[i][0]), static_cast<double>(d[i][1]),
+                                        static_cast<double>(d[i][2])};
+        }
+    }
+    std::vector<Lanes> md(count);
+    penalty.apply(d, md);
+    for (std::size_t i = 0; i < count; ++i) {
+        const Lanes e = d[i] * md[i];
+        fit.energy_mm2 += static_cast<double>(e[0] + e[1] + e[2]);
+    }
+    return fit;
+}
+
 ResidualReport fit_residual(const SkinModel& skin,
                             const TargetSurface& target,
                             std::span<const std::uint32_t> readings,
@@ -182,62 +256,15 @@ ResidualReport fit_residual(const SkinModel& skin,
                             Registration* registration,
                             const Progress& progress) {
     ResidualReport report;
-    Registration trial = *registration;
-    trial.residual = grid_over(trial.ct_box, options.spacing_mm);
-    const DisplacementGrid shape = trial.residual;
-    const std::size_t count = static_cast<std::size_t>(shape.size.x) *
-                              static_cast<std::size_t>(shape.size.y) *
-                              static_cast<std::size_t>(shape.size.z);
-    const std::size_t stride = std::max<std::size_t>(
-        1, skin.points.size() / static_cast<std::size_t>(std::max(1, options.skin_askers)));
-    report.bending = options.bending;
-    for (int attempt = 0; attempt < options.proof_attempts; ++attempt) {
-        if (attempt > 0) report.bending *= 2;
-        SplinePenalty penalty(shape, report.bending * 50 * 50 * 50 * 50,
-                              options.stretching * 50 * 50);
-        add_depth_penalty(skin, trial.ct_box, options, &penalty);
-        std::vector<Lanes> d(count, Lanes{0, 0, 0, 0});
-        trial.residual.control_mm.assign(count, Vector3{});
-        for (int round = 0; round <= options.rounds; ++round) {
-            tell(progress, round / (options.rounds + 1.0), "residual warp");
-            const double t = options.rounds > 1
-                                 ? std::min(1.0, static_cast<double>(round) / (options.rounds - 1))
-                                 : 1;
-            const double loss = 5 * std::pow(2.0 / 5, t);
-            MatchOptions gates;
-            gates.farthest_mm = 40 - 15 * t;
-            gates.side_step_mm = 1.2 * target.spacing_mm;
-            const MappedBySpline mapped = map_all(skin, target, trial);
-            const Matches matches =
-                find_matches(skin, mapped.points, mapped.normals, PointIndex(mapped.points), target,
-                             readings, stride, gates);
-            if (matches.from_target.size() + matches.from_skin.size() < 30) {
-                report.reason = "too few readings lie over the skin";
-                return report;
-            }
-            if (round == 0 && attempt == 0) report.rms_before_mm = robust_rms(matches);
-            if (round == options.rounds) {
-                report.rms_after_mm = robust_rms(matches);
-                break;
-            }
-            std::vector<DataRow> rows;
-            const auto add = [&](const std::vector<Match>& list) {
-                for (const Match& m : list) {
-                    const Point3 x = skin.origin + (skin.points[m.skin] - Point3{});
-                    // The gap that the displacement as a whole must close.
-                    const double wish = dot(m.normal, displacement(trial.residual, x)) - m.gap_mm;
-                    const double w = 0.5 / static_cast<double>(list.size()) /
-                                     (1 + m.gap_mm * m.gap_mm / (loss * loss));
-                    rows.push_back({spline_footprint(shape, x), m.normal, wish, w});
-                }
-            };
-            add(matches.from_target);
-            add(matches.from_skin);
-            report.iterations += solve(penalty, shape, rows, &d);
-            for (std::size_t i = 0; i < count; ++i)
-                trial.residual.control_mm[i] = {d[i][0], d[i][1], d[i][2]};
-        }
-        if (!(report.rms_before_mm >= options.least_gain * report.rms_after_mm)) {
+    ResidualOptions tried = options;
+    for (int attempt = 0; attempt < options.proof_attempts; ++attempt, tried.bending *= 2) {
+        Registration trial = *registration;
+        const FieldFit fit = fit_field(skin, target, readings, tried, &trial, progress);
+        report.iterations += fit.iterations;
+        report.bending = tried.bending;
+        report.rms_before_mm = fit.rms_before_mm;
+        report.rms_after_mm = fit.rms_after_mm;
+        if (!(fit.rms_before_mm > options.least_gain * fit.rms_after_mm)) {
             report.reason = "it would buy nothing";
             return report;
         }

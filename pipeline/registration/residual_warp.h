@@ -18,12 +18,13 @@
 namespace sonocase::pipeline {
 
 struct ResidualOptions {
-    double spacing_mm = 30;      // of control points, >= 10
-    double bending = 0.001;      // lb
-    double stretching = 0.003;   // lm
-    double depth_penalty = 0.1;  // mu
-    double fade_mm = 40;         // depth at which the penalty is whole
-    int rounds = 6;              // of matching
+    double spacing_mm = 30;       // of control points, >= 10
+    double bending = 0.001;       // lb
+    double stretching = 0.003;    // lm
+    double depth_penalty = 0.14;  // mu
+    double fade_mm = 40;          // depth at which the penalty is whole
+    int rounds = 6;               // of matching
+    double tolerance = 1e-3;      // of the solver
     int skin_askers = 2500;
     int proof_attempts = 4;    // bending doubles each time that the proof fails
     double least_gain = 1.15;  // rms before over rms after; less buys nothing and is left away
@@ -37,6 +38,20 @@ struct ResidualReport {
     double rms_before_mm = 0, rms_after_mm = 0;  // robust gaps of one set of matches
     int iterations = 0;                          // of conjugate gradients
 };
+
+// The field alone, unproven, for comparing poses: sets registration's residual.
+struct FieldFit {
+    Matches matches;        // after the last solve
+    double energy_mm2 = 0;  // bending, stretching and depth together
+    double rms_before_mm = 0, rms_after_mm = 0;
+    int iterations = 0;
+};
+FieldFit fit_field(const SkinModel& skin,
+                   const TargetSurface& target,
+                   std::span<const std::uint32_t> readings,
+                   const ResidualOptions& options,
+                   Registration* registration,
+                   const Progress& progress = {});
 
 // registration  quadratic, no residual; ct_box set. On success its residual and min_det_jacobian
 // are

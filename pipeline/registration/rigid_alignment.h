@@ -28,7 +28,7 @@ struct PoseHints {
     std::vector<Place> landmarks;
     double up_weight_mm2 =
         300;  // times |head - up|^2: 15 degrees cost as much as 4.5 mm everywhere
-    double landmark_weight = 0.05;  // each, times its squared distance, beside the mean squared gap
+    double landmark_weight = 0.02;  // each, times its squared distance, beside the mean squared gap
 
     double cost_mm2(const Rigid& pose) const;  // distances beyond 60 mm count as 60
 };
@@ -37,8 +37,8 @@ struct RigidOptions {
     int starts = 96;        // rotations, >= 1
     int offsets = 3;        // along the patient's long axis for each rotation, >= 1
     double offset_mm = 45;  // between these
-    int coarse_iterations = 10;
-    int coarse_points = 160;  // of either surface
+    int coarse_iterations = 8;
+    int coarse_points = 120;  // of either surface
     int kept = 14;            // refined on fine_points
     int fine_iterations = 25;
     int fine_points = 700;

@@ -154,7 +154,7 @@ void SplinePenalty::apply(std::span<const Lanes> in, std::span<Lanes> out) const
                     for (int b = std::max(-3, -j); b <= std::min(3, ny - 1 - j); ++b) {
                         const float* w = row + 7 * (b + 3) + 49 * (c + 3) + 3;
                         const Lanes* v = in.data() + node + nx * (b + ny * c);
-                        for (int a = a0; a <= a1; ++a) sum += static_cast<double>(w[a]) * v[a];
+                        for (int a = a0; a <= a1; ++a) sum += w[a] * v[a];
                     }
                 }
                 out[static_cast<std::size_t>(node)] = sum;

@@ -29,7 +29,7 @@ class SplinePenalty {
     double diagonal(std::size_t control) const { return row_[control * 343 + 171]; }
 
     // out = M in, three components with a fourth of padding; # control points.
-    typedef double Lanes __attribute__((vector_size(32)));
+    typedef float Lanes __attribute__((vector_size(16)));
     void apply(std::span<const Lanes> in, std::span<Lanes> out) const;
 
   private:
