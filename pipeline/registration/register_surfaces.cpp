@@ -18,7 +18,7 @@ constexpr double kFineSkin_mm = 6, kCoarseSkin_mm = 13;
 constexpr double kJudgeConstraint_mm = 10, kJudgeScale_mm = 5, kNoCounterpart_mm = 12;
 // A constraint weight is tried only while it is at least this many robust spreads of the gaps: a
 // lighter one would only bend to what no quadratic can follow.
-constexpr double kFreedom = 1.0;
+constexpr double kFreedom = 0.75;
 constexpr double kCloseScore = 1.10;
 
 std::string text(const char* format, auto... values) {

@@ -20,7 +20,7 @@ namespace sonocase::pipeline {
 
 struct SkinSurfaceOptions {
     double working_mm = 3.0;    // voxels are averaged up to about this, > 0
-    double smoothing_mm = 2.0;  // standard deviation of the Gaussian, >= 0
+    double smoothing_mm = 2.5;  // standard deviation of the Gaussian, >= 0
     double bridge_mm = 12.0;    // thinner sheets, and bridges to them, are not body
     double least_part = 0.35;   // of a slice's largest part: smaller parts are arms or remnants
 };
