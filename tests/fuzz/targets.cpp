@@ -20,12 +20,9 @@
 #include "pipeline/import/label_table.h"
 #include "pipeline/import/ply_file.h"
 #include "runtime/tracking/guidance_protocol.h"
+#include "runtime/tracking/igtl_message.h"
 #include "runtime/tracking/liberty_protocol.h"
 #include "runtime/tracking/viper_protocol.h"
-#if __has_include("runtime/tracking/igtl_message.h")
-#include "runtime/tracking/igtl_message.h"
-#define SONOCASE_HAS_IGTL 1
-#endif
 
 namespace sonocase::fuzz {
 namespace {
@@ -228,7 +225,6 @@ void guidance(Bytes bytes) {
     if (!bytes.empty()) runtime::guidance::error_text(bytes[0], fatal);
 }
 
-#ifdef SONOCASE_HAS_IGTL
 void openigtlink(Bytes bytes) {
     namespace g = runtime::igtl;
     if (bytes.empty()) return;
@@ -259,7 +255,6 @@ void openigtlink(Bytes bytes) {
             demand(is_finite(pose.to_from));
     }
 }
-#endif
 
 }  // namespace
 
@@ -279,9 +274,7 @@ const std::vector<Target>& targets() {
         {"viper", viper},
         {"liberty", liberty},
         {"guidance", guidance},
-#ifdef SONOCASE_HAS_IGTL
         {"openigtlink", openigtlink},
-#endif
     };
     return table;
 }
