@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <condition_variable>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -45,6 +47,29 @@ int frame_count(const PlayerArguments& arguments, const Tracker& tracker) {
     if (tracker.duration_s() > 0) return static_cast<int>(tracker.duration_s() * kFrameRate) + 1;
     return tracker.is_device() ? 300 : 1;
 }
+
+// Rung by a tracker's thread when a reading has come.
+class Bell {
+  public:
+    void ring() {
+        {
+            const std::lock_guard lock(mutex_);
+            rung_ = true;
+        }
+        condition_.notify_one();
+    }
+    // Until it is rung, at most a twentieth of a second.
+    void wait() {
+        std::unique_lock lock(mutex_);
+        condition_.wait_for(lock, std::chrono::milliseconds(50), [this] { return rung_; });
+        rung_ = false;
+    }
+
+  private:
+    std::mutex mutex_;
+    std::condition_variable condition_;
+    bool rung_ = false;
+};
 
 }  // namespace
 
@@ -137,6 +162,13 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     if (!made) return made.error();
     Tracker& tracker = **made;
 
+    Bell bell;
+    tracker.set_wake([&bell] { bell.ring(); });
+    const struct Silence {
+        Tracker& tracker;
+        ~Silence() { tracker.set_wake({}); }  // before the bell is gone
+    } silence{tracker};
+
     if (!arguments.out.empty()) {
         std::error_code failed;
         std::filesystem::create_directories(arguments.out, failed);
@@ -178,7 +210,7 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
             const double give_up_s = context.clock() + kDeviceWait;
             while (!(fresh = tracker.poll(context.clock(), reading)) &&
                    context.clock() < give_up_s && tracker.health().phase != TrackerPhase::failed) {
-                std::this_thread::sleep_for(std::chrono::microseconds(200));
+                bell.wait();
             }
             now_s = context.clock();
             if (!fresh) {
