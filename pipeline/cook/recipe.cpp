@@ -400,10 +400,10 @@ Status check_inputs(const Recipe& recipe) {
     return Done{};
 }
 
-// Exercises beside the recipe: those it names, or all.
+// Exercises beside the recipe: those it names, or all that lie beside a case.toml.
 Status load_exercises(Recipe& recipe, const std::vector<std::string>& named) {
     std::vector<std::string> names = named;
-    if (names.empty()) {
+    if (names.empty() && fs::path(recipe.path).filename() == "case.toml") {
         std::error_code code;
         for (const auto& entry :
              fs::directory_iterator(recipe.folder.empty() ? "." : recipe.folder, code))

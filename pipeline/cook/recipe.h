@@ -2,7 +2,7 @@
 //
 //     name = "real-torso"
 //     preset = "balanced"              # draft | balanced | accurate
-//     exercises = ["liver-biopsy"]     # default: every other .toml beside the recipe
+//     exercises = ["liver-biopsy"]     # default: every other .toml beside a case.toml
 //
 //     [inputs]                         # paths: relative to --data, else to the recipe
 //     labels = "ct/labels.nii.gz"

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <numeric>
 
+#include "formats/stage_files.h"
 #include "pipeline/import/plausible_size.h"
 #include "pipeline/import/structure_list.h"
 #include "pipeline/texture/tissue_table.h"
@@ -54,6 +55,20 @@ TissueChoice tissue_of(const LabelTableEntry& entry) {
     return tissue_for_label(entry.tissue_class);
 }
 
+// A .labels of this program's own import, as it stands.
+Result<ImportedLabels> from_stage_file(const std::string& path) {
+    auto file = load_label_file(path);
+    if (!file) return file.error();
+    if (file->frame != "ct")
+        return Error{"labels are in the frame '" + file->frame + "'", path,
+                     "expected labels of the patient, in the frame 'ct', as import writes them"};
+    ImportedLabels result;
+    result.labels = std::move(file->volume);
+    if (!file->reports.empty()) result.report = file->reports.front();
+    result.report.warnings.clear();  // they were told when the file was made
+    return result;
+}
+
 }  // namespace
 
 Box3 body_box(const LabelVolume& labels) {
@@ -85,6 +100,7 @@ Result<ImportedLabels> import_label_map(const std::string& path,
     std::error_code code;
     if (!std::filesystem::exists(path, code))
         return Error{"no such file or folder", path, "check the path"};
+    if (path.ends_with(".labels")) return from_stage_file(path);
     tell(progress, 0, "reading labels");
     auto list = is_mask_folder(path) ? read_mask_folder(path, options.table)
                                      : read_label_file(path, options.table);

@@ -25,7 +25,8 @@ struct ImportedLabels {
 inline constexpr int kImportVersion = 1;
 
 // path  NIfTI, NRRD, .seg.nrrd, MetaImage; a folder of one binary mask a structure (file name =
-//       structure); or a folder with a DICOM series whose pixels are label values.
+//       structure); a folder with a DICOM series whose pixels are label values; or a .labels that
+//       import wrote, taken as it stands.
 // The palette holds the labels that occur, by rising value after [0], the outside. Label::tissue is
 // what the built-in tissue table says of the name, or of the table's tissue_class where the name is
 // not known. Where masks or segments overlap the smaller structure wins: a vessel stays in its

@@ -6,6 +6,8 @@
 #include "formats/stage_files.h"
 #include "pipeline/cook/pack_case.h"
 #include "pipeline/import/surface_file.h"
+#include "pipeline/parallel.h"
+#include "pipeline/texture/bake_structure.h"
 #include "pipeline/texture/tissue_table.h"
 #include "pipeline/verbs/build_facts.h"
 #include "pipeline/verbs/command_line.h"
@@ -17,17 +19,21 @@ namespace {
 struct PackFiles {
     std::string labels, textures, mannequin, skin, registration, out, name;
     std::vector<std::string> exercises;
+    bool structure = true;
+    std::uint64_t seed = 1;
 };
 
 // A .surface of ours, or any surface file.
 Result<Surface> load_any_surface(const std::string& path) {
-    if (!path.ends_with(".surface")) return import_surface(path);
+    const auto bytes = sonocase::read_file(path);
+    if (!bytes) return bytes.error();
+    if (container_kind(*bytes) != "SURF") return import_surface(path);
     auto file = load_surface_file(path);
     if (!file) return file.error();
     return std::move(file->surface);
 }
 
-Result<PackResult> pack(const PackFiles& files) {
+Result<PackResult> pack(const PackFiles& files, const Progress& progress) {
     auto labels = load_label_file(files.labels);
     if (!labels) return labels.error();
     if (labels->frame != "mannequin")
@@ -62,6 +68,14 @@ Result<PackResult> pack(const PackFiles& files) {
     if (tissues.empty()) {
         const auto built_in = built_in_tissues();
         tissues.assign(built_in.begin(), built_in.end());
+    }
+    if (files.structure && labels->echo_offset.table.empty()) {
+        BakeStructureOptions options;
+        options.seed = files.seed;
+        auto baked = bake_structure(labels->volume, tissues, options, progress);
+        if (!baked) return baked.error();
+        labels->echo_offset = std::move(baked->echo_offset);
+        labels->reports.push_back(baked->report);
     }
     auto packed =
         pack_case({files.name, "", exercises, has_skin ? &skin : nullptr,
@@ -103,13 +117,21 @@ int verb_pack(int argc, char** argv) {
     app.add_option("--exercise", files.exercises, "Exercise to put in; may be repeated")
         ->type_name("FILE.toml")
         ->take_all();
+    app.add_flag("--structure,!--no-structure", files.structure,
+                 "Bake structure inside organs where the labels carry none; on by default");
+    app.add_option("--seed", files.seed, "Of that structure")->capture_default_str();
     app.add_option("--name", files.name, "Of the case")->default_val("case");
     app.add_option("-o,--output", files.out, "Bundle to write")
         ->type_name("OUT.sonocase")
         ->required();
     add_common_options(app, common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
-    auto packed = pack(files);
+    const ThreadLimit limit(common.threads);
+    Result<PackResult> packed = Error{};
+    {
+        ProgressBar bar(common);
+        packed = pack(files, bar.progress());
+    }
     if (!packed) return fail("pack", packed.error());
     print_warnings("pack", packed->report);
     if (auto status = save_bundle(packed->bundle, files.out); !status)

@@ -54,8 +54,9 @@ TEST(StageCache, EveryTruncationAndEveryChangedByteCountsAsAbsent) {
         folder.write(name, changed);
         const auto found = cache.find("warp", kKey, nullptr);
         // A digit of the seconds may change unnoticed: they are no part of a result.
-        if (found)
+        if (found) {
             EXPECT_EQ(digest_of(found->bytes), entry_of("some bytes of a stage").digest) << at;
+        }
     }
     folder.write(name, whole + "x");
     EXPECT_FALSE(cache.find("warp", kKey, nullptr).has_value());

@@ -1,9 +1,9 @@
 // The program sonocase as a user meets it: exit statuses, one-line errors, nothing half-written.
 #include <gtest/gtest.h>
 
+#include <sys/wait.h>
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <sys/wait.h>
 
 #include "support/scratch_folder.h"
 #include "support/temporary_folder.h"
@@ -11,8 +11,8 @@
 namespace {
 
 using sonocase::testing::CommandResult;
-using sonocase::testing::TemporaryFolder;
 using sonocase::testing::read_text;
+using sonocase::testing::TemporaryFolder;
 using sonocase::testing::write_text;
 
 CommandResult sonocase_run(const std::string& arguments, const TemporaryFolder& folder) {
@@ -37,14 +37,15 @@ std::vector<std::string> left_in(const TemporaryFolder& folder) {
 
 const char* const kTinyRecipe =
     "name = \"tiny\"\npreset = \"draft\"\nexercises = []\n[analytic]\nvoxel_mm = 8\nslice_mm = 8\n"
-    "points = 600\nknown_map = true\n[resample]\nvoxel_mm = 6\n[texture]\nedge = 8\nspeckle_edge = 8\n";
+    "points = 600\nknown_map = true\n[resample]\nvoxel_mm = 6\n[texture]\nedge = 8\nspeckle_edge = "
+    "8\n";
 
 TEST(CommandLine, HelpListsVerbsAndVersionSaysHowItWasBuilt) {
     const TemporaryFolder folder;
     const CommandResult help = sonocase_run("--help", folder);
     EXPECT_EQ(help.status, 0);
-    for (const char* verb : {"build", "import", "surface", "align", "warp", "resample", "smooth", "texture",
-                             "pack", "register", "map", "inspect", "validate", "export"})
+    for (const char* verb : {"build", "import", "surface", "align", "warp", "resample", "smooth",
+                             "texture", "pack", "register", "map", "inspect", "validate", "export"})
         EXPECT_NE(help.out.find(std::string("\n  ") + verb), std::string::npos) << verb;
     EXPECT_EQ(help.error, "");
     const CommandResult version = sonocase_run("--version", folder);
@@ -70,8 +71,9 @@ TEST(CommandLine, WrongUsageIsStatusTwoWithTheNearestVerb) {
 
 TEST(CommandLine, EveryVerbHasHelp) {
     const TemporaryFolder folder;
-    for (const char* verb : {"build", "import", "surface", "align", "warp", "resample", "smooth", "texture",
-                             "pack", "register", "map", "inspect", "validate", "export"}) {
+    for (const char* verb :
+         {"build", "import", "surface", "align", "warp", "resample", "smooth", "texture", "pack",
+          "register", "map", "inspect", "validate", "export"}) {
         const CommandResult help = sonocase_run(std::string(verb) + " --help", folder);
         EXPECT_EQ(help.status, 0) << verb;
         EXPECT_NE(help.out.find("Usage: sonocase"), std::string::npos) << verb << help.out;
@@ -132,9 +134,11 @@ TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {
     EXPECT_EQ(stages, (std::vector<std::string>{"import", "surface", "warp", "resample", "texture",
                                                 "structure", "pack"}));
 
-    // Moved away from its report the bundle says that the seconds are not recorded, and stays valid.
+    // Moved away from its report the bundle says that the seconds are not recorded, and stays
+    // valid.
     std::filesystem::rename(folder / "a/tiny.sonocase", folder / "moved.sonocase");
-    const auto moved = nlohmann::json::parse(sonocase_run("inspect moved.sonocase --json", folder).out);
+    const auto moved =
+        nlohmann::json::parse(sonocase_run("inspect moved.sonocase --json", folder).out);
     EXPECT_TRUE(moved["stages"][0]["seconds"].is_null());
     EXPECT_EQ(sonocase_run("validate moved.sonocase", folder).status, 0);
     EXPECT_EQ(sonocase_run("inspect moved.sonocase", folder).status, 0);
@@ -149,26 +153,45 @@ TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {
     const CommandResult damaged = sonocase_run("validate bad.sonocase", folder);
     EXPECT_EQ(damaged.status, 1);
     EXPECT_EQ(lines(damaged.error), 1) << damaged.error;
-}
-
-// The stages one by one, files in and files out, come to the bundle that build makes.
+}  // The stages one by one, files in and files out, come to what build makes of the same inputs.
 TEST(CommandLine, StagesAloneMakeTheCaseThatBuildMakes) {
     const TemporaryFolder folder;
-    write_text(folder / "case.toml",
-               std::string(kTinyRecipe) + "[structure]\nparenchyma = true\n[warp]\nresidual = true\n");
-    ASSERT_EQ(sonocase_run("build case.toml -o whole.sonocase", folder).status, 0);
-    ASSERT_EQ(sonocase_run("export whole.sonocase -o whole", folder).status, 0);
     const auto ok = [&](const std::string& arguments) {
         const CommandResult result = sonocase_run(arguments, folder);
         EXPECT_EQ(result.status, 0) << arguments << "\n" << result.error;
         return result.status == 0;
     };
-    ASSERT_TRUE(ok("import whole/labels.seg.nrrd -o ct.labels --report import.json"));
-    ASSERT_TRUE(ok("surface ct.labels -o skin.ply"));
-    ASSERT_TRUE(ok("register --labels ct.labels --surface whole/mannequin.ply --seed 1 -o reg.json"));
+    write_text(folder / "case.toml", kTinyRecipe);
+    ASSERT_TRUE(ok("build case.toml -o source.sonocase"));
+    ASSERT_TRUE(ok("export source.sonocase -o in"));
+    write_text(folder / "files.toml",
+               "preset = \"draft\"\n[inputs]\nlabels = \"in/labels.seg.nrrd\"\n"
+               "surface = \"in/mannequin.ply\"\n[resample]\nvoxel_mm = 6\n[texture]\nedge = 8\n"
+               "speckle_edge = 8\n");
+    ASSERT_TRUE(ok("build files.toml -o whole.sonocase"));
+
+    const std::string fit = " --labels ct.labels --surface in/mannequin.ply ";
+    ASSERT_TRUE(ok("import in/labels.seg.nrrd -o ct.labels --report import.json"));
+    ASSERT_TRUE(ok("surface --labels ct.labels -o skin.surface"));
+    ASSERT_TRUE(ok("register" + fit + "-o reg.json"));
     ASSERT_TRUE(ok("resample ct.labels --registration reg.json --voxel-mm 6 -o cooked.labels"));
-    ASSERT_TRUE(ok("texture cooked.labels -o bank.textures --labels-out structured.labels") ||
-                true);  // its own test covers its options
+    ASSERT_TRUE(ok("texture --edge 8 --speckle-edge 8 -o bank.textures"));
+    ASSERT_TRUE(
+        ok("pack --labels cooked.labels --textures bank.textures --surface in/mannequin.ply "
+           "--skin skin.surface --registration reg.json --name x -o parts.sonocase"));
+    ASSERT_TRUE(ok("validate parts.sonocase whole.sonocase"));
+    ASSERT_TRUE(ok("export parts.sonocase -o parts"));
+    ASSERT_TRUE(ok("export whole.sonocase -o whole"));
+    for (const char* name : {"labels.seg.nrrd", "boundary.nrrd", "echo-offset.nrrd"})
+        EXPECT_EQ(read_text(folder / (std::string("parts/") + name)),
+                  read_text(folder / (std::string("whole/") + name)))
+            << name;
+    // No seconds in the files between: made again they are the same.
+    const std::string first = read_text(folder / "cooked.labels");
+    ASSERT_TRUE(
+        ok("resample ct.labels --registration reg.json --voxel-mm 6 -o cooked.labels"
+           " --threads 1"));
+    EXPECT_TRUE(first == read_text(folder / "cooked.labels"));
 }
 
 }  // namespace
