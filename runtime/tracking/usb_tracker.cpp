@@ -5,6 +5,11 @@
 #include <utility>
 
 namespace sonocase::runtime {
+namespace {
+
+constexpr const char* kUnplugged = "The tracker was unplugged; plug it in again.";
+
+}  // namespace
 
 UsbTracker::UsbTracker(std::unique_ptr<UsbDriver> driver,
                        SessionClock clock,
@@ -60,8 +65,10 @@ void UsbTracker::run() {
         if (!pipe) {
             const Error& error = pipe.error();
             if (found == 0 && unplugged_) {
+                // Said again: a look between the unplug and its announcement may have said else.
+                say(TrackerPhase::searching, kUnplugged);
                 pause(options_.retry_s);
-                continue;  // what was said at the unplug stays
+                continue;
             }
             // Found and unusable is worse than not there; both come right when the user acts.
             say(found > 0 ? TrackerPhase::failed : TrackerPhase::searching,
@@ -140,7 +147,7 @@ void UsbTracker::stream(UsbPipe& pipe) {
         unplugged_ = outcome == UsbOutcome::gone;
         say(TrackerPhase::searching,
             outcome == UsbOutcome::gone
-                ? "The tracker was unplugged; plug it in again."
+                ? kUnplugged
                 : "The connection to the tracker broke; it is being opened again.");
         return;
     }
