@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "runtime/imaging/effects.h"
+#include "runtime/imaging/governor.h"
 #include "runtime/imaging/paper_fast.h"
 #include "runtime/imaging/physical_fast.h"
 #include "runtime/imaging/simd_target.h"
@@ -54,23 +55,30 @@ Status check_options(const Exercise& exercise, const RenderOptions& o) {
 }  // namespace
 
 struct Renderer::Impl {
+    // One accuracy: its beams and the buffers that go with them.
+    struct Level {
+        ScanGeometry geometry;
+        std::vector<float> row_gain, row_gain_db;  // # samples
+        physical::Tables tables;
+        std::unique_ptr<PaperFast> paper;
+        std::unique_ptr<PhysicalFast> physical;
+    };
+    std::vector<std::unique_ptr<Level>> levels;  // finest first; one without a frame budget
+    Governor governor;
+    Level& now() { return *levels[static_cast<std::size_t>(governor.level())]; }
+
     const CaseBundle& bundle;
     Exercise exercise;
     RenderOptions options;
-    ScanGeometry geometry;
     WorkerPool workers;
     EffectChoice effects;
-    std::vector<float> row_gain, row_gain_db;  // # samples
     std::vector<EffectCost> costs;
 
     PaperScene paper_scene;
-    std::unique_ptr<PaperFast> paper;
 
     PhysicalScene physical_scene;
-    physical::Tables tables;
     PhysicalNoise noise;
     BreathingField breathing;
-    std::unique_ptr<PhysicalFast> physical;
 
     Impl(const CaseBundle& b, const Exercise& e, const RenderOptions& o)
         : bundle(b), exercise(e), options(o), workers(o.threads) {}
@@ -121,26 +129,37 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
     const bool is_paper = options.model == ImageModel::paper;
     const int lines = options.scanlines > 0 ? options.scanlines : is_paper ? 512 : 192;
     const int samples = options.samples > 0 ? options.samples : 512;
-    m.geometry =
-        make_scan_geometry(exercise.probe, lines, samples, options.width_px, options.height_px);
-    m.row_gain.assign(static_cast<std::size_t>(samples), 1.0f);
-    m.row_gain_db.assign(static_cast<std::size_t>(samples), 0.0f);
     if (is_paper) {
         Result<PaperScene> scene = make_paper_scene(bundle);
         if (!scene) return scene.error();
         m.paper_scene = std::move(*scene);
-        m.paper = std::make_unique<PaperFast>(m.paper_scene, m.geometry, options.seed, m.workers);
     } else {
         Result<PhysicalScene> scene = make_physical_scene(bundle, exercise.targets);
         if (!scene) return scene.error();
         m.physical_scene = std::move(*scene);
-        m.tables = physical::make_tables(exercise.probe, m.geometry);
         m.noise = make_physical_noise(options.seed, lines + 128);
         if (exercise.breathing.amplitude_mm != 0) m.breathing = BreathingField(bundle);
-        if (options.kind == RendererKind::fast) {
-            m.physical = std::make_unique<PhysicalFast>(m.physical_scene, m.geometry, m.tables,
-                                                        m.noise, m.workers);
+    }
+    const bool governed = options.frame_budget_ms > 0 && options.kind == RendererKind::fast;
+    m.governor = Governor(governed ? options.frame_budget_ms : 0);
+    for (const AccuracyLevel& accuracy : kAccuracyLevels) {
+        auto level = std::make_unique<Impl::Level>();
+        const int l = std::max(1, static_cast<int>(lines * accuracy.lines)),
+                  k = std::max(1, static_cast<int>(samples * accuracy.samples));
+        level->geometry =
+            make_scan_geometry(exercise.probe, l, k, options.width_px, options.height_px);
+        level->row_gain.assign(static_cast<std::size_t>(k), 1.0f);
+        level->row_gain_db.assign(static_cast<std::size_t>(k), 0.0f);
+        level->tables = physical::make_tables(exercise.probe, level->geometry);
+        if (is_paper) {
+            level->paper = std::make_unique<PaperFast>(m.paper_scene, level->geometry, options.seed,
+                                                       m.workers);
+        } else if (options.kind == RendererKind::fast) {
+            level->physical = std::make_unique<PhysicalFast>(m.physical_scene, level->geometry,
+                                                             level->tables, m.noise, m.workers);
         }
+        m.levels.push_back(std::move(level));
+        if (!governed) break;
     }
     for (const EffectEntry& e : effect_table(options.model))
         m.costs.push_back({e.name, 0, false, ""});
@@ -148,6 +167,8 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
 }
 
 void Renderer::Impl::set_gain(const ImageSettings& s) {
+    const ScanGeometry& geometry = now().geometry;
+    std::vector<float>& row_gain_db = now().row_gain_db;
     for (int k = 0; k < geometry.samples; ++k) {
         const double at = (k + 0.5) / geometry.samples * 7;  // eight sliders, linear in between
         const auto i = static_cast<std::size_t>(at);
@@ -161,7 +182,7 @@ void Renderer::Impl::set_gain(const ImageSettings& s) {
 }
 
 void Renderer::Impl::flip(std::span<std::uint8_t> pixels) const {
-    const auto width = static_cast<std::size_t>(geometry.width_px);
+    const auto width = static_cast<std::size_t>(options.width_px);
     for (std::size_t row = 0; row < pixels.size(); row += width) {
         const auto line = pixels.subspan(row, width);
         std::reverse(line.begin(), line.end());
@@ -171,6 +192,10 @@ void Renderer::Impl::flip(std::span<std::uint8_t> pixels) const {
 FrameStatus Renderer::Impl::render_paper(const FrameInput& input,
                                          const NeedleShape* needle,
                                          std::span<std::uint8_t> pixels) {
+    Level& at = now();
+    const ScanGeometry& geometry = at.geometry;
+    std::vector<float>&row_gain = at.row_gain, &row_gain_db = at.row_gain_db;
+    PaperFast* paper = at.paper.get();
     for (std::size_t k = 0; k < row_gain.size(); ++k) {
         row_gain[k] =
             row_gain_db[k] == 0
@@ -213,6 +238,11 @@ FrameStatus Renderer::Impl::render_paper(const FrameInput& input,
 FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
                                             const NeedleShape* needle,
                                             std::span<std::uint8_t> pixels) {
+    Level& at = now();
+    const ScanGeometry& geometry = at.geometry;
+    const physical::Tables& tables = at.tables;
+    const std::vector<float>& row_gain_db = at.row_gain_db;
+    PhysicalFast* physical = at.physical.get();
     PhysicalFrame frame;
     frame.volume_from_probe = input.mannequin_from_probe;
     frame.needle = needle;
@@ -286,16 +316,28 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
             needle_shape(model, probe_from_mannequin * tip, normalized(probe_from_mannequin * d));
         if (needle.radius_mm > 0 && std::isfinite(needle.slab_mm)) shown = &needle;
     }
-    return m.options.model == ImageModel::paper ? m.render_paper(input, shown, pixels)
-                                                : m.render_physical(input, shown, pixels);
+    const auto start = std::chrono::steady_clock::now();
+    const FrameStatus status = m.options.model == ImageModel::paper
+                                   ? m.render_paper(input, shown, pixels)
+                                   : m.render_physical(input, shown, pixels);
+    m.governor.frame_took(
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+            .count());
+    return status;
 }
 
 std::span<const EffectCost> Renderer::costs() const {
     return impl_->costs;
 }
 
+Renderer::Accuracy Renderer::accuracy() const {
+    const ScanGeometry& g = impl_->now().geometry;
+    return {impl_->governor.level(), static_cast<int>(impl_->levels.size()), g.scanlines,
+            g.samples};
+}
+
 Renderer::Layout Renderer::layout() const {
-    const ScanGeometry& g = impl_->geometry;
+    const ScanGeometry& g = impl_->levels.front()->geometry;
     return {g.mm_per_px, g.origin_x_px, g.origin_y_px};
 }
 

@@ -39,6 +39,9 @@ struct RenderOptions {
     // Sampling; 0 takes the model's default (paper 512 x 512, physical 192 x 512).
     int scanlines = 0;
     int samples = 0;
+    // Asked-for time of a frame; 0: none, full accuracy (recordings). See
+    // runtime/imaging/governor.h.
+    double frame_budget_ms = 0;
 };
 
 // A straight needle as drawn: after calibration and bend constraint.
@@ -84,6 +87,13 @@ class Renderer {
 
     // Of the last frame; # effects of the model, in order of execution.
     std::span<const EffectCost> costs() const;
+
+    // What the governor gives up at present: level 0 is full accuracy. For the screen.
+    struct Accuracy {
+        int level = 0, levels = 1;
+        int scanlines = 0, samples = 0;
+    };
+    Accuracy accuracy() const;
 
     // Millimetres a pixel and the pixel of the probe face's middle, for scales and measuring.
     struct Layout {

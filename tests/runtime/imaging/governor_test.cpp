@@ -1,0 +1,56 @@
+#include "runtime/imaging/governor.h"
+
+#include <gtest/gtest.h>
+
+#include "imaging_support.h"
+
+namespace sonocase::runtime {
+namespace {
+
+double took(int level, double full_ms) {
+    const AccuracyLevel& a = kAccuracyLevels[static_cast<std::size_t>(level)];
+    return full_ms * a.lines * a.samples;
+}
+
+TEST(Governor, SettlesOnTheFinestLevelThatFits) {
+    // Work of the levels is 1, 0.73, 0.50 and 0.25 of the full frame.
+    const double budget = 10;
+    for (const auto& [full_ms, expected] :
+         {std::pair{5.0, 0}, {13.0, 1}, {18.0, 2}, {30.0, 3}, {100.0, 3}}) {
+        Governor governor(budget);
+        for (int i = 0; i < 400; ++i) governor.frame_took(took(governor.level(), full_ms));
+        EXPECT_EQ(governor.level(), expected) << full_ms;
+    }
+}
+
+TEST(Governor, ComesBackWhenTheSceneIsEasyAndIgnoresOneLateFrame) {
+    Governor governor(10);
+    for (int i = 0; i < 200; ++i) governor.frame_took(took(governor.level(), 30));
+    EXPECT_EQ(governor.level(), 3);
+    for (int i = 0; i < 300; ++i) governor.frame_took(took(governor.level(), 5));
+    EXPECT_EQ(governor.level(), 0);
+    governor.frame_took(40);
+    EXPECT_EQ(governor.level(), 0);
+}
+
+TEST(Governor, OffByDefaultAndTheFirstLevelIsTheFullPicture) {
+    Governor off;
+    for (int i = 0; i < 100; ++i) off.frame_took(1e6);
+    EXPECT_EQ(off.level(), 0);
+    RenderOptions options;
+    options.width_px = options.height_px = 128;
+    const auto plain = draw(phantom_exercise(), options, needle_input());
+    options.frame_budget_ms = 1e6;
+    EXPECT_TRUE(draw(phantom_exercise(), options, needle_input()) == plain);
+    options.frame_budget_ms = 1e-6;  // cannot be met: ends at the coarsest, and says so
+    auto renderer = Renderer::create(phantom(), phantom_exercise(), options);
+    ASSERT_TRUE(renderer.has_value());
+    std::vector<std::uint8_t> pixels(128 * 128);
+    for (int i = 0; i < 60; ++i) renderer->render(needle_input(), pixels);
+    EXPECT_EQ(renderer->accuracy().level, 3);
+    EXPECT_EQ(renderer->accuracy().scanlines, 96);
+    EXPECT_LT(compare(pixels, plain).mean, 25);  // the same scene
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
