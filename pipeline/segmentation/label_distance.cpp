@@ -75,6 +75,46 @@ void smooth_rows(
     }
 }
 
+// All three axes; an empty kernel leaves its axis alone.
+void smooth_box(const VoxelBox& box,
+                const std::vector<float>* kernels,
+                std::vector<float>* values,
+                std::vector<float>* other) {
+    other->resize(values->size());
+    const std::size_t nx = static_cast<std::size_t>(box.size.x);
+    const std::size_t ny = static_cast<std::size_t>(box.size.y);
+    const std::size_t nz = static_cast<std::size_t>(box.size.z);
+    if (!kernels[0].empty()) {
+        smooth_rows(values->data(), box.size.x, ny * nz, kernels[0], other->data());
+        values->swap(*other);
+    }
+    if (!kernels[1].empty()) {
+        for (std::size_t k = 0; k < nz; ++k) {
+            const std::size_t at = k * nx * ny;
+            smooth_lines(values->data() + at, nx, box.size.y, nx, kernels[1], other->data() + at);
+        }
+        values->swap(*other);
+    }
+    if (!kernels[2].empty()) {
+        for (std::size_t j = 0; j < ny; ++j) {
+            const std::size_t at = j * nx;
+            smooth_lines(values->data() + at, nx, box.size.z, nx * ny, kernels[2],
+                         other->data() + at);
+        }
+        values->swap(*other);
+    }
+}
+
+// A Gaussian whose value at two standard deviations is 1: one mark spreads fully over that reach.
+std::vector<float> spreading_kernel(double sigma) {
+    const int reach = std::max(1, static_cast<int>(std::ceil(3 * sigma)));
+    std::vector<float> kernel;
+    for (int i = -reach; i <= reach; ++i) {
+        kernel.push_back(static_cast<float>(std::exp(0.7 - 0.5 * i * i / (sigma * sigma))));
+    }
+    return kernel;
+}
+
 // Distance field of one outline alone, on a window of its slice.
 struct OutlineField {
     VoxelBox window;
@@ -168,12 +208,16 @@ LabelDistance::LabelDistance(const LabelVolume& labels, const LabelDistanceOptio
         limit_mm_ = (4 + 2 * options.sigma_vx) * pixel;
     }
     boxes_ = label_boxes(labels_);
-    const double sigma_mm = options.sigma_vx * std::sqrt(h.x * h.y);
     for (int a = 0; a < 3; ++a) {
-        double sigma = sigma_mm / nodes_.spacing_mm[a];
-        if (a == 2 && factor_ > 1 && options.sigma_slices > 0)
-            sigma = options.sigma_slices * factor_;
-        kernel_[a] = nodes_.size[a] > 1 ? smoothing_kernel(sigma) : std::vector<float>{};
+        if (nodes_.size[a] < 2) continue;
+        const double per_vx = std::sqrt(h.x * h.y) / nodes_.spacing_mm[a];
+        const bool across = a == 2 && factor_ > 1;
+        double sigma = options.sigma_vx * per_vx;
+        if (across && options.sigma_slices > 0) sigma = options.sigma_slices * factor_;
+        wide_.axis[a] = smoothing_kernel(sigma);
+        fine_.axis[a] = smoothing_kernel(std::min(options.detail_vx * per_vx, sigma));
+        // What is thin in one slice is thin half-way to the next.
+        spread_.axis[a] = spreading_kernel(across ? 0.5 * factor_ : std::max(0.8, 0.7 * sigma));
     }
 }
 
@@ -284,7 +328,7 @@ VoxelBox LabelDistance::distance(std::uint8_t label, std::vector<float>* phi) co
     for (int a = 0; a < 3; ++a) {
         const double reach =
             std::min(limit_mm_, 6 * h[a]) / h[a] +
-            static_cast<double>(kernel_[a].size() / 2) * nodes_.spacing_mm[a] / h[a];
+            static_cast<double>(wide_.axis[a].size() / 2) * nodes_.spacing_mm[a] / h[a];
         pad[a] = static_cast<int>(std::ceil(reach));
     }
     if (factor_ > 1) pad.z = 2;
@@ -296,29 +340,52 @@ VoxelBox LabelDistance::distance(std::uint8_t label, std::vector<float>* phi) co
     } else {
         signed_distance(labels_, label, box, limit_mm_, {true, true, true}, phi);
     }
-    std::vector<float> other(phi->size());
-    const std::size_t nx = static_cast<std::size_t>(box.size.x),
-                      ny = static_cast<std::size_t>(box.size.y),
-                      nz = static_cast<std::size_t>(box.size.z);
-    if (!kernel_[0].empty()) {
-        smooth_rows(phi->data(), box.size.x, ny * nz, kernel_[0], other.data());
-        phi->swap(other);
-    }
-    if (!kernel_[1].empty()) {
-        for (std::size_t k = 0; k < nz; ++k) {
-            smooth_lines(phi->data() + k * nx * ny, nx, box.size.y, nx, kernel_[1],
-                         other.data() + k * nx * ny);
-        }
-        phi->swap(other);
-    }
-    if (!kernel_[2].empty()) {
-        for (std::size_t j = 0; j < ny; ++j) {
-            smooth_lines(phi->data() + j * nx, nx, box.size.z, nx * ny, kernel_[2],
-                         other.data() + j * nx);
-        }
-        phi->swap(other);
+    if (wide_.axis[0].empty() && wide_.axis[1].empty()) return box;
+    std::vector<float> smooth = *phi, other;
+    smooth_box(box, wide_.axis, &smooth, &other);
+    if (options_.detail_vx < options_.sigma_vx) {
+        smooth_box(box, fine_.axis, phi, &other);
+        keep_detail(label, box, smooth, phi);
+    } else {
+        phi->swap(smooth);
     }
     return box;
+}
+
+void LabelDistance::keep_detail(std::uint8_t label,
+                                const VoxelBox& box,
+                                const std::vector<float>& smooth,
+                                std::vector<float>* phi) const {
+    const float tolerance = static_cast<float>(options_.tolerance_vx *
+                                               std::max(nodes_.spacing_mm.x, nodes_.spacing_mm.y));
+    std::vector<float> across(phi->size(), 0.0f), other;
+    bool any = false;
+    for (int k = 0; k < box.size.z; ++k) {
+        if ((box.first.z + k) % factor_ != 0) continue;  // only slices are known
+        for (int j = 0; j < box.size.y; ++j) {
+            const std::uint8_t* row =
+                labels_.voxels.data() +
+                labels_.grid.index(box.first.x, box.first.y + j, (box.first.z + k) / factor_);
+            const std::size_t at = box.index(0, j, k);
+            for (std::size_t i = 0; i < static_cast<std::size_t>(box.size.x); ++i) {
+                const float d = row[i] == label ? smooth[at + i] : -smooth[at + i];
+                if (d > tolerance) {
+                    across[at + i] = 1;
+                    any = true;
+                }
+            }
+        }
+    }
+    if (!any) {
+        *phi = smooth;
+        return;
+    }
+    smooth_box(box, spread_.axis, &across, &other);
+    float* fine = phi->data();
+    for (std::size_t i = 0; i < phi->size(); ++i) {
+        const float w = std::min(1.0f, across[i]);
+        fine[i] = smooth[i] + w * (fine[i] - smooth[i]);
+    }
 }
 
 }  // namespace sonocase::pipeline

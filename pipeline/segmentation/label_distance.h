@@ -5,7 +5,9 @@
 // Nearly cubic voxels are measured in 3-D. Then one separable smoothing by a kernel without second
 // moment, K = a G - (a - 1) G * G with a = 2 + 1 / (3 sigma^2): planes stay planes, and a sphere of
 // radius R moves by O(sigma^4 / R^3) instead of O(sigma^2 / R) (the 1/3 answers for the cubic
-// B-spline that the nodes are later read with).
+// B-spline that the nodes are later read with). It is done at two widths: sigma where the map's own
+// voxels stay on their side of the surface (within a tolerance: steps and noise), detail where
+// they would not (thin structures, edges, vessels), with a smooth passage between them.
 #pragma once
 
 #include <vector>
@@ -17,7 +19,9 @@
 namespace sonocase::pipeline {
 
 struct LabelDistanceOptions {
-    double sigma_vx = 1;      // smoothing, in-plane voxels of the map; 0: none
+    double sigma_vx = 1.5;       // smoothing, in-plane voxels of the map; 0: none
+    double detail_vx = 0.5;      // smoothing where sigma_vx would carry voxels across the surface
+    double tolerance_vx = 0.25;  // how far across they may come to lie
     double sigma_slices = 0;  // smoothing along thick slices, in slices; 0: as in the plane, in mm
     double thick_ratio =
         1.5;  // slice spacing over pixel from which slices are interpolated by shape
@@ -50,7 +54,16 @@ class LabelDistance {
     double limit_mm_ = 0;
     std::vector<VoxelBox> boxes_;
     SliceGroups groups_;
-    std::vector<float> kernel_[3];
+    // Where the surface of `smooth` leaves voxels on the wrong side, `phi` is taken instead.
+    void keep_detail(std::uint8_t label,
+                     const VoxelBox& box,
+                     const std::vector<float>& smooth,
+                     std::vector<float>* phi) const;
+
+    struct Kernels {
+        std::vector<float> axis[3];
+    };
+    Kernels wide_, fine_, spread_;
 };
 
 // The same voxels with the axis of the largest spacing last.

@@ -31,6 +31,7 @@ FieldRead through_field(const ResampleInput& input,
     };
     LabelFieldOptions field_options;
     field_options.distance = {.sigma_vx = options.sigma_vx,
+                              .detail_vx = options.detail_vx,
                               .sigma_slices = options.sigma_slices,
                               .follow_shift = options.follow_shift};
     LabelField field(input.ct_labels, field_options, progress);

@@ -38,7 +38,8 @@ struct ResampleOptions {
     double voxel_mm = 1;           // edge of the cubic voxels, [0.2, 10]
     double margin_mm = 4;          // air kept round the body
     std::string method = "shape";  // shape | nearest | paper
-    double sigma_vx = 1;           // shape: smoothing, voxels of the map in the plane, [0, 4]
+    double sigma_vx = 1.5;         // shape: smoothing, voxels of the map in the plane, [0, 4]
+    double detail_vx = 0.5;        // shape: smoothing of what sigma_vx would wipe out, [0, 4]
     double sigma_slices = 0;       // shape: along thick slices, slices; 0: as in the plane, in mm
     int volume_iterations = 8;     // shape: Newton steps of the volumes, [0, 50]; 0: not kept
     bool follow_shift = true;      // shape: oblique vessels through thick slices

@@ -57,7 +57,8 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
     LabelPriceReport prices;
     for (int i = 0; i < std::max(1, options.iterations); ++i) {
         LabelFieldOptions field_options;
-        field_options.distance = {.sigma_vx = options.sigma_vx, .shape_slices = false};
+        field_options.distance = {
+            .sigma_vx = options.sigma_vx, .detail_vx = options.detail_vx, .shape_slices = false};
         LabelField field(result.volume, field_options, progress);
         prices = set_label_prices(&field, [](Point3) { return 1.0; },
                                   {.iterations = options.volume_iterations});

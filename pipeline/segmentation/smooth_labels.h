@@ -24,6 +24,7 @@ namespace sonocase::pipeline {
 struct SmoothOptions {
     std::string method = "joint";  // joint | level_set
     double sigma_vx = 1.5;         // joint: voxels, [0, 4]
+    double detail_vx = 0.5;        // joint: smoothing of what sigma_vx would wipe out, [0, 4]
     int iterations = 1;            // joint: times over, [1, 20]
     int volume_iterations = 8;     // joint: Newton steps of the volumes, [0, 50]; 0: not kept
     double record_band_vx = 1.5;   // joint: boundary records up to this distance, [0, 2.6]; 0: none
