@@ -58,6 +58,8 @@ const std::vector<OptionKey>& table() {
          [](Options& o) -> OptionSlot { return &o.resample.method; }, "shape|nearest|paper"},
         {"resample", "sigma_vx", 0, 4, "voxels of the map", "smoothing of the surfaces",
          [](Options& o) -> OptionSlot { return &o.resample.sigma_vx; }},
+        {"resample", "detail_vx", 0, 4, "voxels of the map", "smoothing of what sigma_vx wipes out",
+         [](Options& o) -> OptionSlot { return &o.resample.detail_vx; }},
         {"resample", "sigma_slices", 0, 2, "slices", "smoothing along thick slices; 0: sigma_vx",
          [](Options& o) -> OptionSlot { return &o.resample.sigma_slices; }},
         {"resample", "volume_iterations", 0, 50, "", "Newton steps that keep volumes; 0: not kept",

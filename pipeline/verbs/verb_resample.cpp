@@ -40,6 +40,10 @@ int verb_resample(int argc, char** argv) {
         ->check(CLI::Range(0.0, 4.0))
         ->capture_default_str()
         ->group(shape);
+    app.add_option("--detail-vx", options.detail_vx, "Smoothing of what that would wipe out")
+        ->check(CLI::Range(0.0, 4.0))
+        ->capture_default_str()
+        ->group(shape);
     app.add_option("--sigma-slices", options.sigma_slices,
                    "Smoothing along thick slices, slices; 0: as in the plane")
         ->check(CLI::Range(0.0, 2.0))

@@ -30,6 +30,10 @@ int verb_smooth(int argc, char** argv) {
         ->check(CLI::Range(0.0, 4.0))
         ->capture_default_str()
         ->group(joint);
+    app.add_option("--detail-vx", options.detail_vx, "Smoothing of what that would wipe out")
+        ->check(CLI::Range(0.0, 4.0))
+        ->capture_default_str()
+        ->group(joint);
     app.add_option("--passes", options.iterations, "Times over")
         ->check(CLI::Range(1, 20))
         ->capture_default_str()

@@ -1,0 +1,82 @@
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+
+#include "pipeline/import/label_map.h"
+#include "pipeline/segmentation/export_level_sets.h"
+#include "pipeline/segmentation/export_seg_nrrd.h"
+#include "pipeline/segmentation/segmentation_pictures.h"
+#include "pipeline/segmentation/shapes.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using sonocase::testing::cubic_grid;
+using sonocase::testing::norm_of;
+using sonocase::testing::sample_labels;
+
+std::string scratch(const std::string& name) {
+    const auto folder = std::filesystem::temp_directory_path() / "sonocase_export_labels_test";
+    std::filesystem::create_directories(folder);
+    return (folder / name).string();
+}
+
+LabelVolume torso_sized() {
+    Grid grid = cubic_grid(40, 8);
+    LabelVolume volume = sample_labels(grid, 3, [](Point3 p) {
+        return norm_of(p) > 140 ? 0 : norm_of(p) < 50 ? 2 : 1;
+    });
+    volume.labels[1].name = "other_fat";
+    volume.labels[2].name = "liver";
+    volume.labels[2].colour = {150, 70, 48};
+    return volume;
+}
+
+TEST(ExportSegNrrd, ReadsBackWithNamesColoursAndPlace) {
+    const LabelVolume volume = torso_sized();
+    const std::string path = scratch("labels.seg.nrrd");
+    ASSERT_TRUE(export_seg_nrrd(volume, path));
+    const auto back = import_label_map(path);
+    ASSERT_TRUE(back) << back.error().message();
+    const LabelVolume& read = back->labels;
+    EXPECT_EQ(read.grid.size, volume.grid.size);
+    // Twelve digits of text at least.
+    EXPECT_NEAR(norm(read.grid.origin_mm - volume.grid.origin_mm), 0, 1e-9);
+    ASSERT_EQ(read.labels.size(), 3u);
+    EXPECT_EQ(read.labels[1].name, "other_fat");
+    EXPECT_EQ(read.labels[2].name, "liver");
+    // Four decimals of a colour in [0, 1] are exact to a step of 255.
+    EXPECT_EQ(read.labels[2].colour, volume.labels[2].colour);
+    EXPECT_EQ(read.voxels, volume.voxels);
+}
+
+TEST(ExportLevelSets, WritesAndRefuses) {
+    const LabelVolume volume = torso_sized();
+    const std::string path = scratch("labels.vdb");
+    std::filesystem::remove(path);
+    const auto done = export_level_sets(volume, path);
+    ASSERT_TRUE(done) << done.error().message();
+    EXPECT_GT(std::filesystem::file_size(path), 1000u);
+    const auto unknown = export_level_sets(volume, path, {.labels = {"livr"}});
+    ASSERT_FALSE(unknown);
+    EXPECT_NE(unknown.error().message().find("liver"), std::string::npos);
+    LabelVolume thick = volume;
+    thick.grid.spacing_mm.z = 20;
+    EXPECT_FALSE(export_level_sets(thick, path));
+}
+
+TEST(SegmentationPictures, SixPicturesAreWritten) {
+    const LabelVolume volume = torso_sized();
+    const std::string folder = scratch("pictures");
+    std::filesystem::remove_all(folder);
+    ASSERT_TRUE(write_segmentation_pictures({volume, nullptr, volume, {}}, folder));
+    int count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+        count += entry.path().extension() == ".png";
+    }
+    EXPECT_EQ(count, 6);
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
