@@ -222,9 +222,23 @@ LabelDistance::LabelDistance(const LabelVolume& labels, const LabelDistanceOptio
 }
 
 void LabelDistance::blend_group(const SliceGroup& group,
+                                bool own_label,
                                 const VoxelBox& box,
                                 std::vector<float>* phi) const {
     constexpr int kPad = 6;
+    if (!own_label) {  // most groups are nowhere near
+        Int3 low = box.first, high;
+        for (int a = 0; a < 3; ++a) high[a] = box.first[a] + box.size[a];
+        if ((group.slice + 1) * factor_ <= low.z || group.slice * factor_ >= high.z) return;
+        bool near = false;
+        for (const int o : {group.lower, group.upper}) {
+            if (o < 0) continue;
+            const VoxelBox& b = groups_.outlines[static_cast<std::size_t>(o)].box;
+            near = near || (b.first.x < high.x && b.first.x + b.size.x > low.x &&
+                            b.first.y < high.y && b.first.y + b.size.y > low.y);
+        }
+        if (!near) return;
+    }
     const OutlineField low =
         group.lower >= 0 ? outline_field(labels_, groups_, group.lower, kPad) : OutlineField{};
     const OutlineField high =
@@ -274,13 +288,24 @@ void LabelDistance::blend_group(const SliceGroup& group,
         x1 = std::min(x1, box.first.x + box.size.x);
         y1 = std::min(y1, box.first.y + box.size.y);
         const float w = static_cast<float>(t);
+        // Share of its depth by which an outline that ends has shrunk here; past the pole it goes
+        // on.
+        const double beyond = (group.lower >= 0 ? t : 1 - t) / group.end;
+        const float shrink =
+            static_cast<float>(beyond < 1 ? 1 - std::sqrt(1 - beyond) : 0.5 + 0.5 * beyond);
         for (int y = y0; y < y1; ++y) {
             for (int x = x0; x < x1; ++x) {
-                // An end closes half-way: the missing side is as far outside as this one is deep.
-                const float a = group.lower >= 0 ? value(low, to_low, x, y) : high.deepest;
-                const float b = group.upper >= 0 ? value(high, to_high, x, y) : low.deepest;
+                float here = 0;
+                if (group.lower >= 0 && group.upper >= 0) {
+                    const float a = value(low, to_low, x, y), b = value(high, to_high, x, y);
+                    here = a + w * (b - a);
+                } else {
+                    const bool ends = group.lower >= 0;
+                    const OutlineField& own = ends ? low : high;
+                    here = value(own, ends ? to_low : to_high, x, y) + own.deepest * shrink;
+                }
                 float& to = (*phi)[box.index(x - box.first.x, y - box.first.y, k)];
-                to = std::min(to, a + w * (b - a));
+                to = own_label ? std::min(to, here) : std::max(to, -here);
             }
         }
     }
@@ -311,10 +336,16 @@ void LabelDistance::shape_interpolated(std::uint8_t label,
         for (std::size_t i = 0; i < plane; ++i)
             to[i] = wa * a[i] + wb * b[i] + wc * c[i] + wd * d[i];
     }
-    for (const SliceGroup& group : groups_.of_label[label]) {
-        const bool moves = group.lower >= 0 && group.upper >= 0;
-        if (moves && !options_.follow_shift) continue;
-        blend_group(group, box, phi);
+    // What another label's outline sweeps is its own and not this label's; then this label's own.
+    for (const bool own : {false, true}) {
+        for (std::size_t l = 0; l < groups_.of_label.size(); ++l) {
+            if ((l == label) != own) continue;
+            for (const SliceGroup& group : groups_.of_label[l]) {
+                const bool moves = group.lower >= 0 && group.upper >= 0;
+                if (moves && !options_.follow_shift) continue;
+                blend_group(group, own, box, phi);
+            }
+        }
     }
 }
 

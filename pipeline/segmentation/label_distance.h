@@ -45,7 +45,11 @@ class LabelDistance {
 
   private:
     void shape_interpolated(std::uint8_t label, const VoxelBox& box, std::vector<float>* phi) const;
-    void blend_group(const SliceGroup& group, const VoxelBox& box, std::vector<float>* phi) const;
+    // own: the group is of the label of phi; else it is carved out of it.
+    void blend_group(const SliceGroup& group,
+                     bool own,
+                     const VoxelBox& box,
+                     std::vector<float>* phi) const;
 
     LabelVolume labels_;
     LabelDistanceOptions options_;

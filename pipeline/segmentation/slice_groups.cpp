@@ -137,6 +137,8 @@ SliceGroups find_slice_groups(const LabelVolume& volume) {
         return outline(a).label == outline(b).label && ratio < 4 && ratio > 0.25 &&
                gap(a, b) <= 2 * std::max(length(a), length(b)) + 2;
     };
+    // Area of the outlines of the same label that touch an outline from below and from above.
+    std::vector<double> area_below(out.outlines.size(), 0), area_above(out.outlines.size(), 0);
     for (int k = 0; k + 1 < g.size.z; ++k) {
         const std::size_t low = static_cast<std::size_t>(k) * plane;
         std::map<std::pair<std::int32_t, std::int32_t>, int> links;
@@ -151,6 +153,8 @@ SliceGroups find_slice_groups(const LabelVolume& volume) {
             if (links.try_emplace({a, b}, 0).second) {
                 ++ups[a];
                 ++downs[b];
+                area_above[static_cast<std::size_t>(a)] += outline(b).area;
+                area_below[static_cast<std::size_t>(b)] += outline(a).area;
             }
         }
         const auto add = [&](int a, int b) {
@@ -199,6 +203,17 @@ SliceGroups find_slice_groups(const LabelVolume& volume) {
         }
         for (std::size_t i = 0; i < loose_high.size(); ++i) {
             if (!taken[i]) add(-1, loose_high[i]);
+        }
+    }
+    // On a paraboloid the area falls linearly to the pole.
+    for (auto& groups : out.of_label) {
+        for (SliceGroup& group : groups) {
+            if (group.lower >= 0 && group.upper >= 0) continue;
+            const int own = group.lower >= 0 ? group.lower : group.upper;
+            const auto o = static_cast<std::size_t>(own);
+            const double before = group.lower >= 0 ? area_below[o] : area_above[o];
+            const double ratio = before > 0 ? outline(own).area / before : 1;
+            if (ratio < 0.9) group.end = std::clamp(ratio / (1 - ratio), 0.2, 0.95);
         }
     }
     return out;

@@ -3,8 +3,9 @@
 // A vessel that runs obliquely through thick slices appears at another place in each, often without
 // overlap: blending the slices' distance fields where they are makes a chain of discs of it.
 // Outlines (8-connected components of one label in one slice) are therefore paired, and a pair that
-// a shift and a turn bring together better than leaving it in place is blended along them. An
-// outline that simply ends is closed half-way to the next slice.
+// a shift and a turn bring together better than leaving it in place is blended along them.
+// An outline that simply ends is closed by a paraboloid: the areas of the last two slices say where
+// its pole is; half-way to the next slice where they do not shrink.
 #pragma once
 
 #include <vector>
@@ -33,6 +34,7 @@ struct SliceGroup {
     int slice = 0;                    // k
     double shift_x = 0, shift_y = 0;  // pixels, from the lower to the upper
     double turn_rad = 0;              // about the centroid, likewise
+    double end = 0.5;                 // of an outline that ends: where, in slices beyond it
 };
 
 struct SliceGroups {
