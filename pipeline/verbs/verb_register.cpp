@@ -4,6 +4,7 @@
 
 #include "formats/registration_file.h"
 #include "pipeline/parallel.h"
+#include "pipeline/registration/fit_pictures.h"
 #include "pipeline/verbs/register_inputs.h"
 #include "pipeline/verbs/verbs.h"
 
@@ -40,6 +41,8 @@ int verb_register(int argc, char** argv) {
     add_register_options(app, arguments);
     app.add_option("-o,--output", arguments.out, "Where to write the registration")
         ->type_name("REG.json");
+    app.add_option("--pictures", pictures, "Write pictures of the fit into this folder")
+        ->type_name("DIR");
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     const ThreadLimit limit(arguments.common.threads);
     std::optional<RegisterInputs> inputs;
@@ -53,6 +56,11 @@ int verb_register(int argc, char** argv) {
             register_surfaces({inputs->skin, inputs->mannequin}, inputs->options, bar.progress());
         if (!fitted) return fail("register", at_surface(fitted.error(), arguments));
         result = std::move(*fitted);
+    }
+    if (!pictures.empty()) {
+        const Status drawn =
+            write_fit_pictures(inputs->skin, inputs->mannequin, result->registration, pictures);
+        if (!drawn) return fail("register", drawn.error());
     }
     return finish("register", arguments, *inputs, *result);
 }

@@ -1,0 +1,24 @@
+// Pictures of a fit: the mapped skin coloured by its signed distance to the mannequin, from four
+// sides, and three cuts with both outlines.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/registration.h"
+#include "formats/result.h"
+#include "formats/surface.h"
+#include "pipeline/registration/skin_surface.h"
+
+namespace sonocase::pipeline {
+
+// Writes fit_views.png and fit_cuts.png into the folder, which is made if it is not there.
+// Distances are clipped at +-limit_mm: blue inside the mannequin, red outside, grey without a
+// counterpart.
+Status write_fit_pictures(const SkinSurfaceResult& skin,
+                          const Surface& mannequin,
+                          const Registration& registration,
+                          const std::string& folder,
+                          double limit_mm = 5);
+
+}  // namespace sonocase::pipeline
