@@ -27,6 +27,7 @@
 #include <filesystem>
 
 #include "pipeline/files.h"
+#include "pipeline/pictures/offscreen_display.h"
 #include "pipeline/registration/fit_measure.h"
 
 VTK_MODULE_INIT(vtkRenderingOpenGL2)
@@ -236,6 +237,8 @@ Status write_fit_pictures(const SkinSurfaceResult& skin,
                           double limit_mm) {
     const Result<TargetSurface> target = prepare_target(mannequin);
     if (!target) return target.error();
+    // Before the first window: without a display the library would end the program.
+    if (auto s = ensure_display(); !s) return s.error();
     std::error_code made;
     std::filesystem::create_directories(folder, made);
     if (made) return Error{"folder cannot be made", folder, made.message()};
