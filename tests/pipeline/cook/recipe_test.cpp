@@ -161,9 +161,9 @@ TEST(Recipe, EmbeddedDemoIsTheOneInScenarios) {
     ASSERT_TRUE(embedded.has_value()) << embedded.error().message();
     ASSERT_TRUE(file.has_value()) << file.error().message();
     EXPECT_EQ(embedded->text, file->text);
-    ASSERT_EQ(embedded->exercises.size(), 2u);
-    ASSERT_EQ(file->exercises.size(), 2u);
-    for (std::size_t i = 0; i < 2; ++i)
+    ASSERT_GE(embedded->exercises.size(), 2u);
+    ASSERT_EQ(file->exercises.size(), embedded->exercises.size());
+    for (std::size_t i = 0; i < file->exercises.size(); ++i)
         EXPECT_EQ(embedded->exercises[i].toml, file->exercises[i].toml);
 }
 
