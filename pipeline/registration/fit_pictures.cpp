@@ -23,6 +23,7 @@
 #include <vtkTextProperty.h>
 #include <vtkWindowToImageFilter.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -109,7 +110,8 @@ Status write_png(vtkRenderWindow* window, const std::string& path) {
     return out.commit();
 }
 
-void look(vtkRenderer* renderer, const Box3& box, Vector3 from, Vector3 up) {
+// aspect: width of the view over its height.
+void look(vtkRenderer* renderer, const Box3& box, Vector3 from, Vector3 up, double aspect) {
     const Point3 centre = box.centre();
     const Vector3 e = box.extent();
     vtkCamera* camera = renderer->GetActiveCamera();
@@ -118,7 +120,7 @@ void look(vtkRenderer* renderer, const Box3& box, Vector3 from, Vector3 up) {
     camera->SetPosition(centre.x + 1000 * from.x, centre.y + 1000 * from.y,
                         centre.z + 1000 * from.z);
     camera->SetViewUp(up.x, up.y, up.z);
-    camera->SetParallelScale(0.54 * std::max({e.x, e.y, e.z}));
+    camera->SetParallelScale(0.54 * std::max(std::max(e.x, e.y) / aspect, std::max(e.y, e.z)));
     camera->SetClippingRange(1, 3000);
 }
 
@@ -145,7 +147,7 @@ Status views(const Scene& scene, const std::string& path, double limit) {
         vtkNew<vtkActor> actor;
         actor->SetMapper(mapper);
         renderer->AddActor(actor);
-        look(renderer, scene.box, sides[n].from, {0, 0, 1});
+        look(renderer, scene.box, sides[n].from, {0, 0, 1}, 0.23 * 1600 / 560);
         title(renderer, sides[n].name);
         window->AddRenderer(renderer);
     }
@@ -221,7 +223,7 @@ Status cuts(const Scene& scene, const std::string& path) {
         renderer->SetBackground(0.98, 0.98, 0.98);
         add_cut(renderer, scene.mannequin, scene.box.centre(), planes[n].normal, mannequin);
         add_cut(renderer, scene.skin, scene.box.centre(), planes[n].normal, patient);
-        look(renderer, scene.box, planes[n].from, planes[n].up);
+        look(renderer, scene.box, planes[n].from, planes[n].up, 1600 / 3.0 / 560);
         title(renderer, planes[n].name);
         window->AddRenderer(renderer);
     }
