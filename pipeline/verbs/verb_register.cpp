@@ -22,6 +22,8 @@ int finish(const char* verb,
            RegisterResult& result) {
     add_input_reports(inputs, result.report);
     print_warnings(verb, result.report);
+    // The file holds no seconds, so that the same inputs give the same bytes; they go to --report.
+    for (StageReport& report : result.registration.reports) report.seconds = 0;
     if (!arguments.out.empty()) {
         if (auto s = save_registration(result.registration, arguments.out); !s) {
             return fail(verb, s.error());
