@@ -86,7 +86,7 @@ Suite smooth_suite() {
     suite.knobs = {
         {"resample.sigma_vx",
          {"0", "0.5", "1", "1.5", "2", "3"},
-         "1",
+         "1.5",
          "voxels of the map",
          "standard deviation of the joint smoothing in the plane",
          "steps of the map's voxels",

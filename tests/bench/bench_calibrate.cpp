@@ -24,7 +24,7 @@ std::vector<Pose> recording(int poses, double stray) {
 }
 
 void calibrate_point(benchmark::State& state) {
-    const std::vector<Pose> poses = recording(1000, state.range(0) / 100.0);
+    const std::vector<Pose> poses = recording(1000, static_cast<double>(state.range(0)) / 100.0);
     for (auto _ : state) benchmark::DoNotOptimize(fit_point(poses));
 }
 BENCHMARK(calibrate_point)
