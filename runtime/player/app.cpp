@@ -1,4 +1,6 @@
 #include "runtime/player/app.h"
+#include "runtime/player/session_run.h"
+#include "runtime/player/setup_guide.h"
 
 #include <GLFW/glfw3.h>
 #include <imgui.h>
@@ -219,8 +221,7 @@ void start_attempt(App& app, const std::string& path) {
     Result<std::unique_ptr<SessionRun>> run = Error{"there is no picture to record", file, ""};
     const double now_s = steady_seconds() - app.clock_start_s;
     app.scan->with_engine([&](ScanEngine& engine) {
-        run = SessionRun::start(file, *app.open, engine, app.arguments.trainee, utc_now(),
-                                now_s);
+        run = SessionRun::start(file, *app.open, engine, app.arguments.trainee, utc_now(), now_s);
     });
     if (!run) {
         notify(app, Notice::Kind::error, run.error().message());
@@ -334,6 +335,9 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
         const Result<Calibrations> calibrations = load_calibrations(arguments.calibrations);
         if (!calibrations) return calibrations.error();
         app.calibrations = *calibrations;
+    }
+    for (const std::string& doubt : doubts(app.calibrations, "", utc_now())) {
+        notify(app, Notice::Kind::warning, doubt);
     }
     apply_settings(app);
     WindowOptions options;

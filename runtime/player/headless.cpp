@@ -19,6 +19,7 @@
 #include "runtime/player/scan_engine.h"
 #include "runtime/player/serve.h"
 #include "runtime/player/session_run.h"
+#include "runtime/player/setup_guide.h"
 #include "runtime/session/settings_text.h"
 #include "runtime/tracking/make_tracker.h"
 
@@ -131,6 +132,9 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     const Exercise& exercise = open.exercises[static_cast<std::size_t>(*index)];
     const Result<Calibrations> calibrations = load_calibrations(arguments.calibrations);
     if (!calibrations) return calibrations.error();
+    for (const std::string& doubt : doubts(*calibrations, "", utc_now())) {
+        std::fprintf(stderr, "sonoplay: %s\n", doubt.c_str());
+    }
 
     EngineOptions options;
     RenderOptions& render = options.render;

@@ -83,6 +83,18 @@ TEST_F(Headless, GivesTheSameBytesTwiceAndOnTwoThreads) {
     }
 }
 
+TEST_F(Headless, WarnsOfAnOldAndPoorCalibrationAndGoesOn) {
+    Calibration probe;
+    probe.kind = "probe";
+    probe.rms_mm = 25;
+    probe.date = "2001-02-03T04:05:06Z";
+    ASSERT_TRUE(save_calibration(probe, folder_ / "old.json"));
+    const CommandResult run = play(
+        bundle_ + " --headless --tracker null --frames 1 --calibration " + (folder_ / "old.json"));
+    EXPECT_EQ(run.status, 0) << run.error;
+    EXPECT_NE(run.error.find("Calibration of the probe"), std::string::npos) << run.error;
+}
+
 TEST_F(Headless, ReplaysEveryRowInOrderAndAppliesCalibrations) {
     // The same path twice: once as it is, once seen by a tracker elsewhere through a sensor that is
     // mounted off the probe. Calibrated, the pictures are the same.
