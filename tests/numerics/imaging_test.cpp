@@ -24,10 +24,12 @@ RC_GTEST_PROP(NeedleConstraintNumerics, WeightIsThatOfLongDoubleRisesAndStaysInR
         const long double z = -static_cast<long double>(o.steepness_per_mm) *
                               (static_cast<long double>(depth) - o.midpoint_mm);
         const long double truth = o.max_weight / (1 + std::exp(z));
-        // The exponent's own rounding is multiplied by its size.
+        // The exponent's own rounding is multiplied by its size; below the normal numbers the
+        // exponential overflows and the weight may be 0.
         const double bound = 8 * kEpsilon *
                              (1 + std::min(700.0, std::abs(static_cast<double>(z)))) *
-                             (static_cast<double>(truth) + 1e-300);
+                                 static_cast<double>(truth) +
+                             std::numeric_limits<double>::min();
         RC_ASSERT(std::abs(w - static_cast<double>(truth)) <= bound);
         RC_ASSERT(w >= before && w >= 0 && w <= o.max_weight);
         before = w;
