@@ -71,6 +71,9 @@ TEST(Needle, ExactPinholesGiveDirectionAndTip) {
     EXPECT_LT(angle(fit.paper_direction, truth.direction), 1e-9);
     EXPECT_LT(norm(fit.tip_mm - truth.tip), 1e-7);
     EXPECT_TRUE(fit.tip_measured);
+    // Depths that agree with the motion leave nothing to doubt, and nothing to say.
+    EXPECT_LT(norm(fit.tip_sigma_mm), 1e-3);
+    EXPECT_TRUE(fit.warnings.empty());
     EXPECT_LT(norm(fit.paper_point_mm - fit.axis_point_mm), 1e-7);
     // The frame: origin at the tip, z along the needle.
     const Rigid frame = fit.sensor_from_needle();
