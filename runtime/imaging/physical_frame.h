@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/imaging/motion.h"
+#include "formats/motion.h"
 #include "runtime/imaging/needle_chord.h"
 #include "runtime/imaging/noise.h"
 #include "runtime/imaging/physical_model.h"

@@ -1,10 +1,10 @@
-#include "runtime/imaging/motion.h"
+#include "formats/motion.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-namespace sonocase::runtime {
+namespace sonocase {
 namespace {
 
 constexpr double kTwoPi = 6.283185307179586;
@@ -121,4 +121,4 @@ double BreathingField::weight(Point3 p) const {
     return sum;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase

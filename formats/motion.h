@@ -12,7 +12,7 @@
 #include "formats/case_bundle.h"
 #include "formats/exercise.h"
 
-namespace sonocase::runtime {
+namespace sonocase {
 
 struct MotionState {
     Vector3 breathing_mm;  // shift where the weight is 1
@@ -40,4 +40,4 @@ class BreathingField {
     std::vector<float> cells_;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase
