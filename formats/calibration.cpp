@@ -84,6 +84,19 @@ Result<Calibration> load_calibration(const std::string& path) {
     return parse_calibration(*text, path);
 }
 
+Result<std::optional<double>> parse_lag_s(std::string_view json, const std::string& where) {
+    Json value;
+    JsonFault fault{where, {}};
+    if (!detail::parse_json(json, value, fault) || !value.is_object())
+        return std::optional<double>{};
+    const auto kind = value.find("sonocase");
+    if (kind == value.end() || *kind != "lag") return std::optional<double>{};
+    JsonObject object(value, "", fault);
+    const double lag_s = object.number("lag_s");
+    if (fault.error) return *fault.error;
+    return std::optional<double>(lag_s);
+}
+
 Status save_calibration(const Calibration& calibration, const std::string& path) {
     return write_file(path, format_calibration(calibration));
 }

@@ -1,6 +1,7 @@
 // A saved calibration (JSON): which sensor, what was found, how good it is.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,6 +31,10 @@ struct Calibration {
 Result<Calibration> parse_calibration(std::string_view json, const std::string& where);
 std::string format_calibration(const Calibration& calibration);
 Result<Calibration> load_calibration(const std::string& path);
+
+// What sonocase calibrate lag saves: the second recording shows a motion lag_s later than the first.
+// Nothing where the text is no such file; an Error where it is one and holds no finite lag.
+Result<std::optional<double>> parse_lag_s(std::string_view json, const std::string& where);
 Status save_calibration(const Calibration& calibration, const std::string& path);
 
 }  // namespace sonocase

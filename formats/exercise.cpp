@@ -262,8 +262,11 @@ void read_pass_mark(Table table, std::vector<Exercise::PassMark>& marks) {
     if (mark.metric.empty())
         table.complain("metric", "is missing or empty", "a name of docs/metrics.md");
     if (!mark.metric.empty() && !find_metric(mark.metric)) {
-        table.complain("metric", "'" + mark.metric + "' is no score",
-                       suggest_name(mark.metric, metric_names()));
+        // Some fifty names would bury the fault.
+        const std::string nearest = nearest_name(mark.metric, metric_names());
+        table.complain(
+            "metric", "'" + mark.metric + "' is no score",
+            nearest.empty() ? "docs/metrics.md lists them" : "did you mean '" + nearest + "'?");
     }
     const bool most = table.number("at_most", mark.at_most, -1e12, 1e12);
     const bool least = table.number("at_least", mark.at_least, -1e12, 1e12);

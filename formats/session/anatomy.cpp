@@ -7,7 +7,32 @@
 
 namespace sonocase {
 
-CaseAnatomy::CaseAnatomy(const CaseBundle& bundle) : bundle_(&bundle) {}
+CaseAnatomy::CaseAnatomy(const CaseBundle& bundle, const BreathingMotion& breathing)
+    : bundle_(&bundle), breathing_(breathing) {
+    if (breathing.amplitude_mm != 0) field_ = BreathingField(bundle);
+}
+
+Point3 CaseAnatomy::at_rest(Point3 p, double time_s) const {
+    if (field_.empty()) return p;
+    return p - field_.weight(p) * motion_at(breathing_, {}, time_s).breathing_mm;
+}
+
+Point3 CaseAnatomy::moved(Point3 rest, double time_s) const {
+    if (field_.empty()) return rest;
+    // p = rest + weight(p) shift, by repeated insertion: the weight rises over some centimetres and
+    // the shift is less, so that each step comes nearer.
+    const Vector3 shift = motion_at(breathing_, {}, time_s).breathing_mm;
+    constexpr double kEnoughMm = 1e-9;
+    constexpr int kMost = 64;
+    Point3 p = rest;
+    for (int i = 0; i < kMost; ++i) {
+        const Point3 next = rest + field_.weight(p) * shift;
+        const double step_mm = distance(next, p);
+        p = next;
+        if (step_mm < kEnoughMm) break;
+    }
+    return p;
+}
 
 int CaseAnatomy::label(Point3 p) const {
     const Grid& grid = bundle_->grid;
@@ -54,19 +79,21 @@ double CaseAnatomy::exit_distance(Point3 from, Vector3 direction, double reach) 
 
 namespace {
 
-// Parameter t >= 0 at which from + t direction meets the triangle; negative: not at all.
+// Parameter t >= 0 at which from + t direction meets the triangle; negative: not at all. slack, in
+// parts of an edge, widens the triangle.
 // Moeller and Trumbore, Journal of Graphics Tools 2:21 (1997).
-double ray_triangle(Point3 from, Vector3 direction, Point3 a, Point3 b, Point3 c) {
+double ray_triangle(
+    Point3 from, Vector3 direction, Point3 a, Point3 b, Point3 c, double slack = 0) {
     const Vector3 e1 = b - a, e2 = c - a;
     const Vector3 p = cross(direction, e2);
     const double det = dot(e1, p);
     if (det == 0) return -1;
     const Vector3 s = from - a;
     const double u = dot(s, p) / det;
-    if (!(u >= 0 && u <= 1)) return -1;
+    if (!(u >= -slack && u <= 1 + slack)) return -1;
     const Vector3 q = cross(s, e1);
     const double v = dot(direction, q) / det;
-    if (!(v >= 0 && u + v <= 1)) return -1;
+    if (!(v >= -slack && u + v <= 1 + slack)) return -1;
     return dot(e2, q) / det;
 }
 
@@ -132,10 +159,12 @@ bool MeshAnatomy::inside(Point3 p) const {
 }
 
 double MeshAnatomy::exit_distance(Point3 from, Vector3 direction, double reach) const {
+    // Rounding must not let a line slip out between two triangles or past a corner.
+    constexpr double kSlack = 1e-9;
     double nearest = reach;
     for (const auto& v : mesh_.triangles) {
         const double t = ray_triangle(from, direction, mesh_.points[v[0]], mesh_.points[v[1]],
-                                      mesh_.points[v[2]]);
+                                      mesh_.points[v[2]], kSlack);
         if (t > 0 && t < nearest) nearest = t;
     }
     return nearest;

@@ -1,7 +1,10 @@
-// What a point of the body is, for scores and events: inside or out, and which structure.
+// What a point of the body is, for scores and events: inside or out, and which structure; and where
+// breathing moves the structures. Skin, and so the inserted length, stay where they are at rest:
+// the mannequin that the needle goes into does not breathe.
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -9,6 +12,7 @@
 
 #include "formats/case_bundle.h"
 #include "formats/geometry.h"
+#include "formats/motion.h"
 #include "formats/surface.h"
 
 namespace sonocase {
@@ -23,6 +27,11 @@ class Anatomy {
     // Distance from `from` (inside) along the unit vector `direction` to where the body ends;
     // `reach` if it does not end before. Runs of outside shorter than `gap_mm` do not end it.
     virtual double exit_distance(Point3 from, Vector3 direction, double reach) const = 0;
+    // Where the tissue that is at p now lies at rest, and where tissue that lies at `rest` is now;
+    // at most greatest_shift_mm() apart.
+    virtual Point3 at_rest(Point3 p, double /*time_s*/) const { return p; }
+    virtual Point3 moved(Point3 rest, double /*time_s*/) const { return rest; }
+    virtual double greatest_shift_mm() const { return 0; }
 };
 
 // The cooked labels: a voxel's own label, or the second one beyond its boundary plane, which is the
@@ -30,13 +39,19 @@ class Anatomy {
 // and allocate nothing; exit_distance() costs reach / (half a voxel) of them.
 class CaseAnatomy final : public Anatomy {
   public:
-    explicit CaseAnatomy(const CaseBundle& bundle);
+    // breathing: as the picture shows it; by default none. Its field costs a look-up a brick.
+    explicit CaseAnatomy(const CaseBundle& bundle, const BreathingMotion& breathing = {});
     bool inside(Point3 p) const override { return label(p) != 0; }
     int label(Point3 p) const override;
     double exit_distance(Point3 from, Vector3 direction, double reach) const override;
+    Point3 at_rest(Point3 p, double time_s) const override;
+    Point3 moved(Point3 rest, double time_s) const override;
+    double greatest_shift_mm() const override { return std::abs(breathing_.amplitude_mm); }
 
   private:
     const CaseBundle* bundle_;
+    BreathingMotion breathing_;
+    BreathingField field_;  // empty: at rest
 };
 
 // A closed triangle mesh, as trainers built on mesh anatomy use. Parity of crossings along +z,

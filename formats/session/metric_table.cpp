@@ -33,6 +33,7 @@ constexpr MetricInfo kTable[] = {
     {"depth_perception_mm", "needle", "Motion of the tip along the needle, to and fro", kLess},
     {"no_go_contacts", "needle", "Times that the needle ran into a structure to be spared", kLess},
     {"no_go_time_s", "needle", "Time inside structures to be spared", kLess},
+    {"needle_elapsed_time_s", "needle", "Time from its first reading to its last", kLess},
     {"needle_path_length_mm", "needle", "Way of the tip", kLess},
     {"needle_filtered_path_length_mm", "needle", "Way of the tip, jitter removed", kLess},
     {"needle_average_velocity_mm_s", "needle", "Mean speed of the tip", kNeutral},
@@ -53,6 +54,7 @@ constexpr MetricInfo kTable[] = {
      kNeutral},
 
     {"probe_usage_time_s", "probe", "Time with the probe on the skin", kNeutral},
+    {"probe_elapsed_time_s", "probe", "Time from its first reading to its last", kLess},
     {"probe_path_length_mm", "probe", "Way of the probe", kLess},
     {"probe_filtered_path_length_mm", "probe", "Way of the probe, jitter removed", kLess},
     {"probe_average_velocity_mm_s", "probe", "Mean speed of the probe", kNeutral},

@@ -132,7 +132,7 @@ void SessionMonitor::watch_needle(double time_s, const Rigid& needle) {
     }
     int touched = -1;
     for (double s = 0; s <= depth && touched < 0; s += options_.shaft_step_mm) {
-        const int label = anatomy_->label(tip - s * direction);
+        const int label = anatomy_->label(anatomy_->at_rest(tip - s * direction, time_s));
         if (is_no_go_[static_cast<std::size_t>(label)]) touched = label;
     }
     if (touched >= 0) {
@@ -152,8 +152,9 @@ void SessionMonitor::watch_targets(
     const Rigid probe_from = inverse(probe);
     for (std::size_t t = 0; t < exercise_->targets.size(); ++t) {
         const Target& target = exercise_->targets[t];
+        const Point3 centre = anatomy_ ? anatomy_->moved(target.centre, time_s) : target.centre;
         if (needle_ok) {
-            const double d = distance(target.centre, tip);
+            const double d = distance(centre, tip);
             if (!(d >= to_target_mm_)) {
                 to_target_mm_ = d;
                 nearest_ = static_cast<int>(t);
@@ -165,7 +166,7 @@ void SessionMonitor::watch_targets(
             }
         }
         if (!probe_ok || scanned_[t]) continue;
-        const Point3 p = probe_from * target.centre;
+        const Point3 p = probe_from * centre;
         if (std::abs(p.y) < options_.target_slab_mm && in_image(exercise_->probe, p.x, p.z)) {
             scanned_[t] = true;
             add(LiveEventKind::target_scanned, time_s, static_cast<int>(t));

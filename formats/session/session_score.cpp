@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <sstream>
 #include <thread>
 
 #include "formats/session/image_region.h"
@@ -79,6 +80,12 @@ class Scorer {
     Point3 tip(std::size_t i) const { return origin_of(needle_.points[i].pose); }
     Vector3 direction(std::size_t i) const { return needle_.points[i].pose.rotation.column(2); }
     void set(const std::string& name, double value) { values_[name] = value; }
+    // Where target t is at a time.
+    Point3 target_at(std::size_t t, double time_s) const {
+        const Point3 centre = exercise_.targets[t].centre;
+        return anatomy_ ? anatomy_->moved(centre, time_s) : centre;
+    }
+    double target_shift_mm() const { return anatomy_ ? anatomy_->greatest_shift_mm() : 0; }
 
     Reading look_up_one(const TrackPoint& point) const {
         Reading r;
@@ -93,7 +100,8 @@ class Scorer {
             r.depth_mm = insertion_depth_mm(*anatomy_, tip, direction, length, &r.skin);
             if (has_no_go_ && r.inside) {
                 for (double s = 0; s <= r.depth_mm && !r.no_go; s += options_.shaft_step_mm) {
-                    const int label = anatomy_->label(tip - s * direction);
+                    const int label =
+                        anatomy_->label(anatomy_->at_rest(tip - s * direction, point.time_s));
                     r.no_go = no_go_[static_cast<std::size_t>(label)];
                 }
             }
@@ -159,6 +167,7 @@ class Scorer {
 
     void motion(const std::string& tool, const MotionMetrics& m, bool there) {
         if (!there) return;
+        set(tool + "elapsed_time_s", m.elapsed_time_s);
         set(tool + "path_length_mm", m.path_length_mm);
         set(tool + "filtered_path_length_mm", m.filtered_path_length_mm);
         set(tool + "average_velocity_mm_s", m.average_velocity_mm_s);
@@ -269,10 +278,12 @@ class Scorer {
             s.tip_to_target_mm = kNan;
             double nearest = INFINITY;
             for (std::size_t t = 0; t < exercise_.targets.size(); ++t) {
-                const double d = distance(s.final_tip, exercise_.targets[t].centre);
+                const Point3 centre = target_at(t, time(i));
+                const double d = distance(s.final_tip, centre);
                 if (d < nearest) {
                     nearest = d;
                     s.target = static_cast<int>(t);
+                    s.target_centre = centre;
                     s.tip_to_target_mm = d;
                 }
             }
@@ -285,13 +296,14 @@ class Scorer {
         if (targets.empty()) return;
         out_.targets.resize(targets.size());
         TargetTree hits(targets);
+        const double shift = target_shift_mm();
         int hit = 0;
         for (std::size_t i = 0; i < readings_.size() && !hits.empty(); ++i) {
             const Point3 p = tip(i);
-            hits.search([&](Point3 c, double radius) { return distance(c, p) <= radius; },
+            hits.search([&](Point3 c, double radius) { return distance(c, p) <= radius + shift; },
                         [&](std::uint32_t t) {
-                            if (!(distance(targets[t].centre, p) <= targets[t].hit_radius_mm))
-                                return false;
+                            const double d = distance(target_at(t, time(i)), p);
+                            if (!(d <= targets[t].hit_radius_mm)) return false;
                             out_.targets[t].first_hit_s = time(i);
                             ++hit;
                             return true;
@@ -305,7 +317,7 @@ class Scorer {
         set("targeting_error_mm", error / static_cast<double>(out_.insertions.size()));
         const InsertionScore& last = out_.insertions.back();
         set("final_tip_to_target_mm", last.tip_to_target_mm);
-        const Vector3 way = targets[static_cast<std::size_t>(last.target)].centre - last.entry;
+        const Vector3 way = last.target_centre - last.entry;
         if (!(norm(way) > 0)) return;
         const Vector3 u = normalized(way);
         // atan2 keeps its figures at small angles, where acos loses half of them.
@@ -372,17 +384,18 @@ class Scorer {
         out_.targets.resize(targets.size());
         TargetTree centres(targets), parts(targets);
         const double reach = probe.depth_mm + std::max(probe.radius_mm, probe.width_mm);
+        const double slack = options_.target_slab_mm + target_shift_mm();
         int scanned = 0, seen = 0;
         for (const TrackPoint& point : probe_.points) {
             if (centres.empty() && parts.empty()) break;
             const Rigid probe_from = inverse(point.pose);
             const auto near = [&](Point3 c, double radius) {
                 const Point3 p = probe_from * c;
-                return std::abs(p.y) <= radius + options_.target_slab_mm &&
-                       std::hypot(p.x, p.z) <= reach + radius + options_.target_slab_mm;
+                return std::abs(p.y) <= radius + slack &&
+                       std::hypot(p.x, p.z) <= reach + radius + slack;
             };
             centres.search(near, [&](std::uint32_t t) {
-                const Point3 p = probe_from * targets[t].centre;
+                const Point3 p = probe_from * target_at(t, point.time_s);
                 if (!(std::abs(p.y) < options_.target_slab_mm) || !in_image(probe, p.x, p.z))
                     return false;
                 out_.targets[t].first_scanned_s = point.time_s;
@@ -390,7 +403,7 @@ class Scorer {
                 return true;
             });
             parts.search(near, [&](std::uint32_t t) {
-                const Point3 p = probe_from * targets[t].centre;
+                const Point3 p = probe_from * target_at(t, point.time_s);
                 const double radius = targets[t].radius_mm;
                 if (!(std::abs(p.y) <= radius)) return false;
                 const double in_plane = std::sqrt(radius * radius - p.y * p.y);
@@ -417,8 +430,8 @@ class Scorer {
             double nearest = kNan;
             // Beyond a few targets the curve of the nearest says little and costs much.
             if (exercise_.targets.size() <= 64) {
-                for (const Target& target : exercise_.targets) {
-                    const double d = distance(target.centre, tip(i));
+                for (std::size_t t = 0; t < exercise_.targets.size(); ++t) {
+                    const double d = distance(target_at(t, time(i)), tip(i));
                     if (!(d >= nearest)) nearest = d;
                 }
             }
@@ -469,6 +482,27 @@ double insertion_depth_mm(
     while (ahead < kReachMm && !anatomy.inside(tip + ahead * direction)) ahead += 0.5;
     if (skin) *skin = tip + ahead * direction;
     return -ahead;
+}
+
+BreathingMotion breathing_shown(const Exercise& exercise,
+                                bool physical_model,
+                                const std::vector<std::string>& effects) {
+    // A list that only takes away starts from everything, any other from nothing.
+    bool on = std::all_of(effects.begin(), effects.end(),
+                          [](const std::string& e) { return !e.empty() && e[0] == '-'; });
+    for (const std::string& e : effects) on = on || e == "auto" || e == "all";
+    for (const std::string& e : effects) {
+        if (e == "breathing") on = true;
+        if (e == "-breathing") on = false;
+    }
+    return physical_model && on ? exercise.breathing : BreathingMotion{};
+}
+
+BreathingMotion breathing_shown(const Exercise& exercise, const SessionHeader& header) {
+    std::vector<std::string> effects;
+    std::istringstream words(detail_value(header.render, "effects"));
+    for (std::string word; std::getline(words, word, ',');) effects.push_back(word);
+    return breathing_shown(exercise, detail_value(header.render, "model") == "physical", effects);
 }
 
 double SessionScore::value(std::string_view name) const {

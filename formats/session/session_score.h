@@ -39,6 +39,7 @@ struct InsertionScore {
     Point3 final_tip;  // last tip if it stays in, deepest otherwise
     Vector3 final_direction;
     int target = -1;              // nearest to final_tip; -1: the exercise has none
+    Point3 target_centre;         // where that target was then
     double tip_to_target_mm = 0;  // NaN without a target
 };
 
@@ -75,6 +76,14 @@ SessionScore score_session(const Session& session,
                            const Anatomy* anatomy,
                            const std::vector<Label>& labels,
                            const ScoreOptions& options = {});
+
+// The breathing of a picture of that exercise: none in model paper, nor where the list of effects
+// leaves it out (docs/effects.md). Scores of a session take that of the words it was recorded with;
+// recordings of other trainers show none.
+BreathingMotion breathing_shown(const Exercise& exercise,
+                                bool physical_model,
+                                const std::vector<std::string>& effects);
+BreathingMotion breathing_shown(const Exercise& exercise, const SessionHeader& header);
 
 // Stable JSON: {"metrics": {name: value or null}, "passed", "pass_marks": [...], "insertions":
 // [...], "targets": [...], "warnings": [...]}.

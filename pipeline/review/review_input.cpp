@@ -83,7 +83,7 @@ Result<ReviewInput> load_review(const std::string& session_path,
             }
         }
     }
-    const CaseAnatomy anatomy(input.bundle);
+    const CaseAnatomy anatomy(input.bundle, breathing_shown(input.exercise, header));
     ScoreOptions score;
     score.threads = options.threads;
     input.score =

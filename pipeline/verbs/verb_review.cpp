@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "formats/atomic_file.h"
+#include "pipeline/import/surface_file.h"
 #include "pipeline/review/review_page.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/verbs.h"
@@ -54,7 +55,7 @@ int verb_review(int argc, char** argv) {
 namespace {
 
 struct ScoreArguments {
-    std::string session, bundle, mesh, exercise, probe, needle, drawn, axis = "0,0,1";
+    std::string session, bundle, body, exercise, probe, needle, axis = "0,0,1";
     bool json = false;
 };
 
@@ -83,6 +84,11 @@ int verb_score(int argc, char** argv) {
     CommonOptions common;
     app.add_option("SESSION", a.session, "The recording")->required();
     app.add_option("--case", a.bundle, "Bundle that gives body and exercise")->type_name("BUNDLE");
+    auto* body = app.add_option("--body", a.body,
+                                "Closed mesh of the tissue in the recording's frame, in the place "
+                                "of a bundle's body")
+                     ->type_name("MESH");
+    body->excludes("--case");
     app.add_option("--exercise", a.exercise, "Name in the bundle, or a TOML file");
     app.add_option("--probe", a.probe,
                    "Transform of the probe, e.g. ProbeToReference; default: guessed");
@@ -104,16 +110,26 @@ int verb_score(int argc, char** argv) {
     if (!session) return fail("score", session.error());
     CaseBundle bundle;
     std::vector<std::string> warnings;
-    std::unique_ptr<CaseAnatomy> anatomy;
     if (!a.bundle.empty()) {
         auto loaded = load_bundle(a.bundle);
         if (!loaded) return fail("score", loaded.error());
         bundle = std::move(*loaded);
-        anatomy = std::make_unique<CaseAnatomy>(bundle);
     }
     const auto exercise =
         find_review_exercise(bundle, a.exercise, session->header.exercise, warnings);
     if (!exercise) return fail("score", exercise.error());
+    std::unique_ptr<Anatomy> anatomy;
+    if (!a.body.empty()) {
+        auto mesh = import_surface(a.body);
+        if (!mesh) return fail("score", mesh.error());
+        if (mesh->triangles.empty()) {
+            return fail("score", Error{"holds points and no triangles", a.body, "a closed mesh"});
+        }
+        anatomy = std::make_unique<MeshAnatomy>(std::move(*mesh));
+    } else if (!a.bundle.empty()) {
+        anatomy =
+            std::make_unique<CaseAnatomy>(bundle, breathing_shown(*exercise, session->header));
+    }
     ScoreOptions options;
     options.threads = common.threads;
     const SessionScore score =

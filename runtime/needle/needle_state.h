@@ -31,6 +31,9 @@ class NeedleState {
                 const NeedleModel& needle,
                 const InsertionOptions& options = {});
 
+    // Another view of the same body, as after a change of model.
+    void set_anatomy(const Anatomy* anatomy) { anatomy_ = anatomy; }
+
     // A reading of the tracked needle; readings without a pose are not given.
     NeedleView update(double time_s, const Rigid& mannequin_from_needle);
 

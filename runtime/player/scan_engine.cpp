@@ -128,8 +128,8 @@ void ScanEngine::begin_session(double now_s) {
 }
 
 void ScanEngine::take_over(const ScanEngine& before) {
-    anatomy_ = before.anatomy_;  // the needle's state points to it
     needle_ = before.needle_;
+    needle_.set_anatomy(anatomy_.get());
     probe_watch_ = before.probe_watch_;
     needle_watch_ = before.needle_watch_;
     reading_ = before.reading_;

@@ -13,6 +13,7 @@
 #include "formats/case_bundle.h"
 #include "formats/exercise.h"
 #include "formats/session/anatomy.h"
+#include "formats/session/session_score.h"
 #include "runtime/imaging/renderer.h"
 #include "runtime/needle/needle_state.h"
 #include "runtime/tracking/sensor_watch.h"
@@ -23,6 +24,7 @@ namespace sonocase::runtime {
 
 struct Calibrations {
     std::optional<Calibration> probe, needle, mannequin;
+    double needle_lag_s = 0;  // the needle's recording is so much later than the probe's
 };
 
 // Which sensor is on which tool; -1: none.
@@ -103,7 +105,10 @@ class ScanEngine {
                EngineOptions options,
                Renderer renderer)
         : skin_(bundle),
-          anatomy_(std::make_shared<CaseAnatomy>(bundle)),
+          anatomy_(std::make_shared<CaseAnatomy>(
+              bundle,
+              breathing_shown(
+                  exercise, options.render.model == ImageModel::physical, options.render.effects))),
           needle_(anatomy_.get(), exercise.needle),
           exercise_(std::move(exercise)),
           options_(std::move(options)),

@@ -132,6 +132,11 @@ TEST(Exercise, RangesAreChecked) {
     expect_fault("name = \"x\"\n[[pass_marks]]\nmetric = \"elapsed_time_s\"\n", {"no limit"});
     expect_fault("name = \"x\"\n[[pass_marks]]\nmetric = \"elapsed_tme_s\"\nat_most = 3\n",
                  {"line 3", "no score", "'elapsed_time_s'"});
+    const auto far = parse_exercise(
+        "name = \"x\"\n[[pass_marks]]\nmetric = \"beauty\"\nat_most = 3\n", "e.toml");
+    ASSERT_FALSE(far);
+    EXPECT_NE(far.error().message().find("docs/metrics.md"), std::string::npos);
+    EXPECT_LT(far.error().message().size(), 120u) << far.error().message();
     expect_fault("title = \"x\"\n", {"name is missing"});
     expect_fault("name = \"x\"\n[[sweeps]]\nname = \"s\"\n", {"keys is empty"});
     expect_fault(

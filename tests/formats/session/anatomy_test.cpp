@@ -81,6 +81,48 @@ TEST(CaseAnatomy, FollowsTheBoundaryPlaneInsideTheVoxel) {
     EXPECT_LE(insertion_depth_mm(with, {0, 0, 14}, {0, 0, -1}, 150), -3.5);
 }
 
+// A block of liver in the middle of a body.
+CaseBundle block_of_liver() {
+    CaseBundle b;
+    b.grid = {{96, 96, 96}, {1, 1, 1}, {-48, -48, -48}, {}};
+    b.labels = {{"outside", "outside", 0, {}}, {"muscle", "soft", 1, {}}, {"liver", "soft", 1, {}}};
+    std::vector<std::uint8_t> labels;
+    for (int k = 0; k < 96; ++k) {
+        for (int j = 0; j < 96; ++j) {
+            for (int i = 0; i < 96; ++i) {
+                const int out = std::max({std::abs(i - 48), std::abs(j - 48), std::abs(k - 48)});
+                labels.push_back(out > 45 ? 0 : out > 24 ? 1 : 2);
+            }
+        }
+    }
+    b.label_bricks = bricks_from_dense<std::uint8_t>(labels, b.grid.size);
+    return b;
+}
+
+TEST(CaseAnatomy, BreathingMovesOrgansAndComesBack) {
+    const CaseBundle b = block_of_liver();
+    const CaseAnatomy still(b), breathing(b, {.amplitude_mm = 4, .period_s = 4});
+    EXPECT_EQ(breathing.greatest_shift_mm(), 4);
+    testing::Random random(11);
+    for (int i = 0; i < 2000; ++i) {
+        const Point3 p = random.point(47);
+        const double t = random.uniform(0, 20);
+        EXPECT_EQ(still.moved(p, t), p);
+        EXPECT_EQ(still.at_rest(p, t), p);
+        // moved() stops at 1e-9 mm a step; the steps shrink by half or better.
+        EXPECT_LT(distance(breathing.at_rest(breathing.moved(p, t), t), p), 1e-8);
+        EXPECT_LE(distance(breathing.moved(p, t), p), 4 + 1e-9);
+        EXPECT_EQ(breathing.moved(p, 4), p);              // the end of expiration
+        EXPECT_EQ(breathing.inside(p), still.inside(p));  // the mannequin's skin stays
+    }
+    // In the middle of the liver the weight is 1: the whole amplitude, towards -y.
+    EXPECT_LT(distance(breathing.moved({0, 0, 0}, 2), {0, -4, 0}), 1e-6);
+    EXPECT_LT(distance(breathing.moved({46, 0, 0}, 2), {46, 0, 0}), 0.1);
+    // What stands above the liver's edge at rest is muscle, and liver when the liver comes there.
+    EXPECT_EQ(breathing.label(breathing.at_rest({0, -25, 0}, 0)), 1);
+    EXPECT_EQ(breathing.label(breathing.at_rest({0, -25, 0}, 2)), 2);
+}
+
 TEST(CaseAnatomy, BeyondTheVolumeIsOutside) {
     const CaseBundle b = half_space(true);
     const CaseAnatomy body(b);

@@ -192,6 +192,52 @@ TEST(ScoreCases, ATipTremblingOnTheSkinIsContactAndNoInsertion) {
     EXPECT_EQ(score.value("tissue_punctures"), 0);
 }
 
+// A cube of 100 mm under z = 0 as a mesh; its top face is cut along the diagonal x = y.
+TEST(ScoreCases, EntryOnAnEdgeAndACornerOfTheMeshIsOneInsertion) {
+    Surface cube;
+    for (int i = 0; i < 8; ++i)
+        cube.points.push_back({i & 1 ? 50.0 : -50.0, i & 2 ? 50.0 : -50.0, i & 4 ? 0.0 : -100.0});
+    cube.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 7}, {4, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                      {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    const MeshAnatomy body(std::move(cube));
+    const Exercise e = exercise_with_target({0, 0, -40});
+    for (const Point3 entry : {Point3{0, 0, 0}, Point3{20, 20, 0}, Point3{-50, -50, 0}}) {
+        // Straight down the diagonal edge, or from the corner to the middle.
+        const Vector3 direction = entry.x == -50 ? normalized({1, 1, -1}) : Vector3{0, 0, -1};
+        Session s;
+        for (int i = 0; i <= 60; ++i) {
+            SessionSample sample = sample_at(0.05 * i, 0);
+            sample.mannequin_from_drawn =
+                testing::needle_at(entry + (0.5 * i - 10) * direction, direction);
+            s.samples.push_back(sample);
+        }
+        const SessionScore score = score_session(s, e, &body, kLabels);
+        EXPECT_EQ(score.value("insertions"), 1) << entry.x;
+        EXPECT_NEAR(score.value("deepest_mm"), 20, 1e-9) << entry.x;
+        EXPECT_EQ(score.value("tissue_punctures"), 1) << entry.x;
+        EXPECT_TRUE(std::isfinite(score.value("tissue_damage_mm2"))) << entry.x;
+    }
+}
+
+TEST(ScoreCases, TheBreathingThatCountsIsThatOfThePicture) {
+    Exercise e;
+    e.breathing.amplitude_mm = 7;
+    const auto amplitude = [&](const std::string& render) {
+        SessionHeader header;
+        header.render = render;
+        return breathing_shown(e, header).amplitude_mm;
+    };
+    EXPECT_EQ(amplitude("model=physical effects=auto size=512x512 seed=1"), 7);
+    EXPECT_EQ(amplitude("model=physical effects=all"), 7);
+    EXPECT_EQ(amplitude("model=physical effects=speckle,breathing"), 7);
+    EXPECT_EQ(amplitude("model=physical effects=-speckle"), 7);
+    EXPECT_EQ(amplitude("model=physical effects=auto,-breathing"), 0);
+    EXPECT_EQ(amplitude("model=physical effects=speckle"), 0);
+    EXPECT_EQ(amplitude("model=physical effects=none"), 0);
+    EXPECT_EQ(amplitude("model=paper effects=auto"), 0);  // that model does not breathe
+    EXPECT_EQ(amplitude(""), 0);                          // another trainer's recording
+}
+
 TEST(ScoreCases, TenThousandTargets) {
     testing::Random random(31);
     Exercise e = exercise_with_target({0, 0, 0});
