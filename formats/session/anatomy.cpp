@@ -160,13 +160,20 @@ bool MeshAnatomy::inside(Point3 p) const {
 
 double MeshAnatomy::exit_distance(Point3 from, Vector3 direction, double reach) const {
     // Rounding must not let a line slip out between two triangles or past a corner.
-    constexpr double kSlack = 1e-9;
+    constexpr double kSlack = 1e-9, kOnSurfaceMm = 1e-7;
     double nearest = reach;
+    bool on_surface = false;
     for (const auto& v : mesh_.triangles) {
         const double t = ray_triangle(from, direction, mesh_.points[v[0]], mesh_.points[v[1]],
                                       mesh_.points[v[2]], kSlack);
-        if (t > 0 && t < nearest) nearest = t;
+        if (t > kOnSurfaceMm) {
+            nearest = std::min(nearest, t);
+        } else if (t >= 0) {
+            on_surface = true;
+        }
     }
+    // From a point of the surface the way out is either none or right through.
+    if (on_surface && !inside(from + 2 * kOnSurfaceMm * direction)) return 0;
     return nearest;
 }
 
