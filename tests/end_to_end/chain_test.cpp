@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "support/run_command.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase {
@@ -23,7 +24,7 @@ const std::string kSonoplay = std::string(SONOCASE_BIN) + "/sonoplay";
 class Chain : public ::testing::Test {
   protected:
     CommandResult run(const std::string& command) {
-        return sonocase::testing::run_command(command, folder_);
+        return sonocase::testing::run_command(command);
     }
 
     // Cooks, inspects, validates and plays a sweep; the checks that hold for any case.

@@ -4,44 +4,27 @@
 #include <sys/resource.h>
 
 #include <csignal>
-#include <filesystem>
 
 #include "formats/digest.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase {
 namespace {
 
-namespace fs = std::filesystem;
-
-class Folder {
-  public:
-    Folder() {
-        std::string name = (fs::temp_directory_path() / "sonocase-test-XXXXXX").string();
-        path_ = ::mkdtemp(name.data());
-    }
-    ~Folder() { fs::remove_all(path_); }
-    std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-    std::size_t count() const {
-        return static_cast<std::size_t>(
-            std::distance(fs::directory_iterator(path_), fs::directory_iterator()));
-    }
-
-  private:
-    std::string path_;
-};
+using testing::TemporaryFolder;
 
 TEST(AtomicFile, WritesAndReadsBack) {
-    const Folder folder;
+    const TemporaryFolder folder;
     ASSERT_TRUE(write_file(folder / "a", std::string_view("first")));
     ASSERT_TRUE(write_file(folder / "a", std::string_view("second")));
     EXPECT_EQ(*read_text_file(folder / "a"), "second");
-    EXPECT_EQ(folder.count(), 1u);
+    EXPECT_EQ(folder.names().size(), 1u);
     ASSERT_TRUE(write_file(folder / "empty", std::string_view()));
     EXPECT_TRUE(read_file(folder / "empty")->empty());
 }
 
 TEST(AtomicFile, AFullDiskLeavesTheOldFileAndNothingElse) {
-    const Folder folder;
+    const TemporaryFolder folder;
     ASSERT_TRUE(write_file(folder / "a", std::string_view("first")));
     // A limit on file size fails a write in its middle as a full disk does.
     rlimit before{};
@@ -55,11 +38,11 @@ TEST(AtomicFile, AFullDiskLeavesTheOldFileAndNothingElse) {
     ASSERT_FALSE(status);
     EXPECT_NE(status.error().message().find("nothing was written"), std::string::npos);
     EXPECT_EQ(*read_text_file(folder / "a"), "first");
-    EXPECT_EQ(folder.count(), 1u);
+    EXPECT_EQ(folder.names().size(), 1u);
 }
 
 TEST(AtomicFile, ErrorsNameThePath) {
-    const Folder folder;
+    const TemporaryFolder folder;
     const auto missing = read_file(folder / "none");
     ASSERT_FALSE(missing);
     EXPECT_NE(missing.error().message().find("none: cannot open"), std::string::npos);
@@ -77,7 +60,7 @@ TEST(Digest, IsTheOneOfXxh3AndTellsPartsApart) {
 }
 
 TEST(Digest, OfAFileIsThatOfItsBytes) {
-    const Folder folder;
+    const TemporaryFolder folder;
     ASSERT_TRUE(write_file(folder / "a", std::string_view("content")));
     EXPECT_EQ(*digest_of_file(folder / "a"), digest_of(std::string_view("content")));
     EXPECT_FALSE(digest_of_file(folder / "b"));

@@ -1,18 +1,26 @@
 // A folder for a test's files, removed with everything in it at the end.
 #pragma once
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+#include <iterator>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace sonocase::testing {
 
 class TemporaryFolder {
   public:
-    TemporaryFolder() {
-        std::string name = (std::filesystem::temp_directory_path() / "sonocase_XXXXXX").string();
+    // in_memory: where flushing costs nothing, for tests that write a great many files and are not
+    // about disks.
+    explicit TemporaryFolder(bool in_memory = false) {
+        namespace fs = std::filesystem;
+        const fs::path base =
+            in_memory && fs::exists("/dev/shm") ? fs::path("/dev/shm") : fs::temp_directory_path();
+        std::string name = (base / "sonocase-test-XXXXXX").string();
         path_ = mkdtemp(name.data());
     }
     ~TemporaryFolder() {
@@ -21,38 +29,34 @@ class TemporaryFolder {
     }
     TemporaryFolder(const TemporaryFolder&) = delete;
     TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-    std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+
     const std::string& path() const { return path_; }
+    std::string operator/(std::string_view name) const { return path_ + "/" + std::string(name); }
+
+    // Makes missing folders; returns the path.
+    std::string write(std::string_view name, std::string_view bytes) const {
+        const std::string path = *this / name;
+        std::filesystem::create_directories(std::filesystem::path(path).parent_path());
+        std::ofstream(path, std::ios::binary) << bytes;
+        return path;
+    }
+    // Names of everything below it, sorted.
+    std::vector<std::string> names() const {
+        std::vector<std::string> all;
+        for (const auto& entry : std::filesystem::recursive_directory_iterator(path_))
+            all.push_back(std::filesystem::relative(entry.path(), path_).string());
+        std::sort(all.begin(), all.end());
+        return all;
+    }
 
   private:
     std::string path_;
 };
 
+// The bytes of a file; nothing where there is none.
 inline std::string read_text(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
-    std::stringstream text;
-    text << file.rdbuf();
-    return text.str();
-}
-
-inline void write_text(const std::string& path, const std::string& text) {
-    std::ofstream(path, std::ios::binary) << text;
-}
-
-struct CommandResult {
-    int status = -1;  // exit status; 128 + signal when killed
-    std::string out, error;
-};
-
-// Runs a shell command line and keeps what it says.
-inline CommandResult run_command(const std::string& command, const TemporaryFolder& folder) {
-    CommandResult result;
-    const std::string out = folder / "stdout", error = folder / "stderr";
-    const int status = std::system((command + " >" + out + " 2>" + error).c_str());
-    result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    result.out = read_text(out);
-    result.error = read_text(error);
-    return result;
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
 }  // namespace sonocase::testing

@@ -8,26 +8,14 @@
 #include "formats/atomic_file.h"
 #include "formats/progress/progress_book.h"
 #include "support/random.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase {
 namespace {
 
 namespace fs = std::filesystem;
 
-class Folder {
-  public:
-    Folder() {
-        const fs::path base =
-            fs::exists("/dev/shm") ? fs::path("/dev/shm") : fs::temp_directory_path();
-        std::string name = (base / "sonocase-test-XXXXXX").string();
-        path_ = ::mkdtemp(name.data());
-    }
-    ~Folder() { fs::remove_all(path_); }
-    std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-
-  private:
-    std::string path_;
-};
+using testing::TemporaryFolder;
 
 ProgressEntry entry(const std::string& trainee, int number) {
     ProgressEntry e;
@@ -41,7 +29,7 @@ ProgressEntry entry(const std::string& trainee, int number) {
 }
 
 TEST(ProgressBook, KeepsListsComparesAndExports) {
-    const Folder folder;
+    const TemporaryFolder folder(/*in_memory=*/true);
     const std::string path = folder / "deep/er/progress.sqlite";
     {
         auto book = ProgressBook::open(path);
@@ -68,7 +56,7 @@ TEST(ProgressBook, KeepsListsComparesAndExports) {
 }
 
 TEST(ProgressBook, ARemovedTraineeIsGoneWithFilesAndBytes) {
-    const Folder folder;
+    const TemporaryFolder folder(/*in_memory=*/true);
     const std::string path = folder / "progress.sqlite";
     auto book = ProgressBook::open(path);
     ProgressEntry e = entry("Zaphod-Unmistakable", 1);
@@ -88,7 +76,7 @@ TEST(ProgressBook, ARemovedTraineeIsGoneWithFilesAndBytes) {
 }
 
 TEST(ProgressBook, KilledWhileWritingItStaysConsistent) {
-    const Folder folder;
+    const TemporaryFolder folder(/*in_memory=*/true);
     testing::Random random(3);
     const std::string path = folder / "progress.sqlite";
     ASSERT_TRUE(ProgressBook::open(path));
@@ -127,7 +115,7 @@ TEST(ProgressBook, KilledWhileWritingItStaysConsistent) {
 }
 
 TEST(ProgressBook, AFileThatIsNoneIsRefusedAndLeftAlone) {
-    const Folder folder;
+    const TemporaryFolder folder(/*in_memory=*/true);
     const std::string path = folder / "a.sqlite";
     const std::string text(5000, 'x');
     ASSERT_TRUE(write_file(path, text));

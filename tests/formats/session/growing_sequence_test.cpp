@@ -11,28 +11,14 @@
 
 #include "formats/atomic_file.h"
 #include "support/random.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase {
 namespace {
 
 namespace fs = std::filesystem;
 
-class Folder {
-  public:
-    // in_memory: where flushing costs nothing, for tests that are about killed processes and not
-    // about disks.
-    explicit Folder(bool in_memory = false) {
-        const fs::path base =
-            in_memory && fs::exists("/dev/shm") ? fs::path("/dev/shm") : fs::temp_directory_path();
-        std::string name = (base / "sonocase-test-XXXXXX").string();
-        path_ = ::mkdtemp(name.data());
-    }
-    ~Folder() { fs::remove_all(path_); }
-    std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-
-  private:
-    std::string path_;
-};
+using testing::TemporaryFolder;
 
 Sequence head() {
     Sequence s;
@@ -63,7 +49,7 @@ void expect_frames(const Sequence& s, std::size_t from = 0) {
 }
 
 TEST(GrowingSequence, IsWholeAfterEveryBatchAndEndsAsASequenceWrittenAtOnce) {
-    const Folder folder;
+    const TemporaryFolder folder;
     auto file = GrowingSequence::create(folder / "s.igs.mha", head());
     ASSERT_TRUE(file) << file.error().message();
     EXPECT_EQ(load_sequence(folder / "s.igs.mha")->frames.size(), 0u);
@@ -85,7 +71,7 @@ TEST(GrowingSequence, IsWholeAfterEveryBatchAndEndsAsASequenceWrittenAtOnce) {
 
 // The process is killed without warning while it records; the pipe tells how far it had come.
 TEST(GrowingSequence, KilledAt200RandomMomentsEveryFileOpensAndHoldsEveryCommittedBatch) {
-    const Folder folder(true);
+    const TemporaryFolder folder(/*in_memory=*/true);
     testing::Random random(77);
     for (int run = 0; run < 200; ++run) {
         const std::string path = folder / ("s" + std::to_string(run) + ".igs.mha");
@@ -130,7 +116,7 @@ TEST(GrowingSequence, KilledAt200RandomMomentsEveryFileOpensAndHoldsEveryCommitt
 // Any state that a power cut can leave between two flushes: the part of the file behind the end
 // line is old, new or torn anywhere, as long as the end line is the old one.
 TEST(GrowingSequence, TornTextBehindTheEndLineDoesNotShow) {
-    const Folder folder;
+    const TemporaryFolder folder;
     const std::string path = folder / "s.igs.mha";
     auto file = GrowingSequence::create(path, head());
     std::vector<SequenceFrame> first, second;
@@ -169,7 +155,7 @@ TEST(GrowingSequence, TornTextBehindTheEndLineDoesNotShow) {
 }
 
 TEST(GrowingSequence, AFullDiskKeepsWhatIsThereAndGoesOnWhenThereIsRoom) {
-    const Folder folder;
+    const TemporaryFolder folder;
     const std::string path = folder / "s.igs.mha";
     auto file = GrowingSequence::create(path, head());
     std::vector<SequenceFrame> first, second;

@@ -12,12 +12,12 @@
 #include "pipeline/import/label_map.h"
 #include "pipeline/import/surface_file.h"
 #include "pipeline/parallel.h"
-#include "support/scratch_folder.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-using test::ScratchFolder;
+using testing::TemporaryFolder;
 
 // The demonstration at coarse voxels: every stage runs, in seconds.
 Result<Recipe> coarse_recipe(const std::string& extra = "", std::vector<std::string> sets = {}) {
@@ -39,7 +39,7 @@ Result<Recipe> coarse_recipe(const std::string& extra = "", std::vector<std::str
 
 // One cache for the tests that are not about it, so that the coarse case is cooked once.
 CookOptions shared_cache() {
-    static const ScratchFolder folder;
+    static const TemporaryFolder folder;
     CookOptions options;
     options.cache_folder = folder.path();
     return options;
@@ -53,7 +53,7 @@ std::map<std::string, bool> from_cache(const CookResult& cooked) {
 }
 
 TEST(CookCase, SameBytesOnAnyNumberOfThreadsWithAndWithoutCache) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const auto recipe = coarse_recipe();
     ASSERT_TRUE(recipe.has_value()) << recipe.error().message();
     const auto bytes_with = [&](int threads, const std::string& cache) {
@@ -71,7 +71,7 @@ TEST(CookCase, SameBytesOnAnyNumberOfThreadsWithAndWithoutCache) {
 }
 
 TEST(CookCase, OnlyWhatAChangeReachesIsMadeAgain) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     CookOptions options;
     options.cache_folder = folder.path();
     const auto cook = [&](const std::string& extra, std::vector<std::string> sets = {}) {
@@ -118,7 +118,7 @@ TEST(CookCase, OnlyWhatAChangeReachesIsMadeAgain) {
 }
 
 TEST(CookCase, DamagedCacheEntryIsMadeAgainAndToldOf) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     CookOptions options;
     options.cache_folder = folder.path();
     const auto recipe = coarse_recipe();
@@ -126,7 +126,7 @@ TEST(CookCase, DamagedCacheEntryIsMadeAgainAndToldOf) {
     ASSERT_TRUE(first.has_value());
     for (const std::string& name : folder.names())
         if (name.starts_with("resample/") && name.size() > 20) {
-            std::string bytes = test::file_bytes(folder / name);
+            std::string bytes = testing::read_text(folder / name);
             bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
             folder.write(name, bytes);
         }
@@ -143,7 +143,7 @@ TEST(CookCase, DamagedCacheEntryIsMadeAgainAndToldOf) {
 }
 
 TEST(CookCase, CacheThatCannotBeWrittenCostsAWarningAndNotTheCase) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     CookOptions options;
     options.cache_folder = folder.write("a-file", "x");  // no folder can be made below a file
     const auto cooked = cook_case(*coarse_recipe(), options);
@@ -166,7 +166,7 @@ TEST(CookCase, WrongLabelsAndTissuesOfTheRecipeNameTheLine) {
 }
 
 TEST(CookCase, SurfaceInOtherUnitsThanTheBodyIsRefused) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const auto cooked = cook_case(*coarse_recipe(), shared_cache());
     ASSERT_TRUE(cooked.has_value());
     Surface tiny = cooked->bundle.mannequin_skin;
@@ -186,7 +186,7 @@ TEST(CookCase, SurfaceInOtherUnitsThanTheBodyIsRefused) {
 }
 
 TEST(ExportCase, VolumesAndSurfacesComeBackThroughImport) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const auto cooked = cook_case(*coarse_recipe(), shared_cache());
     ASSERT_TRUE(cooked.has_value());
     const CaseBundle& bundle = cooked->bundle;

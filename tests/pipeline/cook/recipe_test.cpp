@@ -4,12 +4,12 @@
 
 #include <cstdlib>
 
-#include "support/scratch_folder.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-using test::ScratchFolder;
+using testing::TemporaryFolder;
 
 const char* const kGood = R"(name = "x"
 preset = "draft"
@@ -124,7 +124,7 @@ TEST(Recipe, FaultsOfTheHeadAndOfTheCommandLine) {
 }
 
 TEST(Recipe, PathsStartFromDataThenFromTheRecipe) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     folder.write("data/in_data.nii", "x");
     folder.write("recipe/beside.nii", "x");
     Recipe recipe;
@@ -139,7 +139,7 @@ TEST(Recipe, PathsStartFromDataThenFromTheRecipe) {
 }
 
 TEST(Recipe, ExercisesBesideTheRecipeAreChecked) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const std::string path = folder.write("case.toml", "[analytic]\n");
     folder.write("b.toml", "name = \"b\"\nframe = \"ct\"\n");
     folder.write("a.toml", "name = \"a\"\n");

@@ -6,12 +6,12 @@
 #include <thread>
 
 #include "formats/digest.h"
-#include "support/scratch_folder.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-using test::ScratchFolder;
+using testing::TemporaryFolder;
 
 const std::string kKey = "0123456789abcdef0123456789abcdef";
 
@@ -22,7 +22,7 @@ CacheEntry entry_of(const std::string& text) {
 }
 
 TEST(StageCache, GivesBackWhatWasStored) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const StageCache cache(folder.path());
     EXPECT_FALSE(cache.find("warp", kKey, nullptr).has_value());
     ASSERT_TRUE(cache.store("warp", kKey, entry_of("a\nb")).has_value());
@@ -36,11 +36,11 @@ TEST(StageCache, GivesBackWhatWasStored) {
 }
 
 TEST(StageCache, EveryTruncationAndEveryChangedByteCountsAsAbsent) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const StageCache cache(folder.path());
     ASSERT_TRUE(cache.store("warp", kKey, entry_of("some bytes of a stage")).has_value());
     const std::string path = cache.path_of("warp", kKey);
-    const std::string whole = test::file_bytes(path);
+    const std::string whole = testing::read_text(path);
     const std::string name = std::filesystem::relative(path, folder.path()).string();
     for (std::size_t length = 0; length < whole.size(); ++length) {
         folder.write(name, whole.substr(0, length));
@@ -63,7 +63,7 @@ TEST(StageCache, EveryTruncationAndEveryChangedByteCountsAsAbsent) {
 }
 
 TEST(StageCache, EntryOfAnotherKeyIsNotTaken) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const StageCache cache(folder.path());
     ASSERT_TRUE(cache.store("warp", kKey, entry_of("x")).has_value());
     std::string other = kKey;
@@ -73,7 +73,7 @@ TEST(StageCache, EntryOfAnotherKeyIsNotTaken) {
 }
 
 TEST(StageCache, ManyWritersLeaveOneGoodEntryAndNoRest) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     std::vector<std::thread> writers;
     const CacheEntry entry = entry_of(std::string(300000, 'q'));
     for (int t = 0; t < 8; ++t)
@@ -89,7 +89,7 @@ TEST(StageCache, ManyWritersLeaveOneGoodEntryAndNoRest) {
 }
 
 TEST(StageCache, LimitKeepsWhatWasUsedLast) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const StageCache cache(folder.path(), 50000);
     const auto key = [](int n) {
         std::string k = kKey;

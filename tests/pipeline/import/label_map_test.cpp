@@ -8,13 +8,13 @@
 #include <filesystem>
 
 #include "pipeline/import/volume_files.h"
-#include "support/scratch_folder.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-using test::ScratchFolder;
-using test::TinyVolume;
+using testing::TemporaryFolder;
+using testing::TinyVolume;
 
 constexpr int kSpleen = 1, kKidneyRight = 2, kLiver = 5;
 
@@ -35,8 +35,8 @@ int shifted_body(Point3 p) {
 }
 
 TinyVolume ras_volume() {
-    return test::sample_in_order({0, 1, 2}, {false, false, false}, kExtent, kSpacing, kCorner,
-                                 shifted_body);
+    return testing::sample_in_order({0, 1, 2}, {false, false, false}, kExtent, kSpacing, kCorner,
+                                    shifted_body);
 }
 
 std::string name_at(const LabelVolume& labels, Point3 p) {
@@ -65,35 +65,37 @@ void expect_body(const Result<ImportedLabels>& imported) {
 }
 
 TEST(ImportLabelMap, EveryAxisOrderAndFlipOfEveryFormatGivesTheSameBody) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     int number = 0;
     int order[3] = {0, 1, 2};
     do {
         for (int flips = 0; flips < 8; ++flips) {
             const bool flip[3] = {(flips & 1) != 0, (flips & 2) != 0, (flips & 4) != 0};
             const TinyVolume volume =
-                test::sample_in_order(order, flip, kExtent, kSpacing, kCorner, shifted_body);
+                testing::sample_in_order(order, flip, kExtent, kSpacing, kCorner, shifted_body);
             const std::string stem = "v" + std::to_string(number++);
-            expect_body(import_label_map(folder.write(stem + ".nii", test::nifti_bytes(volume))));
-            expect_body(import_label_map(folder.write(stem + ".nrrd", test::nrrd_bytes(volume))));
+            expect_body(
+                import_label_map(folder.write(stem + ".nii", testing::nifti_bytes(volume))));
+            expect_body(
+                import_label_map(folder.write(stem + ".nrrd", testing::nrrd_bytes(volume))));
             expect_body(import_label_map(
-                folder.write(stem + "r.nrrd", test::nrrd_bytes(volume, "", /*lps=*/false))));
-            expect_body(import_label_map(folder.write(stem + ".mha", test::mha_bytes(volume))));
+                folder.write(stem + "r.nrrd", testing::nrrd_bytes(volume, "", /*lps=*/false))));
+            expect_body(import_label_map(folder.write(stem + ".mha", testing::mha_bytes(volume))));
         }
     } while (std::next_permutation(order, order + 3));
     EXPECT_EQ(number, 48);
 }
 
 TEST(ImportLabelMap, ObliqueAxesKeepTheirTiltAndTheBodyItsPlace) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const Matrix3 turn = rotation_about(normalized({1, 2, 3}), 0.4);
     Matrix3 columns;
     for (int axis = 0; axis < 3; ++axis)
         for (int row = 0; row < 3; ++row) columns(row, axis) = 2 * turn(row, axis);
     const auto ball = [](Point3 p) { return distance(p, {10, 20, 30}) < 25 ? kLiver : 0; };
     const Point3 origin = Point3{10, 20, 30} - turn * Vector3{40, 40, 40};
-    const TinyVolume volume = test::sample({40, 40, 40}, columns, origin, ball);
-    const auto imported = import_label_map(folder.write("t.nii", test::nifti_bytes(volume)));
+    const TinyVolume volume = testing::sample({40, 40, 40}, columns, origin, ball);
+    const auto imported = import_label_map(folder.write("t.nii", testing::nifti_bytes(volume)));
     ASSERT_TRUE(imported.has_value()) << imported.error().message();
     std::size_t n = 0, wrong = 0;
     for (int k = 0; k < 40; ++k)
@@ -109,9 +111,9 @@ TEST(ImportLabelMap, ObliqueAxesKeepTheirTiltAndTheBodyItsPlace) {
 }
 
 TEST(ImportLabelMap, NamesAndTissuesOfTotalSegmentatorAreBuiltIn) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const auto imported = import_label_map(
-        folder.write("a.nii.gz", test::gzip_bytes(test::nifti_bytes(ras_volume()))));
+        folder.write("a.nii.gz", testing::gzip_bytes(testing::nifti_bytes(ras_volume()))));
     ASSERT_TRUE(imported.has_value()) << imported.error().message();
     const auto& labels = imported->labels.labels;
     ASSERT_EQ(labels.size(), 4u);
@@ -125,7 +127,7 @@ TEST(ImportLabelMap, NamesAndTissuesOfTotalSegmentatorAreBuiltIn) {
 }
 
 TEST(ImportLabelMap, HeaderExtensionNamesValues) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const std::string xml =
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?> <CaretExtension><VolumeInformation Index=\"0\">"
         "<LabelTable>"
@@ -134,7 +136,7 @@ TEST(ImportLabelMap, HeaderExtensionNamesValues) {
         "<Label Key=\"2\" Red=\"1\" Green=\"0\" Blue=\"0\" Alpha=\"1\">fat &amp; skin</Label>"
         "</LabelTable></VolumeInformation></CaretExtension>";
     const auto imported =
-        import_label_map(folder.write("a.nii", test::nifti_bytes(ras_volume(), xml)));
+        import_label_map(folder.write("a.nii", testing::nifti_bytes(ras_volume(), xml)));
     expect_body(imported);
     const auto& labels = imported->labels.labels;
     EXPECT_EQ(labels[1].name, "uterus");
@@ -144,8 +146,8 @@ TEST(ImportLabelMap, HeaderExtensionNamesValues) {
 }
 
 TEST(ImportLabelMap, SideTableAndGivenTableNameValues) {
-    const ScratchFolder folder;
-    const std::string map = folder.write("map.nii", test::nifti_bytes(ras_volume()));
+    const TemporaryFolder folder;
+    const std::string map = folder.write("map.nii", testing::nifti_bytes(ras_volume()));
     folder.write("map.csv", "value,name,tissue_class\n1,mystery,gas\n2,kidney_right,kidney\n");
     auto beside = import_label_map(map);
     ASSERT_TRUE(beside.has_value()) << beside.error().message();
@@ -160,11 +162,11 @@ TEST(ImportLabelMap, SideTableAndGivenTableNameValues) {
 }
 
 TEST(ImportLabelMap, UnnamedValuesAreKeptAndToldOf) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     TinyVolume volume = ras_volume();
     for (auto& voxel : volume.voxels)
         if (voxel == kSpleen) voxel = 222;
-    const auto imported = import_label_map(folder.write("a.nii", test::nifti_bytes(volume)));
+    const auto imported = import_label_map(folder.write("a.nii", testing::nifti_bytes(volume)));
     ASSERT_TRUE(imported.has_value());
     EXPECT_EQ(imported->labels.labels.back().name, "label_222");
     ASSERT_EQ(imported->report.warnings.size(), 1u);
@@ -172,7 +174,7 @@ TEST(ImportLabelMap, UnnamedValuesAreKeptAndToldOf) {
 }
 
 TEST(ImportLabelMap, SegmentsOfSlicerKeepNamesColoursAndLayers) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     // Two layers: the liver in the first, a vessel inside it and a cyst in the second.
     TinyVolume volume = ras_volume();
     std::vector<std::uint8_t> layered;
@@ -189,7 +191,7 @@ TEST(ImportLabelMap, SegmentsOfSlicerKeepNamesColoursAndLayers) {
     volume.layers = 2;
     const auto imported = import_label_map(folder.write(
         "s.seg.nrrd",
-        test::nrrd_bytes(
+        testing::nrrd_bytes(
             volume,
             "Segment0_Name:=liver\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n"
             "Segment0_Color:=1 0.5 0\n"
@@ -208,19 +210,19 @@ TEST(ImportLabelMap, SegmentsOfSlicerKeepNamesColoursAndLayers) {
 }
 
 TEST(ImportLabelMap, FolderOfMasksIsOneMapAndSmallStructuresWin) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     for (const auto& [name, value] : {std::pair{"liver", kLiver}, {"spleen", kSpleen}}) {
         TinyVolume mask = ras_volume();
         for (auto& voxel : mask.voxels) voxel = voxel == value;
         folder.write(std::string("masks/") + name + ".nii.gz",
-                     test::gzip_bytes(test::nifti_bytes(mask)));
+                     testing::gzip_bytes(testing::nifti_bytes(mask)));
     }
     TinyVolume rest = ras_volume();  // overlaps both
     for (auto& voxel : rest.voxels) voxel = voxel != 0;
-    folder.write("masks/kidney_right.nii.gz", test::gzip_bytes(test::nifti_bytes(rest)));
+    folder.write("masks/kidney_right.nii.gz", testing::gzip_bytes(testing::nifti_bytes(rest)));
     TinyVolume absent = ras_volume();
     for (auto& voxel : absent.voxels) voxel = 0;
-    folder.write("masks/pancreas.nii.gz", test::gzip_bytes(test::nifti_bytes(absent)));
+    folder.write("masks/pancreas.nii.gz", testing::gzip_bytes(testing::nifti_bytes(absent)));
     const auto imported = import_label_map(folder / "masks");
     expect_body(imported);
     EXPECT_EQ(imported->labels.labels.size(), 4u);
@@ -229,23 +231,23 @@ TEST(ImportLabelMap, FolderOfMasksIsOneMapAndSmallStructuresWin) {
 }
 
 TEST(ImportLabelMap, DicomSeriesIsReadInAnyFileOrder) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const TinyVolume volume = ras_volume();
     for (int k = 0; k < volume.size.z; ++k) {
         char name[32];
         std::snprintf(name, sizeof name, "series/s%03d.dcm", (k * 7) % volume.size.z);
-        folder.write(name, test::dicom_slice(volume, k, "1.2.3.5"));
+        folder.write(name, testing::dicom_slice(volume, k, "1.2.3.5"));
     }
     expect_body(import_label_map(folder / "series"));
 }
 
 TEST(ImportLabelMap, MissingDicomSliceIsRefused) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const TinyVolume volume = ras_volume();
     for (int k = 0; k < volume.size.z; ++k)
         if (k != 7)
             folder.write("series/s" + std::to_string(k) + ".dcm",
-                         test::dicom_slice(volume, k, "1.2.3.5"));
+                         testing::dicom_slice(volume, k, "1.2.3.5"));
     const auto imported = import_label_map(folder / "series");
     ASSERT_FALSE(imported.has_value());
     EXPECT_NE(imported.error().what.find("unevenly spaced"), std::string::npos)
@@ -267,20 +269,20 @@ void expect_refused(const Result<ImportedLabels>& imported,
 }
 
 TEST(ImportLabelMapRefuses, WhatIsNotThere) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     expect_refused(import_label_map(folder / "no.nii.gz"), folder / "no.nii.gz", "no such file");
 }
 
 TEST(ImportLabelMapRefuses, EveryTruncationOfEveryFormat) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const TinyVolume volume = ras_volume();
     const std::pair<const char*, std::string> files[] = {
-        {"a.nii", test::nifti_bytes(volume)},
-        {"a.nii.gz", test::gzip_bytes(test::nifti_bytes(volume))},
-        {"a.nrrd", test::nrrd_bytes(volume)},
-        {"z.nrrd", test::nrrd_bytes(volume, "", true, /*gzip=*/true)},
-        {"z.mha", test::mha_bytes(volume, /*compressed=*/true)},
-        {"a.mha", test::mha_bytes(volume)},
+        {"a.nii", testing::nifti_bytes(volume)},
+        {"a.nii.gz", testing::gzip_bytes(testing::nifti_bytes(volume))},
+        {"a.nrrd", testing::nrrd_bytes(volume)},
+        {"z.nrrd", testing::nrrd_bytes(volume, "", true, /*gzip=*/true)},
+        {"z.mha", testing::mha_bytes(volume, /*compressed=*/true)},
+        {"a.mha", testing::mha_bytes(volume)},
     };
     for (const auto& [name, bytes] : files) {
         const std::string whole = folder.write(name, bytes);
@@ -297,47 +299,47 @@ TEST(ImportLabelMapRefuses, EveryTruncationOfEveryFormat) {
 }
 
 TEST(ImportLabelMapRefuses, MapWithoutBody) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     TinyVolume volume = ras_volume();
     for (auto& voxel : volume.voxels) voxel = 0;
-    const std::string path = folder.write("a.nii", test::nifti_bytes(volume));
+    const std::string path = folder.write("a.nii", testing::nifti_bytes(volume));
     expect_refused(import_label_map(path), path, "no body");
 }
 
 TEST(ImportLabelMapRefuses, TwoLabelsOfOneName) {
-    const ScratchFolder folder;
-    const std::string path = folder.write("a.nii", test::nifti_bytes(ras_volume()));
+    const TemporaryFolder folder;
+    const std::string path = folder.write("a.nii", testing::nifti_bytes(ras_volume()));
     ImportOptions options;
     options.table = folder.write("t.csv", "value,name\n1,liver\n5,liver\n");
     expect_refused(import_label_map(path, options), path, "two labels are named 'liver'");
 }
 
 TEST(ImportLabelMapRefuses, ValueOfTwoNames) {
-    const ScratchFolder folder;
-    const std::string path = folder.write("a.nii", test::nifti_bytes(ras_volume()));
+    const TemporaryFolder folder;
+    const std::string path = folder.write("a.nii", testing::nifti_bytes(ras_volume()));
     ImportOptions options;
     options.table = folder.write("t.csv", "value,name\n1,liver\n1,spleen\n");
     expect_refused(import_label_map(path, options), options.table, "two names");
 }
 
 TEST(ImportLabelMapRefuses, MoreLabelsThanFit) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     TinyVolume volume = ras_volume();
     for (std::size_t n = 0; n < volume.voxels.size(); ++n)
         volume.voxels[n] = static_cast<std::uint8_t>(n % 256);
-    const std::string path = folder.write("a.nii", test::nifti_bytes(volume));
+    const std::string path = folder.write("a.nii", testing::nifti_bytes(volume));
     expect_refused(import_label_map(path), path, "255 labels");
 }
 
 TEST(ImportLabelMapRefuses, TorsoInMetresOrMicrometresAndNamesTheFactor) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     for (const auto& [unit, factor] : {std::pair{0.001, "1000"}, {1000.0, "0.001"}}) {
         TinyVolume volume = ras_volume();
         for (int row = 0; row < 3; ++row) {
             for (int column = 0; column < 3; ++column) volume.columns(row, column) *= unit * 4;
             volume.origin[row] *= unit * 4;
         }
-        const std::string path = folder.write("a.nrrd", test::nrrd_bytes(volume));
+        const std::string path = folder.write("a.nrrd", testing::nrrd_bytes(volume));
         const auto imported = import_label_map(path);
         expect_refused(imported, path, "body is");
         EXPECT_NE(imported.error().expected.find(std::string("--scale ") + factor),
@@ -350,15 +352,15 @@ TEST(ImportLabelMapRefuses, TorsoInMetresOrMicrometresAndNamesTheFactor) {
 }
 
 TEST(ImportLabelMapRefuses, MasksOnDifferentGrids) {
-    const ScratchFolder folder;
-    folder.write("m/liver.nii", test::nifti_bytes(ras_volume()));
+    const TemporaryFolder folder;
+    folder.write("m/liver.nii", testing::nifti_bytes(ras_volume()));
     TinyVolume moved = ras_volume();
     moved.origin.x += 5;
     for (auto& voxel : moved.voxels) voxel = voxel != 0;
-    folder.write("m/spleen.nii", test::nifti_bytes(moved));
+    folder.write("m/spleen.nii", testing::nifti_bytes(moved));
     TinyVolume first = ras_volume();
     for (auto& voxel : first.voxels) voxel = voxel != 0;
-    folder.write("m/liver.nii", test::nifti_bytes(first));
+    folder.write("m/liver.nii", testing::nifti_bytes(first));
     expect_refused(import_label_map(folder / "m"), "spleen.nii", "another grid");
 }
 

@@ -9,12 +9,12 @@
 #include <cstring>
 #include <sstream>
 
-#include "support/scratch_folder.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-using test::ScratchFolder;
+using testing::TemporaryFolder;
 
 // An ellipsoid of half axes 150, 100 and 200 mm about (10, 20, 30): vertices and triangles with the
 // outside counter-clockwise.
@@ -146,7 +146,7 @@ void expect_ellipsoid(const Result<Surface>& surface, const std::string& name) {
 }
 
 TEST(ImportSurface, EveryMeshFormatGivesTheSameSurfaceWithOutwardNormals) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const Mesh mesh = ellipsoid();
     for (const auto& [name, bytes] : {std::pair<const char*, std::string>{"a.ply", ply_ascii(mesh)},
                                       {"l.ply", ply_binary(mesh, false)},
@@ -159,7 +159,7 @@ TEST(ImportSurface, EveryMeshFormatGivesTheSameSurfaceWithOutwardNormals) {
 }
 
 TEST(ImportSurface, TurnsAMeshThatFacesInwardsAndTrianglesThatDisagree) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     Mesh inward = ellipsoid(), mixed = ellipsoid();
     for (auto& t : inward.triangles) std::swap(t[0], t[1]);
     for (std::size_t n = 0; n < mixed.triangles.size(); n += 3)
@@ -172,7 +172,7 @@ TEST(ImportSurface, TurnsAMeshThatFacesInwardsAndTrianglesThatDisagree) {
 }
 
 TEST(ImportSurface, ReadsCloudsInEveryDialect) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const Mesh mesh = ellipsoid();
     std::string comma = "X,Y,Z\n", blanks, excel = "name;x;y;z\r\n",
                 pose = "frame,timestamp_s,status,tx,ty,tz,r00\n";
@@ -207,7 +207,7 @@ TEST(ImportSurface, ReadsCloudsInEveryDialect) {
 }
 
 TEST(ImportSurface, ScaleTurnsMetresIntoMillimetres) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     Mesh mesh = ellipsoid();
     for (Point3& p : mesh.points) p = {p.x / 1000, p.y / 1000, p.z / 1000};
     const std::string path = folder.write("m.ply", ply_binary(mesh, false));
@@ -221,7 +221,7 @@ TEST(ImportSurface, ScaleTurnsMetresIntoMillimetres) {
 }
 
 TEST(ImportSurfaceRefuses, TooFewPointsNoneAndWhatIsNotThere) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     std::string few = "x,y,z\n";
     for (int n = 0; n < 99; ++n)
         few += std::to_string(n) + "," + std::to_string(n * n % 97) + ",0\n";
@@ -248,7 +248,7 @@ TEST(ImportSurfaceRefuses, TooFewPointsNoneAndWhatIsNotThere) {
 }
 
 TEST(ImportSurfaceRefuses, EveryTruncationOfFormatsThatSayTheirLength) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const Mesh mesh = ellipsoid();
     for (const auto& [name, bytes] : {std::pair<const char*, std::string>{"a.ply", ply_ascii(mesh)},
                                       {"l.ply", ply_binary(mesh, false)},
@@ -268,7 +268,7 @@ TEST(ImportSurfaceRefuses, EveryTruncationOfFormatsThatSayTheirLength) {
 }
 
 TEST(ImportSurfaceRefuses, FacesThatNameNoVertexAndHugeCounts) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     const std::string head =
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
         "float z\n"

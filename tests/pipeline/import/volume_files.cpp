@@ -6,7 +6,7 @@
 #include <cstring>
 #include <sstream>
 
-namespace sonocase::test {
+namespace sonocase::testing {
 namespace {
 
 template <class T>
@@ -236,4 +236,4 @@ std::string dicom_slice(const TinyVolume& volume, int k, const std::string& seri
     return bytes + element(0x7fe0, 0x10, "OW", pixels);
 }
 
-}  // namespace sonocase::test
+}  // namespace sonocase::testing

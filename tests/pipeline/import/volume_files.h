@@ -9,7 +9,7 @@
 
 #include "formats/grid.h"
 
-namespace sonocase::test {
+namespace sonocase::testing {
 
 // A voxel array of 8 bits, x fastest, with the RAS+ position of voxel (i, j, k):
 // origin + columns * (i, j, k).
@@ -50,4 +50,4 @@ std::string gzip_bytes(const std::string& bytes);
 // One slice of an uncompressed DICOM series of unsigned 16-bit values, explicit little-endian.
 std::string dicom_slice(const TinyVolume& volume, int k, const std::string& series);
 
-}  // namespace sonocase::test
+}  // namespace sonocase::testing

@@ -1,11 +1,10 @@
 // The program sonocase as a user meets it: exit statuses, one-line errors, nothing half-written.
 #include <gtest/gtest.h>
 
-#include <sys/wait.h>
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "support/scratch_folder.h"
+#include "support/run_command.h"
 #include "support/temporary_folder.h"
 
 namespace {
@@ -13,26 +12,14 @@ namespace {
 using sonocase::testing::CommandResult;
 using sonocase::testing::read_text;
 using sonocase::testing::TemporaryFolder;
-using sonocase::testing::write_text;
 
 CommandResult sonocase_run(const std::string& arguments, const TemporaryFolder& folder) {
-    return sonocase::testing::run_command(
-        "cd " + folder.path() + " && " SONOCASE_BIN "/sonocase " + arguments, folder);
+    return sonocase::testing::run_command("cd " + folder.path() + " && " SONOCASE_BIN "/sonocase " +
+                                          arguments);
 }
 
 int lines(const std::string& text) {
     return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
-}
-
-// Names in the folder but for the two that run_command makes.
-std::vector<std::string> left_in(const TemporaryFolder& folder) {
-    std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.path())) {
-        const std::string name = std::filesystem::relative(entry.path(), folder.path()).string();
-        if (name != "stdout" && name != "stderr") names.push_back(name);
-    }
-    std::sort(names.begin(), names.end());
-    return names;
 }
 
 const char* const kTinyRecipe =
@@ -66,7 +53,7 @@ TEST(CommandLine, WrongUsageIsStatusTwoWithTheNearestVerb) {
     EXPECT_EQ(lines(option.error), 1) << option.error;
     EXPECT_EQ(sonocase_run("import a.nii", folder).status, 2);  // no -o
     EXPECT_EQ(sonocase_run("build --threads -3", folder).status, 2);
-    EXPECT_TRUE(left_in(folder).empty());
+    EXPECT_TRUE(folder.names().empty());
 }
 
 TEST(CommandLine, EveryVerbHasHelp) {
@@ -82,11 +69,11 @@ TEST(CommandLine, EveryVerbHasHelp) {
 
 TEST(CommandLine, FailureIsStatusOneWithOneLineAndNothingWritten) {
     const TemporaryFolder folder;
-    write_text(folder / "bad.toml", "[inputs]\nlables = \"x\"\n");
-    write_text(folder / "gone.toml", "[inputs]\nlabels = \"no.nii.gz\"\nsurface = \"no.ply\"\n");
-    write_text(folder / "short.nii", std::string(200, 'x'));
-    write_text(folder / "few.csv", "x,y,z\n1,2,3\n");
-    const auto before = left_in(folder);
+    folder.write("bad.toml", "[inputs]\nlables = \"x\"\n");
+    folder.write("gone.toml", "[inputs]\nlabels = \"no.nii.gz\"\nsurface = \"no.ply\"\n");
+    folder.write("short.nii", std::string(200, 'x'));
+    folder.write("few.csv", "x,y,z\n1,2,3\n");
+    const auto before = folder.names();
     for (const auto& [arguments, part] :
          {std::pair<const char*, const char*>{"build bad.toml -o out.sonocase", "bad.toml:2"},
           {"build gone.toml -o out.sonocase", "no.nii.gz"},
@@ -99,13 +86,13 @@ TEST(CommandLine, FailureIsStatusOneWithOneLineAndNothingWritten) {
         EXPECT_EQ(result.status, 1) << arguments << "\n" << result.error;
         EXPECT_EQ(lines(result.error), 1) << arguments << "\n" << result.error;
         EXPECT_NE(result.error.find(part), std::string::npos) << arguments << "\n" << result.error;
-        EXPECT_EQ(left_in(folder), before) << arguments;
+        EXPECT_EQ(folder.names(), before) << arguments;
     }
 }
 
 TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {
     const TemporaryFolder folder;
-    write_text(folder / "case.toml", kTinyRecipe);
+    folder.write("case.toml", kTinyRecipe);
     const CommandResult build =
         sonocase_run("build case.toml -o a/tiny.sonocase --report r.json --cache cache", folder);
     ASSERT_EQ(build.status, 0) << build.error;
@@ -149,7 +136,7 @@ TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {
     // A damaged bundle is not valid, in one line.
     std::string bytes = read_text(folder / "moved.sonocase");
     bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
-    write_text(folder / "bad.sonocase", bytes);
+    folder.write("bad.sonocase", bytes);
     const CommandResult damaged = sonocase_run("validate bad.sonocase", folder);
     EXPECT_EQ(damaged.status, 1);
     EXPECT_EQ(lines(damaged.error), 1) << damaged.error;
@@ -161,13 +148,13 @@ TEST(CommandLine, StagesAloneMakeTheCaseThatBuildMakes) {
         EXPECT_EQ(result.status, 0) << arguments << "\n" << result.error;
         return result.status == 0;
     };
-    write_text(folder / "case.toml", kTinyRecipe);
+    folder.write("case.toml", kTinyRecipe);
     ASSERT_TRUE(ok("build case.toml -o source.sonocase"));
     ASSERT_TRUE(ok("export source.sonocase -o in"));
-    write_text(folder / "files.toml",
-               "preset = \"draft\"\n[inputs]\nlabels = \"in/labels.seg.nrrd\"\n"
-               "surface = \"in/mannequin.ply\"\n[resample]\nvoxel_mm = 6\n[texture]\nedge = 8\n"
-               "speckle_edge = 8\n");
+    folder.write("files.toml",
+                 "preset = \"draft\"\n[inputs]\nlabels = \"in/labels.seg.nrrd\"\n"
+                 "surface = \"in/mannequin.ply\"\n[resample]\nvoxel_mm = 6\n[texture]\nedge = 8\n"
+                 "speckle_edge = 8\n");
     ASSERT_TRUE(ok("build files.toml -o whole.sonocase"));
 
     const std::string fit = " --labels ct.labels --surface in/mannequin.ply ";

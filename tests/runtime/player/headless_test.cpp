@@ -7,6 +7,7 @@
 #include "formats/calibration.h"
 #include "formats/case_bundle.h"
 #include "formats/poses.h"
+#include "support/run_command.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
 
@@ -15,7 +16,6 @@ namespace {
 
 using sonocase::testing::CommandResult;
 using sonocase::testing::read_text;
-using sonocase::testing::write_text;
 
 class Headless : public ::testing::Test {
   protected:
@@ -28,8 +28,7 @@ class Headless : public ::testing::Test {
         // No display and no home: headless needs neither.
         return sonocase::testing::run_command(
             "env -u DISPLAY -u WAYLAND_DISPLAY HOME=/nonexistent " SONOCASE_BIN "/sonoplay " +
-                arguments,
-            folder_);
+            arguments);
     }
     sonocase::testing::TemporaryFolder folder_;
     std::string bundle_;
@@ -115,8 +114,8 @@ TEST_F(Headless, ReplaysEveryRowInOrderAndAppliesCalibrations) {
         pose.tracker_from_tool = world_from_mannequin * scaled * inverse(sensor_from_probe);
         seen.push_back(pose);
     }
-    write_text(folder_ / "bare.csv", format_poses(bare));
-    write_text(folder_ / "seen.csv", format_poses(seen));
+    folder_.write("bare.csv", format_poses(bare));
+    folder_.write("seen.csv", format_poses(seen));
     Calibration probe, mannequin;
     probe.kind = "probe";
     probe.sensor_from_tool = sensor_from_probe;
@@ -174,8 +173,8 @@ TEST_F(Headless, SaysInOneLineWhatIsWrong) {
         int status;
         std::string says;
     };
-    write_text(folder_ / "damaged.sonocase", read_text(bundle_).substr(0, 2000));
-    write_text(folder_ / "empty.csv", "");
+    folder_.write("damaged.sonocase", read_text(bundle_).substr(0, 2000));
+    folder_.write("empty.csv", "");
     const std::vector<Case> cases = {
         {"--headless", 1, "no bundle"},
         {(folder_ / "absent.sonocase") + " --headless", 1, "absent.sonocase"},
@@ -206,9 +205,7 @@ TEST_F(Headless, SaysInOneLineWhatIsWrong) {
 }
 
 TEST(PlayerProgram, LinksNoLibraryOfThePipeline) {
-    const sonocase::testing::TemporaryFolder folder;
-    const CommandResult run =
-        sonocase::testing::run_command("ldd " SONOCASE_BIN "/sonoplay", folder);
+    const CommandResult run = sonocase::testing::run_command("ldd " SONOCASE_BIN "/sonoplay");
     ASSERT_EQ(run.status, 0) << run.error;
     ASSERT_NE(run.out.find("libc.so"), std::string::npos);
     for (const char* name :

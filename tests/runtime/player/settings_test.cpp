@@ -8,7 +8,6 @@ namespace sonocase::runtime {
 namespace {
 
 using sonocase::testing::TemporaryFolder;
-using sonocase::testing::write_text;
 
 TEST(Settings, ComeBackAsSaved) {
     const TemporaryFolder folder;
@@ -35,7 +34,7 @@ TEST(Settings, OfAMissingOrDamagedFileAreTheDefaults) {
     EXPECT_EQ(load_settings(folder / "absent.json", warning).window_width_px, 1280);
     EXPECT_EQ(warning, "");
     for (const char* text : {"", "{", "[1,2]", "null", "\x00\xFF"}) {
-        write_text(folder / "bad.json", text);
+        folder.write("bad.json", text);
         EXPECT_EQ(load_settings(folder / "bad.json", warning).window_width_px, 1280);
         EXPECT_NE(warning, "") << text;
     }
@@ -43,8 +42,8 @@ TEST(Settings, OfAMissingOrDamagedFileAreTheDefaults) {
 
 TEST(Settings, HoldNothingOutOfRange) {
     const TemporaryFolder folder;
-    write_text(
-        folder / "odd.json",
+    folder.write(
+        "odd.json",
         R"({"window_width_px": -5, "ui_scale": 1e9, "gain_db": "loud", "tgc_db": [99], "recent": 7,
                    "probe_sensor": 1000, "unknown": true})");
     std::string warning;
@@ -66,8 +65,8 @@ TEST(Settings, ThatCannotBeSavedSayWhy) {
 
 TEST(Bundles, AreFoundOnceRecentOnesFirst) {
     const TemporaryFolder folder;
-    write_text(folder / "one.sonocase", "x");
-    write_text(folder / "other.txt", "x");
+    folder.write("one.sonocase", "x");
+    folder.write("other.txt", "x");
     Settings s;
     s.recent = {folder / "absent.sonocase", folder / "one.sonocase", folder / "one.sonocase"};
     const auto found = find_bundles(s);

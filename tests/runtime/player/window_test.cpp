@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/case_bundle.h"
+#include "support/run_command.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
 
@@ -14,7 +15,6 @@ namespace sonocase::runtime {
 namespace {
 
 using sonocase::testing::CommandResult;
-using sonocase::testing::write_text;
 
 struct Picture {
     int width = 0, height = 0;
@@ -63,12 +63,11 @@ class WindowOnVirtualDisplay : public ::testing::Test {
     CommandResult run(const std::string& arguments,
                       const std::string& script,
                       const std::string& screen) {
-        write_text(folder_ / "script", script);
+        folder_.write("script", script);
         return sonocase::testing::run_command(
             "env XDG_CONFIG_HOME=" + (folder_ / "config") + " XDG_DATA_HOME=" + (folder_ / "data") +
-                " xvfb-run -a -s '-screen 0 " + screen + "x24' " SONOCASE_BIN "/sonoplay " +
-                arguments + " --script " + (folder_ / "script"),
-            folder_);
+            " xvfb-run -a -s '-screen 0 " + screen + "x24' " SONOCASE_BIN "/sonoplay " + arguments +
+            " --script " + (folder_ / "script"));
     }
     sonocase::testing::TemporaryFolder folder_;
     std::string bundle_;
@@ -139,7 +138,7 @@ TEST_F(WindowOnVirtualDisplay, IsTheSameLayoutAtFourTimesTheSize) {
 }
 
 TEST_F(WindowOnVirtualDisplay, GoesOnAfterWhatIsWrong) {
-    write_text(folder_ / "damaged.sonocase", sonocase::testing::read_text(bundle_).substr(0, 3000));
+    folder_.write("damaged.sonocase", sonocase::testing::read_text(bundle_).substr(0, 3000));
     CommandResult result = run(folder_ / "damaged.sonocase", "wait 4\nquit\n", "1280x720");
     EXPECT_EQ(result.status, 0);  // the list of bundles is there
     EXPECT_NE(result.error.find("damaged.sonocase"), std::string::npos) << result.error;
@@ -148,7 +147,7 @@ TEST_F(WindowOnVirtualDisplay, GoesOnAfterWhatIsWrong) {
     EXPECT_NE(result.error.find("no sweep named none"), std::string::npos) << result.error;
     result = run(bundle_ + " --tracker viper --model paper", "wait 30\nquit\n", "1280x720");
     EXPECT_EQ(result.status, 0) << result.error;
-    write_text(folder_ / "config/sonocase/player.json", "{ broken");
+    folder_.write("config/sonocase/player.json", "{ broken");
     result = run(bundle_ + " --model paper", "wait 4\nquit\n", "1280x720");
     EXPECT_EQ(result.status, 0);
     EXPECT_NE(result.error.find("player.json"), std::string::npos) << result.error;
@@ -156,7 +155,7 @@ TEST_F(WindowOnVirtualDisplay, GoesOnAfterWhatIsWrong) {
 
 TEST_F(WindowOnVirtualDisplay, WithoutADisplaySaysSoInOneLine) {
     const CommandResult result = sonocase::testing::run_command(
-        "env -u DISPLAY -u WAYLAND_DISPLAY " SONOCASE_BIN "/sonoplay " + bundle_, folder_);
+        "env -u DISPLAY -u WAYLAND_DISPLAY " SONOCASE_BIN "/sonoplay " + bundle_);
     EXPECT_EQ(result.status, 1);
     EXPECT_NE(result.error.find("--headless"), std::string::npos) << result.error;
     EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;

@@ -11,26 +11,14 @@
 #include <thread>
 
 #include "support/random.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase::runtime {
 namespace {
 
 namespace fs = std::filesystem;
 
-class Folder {
-  public:
-    Folder() {
-        const fs::path base =
-            fs::exists("/dev/shm") ? fs::path("/dev/shm") : fs::temp_directory_path();
-        std::string name = (base / "sonocase-test-XXXXXX").string();
-        path_ = ::mkdtemp(name.data());
-    }
-    ~Folder() { fs::remove_all(path_); }
-    std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-
-  private:
-    std::string path_;
-};
+using testing::TemporaryFolder;
 
 RecordedFrame frame(int i) {
     testing::Random random(static_cast<std::uint64_t>(i) + 1);
@@ -53,7 +41,7 @@ Result<Session> load(const std::string& path) {
 }
 
 TEST(SessionRecorder, WritesFramesEventsSettingsAndPictures) {
-    const Folder folder;
+    const TemporaryFolder folder(/*in_memory=*/true);
     Exercise exercise;
     exercise.targets.resize(1);
     exercise.targets[0].name = "lesion";
@@ -98,7 +86,7 @@ TEST(SessionRecorder, WritesFramesEventsSettingsAndPictures) {
 
 // The trainer's process dies at any moment; its clock runs as in life, at 500 frames a second.
 TEST(SessionRecorder, KilledWhileItRunsLosesAtMostTheLastSecond) {
-    const Folder folder;
+    const TemporaryFolder folder(/*in_memory=*/true);
     testing::Random random(5);
     for (int run = 0; run < 6; ++run) {
         const std::string path = folder / ("s" + std::to_string(run) + ".igs.mha");
@@ -142,7 +130,7 @@ TEST(SessionRecorder, KilledWhileItRunsLosesAtMostTheLastSecond) {
 }
 
 TEST(SessionRecorder, AFullDiskIsToldAndLosesNothingThatWasThere) {
-    const Folder folder;
+    const TemporaryFolder folder(/*in_memory=*/true);
     const std::string path = folder / "s.igs.mha";
     rlimit before{};
     ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
