@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/build_facts.h"
 #include "formats/nearest_name.h"
-#include "pipeline/verbs/build_facts.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/verbs.h"
 
@@ -80,7 +80,7 @@ int run(int argc, char** argv) {
         return kDone;
     }
     if (name == "--version") {
-        std::fputs(build_facts("sonocase").c_str(), stdout);
+        std::fputs(build_facts().c_str(), stdout);
         return kDone;
     }
     std::vector<std::string> names;

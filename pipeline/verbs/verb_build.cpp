@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "formats/atomic_file.h"
+#include "formats/build_facts.h"
 #include "formats/digest.h"
 #include "pipeline/cook/cook_case.h"
 #include "pipeline/files.h"
@@ -13,7 +14,6 @@
 #include "pipeline/tradeoff/boundary_error.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/tradeoff/suites.h"
-#include "pipeline/verbs/build_facts.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/verbs.h"
 

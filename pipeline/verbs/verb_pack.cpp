@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include "formats/atomic_file.h"
+#include "formats/build_facts.h"
 #include "formats/registration_file.h"
 #include "formats/stage_files.h"
 #include "pipeline/cook/pack_case.h"
@@ -9,7 +10,6 @@
 #include "pipeline/parallel.h"
 #include "pipeline/texture/bake_structure.h"
 #include "pipeline/texture/tissue_table.h"
-#include "pipeline/verbs/build_facts.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/verbs.h"
 

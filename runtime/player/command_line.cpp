@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <sstream>
 
+#include "formats/build_facts.h"
+
 namespace sonocase::runtime {
 namespace {
 
@@ -20,7 +22,9 @@ std::vector<std::string> split(const std::string& list) {
 
 int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exit_now) {
     CLI::App app{"Scan a case bundle with a tracked probe, the mouse or a script.", "sonoplay"};
-    app.set_version_flag("--version", "sonoplay " SONOCASE_VERSION);
+    std::string facts = build_facts();
+    facts.pop_back();  // the last end of line is printed by the library
+    app.set_version_flag("--version", facts);
     std::string size, effects;
     app.add_option("bundle", arguments.bundle,
                    "Case bundle (*.sonocase); none: choose from a list");

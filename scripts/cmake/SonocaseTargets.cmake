@@ -46,3 +46,45 @@ function(sonocase_test name)
                         GTest::gtest_main)
   add_test(NAME ${name} COMMAND ${name})
 endfunction()
+
+# sonocase_uses(LIBRARY "NAME VERSION"...): what LIBRARY is built with, for --version.
+function(sonocase_uses library)
+  set_property(GLOBAL APPEND PROPERTY ${library}_uses ${ARGN})
+endfunction()
+
+# sonocase_build_facts(PROGRAM LIBRARY...): gives PROGRAM the functions of formats/build_facts.h.
+add_custom_target(sonocase_commit
+  COMMAND ${CMAKE_COMMAND} -DSOURCE=${CMAKE_SOURCE_DIR} -DFILE=${CMAKE_BINARY_DIR}/facts/commit.h
+          -P ${CMAKE_SOURCE_DIR}/scripts/cmake/commit.cmake
+  BYPRODUCTS ${CMAKE_BINARY_DIR}/facts/commit.h VERBATIM)
+function(sonocase_build_facts program)
+  set(libraries "")
+  foreach(library IN LISTS ARGN)
+    get_property(uses GLOBAL PROPERTY ${library}_uses)
+    list(APPEND libraries ${uses})
+  endforeach()
+  list(REMOVE_DUPLICATES libraries)
+  list(JOIN libraries ", " libraries)
+  set(build "${CMAKE_BUILD_TYPE}")
+  if(SONOCASE_SANITIZE)
+    string(APPEND build ", sanitizers ${SONOCASE_SANITIZE}")
+  endif()
+  configure_file("${CMAKE_SOURCE_DIR}/scripts/cmake/build_facts.cpp.in"
+                 "${CMAKE_BINARY_DIR}/facts/${program}.cpp" @ONLY)
+  target_sources(${program} PRIVATE "${CMAKE_BINARY_DIR}/facts/${program}.cpp")
+  target_include_directories(${program} PRIVATE "${CMAKE_BINARY_DIR}/facts")
+  add_dependencies(${program} sonocase_commit)
+endfunction()
+
+# sonocase_header_version(VARIABLE HEADER MACRO...): numbers that a header defines, joined by dots, of a library
+# whose package file Debian ships broken.
+function(sonocase_header_version variable header)
+  set(numbers "")
+  foreach(macro IN LISTS ARGN)
+    file(STRINGS "${header}" line REGEX "#define +${macro} +[0-9]+" LIMIT_COUNT 1)
+    string(REGEX REPLACE ".*${macro} +([0-9]+).*" "\\1" number "${line}")
+    list(APPEND numbers "${number}")
+  endforeach()
+  list(JOIN numbers "." numbers)
+  set(${variable} "${numbers}" PARENT_SCOPE)
+endfunction()

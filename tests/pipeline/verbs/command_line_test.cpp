@@ -38,7 +38,8 @@ TEST(CommandLine, HelpListsVerbsAndVersionSaysHowItWasBuilt) {
     const CommandResult version = sonocase_run("--version", folder);
     EXPECT_EQ(version.status, 0);
     EXPECT_TRUE(version.out.starts_with("sonocase ")) << version.out;
-    EXPECT_NE(version.out.find("compiler"), std::string::npos);
+    for (const char* fact : {"\ncommit ", "\ncompiler ", "\nbuild ", "\nlibraries ", "ITK "})
+        EXPECT_NE(version.out.find(fact), std::string::npos) << fact << "\n" << version.out;
 }
 
 TEST(CommandLine, WrongUsageIsStatusTwoWithTheNearestVerb) {
