@@ -1,25 +1,36 @@
-# Two Debian packages: sonocase (the pipeline) and sonoplay (the player, which needs none of it).
-#   cpack --config build/release/CPackConfig.cmake
+# Two Debian packages: sonocase (the pipeline, with recipes and documents) and sonoplay (the player, which needs none of
+# the pipeline's libraries).
+#   cpack --config build/release/CPackConfig.cmake -B build/release/packages
+# scripts/packaging/test-packages makes them, installs them in a clean Debian and runs them there.
 set(share ${CMAKE_INSTALL_DATADIR})
 set(packaging ${CMAKE_SOURCE_DIR}/scripts/packaging)
+set(manuals ${CMAKE_BINARY_DIR}/manuals)
+
+# install_manuals(PROGRAM): manual page and completion, made from its --help when it is installed.
+function(install_manuals program)
+  install(CODE "execute_process(COMMAND ${packaging}/manuals ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${manuals} ${PROJECT_VERSION} ${program}
+                                COMMAND_ERROR_IS_FATAL ANY)" COMPONENT ${program})
+  install(FILES ${manuals}/${program}.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT ${program})
+  install(FILES ${manuals}/${program}.bash DESTINATION ${share}/bash-completion/completions
+          RENAME ${program} COMPONENT ${program})
+  install(FILES ${packaging}/copyright DESTINATION ${share}/doc/${program} COMPONENT ${program})
+endfunction()
 
 if(SONOCASE_RUNTIME)
-  install(FILES ${packaging}/60-sonocase-trackers.rules
-          DESTINATION ${CMAKE_INSTALL_PREFIX}/lib/udev/rules.d COMPONENT sonoplay)
+  install_manuals(sonoplay)
+  install(FILES ${packaging}/60-sonocase-trackers.rules DESTINATION lib/udev/rules.d COMPONENT sonoplay)
   install(FILES ${packaging}/sonoplay.desktop DESTINATION ${share}/applications COMPONENT sonoplay)
   install(FILES ${packaging}/sonocase-mime.xml DESTINATION ${share}/mime/packages
           RENAME sonocase.xml COMPONENT sonoplay)
-  install(FILES ${packaging}/sonoplay.svg DESTINATION ${share}/icons/hicolor/scalable/apps
-          COMPONENT sonoplay)
-  install(FILES ${packaging}/sonoplay.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT sonoplay)
-  install(FILES ${packaging}/sonoplay.bash DESTINATION ${share}/bash-completion/completions
-          RENAME sonoplay COMPONENT sonoplay)
+  install(FILES ${packaging}/sonoplay.svg DESTINATION ${share}/icons/hicolor/scalable/apps COMPONENT sonoplay)
+  install(FILES ${packaging}/sonoplay.svg DESTINATION ${share}/icons/hicolor/scalable/mimetypes
+          RENAME application-x-sonocase.svg COMPONENT sonoplay)
+  install(FILES docs/training.md docs/metrics.md DESTINATION ${share}/doc/sonoplay COMPONENT sonoplay)
 endif()
 if(SONOCASE_PIPELINE)
-  install(FILES ${packaging}/sonocase.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT sonocase)
-  install(FILES ${packaging}/sonocase.bash DESTINATION ${share}/bash-completion/completions
-          RENAME sonocase COMPONENT sonocase)
-  install(DIRECTORY ${CMAKE_SOURCE_DIR}/scenarios DESTINATION ${share}/sonocase COMPONENT sonocase)
+  install_manuals(sonocase)
+  install(DIRECTORY scenarios DESTINATION ${share}/sonocase COMPONENT sonocase)
+  install(DIRECTORY docs/ DESTINATION ${share}/doc/sonocase COMPONENT sonocase)
 endif()
 
 set(CPACK_GENERATOR DEB)
@@ -28,6 +39,8 @@ set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_PACKAGE_CONTACT "sonocase maintainers <maintainers@sonocase.invalid>")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
+    OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_COMPONENTS_ALL "")
@@ -38,15 +51,24 @@ if(SONOCASE_RUNTIME)
   list(APPEND CPACK_COMPONENTS_ALL sonoplay)
 endif()
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
+# The libraries that the programs link, found by dpkg-shlibdeps. What they open while they run is named here.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_SONOCASE_PACKAGE_NAME sonocase)
 set(CPACK_DEBIAN_SONOCASE_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_SONOCASE_PACKAGE_SUGGESTS "sonoplay")
 set(CPACK_DEBIAN_SONOPLAY_PACKAGE_NAME sonoplay)
 set(CPACK_DEBIAN_SONOPLAY_PACKAGE_SECTION education)
+set(CPACK_DEBIAN_SONOPLAY_PACKAGE_DEPENDS "libgl1, fonts-dejavu-core")
+set(CPACK_DEBIAN_SONOPLAY_PACKAGE_RECOMMENDS "libgl1-mesa-dri, shared-mime-info, udev")
+set(CPACK_DEBIAN_SONOPLAY_PACKAGE_SUGGESTS "sonocase")
 set(CPACK_COMPONENT_SONOCASE_DESCRIPTION
     "Case bundles for ultrasound-guided needle placement training
- Turns a segmented CT and a digitised mannequin into a case bundle.")
+Turns a segmented CT and a digitised mannequin into a case bundle: fits the
+patient to the mannequin, proves that the fit does not fold, learns textures
+from real ultrasound, and says how good the result is.")
 set(CPACK_COMPONENT_SONOPLAY_DESCRIPTION
     "Trainer for ultrasound-guided needle placement
- Opens a case bundle, follows a tracked probe and needle, shows the ultrasound.")
+Opens a case bundle, follows a tracked probe and needle, or the mouse, and
+shows the ultrasound that the probe would see in a real patient.")
 include(CPack)

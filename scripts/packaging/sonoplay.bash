@@ -1,16 +1,21 @@
-# Bash completion of sonoplay.
+# Bash completion of sonoplay. The tables are made from its help by scripts/packaging/manuals.
+@TABLE@
+
 _sonoplay() {
-    local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD - 1]}
-    case $prev in
-        --model) COMPREPLY=($(compgen -W "physical paper" -- "$cur")) ; return ;;
-        --renderer) COMPREPLY=($(compgen -W "fast reference" -- "$cur")) ; return ;;
-        --tracker) COMPREPLY=($(compgen -W "mouse null viper 3dg liberty sweep: replay: igtl:" -- "$cur")) ; return ;;
-        --out | --stats | --record | --calibration) COMPREPLY=($(compgen -f -- "$cur")) ; return ;;
+    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]}
+    local choices=${_sonoplay_choices["sonoplay $before"]:-}
+    case $before in
+        --tracker) choices="mouse null viper 3dg liberty sweep: replay: igtl:" ;;
+        --effects) choices="auto all none" ;;
     esac
-    if [[ $cur == -* ]]; then
-        COMPREPLY=($(compgen -W "$(sonoplay --help 2>/dev/null | grep -o -- '--[a-z-]*' | sort -u)" -- "$cur"))
+    if [[ -n $choices ]]; then
+        mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$word")
+    elif [[ $word == -* ]]; then
+        mapfile -t COMPREPLY < <(compgen -W "${_sonoplay_options[sonoplay]}" -- "$word")
+    elif [[ $before == --* && $before != --headless ]]; then
+        mapfile -t COMPREPLY < <(compgen -f -- "$word")
     else
-        COMPREPLY=($(compgen -f -X '!*.sonocase' -- "$cur") $(compgen -d -- "$cur"))
+        mapfile -t COMPREPLY < <(compgen -f -X '!*.sonocase' -- "$word"; compgen -d -- "$word")
     fi
 }
 complete -o filenames -F _sonoplay sonoplay
