@@ -85,7 +85,8 @@ Result<Registration> fit(const Recipe& recipe,
                          const Surface& mannequin,
                          const Progress& progress) {
     if (recipe.inputs.analytic && recipe.inputs.torso.known_map) {
-        Registration registration = analytic_torso_truth(recipe.inputs.torso.mannequin.strength);
+        Registration registration =
+            analytic_torso_truth(recipe.inputs.torso.mannequin.strength, recipe.inputs.torso.body);
         StageReport report;
         report.stage = "warp";
         report.version = kRegisterVersion;
@@ -100,6 +101,12 @@ Result<Registration> fit(const Recipe& recipe,
         auto landmarks = load_landmarks(recipe.resolve(recipe.inputs.landmarks));
         if (!landmarks) return landmarks.error();
         options.landmarks = std::move(*landmarks);
+    }
+    if (recipe.inputs.analytic) {
+        const AnalyticInput& in = recipe.inputs.torso;
+        for (const AnalyticLandmark& mark :
+             analytic_torso_landmarks(in.landmarks, in.landmark_noise_mm, in.mannequin, in.body))
+            options.landmarks.push_back({mark.name, mark.ct, mark.mannequin});
     }
     auto result = register_surfaces({skin, mannequin}, options, progress);
     if (!result) return result.error();
@@ -126,7 +133,8 @@ std::string analytic_text(const AnalyticInput& in) {
     for (const double value :
          {in.body.width_scale, in.body.depth_scale, in.body.belly_mm, in.voxel_mm, in.slice_mm,
           in.mannequin.noise_mm, in.mannequin.strength, static_cast<double>(in.mannequin.points),
-          in.mannequin.mesh ? 1.0 : 0.0, in.mannequin.front_only ? 1.0 : 0.0,
+          static_cast<double>(in.body.warp), static_cast<double>(in.landmarks),
+          in.landmark_noise_mm, in.mannequin.mesh ? 1.0 : 0.0, in.mannequin.front_only ? 1.0 : 0.0,
           static_cast<double>(in.mannequin.seed)})
         text += " " + number_text(value);
     return text;

@@ -207,16 +207,35 @@ class RecipeParser {
     Status analytic(const toml::table& table) {
         recipe_.inputs.analytic = true;
         AnalyticInput& in = recipe_.inputs.torso;
-        const std::vector<std::string> known{"voxel_mm", "slice_mm",    "points",      "noise_mm",
-                                             "mesh",     "seed",        "known_map",   "front_only",
-                                             "strength", "width_scale", "depth_scale", "belly_mm",
-                                             "examples"};
+        const std::vector<std::string> known{
+            "body",     "voxel_mm",  "slice_mm",   "points",    "noise_mm",         "mesh",
+            "seed",     "known_map", "front_only", "strength",  "width_scale",      "depth_scale",
+            "belly_mm", "examples",  "up",         "landmarks", "landmark_noise_mm"};
+        // The named body comes first: the proportions beside it change it.
+        if (const toml::node* node = table.get("body")) {
+            std::string body;
+            if (auto status = text(*node, "analytic.body", &body); !status) return status;
+            const auto found = analytic_body(body);
+            if (!found)
+                return Error{"unknown body '" + body + "'", place(path_, node->source()),
+                             suggest_name(body, analytic_body_names())};
+            in.body = *found;
+        }
         for (const auto& [key, node] : table) {
             const std::string name(key.str()), full = "analytic." + name;
             Status status = Done{};
             double value = 0;
-            if (name == "voxel_mm")
+            if (name == "body")
+                continue;
+            else if (name == "voxel_mm")
                 status = number(node, full, 0.5, 10, &in.voxel_mm);
+            else if (name == "up")
+                status = direction(node, full, &recipe_.inputs.up);
+            else if (name == "landmarks") {
+                status = whole(node, full, 0, 9, &value);
+                in.landmarks = static_cast<int>(value);
+            } else if (name == "landmark_noise_mm")
+                status = number(node, full, 0, 50, &in.landmark_noise_mm);
             else if (name == "slice_mm")
                 status = number(node, full, 0.5, 10, &in.slice_mm);
             else if (name == "noise_mm")

@@ -25,7 +25,9 @@ struct AnalyticInput {
     AnalyticMannequinOptions mannequin;
     double voxel_mm = 2;
     double slice_mm = 3;
-    bool known_map = false;  // take the map that made the mannequin instead of fitting one
+    int landmarks = 0;             // marked on both bodies, see analytic_torso_landmarks
+    double landmark_noise_mm = 1;  // of each and axis
+    bool known_map = false;        // take the map that made the mannequin instead of fitting one
 };
 
 struct TextureStageOptions {

@@ -325,12 +325,34 @@ double solid_distance(const Solid& solid, Point3 p) {
     return solid.within_depth < 0 ? d : std::max(d, layer(solid.within_depth));
 }
 
+// Not std::normal_distribution: its sequence differs between standard libraries.
+class Gaussian {
+  public:
+    explicit Gaussian(std::uint64_t seed) : engine_(seed) {}
+    double uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+    double operator()() {
+        const double u = 1 - uniform(), v = uniform();
+        return std::sqrt(-2 * std::log(u)) * std::cos(2 * kPi * v);
+    }
+
+  private:
+    std::mt19937_64 engine_;
+};
+
 // Body to standard torso: organs follow the change of proportion.
 Point3 standard_point(Point3 p, const AnalyticBody& body) {
     return {p.x / body.width_scale, p.y / body.depth_scale, p.z};
 }
 
 }  // namespace
+
+std::vector<std::string> analytic_body_names() { return {"standard", "slender"}; }
+
+std::optional<AnalyticBody> analytic_body(std::string_view name) {
+    if (name == "standard") return AnalyticBody{};
+    if (name == "slender") return AnalyticBody{0.88, 0.92, 4, 2};
+    return std::nullopt;
+}
 
 std::vector<Label> analytic_torso_labels() { return anatomy().labels; }
 
@@ -388,18 +410,25 @@ LabelVolume sample_analytic_torso(const Grid& grid, const AnalyticBody& body) {
     return out;
 }
 
-Registration analytic_torso_truth(double strength) {
+Registration analytic_torso_truth(double strength, const AnalyticBody& body) {
     // The mannequin's axes differ from the patient's: x to his left, y to the head, z to the front.
+    const bool second = body.warp == 2;
     const Matrix3 axes = Matrix3::from_columns({-1, 0, 0}, {0, 0, 1}, {0, 1, 0});
-    const Rigid rigid{rotation_about(normalized({0.4, 1, -0.3}), 0.21) * axes, {35, -20, 12}};
+    const Matrix3 tilt = second ? rotation_about(normalized({1, -0.3, 0.5}), 0.17)
+                                : rotation_about(normalized({0.4, 1, -0.3}), 0.21);
+    const Rigid rigid{tilt * axes, second ? Vector3{-48, 15, 30} : Vector3{35, -20, 12}};
     Registration truth;
     truth.mannequin_from_ct = rigid;
     constexpr double kScale = 150;
     truth.quadratic = QuadraticMap::from_rigid(rigid, {0, 0, 0}, kScale);
     // Extra terms in the patient's axes, mm per unit of u = p / 150: x, y, z; xx, yy, zz; xy, xz, yz.
-    const double extra[3][9] = {{9, 2, -2, 1.5, 1, 3, 4, 6, -2},
-                                {-2, 11, 3, 3, 4, -6, -3, 2, 7},
-                                {1, -3, 6, 4, -2, 3, 2, -3, 4}};
+    constexpr double kFirst[3][9] = {{9, 2, -2, 1.5, 1, 3, 4, 6, -2},
+                                     {-2, 11, 3, 3, 4, -6, -3, 2, 7},
+                                     {1, -3, 6, 4, -2, 3, 2, -3, 4}};
+    constexpr double kSecond[3][9] = {{10, -3, 3, -2, 3, -2, -4, 3, 3},
+                                      {3, -5, 2, -3, 2, 6, 3, -3, -3},
+                                      {-3, 3, -8, 3, 4, -3, -3, 4, 2}};
+    const auto& extra = second ? kSecond : kFirst;
     for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 9; ++c) {
             for (int a = 0; a < 3; ++a) {
@@ -413,7 +442,7 @@ Registration analytic_torso_truth(double strength) {
 }
 
 Surface analytic_torso_mannequin(const AnalyticMannequinOptions& options, const AnalyticBody& body) {
-    const Registration truth = analytic_torso_truth(options.strength);
+    const Registration truth = analytic_torso_truth(options.strength, body);
     const double low = -kHalfHeight - 30, high = kHalfHeight + 30;
     const auto skin_point = [&](double theta, double z) {
         const Point3 p = trunk_point(theta, z, 0, body.belly_mm);
@@ -440,21 +469,42 @@ Surface analytic_torso_mannequin(const AnalyticMannequinOptions& options, const 
         }
         return out;
     }
-    std::mt19937_64 engine(options.seed);
-    const auto uniform = [&] { return static_cast<double>(engine() >> 11) * 0x1p-53; };
-    const auto gaussian = [&] {
-        const double u = 1 - uniform(), v = uniform();
-        return std::sqrt(-2 * std::log(u)) * std::cos(2 * kPi * v);
-    };
+    Gaussian gaussian(options.seed);
     while (static_cast<int>(out.points.size()) < options.points) {
-        const double theta = 2 * kPi * uniform();
-        const double z = low + (high - low) * uniform();
+        const double theta = 2 * kPi * gaussian.uniform();
+        const double z = low + (high - low) * gaussian.uniform();
         if (options.front_only && std::sin(theta) < -0.3) continue;
         const Point3 p = skin_point(theta, z);
         const double nx = gaussian(), ny = gaussian(), nz = gaussian();
         out.points.push_back(p + options.noise_mm * Vector3{nx, ny, nz});
     }
     return out;
+}
+
+std::vector<AnalyticLandmark> analytic_torso_landmarks(int count,
+                                                       double noise_mm,
+                                                       const AnalyticMannequinOptions& options,
+                                                       const AnalyticBody& body) {
+    const struct {
+        const char* name;
+        double theta, z;  // direction from the axis, 0 right, pi/2 front; height, mm
+    } places[] = {{"navel", 0.5 * kPi, -40},          {"xiphoid", 0.5 * kPi, 105},
+                  {"spinous_process_L4", 1.5 * kPi, -80}, {"hip_bone_right", 0.12 * kPi, -105},
+                  {"hip_bone_left", 0.88 * kPi, -105},    {"costal_margin_right", 0.2 * kPi, 35},
+                  {"costal_margin_left", 0.8 * kPi, 35},  {"spinous_process_T10", 1.5 * kPi, 120},
+                  {"pubis", 0.5 * kPi, -145}};
+    const Registration truth = analytic_torso_truth(options.strength, body);
+    Gaussian noise(options.seed + 1000);
+    std::vector<AnalyticLandmark> marks;
+    for (const auto& place : places) {
+        if (static_cast<int>(marks.size()) >= count) break;
+        const Point3 p = trunk_point(place.theta, place.z, 0, body.belly_mm);
+        const Point3 ct{p.x * body.width_scale, p.y * body.depth_scale, p.z};
+        const double nx = noise(), ny = noise(), nz = noise();
+        marks.push_back(
+            {place.name, ct, mannequin_from_ct(truth, ct) + noise_mm * Vector3{nx, ny, nz}});
+    }
+    return marks;
 }
 
 }  // namespace sonocase::pipeline

@@ -8,7 +8,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/label_volume.h"
@@ -22,7 +24,13 @@ struct AnalyticBody {
     double width_scale = 1;   // of the patient across, [0.7, 1.4]; organs move along
     double depth_scale = 1;   // front to back, [0.7, 1.4]
     double belly_mm = 12;     // how far the belly stands out, [0, 40]
+    int warp = 1;             // which known warp makes the mannequin, 1 or 2
 };
+
+// The bodies that a recipe can name: "standard", and "slender": narrower and shallower, its
+// mannequin made by the second warp. Empty for another name.
+std::optional<AnalyticBody> analytic_body(std::string_view name);
+std::vector<std::string> analytic_body_names();
 
 // Palette, outside first. Names are those of TotalSegmentator's classes where it has one.
 std::vector<Label> analytic_torso_labels();
@@ -43,7 +51,7 @@ Grid analytic_torso_grid(Vector3 spacing_mm);
 // The map that made the mannequin: rigid and quadratic parts, no residual. The quadratic moves skin by
 // 9 mm on average beyond the rigid part; its smallest det J over the patient's box is above 0.6.
 // `strength` scales the quadratic part; 0 leaves the rigid motion.
-Registration analytic_torso_truth(double strength = 1);
+Registration analytic_torso_truth(double strength = 1, const AnalyticBody& body = {});
 
 struct AnalyticMannequinOptions {
     int points = 2000;       // readings, or vertices of the mesh (approximately)
@@ -57,5 +65,17 @@ struct AnalyticMannequinOptions {
 // patient's grid at either end. Readings are shuffled and carry no normals.
 Surface analytic_torso_mannequin(const AnalyticMannequinOptions& options = {},
                                  const AnalyticBody& body = {});
+
+// Places of the skin that a case author would mark on both bodies: navel, tip of the breastbone,
+// costal margins, hip bones, pubis, two spinous processes. At most nine; noise_mm per axis is the
+// error of pointing, added on the mannequin's side.
+struct AnalyticLandmark {
+    std::string name;
+    Point3 ct, mannequin;
+};
+std::vector<AnalyticLandmark> analytic_torso_landmarks(int count,
+                                                       double noise_mm,
+                                                       const AnalyticMannequinOptions& options = {},
+                                                       const AnalyticBody& body = {});
 
 }  // namespace sonocase::pipeline

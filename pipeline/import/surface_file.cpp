@@ -125,8 +125,9 @@ Result<Surface> import_surface(const std::string& path,
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
             return Error{"surface has a vertex that is not finite", path, "export it again"};
     if (surface->points.size() < kFewestSurfacePoints)
-        return Error{"surface of " + std::to_string(surface->points.size()) + " points", path,
-                     "expected at least 100 all round the torso; take more readings"};
+        return Error{
+            "surface of " + std::to_string(surface->points.size()) + " points", path,
+            "expected at least 30 all round the torso, 500 or more are good; take more readings"};
     if (options.scale != 1)
         for (Point3& p : surface->points) p = Point3{} + options.scale * (p - Point3{});
     Box3 box;

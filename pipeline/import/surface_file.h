@@ -23,12 +23,12 @@ struct SurfaceFileOptions {
 // Readings that are not finite are left out and counted in `report` (stage "surface_file", may be
 // null).
 //
-// Errors: no such file, unreadable or truncated, fewer than 100 points, an extent that cannot be a
+// Errors: no such file, unreadable or truncated, fewer than 30 points, an extent that cannot be a
 // torso in mm.
 Result<Surface> import_surface(const std::string& path,
                                const SurfaceFileOptions& options = {},
                                StageReport* report = nullptr);
 
-inline constexpr int kFewestSurfacePoints = 100;
+inline constexpr int kFewestSurfacePoints = 30;
 
 }  // namespace sonocase::pipeline

@@ -30,6 +30,17 @@ std::vector<std::uint32_t> one_per_cube(std::span<const Point3> points, double s
     return chosen;
 }
 
+// The gap along the mean of the two normals: points of one round surface, a step apart, have gap 0,
+// where either plane alone is off by step^2 / (2 radius).
+Match match_of(std::uint32_t skin,
+               Point3 mapped,
+               Vector3 mapped_normal,
+               const TargetSurface& target,
+               std::uint32_t j) {
+    const Vector3 n = normalized(mapped_normal + target.normals[j]);
+    return {skin, target.points[j], n, dot(n, mapped - target.points[j])};
+}
+
 }  // namespace
 
 SkinModel thin_skin(const Surface& skin,
@@ -94,8 +105,7 @@ Matches find_matches(const SkinModel& skin,
             const std::uint32_t i = mapped_index.nearest(target.points[j], &d2);
             if (d2 > farthest2 || skin.on_rim[i]) continue;
             if (dot(mapped_normals[i], target.normals[j]) < options.least_cosine) continue;
-            const double gap = dot(mapped_normals[i], mapped[i] - target.points[j]);
-            found[n] = {{i, target.points[j], mapped_normals[i], gap}, true};
+            found[n] = {match_of(i, mapped[i], mapped_normals[i], target, j), true};
         }
     });
     matches.from_target.reserve(found.size());
@@ -118,8 +128,9 @@ Matches find_matches(const SkinModel& skin,
             const double aside = std::sqrt(std::max(0.0, d2 - gap * gap));
             // Beside a rim reading the mannequin may have ended.
             if (aside > (target.on_rim[j] ? 0.35 : 1.0) * options.side_step_mm) continue;
-            found[n] = {{static_cast<std::uint32_t>(i), target.points[j], target.normals[j], gap},
-                        true};
+            found[n] = {
+                match_of(static_cast<std::uint32_t>(i), mapped[i], mapped_normals[i], target, j),
+                true};
         }
     });
     for (std::size_t n = 0; n < asked; ++n) {

@@ -1,8 +1,8 @@
 // Which point of the skin lies against which place of the mannequin, and which have no counterpart.
 //
-// Both directions give rows of one kind, n . (f(x) - y): x a skin point, y a place on the
-// mannequin, n the mapped skin's normal (a reading looks for the skin) or the mannequin's (the skin
-// looks for it).
+// Both directions (a reading looks for the skin, the skin looks for the mannequin) give rows of one
+// kind, n . (f(x) - y): x a skin point, y a place on the mannequin, n the mean of the mapped skin's
+// normal and the mannequin's.
 #pragma once
 
 #include <cstdint>

@@ -11,6 +11,7 @@ namespace sonocase::pipeline {
 namespace {
 
 using Row10 = Eigen::Matrix<double, 1, 10>;
+constexpr double kFarGap_mm = 8;  // larger gaps count as this where maps are compared
 
 Vector3 scaled(const RigidQuadratic& q, Point3 skin) {
     return (q.rigid.rotation * (skin - Point3{})) / q.scale_mm;
@@ -59,6 +60,8 @@ ConstraintRows constraint_rows(const RigidQuadratic& q,
     return rows;
 }
 
+}  // namespace
+
 std::vector<Point3> every_so_many(const std::vector<Point3>& points, std::size_t count) {
     std::vector<Point3> some;
     const std::size_t stride =
@@ -66,8 +69,6 @@ std::vector<Point3> every_so_many(const std::vector<Point3>& points, std::size_t
     for (std::size_t i = 0; i < points.size(); i += stride) some.push_back(points[i]);
     return some;
 }
-
-}  // namespace
 
 RigidQuadratic RigidQuadratic::from_rigid(const Rigid& rigid) {
     RigidQuadratic q;
@@ -162,128 +163,6 @@ double proven_min_det(const RigidQuadratic& q, const Box3& box) {
     return prove_no_fold(r).least_bound;
 }
 
-RansacResult ransac_quadratic(const SkinModel& skin,
-                              const TargetSurface& target,
-                              const Rigid& rigid,
-                              const Box3& box,
-                              const RansacOptions& options,
-                              const Progress& progress) {
-    RansacResult result;
-    result.map = RigidQuadratic::from_rigid(rigid);
-    // N_v points of the skin, N_m of the mannequin.
-    std::vector<Point3> inner;
-    for (std::size_t i = 0; i < skin.points.size(); ++i) {
-        if (!skin.on_rim[i]) inner.push_back(skin.points[i]);
-    }
-    const std::vector<Point3> volume =
-        every_so_many(inner, static_cast<std::size_t>(std::max(1, options.skin_points)));
-    std::vector<Point3> places;
-    for (std::size_t j = 0; j < target.points.size(); ++j) {
-        if (!target.lifted[j]) places.push_back(target.points[j]);
-    }
-    if (volume.empty() || places.empty()) return result;
-    const PointIndex index(places);
-    Vector3 sum;
-    for (Point3 p : places) sum = sum + (p - Point3{});
-    const Point3 centroid = Point3{} + sum / static_cast<double>(places.size());
-    double mean_distance = 0;
-    for (Point3 p : places)
-        mean_distance += distance(p, centroid) / static_cast<double>(places.size());
-    result.consensus_mm = options.consensus_share * mean_distance;
-
-    // Eqs. (7)-(8): the true entries of the N_v x N_m matrix, row by row.
-    struct Entry {
-        std::uint32_t volume, place;
-    };
-    std::vector<std::vector<Entry>> by_row(volume.size());
-    parallel_for(volume.size(), 16, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v) {
-            const Point3 p = rigid * volume[v];
-            double nearest2 = 0;
-            index.nearest(p, &nearest2);
-            const double limit2 = options.match_ratio * options.match_ratio * nearest2;
-            for (std::size_t m = 0; m < places.size(); ++m) {
-                const Vector3 d = places[m] - p;
-                if (dot(d, d) < limit2) {
-                    by_row[v].push_back(
-                        {static_cast<std::uint32_t>(v), static_cast<std::uint32_t>(m)});
-                }
-            }
-        }
-    });
-    std::vector<Entry> entries;
-    for (const auto& row : by_row) entries.insert(entries.end(), row.begin(), row.end());
-
-    // Eq. (9).
-    const auto consensus = [&](const RigidQuadratic& q) {
-        int near = 0;
-        for (Point3 v : volume) {
-            double d2 = 0;
-            index.nearest(map_point(q, v), &d2);
-            near += d2 < result.consensus_mm * result.consensus_mm;
-        }
-        return near / static_cast<double>(volume.size());
-    };
-    result.rigid_consensus = result.consensus = consensus(result.map);
-    if (entries.empty() || options.trials <= 0) return result;
-
-    struct Trial {
-        RigidQuadratic map;
-        double consensus = -1;
-        bool folds = false;
-    };
-    std::vector<Trial> trials(static_cast<std::size_t>(options.trials));
-    parallel_for(trials.size(), 2, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t t = begin; t < end; ++t) {
-            std::uint64_t state = options.seed * 0x9E3779B97F4A7C15ull + t;
-            const auto next = [&state] {  // splitmix64
-                std::uint64_t z = state += 0x9E3779B97F4A7C15ull;
-                z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
-                z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
-                return z ^ (z >> 31);
-            };
-            std::vector<Correspondence> sample;
-            for (int n = 0; n < options.correspondences; ++n) {
-                const Entry e = entries[next() % entries.size()];
-                sample.push_back({volume[e.volume], places[e.place]});
-            }
-            trials[t].map = fit_correspondences(sample, rigid, options.constraint_mm);
-            if (!(proven_min_det(trials[t].map, box) > kLeastDetJacobian)) {
-                trials[t].folds = true;
-                continue;
-            }
-            trials[t].consensus = consensus(trials[t].map);
-        }
-    });
-    tell(progress, 0.8, "quadratic warp: trials done");
-    for (std::size_t t = 0; t < trials.size(); ++t) {
-        result.folding_trials += trials[t].folds;
-        result.best_trial_consensus = std::max(result.best_trial_consensus, trials[t].consensus);
-        if (trials[t].consensus > result.consensus) {
-            result.consensus = trials[t].consensus;
-            result.map = trials[t].map;
-            result.best_trial = static_cast<int>(t);
-        }
-    }
-    // Re-estimate from all closest pairs within T_c; keep the better.
-    std::vector<Correspondence> pairs;
-    for (Point3 v : volume) {
-        double d2 = 0;
-        const std::uint32_t m = index.nearest(map_point(result.map, v), &d2);
-        if (d2 < result.consensus_mm * result.consensus_mm) pairs.push_back({v, places[m]});
-    }
-    if (pairs.size() >= 10) {
-        const RigidQuadratic again = fit_correspondences(pairs, rigid, options.constraint_mm);
-        const double c = consensus(again);
-        if (c > result.consensus && proven_min_det(again, box) > kLeastDetJacobian) {
-            result.map = again;
-            result.consensus = c;
-            result.re_estimated = true;
-        }
-    }
-    return result;
-}
-
 MappedSkin map_skin(const SkinModel& skin, const RigidQuadratic& q) {
     MappedSkin mapped;
     mapped.points.resize(skin.points.size());
@@ -299,6 +178,149 @@ MappedSkin map_skin(const SkinModel& skin, const RigidQuadratic& q) {
     return mapped;
 }
 
+namespace {
+
+using Rows = Eigen::MatrixXd;  // 30 unknowns and the right-hand side
+
+Vector3 mean_turn_column(const std::array<std::array<double, 10>, 3>& k, Vector3 w, int axis) {
+    Vector3 column;
+    for (int r = 0; r < 3; ++r) {
+        const auto& c = k[static_cast<std::size_t>(r)];
+        const double slopes[3] = {c[1] + 2 * c[4] * w.x + c[7] * w.y + c[8] * w.z,
+                                  c[2] + 2 * c[5] * w.y + c[7] * w.x + c[9] * w.z,
+                                  c[3] + 2 * c[6] * w.z + c[8] * w.x + c[9] * w.y};
+        column[r] = slopes[axis];
+    }
+    return column;
+}
+
+// The rotation that the map makes on the whole, beyond that of the rigid pose: what (4)-(6) mean by
+// rigid must not be the tilt that the rigid fit of two unlike bodies happened to find.
+Matrix3 mean_turn(const RigidQuadratic& q, const std::vector<Point3>& held) {
+    Vector3 sum[3];
+    for (Point3 p : held) {
+        const Vector3 w = scaled(q, p);
+        for (int axis = 0; axis < 3; ++axis) sum[axis] = sum[axis] + mean_turn_column(q.k, w, axis);
+    }
+    const double unit = 1 / (q.scale_mm * static_cast<double>(held.size()));
+    return nearest_rotation(Matrix3::from_columns(unit * sum[0], unit * sum[1], unit * sum[2]));
+}
+
+Matches match_quadratic(const SkinModel& skin,
+                        const TargetSurface& target,
+                        std::span<const std::uint32_t> readings,
+                        const RigidQuadratic& q,
+                        int skin_askers,
+                        double gate_mm) {
+    MatchOptions gates;
+    gates.farthest_mm = gate_mm;
+    gates.side_step_mm = 1.2 * target.spacing_mm;
+    const MappedSkin mapped = map_skin(skin, q);
+    const std::size_t stride = std::max<std::size_t>(
+        1, skin.points.size() / static_cast<std::size_t>(std::max(1, skin_askers)));
+    return find_matches(skin, mapped.points, mapped.normals, mapped.index, target, readings, stride,
+                        gates);
+}
+
+// One weighted row a match: w n . (K b) = w n . place, the two directions weighing as one each.
+Rows gap_rows(const SkinModel& skin,
+              const RigidQuadratic& q,
+              const Matches& matches,
+              double loss_mm) {
+    Rows rows(static_cast<Eigen::Index>(matches.from_target.size() + matches.from_skin.size()), 31);
+    Eigen::Index row = 0;
+    for (const auto* list : {&matches.from_target, &matches.from_skin}) {
+        const double share = 1 / static_cast<double>(std::max<std::size_t>(1, list->size()));
+        for (const Match& m : *list) {
+            const double w = std::sqrt(share / (1 + m.gap_mm * m.gap_mm / (loss_mm * loss_mm)));
+            const Row10 basis_row = basis(scaled(q, skin.points[m.skin]));
+            for (int d = 0; d < 3; ++d)
+                rows.block<1, 10>(row, 10 * d) = w * m.normal[d] * basis_row;
+            rows(row++, 30) = w * dot(m.normal, m.place - Point3{});
+        }
+    }
+    return rows;
+}
+
+// Landmarks and the constraint about `turn`.
+Rows held_rows(const RigidQuadratic& q,
+               const RefineOptions& options,
+               const ConstraintRows& constraint,
+               const Matrix3& turn) {
+    Rows rows = Rows::Zero(3 * static_cast<Eigen::Index>(options.landmarks.size()) + 30, 31);
+    Eigen::Index row = 0;
+    for (const Correspondence& c : options.landmarks) {
+        const Vector3 r = map_point(q, c.skin) - c.place;
+        const double w = std::sqrt(2 * options.landmark_weight / (1 + dot(r, r) / (30 * 30)));
+        const Row10 basis_row = basis(scaled(q, c.skin));
+        for (int d = 0; d < 3; ++d, ++row) {
+            rows.block<1, 10>(row, 10 * d) = w * basis_row;
+            rows(row, 30) = w * c.place[d];
+        }
+    }
+    for (int d = 0; d < 3; ++d) {
+        rows.block<10, 10>(row + 10 * d, 10 * d) = constraint.left;
+        for (int e = 0; e < 3; ++e)
+            rows.block<10, 1>(row + 10 * d, 30) += turn(d, e) * constraint.right.col(e);
+    }
+    return rows;
+}
+
+// The triangular factor of rows, with the right-hand side: all that a fit needs of them.
+Rows triangle(Rows rows) {
+    const Eigen::Index kept = std::min<Eigen::Index>(rows.rows(), 31);
+    Eigen::HouseholderQR<Eigen::Ref<Rows>> qr(rows);
+    Rows out = Rows::Zero(31, 31);
+    out.topRows(kept) = qr.matrixQR().topRows(kept).triangularView<Eigen::Upper>();
+    return out;
+}
+
+Eigen::VectorXd solution(const Rows& factor) {
+    return factor.topLeftCorner(30, 30).triangularView<Eigen::Upper>().solve(
+        factor.topRightCorner(30, 1));
+}
+
+Rows stacked(const std::vector<const Rows*>& parts) {
+    Eigen::Index count = 0;
+    for (const Rows* p : parts) count += p->rows();
+    Rows all(count, 31);
+    count = 0;
+    for (const Rows* p : parts) {
+        all.middleRows(count, p->rows()) = *p;
+        count += p->rows();
+    }
+    return all;
+}
+
+constexpr double kPatch_mm = 60;
+constexpr int kFolds = 5;
+
+// Number of the patch of each place: cubes of the mannequin's frame, numbered in their order.
+std::vector<int> patches_of(const Matches& matches, int* count) {
+    std::vector<std::array<int, 3>> cube;
+    for (const auto* list : {&matches.from_target, &matches.from_skin}) {
+        for (const Match& m : *list) {
+            std::array<int, 3> c{};
+            for (int a = 0; a < 3; ++a)
+                c[static_cast<std::size_t>(a)] =
+                    static_cast<int>(std::floor(m.place[a] / kPatch_mm));
+            cube.push_back(c);
+        }
+    }
+    std::vector<std::array<int, 3>> distinct = cube;
+    std::sort(distinct.begin(), distinct.end());
+    distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+    *count = static_cast<int>(distinct.size());
+    std::vector<int> number;
+    for (const auto& c : cube) {
+        number.push_back(static_cast<int>(std::lower_bound(distinct.begin(), distinct.end(), c) -
+                                          distinct.begin()));
+    }
+    return number;
+}
+
+}  // namespace
+
 RefineResult refine_quadratic(const SkinModel& skin,
                               const TargetSurface& target,
                               std::span<const std::uint32_t> readings,
@@ -310,60 +332,24 @@ RefineResult refine_quadratic(const SkinModel& skin,
     const std::vector<Point3> held = every_so_many(skin.points, 800);
     const ConstraintRows constraint =
         constraint_rows(q, held, options.constraint_mm, static_cast<double>(held.size()));
-    const std::size_t stride = std::max<std::size_t>(
-        1, skin.points.size() / static_cast<std::size_t>(std::max(1, options.skin_askers)));
     for (int n = 0; n < options.iterations; ++n) {
         const double t =
             options.iterations > 1 ? static_cast<double>(n) / (options.iterations - 1) : 1;
         const double loss =
             options.first_loss_mm * std::pow(options.last_loss_mm / options.first_loss_mm, t);
-        MatchOptions gates;
-        gates.farthest_mm =
+        const double gate =
             options.first_gate_mm + t * (options.last_gate_mm - options.first_gate_mm);
-        gates.side_step_mm = 1.2 * target.spacing_mm;
-        const MappedSkin mapped = map_skin(skin, q);
-        const Matches matches = find_matches(skin, mapped.points, mapped.normals, mapped.index,
-                                             target, readings, stride, gates);
-        const std::size_t count = matches.from_target.size() + matches.from_skin.size();
-        if (count < 30) break;
-        const auto marks = static_cast<Eigen::Index>(options.landmarks.size());
-        Eigen::MatrixXd a(static_cast<Eigen::Index>(count) + 3 * marks + 30, 30);
-        Eigen::VectorXd b(a.rows());
-        a.bottomRows(30).setZero();
-        Eigen::Index row = 0;
-        const auto add = [&](const std::vector<Match>& list) {
-            const double share = 0.5 / static_cast<double>(std::max<std::size_t>(1, list.size()));
-            for (const Match& m : list) {
-                const double w = std::sqrt(2 * share / (1 + m.gap_mm * m.gap_mm / (loss * loss)));
-                const Row10 basis_row = basis(scaled(q, skin.points[m.skin]));
-                for (int d = 0; d < 3; ++d)
-                    a.block<1, 10>(row, 10 * d) = w * m.normal[d] * basis_row;
-                b[row++] = w * dot(m.normal, m.place - Point3{});
-            }
-        };
-        add(matches.from_target);
-        add(matches.from_skin);
-        for (const Correspondence& c : options.landmarks) {
-            const Vector3 r = map_point(q, c.skin) - c.place;
-            const double w = std::sqrt(2 * options.landmark_weight / (1 + dot(r, r) / (30 * 30)));
-            const Row10 basis_row = basis(scaled(q, c.skin));
-            for (int d = 0; d < 3; ++d, ++row) {
-                a.row(row).setZero();
-                a.block<1, 10>(row, 10 * d) = w * basis_row;
-                b[row] = w * c.place[d];
-            }
-        }
-        for (int d = 0; d < 3; ++d) {
-            a.block<10, 10>(row + 10 * d, 10 * d) = constraint.left;
-            b.segment<10>(row + 10 * d) = constraint.right.col(d);
-        }
-        Eigen::HouseholderQR<Eigen::MatrixXd> qr(a);
+        const Matches matches =
+            match_quadratic(skin, target, readings, q, options.skin_askers, gate);
+        if (matches.from_target.size() + matches.from_skin.size() < 30) break;
+        const Rows gaps = gap_rows(skin, q, matches, loss);
+        const Rows rest = held_rows(q, options, constraint, mean_turn(q, held));
+        const Rows factor = triangle(stacked({&gaps, &rest}));
         if (n + 1 == options.iterations) {
-            const Eigen::MatrixXd r = qr.matrixQR().topRows(30).triangularView<Eigen::Upper>();
-            const Eigen::JacobiSVD<Eigen::MatrixXd> svd(r);
+            const Eigen::JacobiSVD<Eigen::MatrixXd> svd(factor.topLeftCorner(30, 30));
             result.condition = svd.singularValues()[0] / svd.singularValues()[29];
         }
-        const Eigen::VectorXd k = qr.solve(b);
+        const Eigen::VectorXd k = solution(factor);
         if (!k.allFinite()) break;
         for (int d = 0; d < 3; ++d) {
             for (int c = 0; c < 10; ++c) {
@@ -371,13 +357,113 @@ RefineResult refine_quadratic(const SkinModel& skin,
             }
         }
     }
+    const Matrix3 turn = mean_turn(q, held);
     for (int d = 0; d < 3; ++d) {
-        Eigen::Matrix<double, 10, 1> k;
+        Eigen::Matrix<double, 10, 1> off;
         for (int c = 0; c < 10; ++c)
-            k[c] = q.k[static_cast<std::size_t>(d)][static_cast<std::size_t>(c)];
-        result.constraint_cost += (constraint.left * k - constraint.right.col(d)).squaredNorm();
+            off[c] = q.k[static_cast<std::size_t>(d)][static_cast<std::size_t>(c)];
+        off = constraint.left * off;
+        for (int e = 0; e < 3; ++e) off -= turn(d, e) * constraint.right.col(e);
+        result.constraint_cost += off.squaredNorm();
     }
     return result;
+}
+
+QuadraticTrust trust_quadratic(const SkinModel& skin,
+                               const TargetSurface& target,
+                               std::span<const std::uint32_t> readings,
+                               const RigidQuadratic& q,
+                               const RefineOptions& options,
+                               double strain,
+                               std::span<const Point3> inside) {
+    QuadraticTrust trust;
+    const Matches matches =
+        match_quadratic(skin, target, readings, q, options.skin_askers, options.last_gate_mm);
+    std::vector<double> gaps;
+    for (const auto* list : {&matches.from_target, &matches.from_skin}) {
+        for (const Match& m : *list) gaps.push_back(m.gap_mm);
+    }
+    if (gaps.size() < 30) return trust;
+    std::vector<double> size;
+    for (double g : gaps) size.push_back(std::abs(g));
+    std::nth_element(size.begin(), size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2),
+                     size.end());
+    trust.sigma_mm = 1.4826 * size[size.size() / 2];
+    const double limit = std::max(3 * trust.sigma_mm, 1e-6);
+    const auto clipped = [limit](double g) { return std::clamp(g, -limit, limit); };
+
+    // Gaps of one patch go together: the patches, not the readings, are the independent evidence.
+    int patches = 0;
+    const std::vector<int> patch = patches_of(matches, &patches);
+    std::vector<double> sum(static_cast<std::size_t>(patches), 0), count = sum;
+    for (std::size_t i = 0; i < gaps.size(); ++i) {
+        sum[static_cast<std::size_t>(patch[i])] += clipped(gaps[i]);
+        count[static_cast<std::size_t>(patch[i])] += 1;
+    }
+    double variance = 0;
+    for (std::size_t p = 0; p < sum.size(); ++p) {
+        const double share = sum[p] / static_cast<double>(gaps.size());
+        variance += share * share;
+    }
+    trust.patches = patches;
+    trust.standard_error_mm = std::sqrt(variance);
+
+    // Each fold of patches as the fit of the others has it.
+    const Rows all = gap_rows(skin, q, matches, options.last_loss_mm);
+    const std::vector<Point3> held = every_so_many(skin.points, 800);
+    const ConstraintRows constraint =
+        constraint_rows(q, held, options.constraint_mm, static_cast<double>(held.size()));
+    const Rows rest = held_rows(q, options, constraint, mean_turn(q, held));
+    std::vector<Rows> fold(kFolds);
+    for (int f = 0; f < kFolds; ++f) {
+        Eigen::Index n = 0;
+        Rows rows(all.rows(), 31);
+        for (Eigen::Index i = 0; i < all.rows(); ++i) {
+            if (patch[static_cast<std::size_t>(i)] % kFolds == f) rows.row(n++) = all.row(i);
+        }
+        fold[static_cast<std::size_t>(f)] = triangle(rows.topRows(n));
+    }
+    double left_out = 0, fitted = 0;
+    for (int f = 0; f < kFolds; ++f) {
+        std::vector<const Rows*> others{&rest};
+        for (int g = 0; g < kFolds; ++g) {
+            if (g != f) others.push_back(&fold[static_cast<std::size_t>(g)]);
+        }
+        const Eigen::VectorXd k = solution(triangle(stacked(others)));
+        std::size_t i = 0;
+        for (const auto* list : {&matches.from_target, &matches.from_skin}) {
+            for (const Match& m : *list) {
+                if (patch[i++] % kFolds != f) continue;
+                const Row10 b = basis(scaled(q, skin.points[m.skin]));
+                double gap = -dot(m.normal, m.place - Point3{});
+                for (int d = 0; d < 3; ++d) gap += m.normal[d] * b.dot(k.segment<10>(10 * d));
+                const double share = 0.5 / static_cast<double>(list->size());
+                const double held_out = std::min(std::abs(gap), kFarGap_mm);
+                const double here = std::min(std::abs(m.gap_mm), kFarGap_mm);
+                left_out += share * held_out * held_out;
+                fitted += share * here * here;
+            }
+        }
+    }
+    trust.held_out_mm = std::sqrt(left_out);
+    trust.fitted_mm = std::sqrt(fitted);
+
+    // Posterior spread of the map inside the body, for strains of the given size beforehand.
+    const double scale2 =
+        std::max(2 * variance, options.constraint_mm * options.constraint_mm * strain * strain);
+    const Rows factor = triangle(stacked({&all, &rest}));
+    const Eigen::MatrixXd back = factor.topLeftCorner(30, 30).triangularView<Eigen::Upper>().solve(
+        Eigen::MatrixXd::Identity(30, 30));
+    const Eigen::MatrixXd covariance = scale2 * back * back.transpose();
+    Eigen::Matrix<double, 10, 10> blocks = Eigen::Matrix<double, 10, 10>::Zero();
+    for (int d = 0; d < 3; ++d) blocks += covariance.block<10, 10>(10 * d, 10 * d);
+    double spread = 0;
+    for (Point3 p : inside) {
+        const Row10 b = basis(scaled(q, p));
+        spread += b.dot(b * blocks);
+    }
+    if (!inside.empty()) trust.inside_mm = std::sqrt(spread / static_cast<double>(inside.size()));
+    return trust;
 }
 
 }  // namespace sonocase::pipeline

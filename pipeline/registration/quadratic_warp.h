@@ -70,6 +70,9 @@ RansacResult ransac_quadratic(const SkinModel& skin,
                               const RansacOptions& options,
                               const Progress& progress = {});
 
+// Every n-th point, about `count` of them.
+std::vector<Point3> every_so_many(const std::vector<Point3>& points, std::size_t count);
+
 // Skin through a map, ready for matching.
 struct MappedSkin {
     std::vector<Point3> points;
@@ -100,6 +103,29 @@ RefineResult refine_quadratic(const SkinModel& skin,
                               std::span<const std::uint32_t> readings,
                               const RigidQuadratic& start,
                               const RefineOptions& options);
+
+// What the data say about a fitted quadratic.
+struct QuadraticTrust {
+    double sigma_mm = 0;           // robust spread of the gaps
+    double standard_error_mm = 0;  // of a mean gap: gaps of one 60 mm patch count as one
+    int patches = 0;
+    double fitted_mm = 0;    // root of the mean squared gap, gaps beyond 8 mm counted as 8
+    double held_out_mm = 0;  // the same where each gap's patch took no part in the fit
+    double inside_mm = 0;    // expected error inside the body, root mean square
+};
+
+// strain  what is expected of the map's slopes beforehand (standard deviation); with it and the
+//         standard error e the best constraint weight is sqrt(2) e / strain, and the spread of the
+//         answer is known. A surface says little of what happens along it: that spread is the
+//         honest figure of a fit, the gaps are not.
+// inside  skin frame, less its origin. Cost: about two iterations of refine_quadratic.
+QuadraticTrust trust_quadratic(const SkinModel& skin,
+                               const TargetSurface& target,
+                               std::span<const std::uint32_t> readings,
+                               const RigidQuadratic& q,
+                               const RefineOptions& options,
+                               double strain,
+                               std::span<const Point3> inside);
 
 // Least det J over a box of skin coordinates, proven.
 double proven_min_det(const RigidQuadratic& q, const Box3& box);

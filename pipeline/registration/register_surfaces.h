@@ -27,9 +27,9 @@
 
 namespace sonocase::pipeline {
 
-inline constexpr int kRegisterVersion = 1;
+inline constexpr int kRegisterVersion = 2;
 
-// The same place of the body on both sides, e.g. navel or crotch, good to some 10 mm.
+// The same place of the body on both sides, e.g. navel or crotch.
 struct Landmark {
     std::string name;
     Point3 ct, mannequin;
@@ -45,18 +45,24 @@ struct RegisterOptions {
     RigidOptions rigid;  // `up` and `seed` here are overwritten by those below
     RansacOptions ransac;
     bool paper_warp = false;  // stop after RANSAC and re-estimation, eqs. (3)-(9)
-    // Constraint weights in mm, tried downwards while the gaps are small enough to deserve the
-    // freedom.
-    std::vector<double> constraint_mm{30, 10, 3, 1};
+    // Weight of eqs. (4)-(6) in mm. 0: sqrt(2) e / strain with the standard error e of the gaps,
+    // so that directions which the readings determine are hardly held and the others are.
+    double constraint_mm = 0;
+    double strain = 0.05;  // expected slopes of the map beyond a rotation, standard deviation
+    double least_constraint_mm = 0.3;
     double wanted_det = 0.35;  // a weight whose proven det J is below this is not taken
     bool residual_warp = true;
     ResidualOptions residual;
     std::optional<Vector3> up;  // the patient's head direction in the mannequin frame
+    double landmark_mm = 4;  // of each landmark and axis, standard deviation, both sides together
     std::vector<Landmark> landmarks;
     std::uint64_t seed = 1;
 };
 
+enum class PoseKind { shifted, tilted, rolled, upside_down };
+
 struct RunnerUp {
+    PoseKind kind = PoseKind::shifted;  // against the chosen pose
     double score_mm = 0, coverage = 0;
     double turn_deg = 0;  // from the chosen pose
     double shift_mm = 0;

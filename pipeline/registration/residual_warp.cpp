@@ -193,8 +193,7 @@ FieldFit fit_field(const SkinModel& skin,
                    const Progress& progress) {
     FieldFit fit;
     Registration& r = *registration;
-    r.residual = grid_over(r.ct_box, options.spacing_mm);
-    const DisplacementGrid shape = r.residual;
+    const DisplacementGrid shape = grid_over(r.ct_box, options.spacing_mm);
     const std::size_t count = static_cast<std::size_t>(shape.size.x) *
                               static_cast<std::size_t>(shape.size.y) *
                               static_cast<std::size_t>(shape.size.z);
@@ -203,12 +202,22 @@ FieldFit fit_field(const SkinModel& skin,
     SplinePenalty penalty(shape, options.bending * 50 * 50 * 50 * 50, options.stretching * 50 * 50);
     add_depth_penalty(skin, r.ct_box, options, &penalty);
     std::vector<Lanes> d(count, Lanes{0, 0, 0, 0});
-    r.residual.control_mm.assign(count, Vector3{});
-    for (int round = 0; round <= options.rounds; ++round) {
-        tell(progress, 0.7 + 0.2 * round / (options.rounds + 1.0), "residual warp");
-        const double t = options.rounds > 1
-                             ? std::min(1.0, static_cast<double>(round) / (options.rounds - 1))
-                             : 1;
+    const bool warm = r.residual.control_mm.size() == count;
+    if (warm) {
+        for (std::size_t i = 0; i < count; ++i) {
+            const Vector3 c = r.residual.control_mm[i];
+            d[i] =
+                Lanes{static_cast<float>(c.x), static_cast<float>(c.y), static_cast<float>(c.z), 0};
+        }
+    } else {
+        r.residual = shape;
+        r.residual.control_mm.assign(count, Vector3{});
+    }
+    const int rounds = warm ? std::min(options.rounds, 3) : options.rounds;
+    for (int round = 0; round <= rounds; ++round) {
+        tell(progress, 0.7 + 0.2 * round / (rounds + 1.0), "residual warp");
+        const double t =
+            !warm && rounds > 1 ? std::min(1.0, static_cast<double>(round) / (rounds - 1)) : 1;
         const double loss = 5 * std::pow(2.0 / 5, t);
         MatchOptions gates;
         gates.farthest_mm = 40 - 15 * t;
@@ -220,7 +229,7 @@ FieldFit fit_field(const SkinModel& skin,
         if (matches.from_target.size() + matches.from_skin.size() < 30) break;
         fit.rms_after_mm = robust_rms(matches);
         if (round == 0) fit.rms_before_mm = fit.rms_after_mm;
-        if (round == options.rounds) break;
+        if (round == rounds) break;
         std::vector<DataRow> rows;
         const auto add = [&](const std::vector<Match>& list) {
             for (const Match& m : list) {
@@ -252,21 +261,34 @@ FieldFit fit_field(const SkinModel& skin,
 ResidualReport fit_residual(const SkinModel& skin,
                             const TargetSurface& target,
                             std::span<const std::uint32_t> readings,
+                            std::span<const Point3> inside,
                             const ResidualOptions& options,
                             Registration* registration,
                             const Progress& progress) {
     ResidualReport report;
     ResidualOptions tried = options;
-    for (int attempt = 0; attempt < options.proof_attempts; ++attempt, tried.bending *= 2) {
-        Registration trial = *registration;
+    Registration trial = *registration;
+    for (int attempt = 0; attempt < options.attempts; ++attempt) {
         const FieldFit fit = fit_field(skin, target, readings, tried, &trial, progress);
         report.iterations += fit.iterations;
         report.bending = tried.bending;
-        report.rms_before_mm = fit.rms_before_mm;
+        report.depth_penalty = tried.depth_penalty;
+        if (attempt == 0) report.rms_before_mm = fit.rms_before_mm;
         report.rms_after_mm = fit.rms_after_mm;
-        if (!(fit.rms_before_mm > options.least_gain * fit.rms_after_mm)) {
+        if (!(report.rms_before_mm > options.least_gain * fit.rms_after_mm)) {
             report.reason = "it would buy nothing";
             return report;
+        }
+        double moved = 0;
+        for (Point3 p : inside)
+            moved += norm(displacement(trial.residual, skin.origin + (p - Point3{})));
+        report.inside_mm = inside.empty() ? 0 : moved / static_cast<double>(inside.size());
+        if (report.inside_mm > options.inside_mm) {
+            // The deep field falls about as the root of its penalty.
+            const double over = report.inside_mm / options.inside_mm;
+            tried.depth_penalty *= std::clamp(1.3 * over * over, 1.5, 8.0);
+            report.reason = "it moves the inside of the body by more than the surface supports";
+            continue;
         }
         report.least_det = prove_no_fold(trial).least_bound;
         if (report.least_det > kLeastDetJacobian) {
@@ -275,8 +297,9 @@ ResidualReport fit_residual(const SkinModel& skin,
             report.used = true;
             return report;
         }
+        tried.bending *= 2;
+        report.reason = "no field passed the proof that space does not fold";
     }
-    report.reason = "no field passed the proof that space does not fold";
     return report;
 }
 

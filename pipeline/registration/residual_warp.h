@@ -26,20 +26,23 @@ struct ResidualOptions {
     int rounds = 6;               // of matching
     double tolerance = 1e-3;      // of the solver
     int skin_askers = 2500;
-    int proof_attempts = 4;    // bending doubles each time that the proof fails
+    double inside_mm = 1.5;  // the field moves the inside of the body by no more on average
+    int attempts = 6;  // bending doubles when the proof fails, depth grows with the inside's move
     double least_gain = 1.15;  // rms before over rms after; less buys nothing and is left away
 };
 
 struct ResidualReport {
     bool used = false;
     const char* reason = "";                     // why not
-    double bending = 0;                          // that passed
+    double bending = 0, depth_penalty = 0;       // that passed
+    double inside_mm = 0;                        // mean displacement of the inside
     double least_det = 0;                        // proven, of the whole map
     double rms_before_mm = 0, rms_after_mm = 0;  // robust gaps of one set of matches
     int iterations = 0;                          // of conjugate gradients
 };
 
-// The field alone, unproven, for comparing poses: sets registration's residual.
+// The field alone, unproven, for comparing poses: sets registration's residual. One that is there
+// already, on the same grid, is the start.
 struct FieldFit {
     Matches matches;        // after the last solve
     double energy_mm2 = 0;  // bending, stretching and depth together
@@ -53,12 +56,13 @@ FieldFit fit_field(const SkinModel& skin,
                    Registration* registration,
                    const Progress& progress = {});
 
+// inside        of the body, where organs lie; less the skin's origin
 // registration  quadratic, no residual; ct_box set. On success its residual and min_det_jacobian
-// are
-//               set, otherwise it is unchanged.
+//               are set, otherwise it is unchanged.
 ResidualReport fit_residual(const SkinModel& skin,
                             const TargetSurface& target,
                             std::span<const std::uint32_t> readings,
+                            std::span<const Point3> inside,
                             const ResidualOptions& options,
                             Registration* registration,
                             const Progress& progress = {});

@@ -95,7 +95,8 @@ BoundaryError measure_boundary_error(const LabelVolume& cooked,
 BoundaryError measure_boundary_error(const CaseBundle& bundle, const AnalyticInput& torso) {
     const LabelVolume cooked{bundle.grid, dense_from_bricks(bundle.label_bricks), bundle.labels};
     return measure_boundary_error(cooked, bundle.boundary,
-                                  analytic_torso_truth(torso.mannequin.strength), torso.body);
+                                  analytic_torso_truth(torso.mannequin.strength, torso.body),
+                                  torso.body);
 }
 
 }  // namespace sonocase::pipeline

@@ -167,6 +167,29 @@ TEST(Recipe, EmbeddedDemoIsTheOneInScenarios) {
         EXPECT_EQ(embedded->exercises[i].toml, file->exercises[i].toml);
 }
 
+TEST(Recipe, AnalyticBodiesAndHintsAreNamed) {
+    const auto parse_text = [](const std::string& text) {
+        const std::vector<EmbeddedExercise> none;
+        return parse_recipe(text, "x.toml", {}, &none);
+    };
+    const auto good = parse_text(
+        "exercises = []\n[analytic]\ndepth_scale = 1.1\nbody = \"slender\"\nup = [0, 2, 0]\n"
+        "landmarks = 4\nlandmark_noise_mm = 2\n");
+    ASSERT_TRUE(good.has_value()) << good.error().message();
+    const AnalyticInput& in = good->inputs.torso;
+    EXPECT_EQ(in.body.warp, analytic_body("slender")->warp);
+    EXPECT_EQ(in.body.width_scale, analytic_body("slender")->width_scale);
+    EXPECT_EQ(in.body.depth_scale, 1.1);  // wherever it stands, it changes the named body
+    ASSERT_TRUE(good->inputs.up.has_value());
+    EXPECT_EQ(good->inputs.up->y, 1);
+    EXPECT_EQ(in.landmarks, 4);
+    EXPECT_EQ(in.landmark_noise_mm, 2);
+    const auto bad = parse_text("exercises = []\n[analytic]\nbody = \"slendr\"\n");
+    ASSERT_FALSE(bad.has_value());
+    EXPECT_NE(bad.error().message().find("slender"), std::string::npos) << bad.error().message();
+    EXPECT_NE(bad.error().message().find("x.toml:3"), std::string::npos) << bad.error().message();
+}
+
 TEST(StageOptions, EveryKeyKeepsItsDefaultThroughText) {
     for (const OptionKey& key : option_keys()) {
         StageOptions options;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "pipeline/parallel.h"
@@ -61,25 +62,54 @@ TEST(AnalyticTorso, SamplingIsTheSameOnOneThreadAndTwo) {
     EXPECT_EQ(sample_analytic_torso(grid).voxels, serial);
 }
 
-TEST(AnalyticTorso, TrueWarpIsStrongAndFarFromFolding) {
-    const Registration truth = analytic_torso_truth();
-    const LabelVolume volume = sample_analytic_torso(analytic_torso_grid({12, 12, 12}));
-    double least = 1e9, sum = 0;
-    int n = 0;
-    for (int k = 0; k < volume.grid.size.z; ++k) {
-        for (int j = 0; j < volume.grid.size.y; ++j) {
-            for (int i = 0; i < volume.grid.size.x; ++i) {
-                const Point3 p = volume.grid.point_from_voxel({double(i), double(j), double(k)});
-                least = std::min(least, determinant(jacobian(truth, p)));
-                if (volume.voxels[volume.grid.index(i, j, k)] == label_named("skin")) {
-                    sum += distance(mannequin_from_ct(truth, p), truth.mannequin_from_ct * p);
-                    ++n;
+TEST(AnalyticTorso, TrueWarpsAreStrongAndFarFromFolding) {
+    for (const std::string& name : analytic_body_names()) {
+        SCOPED_TRACE(name);
+        const AnalyticBody body = *analytic_body(name);
+        const Registration truth = analytic_torso_truth(1, body);
+        const LabelVolume volume = sample_analytic_torso(analytic_torso_grid({12, 12, 12}), body);
+        double least = 1e9, sum = 0;
+        int n = 0;
+        for (int k = 0; k < volume.grid.size.z; ++k) {
+            for (int j = 0; j < volume.grid.size.y; ++j) {
+                for (int i = 0; i < volume.grid.size.x; ++i) {
+                    const Point3 p =
+                        volume.grid.point_from_voxel({double(i), double(j), double(k)});
+                    least = std::min(least, determinant(jacobian(truth, p)));
+                    if (volume.voxels[volume.grid.index(i, j, k)] == label_named("skin")) {
+                        sum += distance(mannequin_from_ct(truth, p), truth.mannequin_from_ct * p);
+                        ++n;
+                    }
                 }
             }
         }
+        EXPECT_GT(least, 0.6);
+        EXPECT_NEAR(sum / n, 9, 2);
     }
-    EXPECT_GT(least, 0.6);
-    EXPECT_NEAR(sum / n, 9, 2);
+    EXPECT_FALSE(analytic_body("nobody"));
+}
+
+TEST(AnalyticTorso, LandmarksLieOnTheSkinAndGoThroughTheKnownMap) {
+    for (const std::string& name : analytic_body_names()) {
+        const AnalyticBody body = *analytic_body(name);
+        const Registration truth = analytic_torso_truth(1, body);
+        const auto exact = analytic_torso_landmarks(9, 0, {}, body);
+        const auto noisy = analytic_torso_landmarks(9, 2, {}, body);
+        ASSERT_EQ(exact.size(), 9u);
+        double square = 0;
+        for (std::size_t n = 0; n < exact.size(); ++n) {
+            // A millimetre either way along the skin's depth is in and out of the body.
+            const Point3 p = exact[n].ct;
+            const Vector3 inwards = normalized(Point3{0, 0, p.z} - p);
+            EXPECT_NE(analytic_torso_label(p + inwards, body), 0) << name << exact[n].name;
+            EXPECT_EQ(analytic_torso_label(p - inwards, body), 0) << name << exact[n].name;
+            EXPECT_LT(distance(exact[n].mannequin, mannequin_from_ct(truth, p)), 1e-9);
+            const double off = distance(noisy[n].mannequin, exact[n].mannequin);
+            square += off * off / 27;
+        }
+        EXPECT_NEAR(std::sqrt(square), 2, 1);  // of 27 samples: 2 +- 0.3
+    }
+    EXPECT_EQ(analytic_torso_landmarks(3, 0).size(), 3u);
 }
 
 TEST(AnalyticTorso, MannequinReadingsLieOnTheWarpedSkin) {

@@ -223,10 +223,10 @@ TEST(ImportSurface, ScaleTurnsMetresIntoMillimetres) {
 TEST(ImportSurfaceRefuses, TooFewPointsNoneAndWhatIsNotThere) {
     const TemporaryFolder folder;
     std::string few = "x,y,z\n";
-    for (int n = 0; n < 99; ++n)
+    for (int n = 0; n < 29; ++n)
         few += std::to_string(n) + "," + std::to_string(n * n % 97) + ",0\n";
     const std::pair<std::string, const char*> cases[] = {
-        {folder.write("few.csv", few), "surface of 99 points"},
+        {folder.write("few.csv", few), "surface of 29 points"},
         {folder.write("none.csv", "x,y,z\n"), "no points"},
         {folder.write("none.ply",
                       "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n"

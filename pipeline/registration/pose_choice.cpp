@@ -1,0 +1,198 @@
+#include "pipeline/registration/pose_choice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/parallel.h"
+#include "pipeline/registration/line_text.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+// Candidates are judged after a quadratic of this stiffness, by gaps with this Cauchy scale; what
+// has no counterpart costs as much as this gap.
+constexpr double kJudgeConstraint_mm = 10, kJudgeScale_mm = 5, kNoCounterpart_mm = 12;
+constexpr double kCloseScore = 1.10;
+
+double penalty(double gap) {
+    return kJudgeScale_mm * kJudgeScale_mm *
+           std::log1p(gap * gap / (kJudgeScale_mm * kJudgeScale_mm));
+}
+
+// A candidate after a stiff quadratic and a coarse field: gaps, missing counterparts, deformation
+// and hints together.
+JudgedPose judge(const FitSetting& s, const TargetSurface& target, const RigidCandidate& rigid) {
+    JudgedPose judged;
+    judged.rigid = rigid;
+    judged.quadratic = RigidQuadratic::from_rigid(rigid.target_from_skin);
+    std::vector<std::uint32_t> readings = thin_target(target, 1.2 * target.spacing_mm);
+    if (readings.size() > 900) {
+        std::vector<std::uint32_t> fewer;
+        for (std::size_t n = 0; n < 900; ++n) fewer.push_back(readings[n * readings.size() / 900]);
+        readings = std::move(fewer);
+    }
+    RefineOptions options;
+    options.skin_askers = 900;
+    options.landmarks = s.landmarks;
+    options.landmark_weight = s.hints.landmark_weight;
+    double deformation = 0;
+    for (double constraint : {3 * kJudgeConstraint_mm, kJudgeConstraint_mm}) {
+        options.constraint_mm = constraint;
+        options.iterations = 5;
+        const RefineResult refined =
+            refine_quadratic(s.coarse, target, readings, judged.quadratic, options);
+        judged.quadratic = refined.map;
+        deformation = refined.constraint_cost;
+        options.first_loss_mm = 5;
+    }
+    // What it would still cost to bend the skin all the way: a coarse residual field.
+    ResidualOptions field;
+    field.spacing_mm = 45;
+    field.rounds = 3;
+    field.tolerance = 1e-2;
+    field.skin_askers = 900;
+    Registration map;
+    map.quadratic = in_frames(judged.quadratic, s.coarse.origin, target.origin);
+    map.ct_box = s.skin.box;
+    const FieldFit fit = fit_field(s.coarse, target, readings, field, &map);
+    const auto mean = [](const std::vector<Match>& list, std::size_t asked) {
+        double sum = 0;
+        for (const Match& m : list) sum += penalty(m.gap_mm);
+        const auto count = static_cast<double>(std::max<std::size_t>(1, asked));
+        return (sum + (count - static_cast<double>(list.size())) * penalty(kNoCounterpart_mm)) /
+               count;
+    };
+    const Matches& matches = fit.matches;
+    const double gaps = 0.5 * mean(matches.from_target, matches.target_asked) +
+                        0.5 * mean(matches.from_skin, matches.skin_asked);
+    double hints = 0;
+    for (const Correspondence& c : s.landmarks) {
+        const Vector3 r = map_point(judged.quadratic, c.skin) - c.place;
+        hints += s.hints.landmark_weight * std::min(dot(r, r), 60.0 * 60.0);
+    }
+    if (s.hints.up) {
+        const Vector3 r = rigid.target_from_skin.rotation.column(2) - *s.hints.up;
+        hints += s.hints.up_weight_mm2 * dot(r, r);
+    }
+    judged.score_mm = std::sqrt(gaps + 0.5 * deformation + fit.energy_mm2 + hints);
+    judged.coverage = static_cast<double>(matches.from_target.size()) /
+                      static_cast<double>(std::max<std::size_t>(1, matches.target_asked));
+    return judged;
+}
+
+// How another pose differs from the chosen one, in a word that a case author understands.
+RunnerUp described(const JudgedPose& best, const JudgedPose& other) {
+    RunnerUp r;
+    r.score_mm = other.score_mm;
+    r.coverage = other.coverage;
+    const Rigid &a = best.rigid.target_from_skin, &b = other.rigid.target_from_skin;
+    r.turn_deg = rotation_angle(transpose(a.rotation) * b.rotation) / kDegree;
+    r.shift_mm = norm(a.translation - b.translation);
+    const double head = dot(a.rotation.column(2), b.rotation.column(2));
+    const double front = dot(a.rotation.column(1), b.rotation.column(1));
+    if (head < -0.5) {
+        r.kind = PoseKind::upside_down;
+        r.described = front < -0.5 ? "upside down and front to back" : "upside down";
+    } else if (r.turn_deg < 25) {
+        r.kind = PoseKind::shifted;
+        r.described = text("shifted by %.0f mm", r.shift_mm);
+    } else if (head > 0.7 && front < -0.5) {
+        r.kind = PoseKind::rolled;
+        r.described = "turned front to back";
+    } else if (head > 0.7) {
+        r.kind = PoseKind::rolled;
+        r.described = text("rolled by %.0f degrees about the body's length", r.turn_deg);
+    } else {
+        r.kind = PoseKind::tilted;
+        r.described = text("tilted by %.0f degrees", r.turn_deg);
+    }
+    return r;
+}
+
+// One warning for each kind of pose that the surfaces cannot rule out, with the hint that can.
+void warn_of_runners_up(const FitSetting& s, PoseChoice* choice) {
+    std::vector<PoseKind> told;
+    for (const RunnerUp& r : choice->runners_up) {
+        if (r.score_mm > kCloseScore * choice->best.score_mm) break;
+        if (std::find(told.begin(), told.end(), r.kind) != told.end()) continue;
+        told.push_back(r.kind);
+        const char* hint = "add landmarks that lie far apart (--landmarks FILE.csv)";
+        if (r.kind == PoseKind::upside_down && !s.hints.up) {
+            hint =
+                "give the patient's head direction in the surface's frame (--up X,Y,Z) or two "
+                "landmarks such as crotch and navel (--landmarks FILE.csv)";
+        } else if (r.kind == PoseKind::rolled && s.landmarks.empty()) {
+            hint =
+                "give a landmark on the front, such as the navel, and one on the back "
+                "(--landmarks FILE.csv)";
+        } else if (r.kind == PoseKind::shifted && s.landmarks.empty()) {
+            hint = "give a landmark low on the body, such as the crotch (--landmarks FILE.csv)";
+        } else if (r.kind == PoseKind::tilted && !s.hints.up) {
+            hint = "give the patient's head direction in the surface's frame (--up X,Y,Z)";
+        }
+        choice->warnings.push_back(
+            text("ambiguous pose: a fit %s scores %.2f mm against %.2f mm of the one chosen; %s",
+                 r.described.c_str(), r.score_mm, choice->best.score_mm, hint));
+    }
+}
+
+// The target seen in a mirror that stands in the patient's middle plane.
+TargetSurface mirrored(const TargetSurface& target, const Rigid& pose) {
+    TargetSurface m;
+    m.origin = target.origin;
+    const Vector3 across = pose.rotation.column(0);
+    const Vector3 middle = pose.translation;
+    for (Point3 p : target.points) {
+        const double d = dot(across, (p - Point3{}) - middle);
+        m.points.push_back(p - 2 * d * across);
+    }
+    for (Vector3 n : target.normals) m.normals.push_back(n - 2 * dot(n, across) * across);
+    m.on_rim = target.on_rim;
+    m.lifted = target.lifted;
+    m.spacing_mm = target.spacing_mm;
+    m.index = PointIndex(m.points);
+    return m;
+}
+
+}  // namespace
+
+PoseChoice choose_pose(const FitSetting& s,
+                       const RegisterOptions& options,
+                       const Progress& progress) {
+    RigidOptions rigid = options.rigid;
+    rigid.hints = s.hints;
+    rigid.seed = options.seed;
+    tell(progress, 0.05, "rigid alignment: starts");
+    std::vector<RigidCandidate> candidates =
+        align_rigid_candidates(s.coarse, s.target, rigid, progress);
+    tell(progress, 0.2, "rigid alignment: judging candidates");
+    std::vector<JudgedPose> judged(candidates.size());
+    parallel_for(candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n) judged[n] = judge(s, s.target, candidates[n]);
+    });
+    std::stable_sort(judged.begin(), judged.end(), [](const JudgedPose& a, const JudgedPose& b) {
+        return a.score_mm < b.score_mm;
+    });
+    PoseChoice choice;
+    choice.best = judged[0];
+    for (std::size_t n = 1; n < judged.size(); ++n) {
+        choice.runners_up.push_back(described(judged[0], judged[n]));
+    }
+    warn_of_runners_up(s, &choice);
+    // A mirrored surface (left-handed axes) fits a symmetric torso as well: only one that fits
+    // clearly better in the mirror is worth a word.
+    const TargetSurface mirror = mirrored(s.target, judged[0].rigid.target_from_skin);
+    const JudgedPose other =
+        judge(s, mirror, refine_rigid(s.coarse, mirror, judged[0].rigid.target_from_skin, rigid));
+    choice.mirror_score_mm = other.score_mm;
+    if (other.score_mm * kCloseScore < judged[0].score_mm) {
+        choice.warnings.push_back(
+            text("the surface looks like a mirror image of the patient: it fits to %.2f mm in a "
+                 "mirror and to %.2f mm as given; check that its axes are right-handed",
+                 other.score_mm, judged[0].score_mm));
+    }
+    return choice;
+}
+
+}  // namespace sonocase::pipeline

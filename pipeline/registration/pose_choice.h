@@ -1,0 +1,30 @@
+// Which of the rigid candidates is the patient's pose, and what else it could have been.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipeline/registration/fit_setting.h"
+
+namespace sonocase::pipeline {
+
+// A candidate after a stiff quadratic and a coarse field.
+struct JudgedPose {
+    RigidCandidate rigid;
+    RigidQuadratic quadratic;
+    double score_mm = 0;  // root of gaps, missing counterparts, deformation and hints together
+    double coverage = 0;
+};
+
+struct PoseChoice {
+    JudgedPose best;
+    std::vector<RunnerUp> runners_up;  // best first
+    double mirror_score_mm = 0;        // of the surface seen in a mirror
+    std::vector<std::string> warnings;
+};
+
+PoseChoice choose_pose(const FitSetting& s,
+                       const RegisterOptions& options,
+                       const Progress& progress);
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,260 @@
+// Registration against known truth: the real CT's own skin carried by random poses and quadratics.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "pipeline/import/label_map.h"
+#include "pipeline/registration/inverse_map.h"
+#include "pipeline/registration/register_surfaces.h"
+#include "support/warped_skin.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using sonocase::testing::Random;
+using sonocase::testing::SweepPlan;
+using sonocase::testing::SweptPart;
+
+struct Patient {
+    SkinSurfaceResult skin;
+    std::vector<Point3> inside;
+};
+
+// The CT patient; null where the data are absent.
+const Patient* patient() {
+    static const std::optional<Patient> read = []() -> std::optional<Patient> {
+        const std::string path = SONOCASE_DATA "/ct/labels.nii.gz";
+        if (!std::filesystem::exists(path)) return std::nullopt;
+        const auto labels = import_label_map(path);
+        if (!labels) return std::nullopt;
+        Patient p{std::move(*extract_skin_surface(labels->labels)), {}};
+        const Grid& grid = labels->labels.grid;
+        for (int k = 2; k < grid.size.z; k += 6) {
+            for (int j = 2; j < grid.size.y; j += 6) {
+                for (int i = 2; i < grid.size.x; i += 6) {
+                    if (labels->labels.voxels[grid.index(i, j, k)] != 0)
+                        p.inside.push_back(grid.point_from_voxel({1.0 * i, 1.0 * j, 1.0 * k}));
+                }
+            }
+        }
+        return p;
+    }();
+    return read ? &*read : nullptr;
+}
+
+#define NEEDS_PATIENT() \
+    if (patient() == nullptr) GTEST_SKIP() << "no " SONOCASE_DATA "/ct"
+
+struct TargetError {
+    double mean = 0, p95 = 0;
+};
+TargetError target_error(const Registration& fitted, const Registration& truth) {
+    std::vector<double> error;
+    for (Point3 p : patient()->inside)
+        error.push_back(distance(mannequin_from_ct(fitted, p), mannequin_from_ct(truth, p)));
+    std::sort(error.begin(), error.end());
+    TargetError t;
+    for (double e : error) t.mean += e / static_cast<double>(error.size());
+    t.p95 = error[error.size() * 95 / 100];
+    return t;
+}
+
+Registration rigid_part(const Registration& fitted) {
+    Registration rigid = fitted;
+    rigid.residual = {};
+    rigid.quadratic = QuadraticMap::from_rigid(fitted.mannequin_from_ct, {}, 200);
+    return rigid;
+}
+
+double measure(const RegisterResult& r, const std::string& name) {
+    for (const Measure& m : r.report.measures) {
+        if (m.name == name) return m.value;
+    }
+    ADD_FAILURE() << name;
+    return -1;
+}
+
+std::string warnings_of(const RegisterResult& r) {
+    std::string all;
+    for (const std::string& w : r.report.warnings) all += w + "\n";
+    return all;
+}
+
+struct Fitted {
+    Registration truth;
+    RegisterResult result;
+};
+Fitted fit(std::uint64_t seed,
+           double mean_mm,
+           const SweepPlan& plan,
+           RegisterOptions options = {}) {
+    Random random(seed);
+    Fitted f;
+    f.truth =
+        testing::random_quadratic_map(patient()->skin.box, patient()->skin.skin, random, mean_mm);
+    const Surface sweep = testing::sweep_of(patient()->skin.skin, f.truth, random, plan);
+    auto result = register_surfaces({patient()->skin, sweep}, options);
+    EXPECT_TRUE(result) << result.error().message();
+    if (result) f.result = std::move(*result);
+    return f;
+}
+
+TEST(KnownMap, TheInsideComesBackAndTheInverseClosesTheLoop) {
+    NEEDS_PATIENT();
+    for (std::uint64_t seed : {1, 2}) {
+        SCOPED_TRACE(::testing::Message() << "seed " << seed);
+        const Fitted f = fit(seed, 9, {});
+        const TargetError error = target_error(f.result.registration, f.truth);
+        const TargetError rigid = target_error(rigid_part(f.result.registration), f.truth);
+        EXPECT_LT(error.mean, 1.2);
+        EXPECT_LT(error.p95, 2.2);
+        EXPECT_LT(error.mean, rigid.mean);
+        EXPECT_LT(f.result.fit.rms_mm, 0.8);  // 0.7 of noise
+        EXPECT_GT(f.result.fit.coverage, 0.95);
+        EXPECT_GT(f.result.registration.min_det_jacobian, 0.2);
+        const InverseMap inverse_map(f.result.registration);
+        for (Point3 p : patient()->inside) {
+            Point3 back;
+            ASSERT_EQ(inverse_map.invert(mannequin_from_ct(f.result.registration, p), &back),
+                      MapStatus::ok);
+            EXPECT_LT(distance(back, p), 1e-3);
+        }
+    }
+}
+
+TEST(KnownMap, TheFrontHalfAloneStaysWithinTwoMillimetres) {
+    NEEDS_PATIENT();
+    SweepPlan front;
+    front.part = SweptPart::front;
+    const Fitted f = fit(3, 9, front);
+    const TargetError error = target_error(f.result.registration, f.truth);
+    EXPECT_LT(error.mean, 2.0);
+    EXPECT_LT(error.mean, target_error(rigid_part(f.result.registration), f.truth).mean);
+    EXPECT_NE(warnings_of(f.result).find("cover only"), std::string::npos) << warnings_of(f.result);
+}
+
+TEST(KnownMap, OneSideGivesNumbersAndAWarning) {
+    NEEDS_PATIENT();
+    SweepPlan side;
+    side.part = SweptPart::one_side;
+    const Fitted f = fit(4, 9, side);
+    EXPECT_NE(warnings_of(f.result).find("cover only"), std::string::npos);
+    EXPECT_GT(f.result.registration.min_det_jacobian, 0.2);
+    EXPECT_LT(target_error(f.result.registration, f.truth).mean,
+              target_error(rigid_part(f.result.registration), f.truth).mean);
+}
+
+TEST(KnownMap, GrossOutliersAreLeftOutAndCounted) {
+    NEEDS_PATIENT();
+    SweepPlan lifted;
+    lifted.lift_off_share = 0.05;
+    const Fitted f = fit(5, 9, lifted);
+    EXPECT_LT(target_error(f.result.registration, f.truth).mean, 1.2);
+    // Of a hundred expected. What lies less than 8 mm and two deviations off its neighbours' plane,
+    // as beside another lift-off, is left to the robust loss.
+    EXPECT_GT(measure(f.result, "readings_lifted_off"), 50);
+}
+
+TEST(KnownMap, ARigidCopyIsNotBent) {
+    NEEDS_PATIENT();
+    const Fitted f = fit(6, 0, {});
+    // The pose of 2,000 readings with 0.7 mm of noise, and of a map that has 30 parameters more.
+    EXPECT_LT(target_error(f.result.registration, f.truth).mean, 0.3);
+}
+
+TEST(KnownMap, FewNoisyReadingsAreNoWorseThanTheRigidAnswer) {
+    NEEDS_PATIENT();
+    SweepPlan poor;
+    poor.points = 60;
+    poor.noise_mm = 4;
+    const Fitted f = fit(7, 1, poor);
+    const double rigid = target_error(rigid_part(f.result.registration), f.truth).mean;
+    EXPECT_LT(target_error(f.result.registration, f.truth).mean, 1.15 * rigid);
+    EXPECT_NE(warnings_of(f.result).find("readings"), std::string::npos);
+}
+
+TEST(KnownMap, AHalfTurnAboutAnyAxisIsFound) {
+    NEEDS_PATIENT();
+    for (int axis = 0; axis < 3; ++axis) {
+        Vector3 a;
+        a[axis] = 1;
+        const Rigid turn{rotation_about(a, 3.14159265358979323846), {}};
+        Surface turned;
+        for (std::size_t i = 0; i < patient()->skin.skin.points.size(); i += 9)
+            turned.points.push_back(turn * patient()->skin.skin.points[i]);
+        const auto result = register_surfaces({patient()->skin, turned});
+        ASSERT_TRUE(result);
+        Registration truth = result->registration;
+        truth.residual = {};
+        truth.quadratic = QuadraticMap::from_rigid(turn, {}, 200);
+        EXPECT_LT(target_error(result->registration, truth).mean, 0.2) << axis;
+    }
+}
+
+TEST(KnownMap, FramesAKilometreAwayAreFittedLikeNearOnes) {
+    NEEDS_PATIENT();
+    Random random(8);
+    Registration truth =
+        testing::random_quadratic_map(patient()->skin.box, patient()->skin.skin, random, 9);
+    for (auto& row : truth.quadratic.coefficients) row[0] += 1e6;
+    const Surface sweep = testing::sweep_of(patient()->skin.skin, truth, random);
+    const auto result = register_surfaces({patient()->skin, sweep});
+    ASSERT_TRUE(result) << result.error().message();
+    EXPECT_LT(target_error(result->registration, truth).mean, 1.2);
+}
+
+TEST(KnownMap, AMirroredSweepIsRecognised) {
+    NEEDS_PATIENT();
+    Random random(9);
+    const Registration truth =
+        testing::random_quadratic_map(patient()->skin.box, patient()->skin.skin, random, 4);
+    Surface sweep = testing::sweep_of(patient()->skin.skin, truth, random);
+    for (Point3& p : sweep.points) p.x = -p.x;
+    const auto result = register_surfaces({patient()->skin, sweep});
+    ASSERT_TRUE(result);
+    EXPECT_NE(warnings_of(*result).find("mirror image"), std::string::npos) << warnings_of(*result);
+}
+
+TEST(KnownMap, LandmarksInTheWrongPlaceAreNamed) {
+    NEEDS_PATIENT();
+    Random random(10);
+    const Registration truth =
+        testing::random_quadratic_map(patient()->skin.box, patient()->skin.skin, random, 9);
+    const Surface sweep = testing::sweep_of(patient()->skin.skin, truth, random);
+    RegisterOptions options;
+    for (int n = 0; n < 4; ++n) {
+        const auto& points = patient()->skin.skin.points;
+        const Point3 ct = points[points.size() * static_cast<std::size_t>(2 * n + 1) / 8];
+        options.landmarks.push_back({"mark" + std::to_string(n), ct, mannequin_from_ct(truth, ct)});
+    }
+    options.landmarks[2].mannequin = options.landmarks[2].mannequin + Vector3{0, 28, 0};
+    const auto result = register_surfaces({patient()->skin, sweep}, options);
+    ASSERT_TRUE(result);
+    EXPECT_NE(warnings_of(*result).find("'mark2'"), std::string::npos) << warnings_of(*result);
+    EXPECT_EQ(warnings_of(*result).find("'mark0'"), std::string::npos) << warnings_of(*result);
+    // A hint that is 28 mm wrong must not spoil what the readings say.
+    EXPECT_LT(target_error(result->registration, truth).mean, 1.5);
+}
+
+TEST(KnownMap, AMapOnTheVergeOfFoldingIsAnsweredByOneThatDoesNot) {
+    NEEDS_PATIENT();
+    // y_x = x + x^2 / (2 L) about the middle has det J = 1 + x / L: 0.05 at the far left face.
+    Registration truth;
+    const Box3 box = patient()->skin.box;
+    truth.ct_box = box;
+    truth.quadratic = QuadraticMap::from_rigid({}, box.centre(), 200);
+    const double length = 0.5 * box.extent().x / 0.95;
+    truth.quadratic.coefficients[0][4] = 200.0 * 200.0 / (2 * length);
+    Random random(11);
+    const Surface sweep = testing::sweep_of(patient()->skin.skin, truth, random);
+    const auto result = register_surfaces({patient()->skin, sweep});
+    ASSERT_TRUE(result);
+    EXPECT_GT(result->registration.min_det_jacobian, 0.2);
+    EXPECT_LT(target_error(result->registration, truth).mean,
+              target_error(rigid_part(result->registration), truth).mean);
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
