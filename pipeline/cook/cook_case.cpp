@@ -1,8 +1,7 @@
 #include "pipeline/cook/cook_case.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
+#include <optional>
 
 #include "formats/nearest_name.h"
 #include "pipeline/cook/input_files.h"
@@ -18,12 +17,6 @@
 
 namespace sonocase::pipeline {
 namespace {
-
-// Of stages whose headers name none. A change of what a stage computes raises its number, and with
-// it every key of the cache that the stage has a part in.
-constexpr int kSmoothVersion = 2;
-constexpr int kTextureVersion = 1;
-constexpr int kStructureVersion = 1;
 
 // The recipe's [labels] laid over the built-in choice of tissues.
 Status assign_tissues(const Recipe& recipe, std::vector<Label>& labels) {
@@ -121,51 +114,6 @@ Result<Surface> mannequin_of(const Recipe& recipe, StageReport* report) {
     return import_surface(recipe.resolve(recipe.inputs.surface), options, report);
 }
 
-std::string number_text(double value) {
-    char text[40];
-    std::snprintf(text, sizeof text, "%.17g", value);
-    return text;
-}
-
-// Everything of the analytic torso that a result can depend on.
-std::string analytic_text(const AnalyticInput& in) {
-    std::string text = "analytic";
-    for (const double value :
-         {in.body.width_scale, in.body.depth_scale, in.body.belly_mm, in.voxel_mm, in.slice_mm,
-          in.mannequin.noise_mm, in.mannequin.strength, static_cast<double>(in.mannequin.points),
-          static_cast<double>(in.body.warp), static_cast<double>(in.landmarks),
-          in.landmark_noise_mm, in.mannequin.mesh ? 1.0 : 0.0, in.mannequin.front_only ? 1.0 : 0.0,
-          static_cast<double>(in.mannequin.seed)})
-        text += " " + number_text(value);
-    return text;
-}
-
-std::string tissues_text(const std::vector<Tissue>& tissues) {
-    std::string text;
-    for (const Tissue& t : tissues) {
-        text += t.name + "|" + t.texture + "|" + std::to_string(static_cast<int>(t.kind)) + "|" +
-                (t.casts_shadow ? "1" : "0");
-        for (const double value : {t.grey_mean, t.grey_sd, t.echo_db, t.structure_db,
-                                   t.attenuation_db_cm_mhz, t.impedance_mrayl, t.sound_speed_m_s})
-            text += "|" + number_text(value);
-        text += "\n";
-    }
-    return text;
-}
-
-std::string palette_text(const std::vector<Label>& labels) {
-    std::string text;
-    for (const Label& label : labels) text += label.name + "=" + label.tissue + "\n";
-    return text;
-}
-
-std::string hint_text(const RecipeInputs& in) {
-    if (in.analytic && in.torso.known_map) return "known";
-    if (!in.up) return "";
-    return "up " + number_text(in.up->x) + " " + number_text(in.up->y) + " " +
-           number_text(in.up->z);
-}
-
 // The tissues that the palette uses, in the table's order, outside first.
 std::vector<Tissue> used_tissues(const std::vector<Tissue>& all, const std::vector<Label>& labels) {
     std::vector<Tissue> used;
@@ -179,14 +127,42 @@ std::vector<Tissue> used_tissues(const std::vector<Tissue>& all, const std::vect
     return used;
 }
 
+Vector3 extent(const Surface& surface) {
+    Box3 box;
+    for (const Point3 p : surface.points) box.include(p);
+    return box.extent();
+}
+
+template <class T>
+const Error* failed(const Result<T>& result) {
+    return result ? nullptr : &result.error();
+}
+
+// What is wrong with where the cook is to stop.
+std::optional<Error> check_goal(const std::vector<PlannedStage>& stages,
+                                const CookOptions& options,
+                                const std::string& where) {
+    const std::string until = options.until.empty() ? "pack" : options.until;
+    std::vector<std::string> names;
+    for (const PlannedStage& stage : stages) names.push_back(stage.stage);
+    const auto found = std::find(names.begin(), names.end(), until);
+    if (found == names.end())
+        return Error{"this case has no stage '" + until + "'", where, suggest_name(until, names)};
+    if (until != "pack" && options.cache_folder.empty())
+        return Error{"stopping at " + until + " leaves nothing behind", "", "give --cache"};
+    const auto index = static_cast<std::size_t>(found - names.begin());
+    if (!options.plan_key.empty() && options.plan_key != stages[index].plan_key)
+        return Error{"recipe or inputs of " + until + " have changed since the plan was made",
+                     where, "plan again"};
+    return std::nullopt;
+}
+
 }  // namespace
 
 Result<double> cooked_volume_mm3(const Recipe& recipe) {
     auto mannequin = mannequin_of(recipe, nullptr);
     if (!mannequin) return mannequin.error();
-    Box3 box;
-    for (const Point3 p : mannequin->points) box.include(p);
-    const Vector3 e = box.extent();
+    const Vector3 e = extent(*mannequin);
     return e.x * e.y * e.z;
 }
 
@@ -194,74 +170,80 @@ Result<CookResult> cook_case(const Recipe& recipe,
                              const CookOptions& options,
                              const Progress& progress) {
     StageRunner cook(options, progress);
-    const StageOptions& stage = recipe.options;
-    const RecipeInputs& in = recipe.inputs;
-
-    std::vector<InputHash> inputs;
-    const auto input_digest = [&](const std::string& given) -> Result<std::string> {
-        if (given.empty()) return std::string();
-        auto digest = digest_of_input(recipe.resolve(given));
-        if (digest) inputs.push_back({given, *digest});
-        return digest;
-    };
+    const StageOptions& option = recipe.options;
+    const std::string input_name =
+        recipe.inputs.analytic ? "(analytic)" : recipe.resolve(recipe.inputs.surface);
 
     // Inputs. Every file is looked at before the first long stage.
-    std::string labels_key = analytic_text(in.torso), surface_key = labels_key, examples_key;
-    if (!in.analytic) {
-        auto labels = input_digest(in.labels);
-        if (!labels) return labels.error();
-        auto table = input_digest(in.label_table);
-        if (!table) return table.error();
-        auto surface = input_digest(in.surface);
-        if (!surface) return surface.error();
-        labels_key = *labels + " " + *table + " " + number_text(in.labels_scale);
-        surface_key = *surface + " " + number_text(in.surface_scale);
-    }
-    auto examples = input_digest(in.examples);
-    if (!examples) return examples.error();
-    auto landmarks_key = input_digest(in.landmarks);
-    if (!landmarks_key) return landmarks_key.error();
+    auto inputs =
+        digest_inputs(recipe, [](const std::string& path) { return digest_of_input(path); });
+    if (!inputs) return inputs.error();
+    const std::vector<PlannedStage> stages = plan_stages(recipe, *inputs);
+    if (const auto error = check_goal(stages, options, recipe.path)) return *error;
+    const auto stage = [&](std::string_view name) -> const PlannedStage& {
+        return *std::find_if(stages.begin(), stages.end(),
+                             [&](const PlannedStage& s) { return s.stage == name; });
+    };
+    const auto stopped = [&](const std::string& digest) {
+        return CookResult{{}, std::move(cook.runs), digest};
+    };
     StageReport surface_report;
-    auto mannequin = mannequin_of(recipe, &surface_report);
-    if (!mannequin) return mannequin.error();
+    std::optional<Surface> mannequin;
+    const auto need_mannequin = [&]() -> Status {
+        if (mannequin) return Done{};
+        auto read = mannequin_of(recipe, &surface_report);
+        if (!read) return read.error();
+        mannequin = std::move(*read);
+        return Done{};
+    };
+    if (cook.whole())
+        if (auto status = need_mannequin(); !status) return status.error();
 
-    auto imported =
-        cook.run<LabelCodec>("import", kImportVersion, {labels_key}, 0.03,
-                             [&](const Progress& p) { return import_labels(recipe, p); });
+    auto imported = cook.run<LabelCodec>(
+        stage("import"), {}, 0.03, [&](const Progress& p) { return import_labels(recipe, p); });
     if (!imported) return imported.error();
-    for (const std::string& warning : surface_report.warnings)
-        cook.runs.back().report.warnings.push_back("surface: " + warning);
-    LabelFile& ct = imported->value;
-    if (auto status = assign_tissues(recipe, ct.volume.labels); !status) return status.error();
-    Box3 mannequin_box;
-    for (const Point3 p : mannequin->points) mannequin_box.include(p);
-    if (const auto error = check_same_unit(body_box(ct.volume).extent(), mannequin_box.extent(),
-                                           in.analytic ? "(analytic)" : recipe.resolve(in.surface)))
-        return *error;
+    if (cook.wants("import")) {
+        for (const std::string& warning : surface_report.warnings)
+            cook.runs.back().report.warnings.push_back("surface: " + warning);
+        // A recipe's mistake in labels is told now; its tissues are of the palette that comes out.
+        auto ct = imported->get();
+        if (!ct) return ct.error();
+        std::vector<Label> labels = (*ct)->volume.labels;
+        if (auto status = assign_tissues(recipe, labels); !status) return status.error();
+    }
+    if (options.until == "import") return stopped(imported->digest);
 
     // Surface and registration.
-    const StageClock surface_clock;
-    auto skin = extract_skin_surface(ct.volume, stage.surface);
+    auto skin = cook.run<SkinCodec>(stage("surface"), {imported->digest}, 0.02,
+                                    [&](const Progress&) -> Result<SkinSurfaceResult> {
+                                        auto ct = imported->get();
+                                        if (!ct) return ct.error();
+                                        return extract_skin_surface((*ct)->volume, option.surface);
+                                    });
     if (!skin) return skin.error();
-    skin->report.seconds = surface_clock.seconds();
-    cook.runs.push_back({skin->report, "", false});
+    if (options.until == "surface") return stopped(skin->digest);
     auto registered = cook.run<RegistrationCodec>(
-        "warp", kRegisterVersion,
-        {imported->digest, surface_key, *landmarks_key, hint_text(in),
-         canonical_options("surface", stage), canonical_options("align", stage),
-         canonical_options("warp", stage), canonical_options("case", stage)},
-        0.2, [&](const Progress& p) -> Result<Registration> {
-            return fit(recipe, *skin, *mannequin, p);
+        stage("warp"), {skin->digest}, 0.18, [&](const Progress& p) -> Result<Registration> {
+            if (auto status = need_mannequin(); !status) return status.error();
+            auto ct_skin = skin->get();
+            if (!ct_skin) return ct_skin.error();
+            if (const auto error =
+                    check_same_unit(extent((*ct_skin)->skin), extent(*mannequin), input_name))
+                return *error;
+            return fit(recipe, **ct_skin, *mannequin, p);
         });
     if (!registered) return registered.error();
-    const Registration& registration = registered->value;
+    if (options.until == "warp") return stopped(registered->digest);
 
     // Volumes.
     auto resampled = cook.run<LabelCodec>(
-        "resample", kResampleVersion,
-        {imported->digest, registered->digest, canonical_options("resample", stage)}, 0.4,
+        stage("resample"), {imported->digest, registered->digest}, 0.4,
         [&](const Progress& p) -> Result<LabelFile> {
-            auto result = resample_labels({ct.volume, registration}, stage.resample, p);
+            auto ct = imported->get();
+            if (!ct) return ct.error();
+            auto registration = registered->get();
+            if (!registration) return registration.error();
+            auto result = resample_labels({(*ct)->volume, **registration}, option.resample, p);
             if (!result) return result.error();
             return LabelFile{"mannequin",
                              std::move(result->volume),
@@ -270,18 +252,19 @@ Result<CookResult> cook_case(const Recipe& recipe,
                              {result->report}};
         });
     if (!resampled) return resampled.error();
+    imported->drop();
+    if (options.until == "resample") return stopped(resampled->digest);
+    Made<LabelCodec>* last = &*resampled;
 
-    const std::string& method = stage.smooth_method;
-    LabelFile cooked = std::move(resampled->value);
-    std::string cooked_digest = resampled->digest;
-    if (method == "joint" || method == "level_set" ||
-        (method == "auto" && stage.resample.method == "nearest")) {
-        auto smoothed = cook.run<LabelCodec>(
-            "smooth", kSmoothVersion, {cooked_digest, canonical_options("smooth", stage)}, 0.1,
-            [&](const Progress& p) -> Result<LabelFile> {
-                SmoothOptions smooth = stage.smooth;
-                smooth.method = method == "level_set" ? "level_set" : "joint";
-                auto result = smooth_labels(cooked.volume, smooth, p);
+    std::optional<Made<LabelCodec>> smoothed;
+    if (stages[4].stage == "smooth") {
+        auto made = cook.run<LabelCodec>(
+            stage("smooth"), {resampled->digest}, 0.1, [&](const Progress& p) -> Result<LabelFile> {
+                auto before = resampled->get();
+                if (!before) return before.error();
+                SmoothOptions smooth = option.smooth;
+                smooth.method = option.smooth_method == "level_set" ? "level_set" : "joint";
+                auto result = smooth_labels((*before)->volume, smooth, p);
                 if (!result) return result.error();
                 return LabelFile{"mannequin",
                                  std::move(result->volume),
@@ -289,61 +272,73 @@ Result<CookResult> cook_case(const Recipe& recipe,
                                  {},
                                  {result->report}};
             });
-        if (!smoothed) return smoothed.error();
-        cooked = std::move(smoothed->value);
-        cooked_digest = smoothed->digest;
+        if (!made) return made.error();
+        smoothed = std::move(*made);
+        last = &*smoothed;
+        resampled->drop();
     }
+    if (options.until == "smooth") return stopped(last->digest);
 
     // Textures and structure.
+    auto cooked_file = last->get();
+    if (!cooked_file) return cooked_file.error();
+    LabelFile& cooked = **cooked_file;
     std::vector<Label>& palette = cooked.volume.labels;
     if (auto status = assign_tissues(recipe, palette); !status) return status.error();
     const std::vector<Tissue> tissues = used_tissues(recipe.tissues, palette);
     const std::string tissue_key = tissues_text(tissues) + palette_text(palette);
-    auto textures = cook.run<TextureCodec>(
-        "texture", kTextureVersion,
-        {*examples, tissue_key, canonical_options("texture", stage),
-         canonical_options("case", stage)},
-        0.1, [&](const Progress& p) -> Result<TextureFile> {
-            TextureBankOptions bank = stage.texture.bank;
-            bank.mode =
-                stage.texture_mode == "pyramid" ? TextureMode::pyramid : TextureMode::matched;
-            bank.example_folder = recipe.resolve(in.examples);
-            bank.seed = static_cast<std::uint64_t>(stage.seed);
-            auto result = build_texture_bank(tissues, bank, p);
-            if (!result) return result.error();
-            return TextureFile{std::move(result->textures),
-                               make_speckle(stage.texture.speckle_edge, bank.seed),
-                               tissues,
-                               {result->report}};
-        });
-    if (!textures) return textures.error();
+    std::optional<Made<TextureCodec>> textures;
+    if (cook.wants("texture")) {
+        auto made = cook.run<TextureCodec>(
+            stage("texture"), {tissue_key}, 0.1, [&](const Progress& p) -> Result<TextureFile> {
+                TextureBankOptions bank = option.texture.bank;
+                bank.mode =
+                    option.texture_mode == "pyramid" ? TextureMode::pyramid : TextureMode::matched;
+                bank.example_folder = recipe.resolve(recipe.inputs.examples);
+                bank.seed = static_cast<std::uint64_t>(option.seed);
+                auto result = build_texture_bank(tissues, bank, p);
+                if (!result) return result.error();
+                return TextureFile{std::move(result->textures),
+                                   make_speckle(option.texture.speckle_edge, bank.seed),
+                                   tissues,
+                                   {result->report}};
+            });
+        if (!made) return made.error();
+        textures = std::move(*made);
+        if (options.until == "texture") return stopped(textures->digest);
+    }
     auto structure = cook.run<EchoCodec>(
-        "structure", kStructureVersion,
-        {cooked_digest, tissue_key, canonical_options("structure", stage),
-         canonical_options("case", stage)},
-        0.2, [&](const Progress& p) -> Result<EchoOffsets> {
-            BakeStructureOptions bake = stage.structure;
-            bake.seed = static_cast<std::uint64_t>(stage.seed);
+        stage("structure"), {last->digest, tissue_key}, 0.2,
+        [&](const Progress& p) -> Result<EchoOffsets> {
+            BakeStructureOptions bake = option.structure;
+            bake.seed = static_cast<std::uint64_t>(option.seed);
             auto result = bake_structure(cooked.volume, tissues, bake, p);
             if (!result) return result.error();
             return EchoOffsets{std::move(result->echo_offset), {result->report}};
         });
     if (!structure) return structure.error();
-    cooked.echo_offset = std::move(structure->value.offset);
+    if (options.until == "structure") return stopped(structure->digest);
 
-    // Pack.
+    // Pack. All answers are there.
+    auto echo = structure->get();
+    auto bank = textures->get();
+    auto ct_skin = skin->get();
+    auto registration = registered->get();
+    for (const Error* error : {failed(echo), failed(bank), failed(ct_skin), failed(registration)})
+        if (error != nullptr) return *error;
+    cooked.echo_offset = std::move((*echo)->offset);
     const StageClock pack_clock;
     tell(progress, 0.95, "packing");
-    auto packed = pack_case({recipe.name, recipe.text, recipe.exercises, &skin->skin, &registration,
-                             *mannequin, cooked, textures->value, tissues});
+    auto packed = pack_case({recipe.name, recipe.text, recipe.exercises, &(*ct_skin)->skin,
+                             *registration, *mannequin, cooked, **bank, tissues});
     if (!packed) return packed.error();
     packed->report.seconds = pack_clock.seconds();
     cook.runs.push_back({packed->report, "", false});
 
-    CookResult result{std::move(packed->bundle), std::move(cook.runs)};
+    CookResult result{std::move(packed->bundle), std::move(cook.runs), ""};
     CaseManifest& manifest = result.bundle.manifest;
     manifest.producer = options.producer;
-    manifest.inputs = std::move(inputs);
+    manifest.inputs = std::move(inputs->files);
     for (const StageRun& run : result.stages) {
         manifest.stages.push_back(run.report);
         manifest.stages.back().seconds = 0;

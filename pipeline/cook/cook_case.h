@@ -22,6 +22,8 @@ struct CookOptions {
     std::string cache_folder;       // empty: no cache
     std::uint64_t cache_bytes = 0;  // bound of the cache; 0: none
     std::string producer;           // program and version, for the manifest
+    std::string until;              // the stage to stop at, stage_keys.h; empty: pack
+    std::string plan_key;           // that it must have by now; empty: any
 };
 
 struct StageRun {
@@ -31,13 +33,17 @@ struct StageRun {
 };
 
 struct CookResult {
-    CaseBundle bundle;
-    std::vector<StageRun> stages;
+    CaseBundle bundle;             // empty where it stops before pack
+    std::vector<StageRun> stages;  // that ran or were read
+    std::string digest;            // of the answer it stopped at; empty at pack
 };
 
 // Volume of the grid that cooking would fill, from the mannequin's extent alone.
 Result<double> cooked_volume_mm3(const Recipe& recipe);
 
+// Stopping early needs a cache, through which the stages before and after are handed on. Errors
+// besides those of the stages: no such stage in the case; inputs that have changed since plan_key
+// was made.
 Result<CookResult> cook_case(const Recipe& recipe,
                              const CookOptions& options = {},
                              const Progress& progress = {});

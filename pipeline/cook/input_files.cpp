@@ -4,16 +4,16 @@
 #include <filesystem>
 #include <vector>
 
-#include "formats/digest.h"
-
 namespace sonocase::pipeline {
 
 namespace fs = std::filesystem;
 
-Result<std::string> digest_of_input(const std::string& path) {
+Result<std::string> digest_of_input(
+    const std::string& path,
+    const std::function<Result<std::string>(const std::string&)>& of_file) {
     std::error_code code;
     if (!fs::exists(path, code)) return Error{"no such file or folder", path, "check the path"};
-    if (!fs::is_directory(path, code)) return digest_of_file(path);
+    if (!fs::is_directory(path, code)) return of_file(path);
     std::vector<std::string> files;
     for (auto it = fs::recursive_directory_iterator(path, code);
          !code && it != fs::recursive_directory_iterator(); it.increment(code)) {
@@ -27,7 +27,7 @@ Result<std::string> digest_of_input(const std::string& path) {
     std::sort(files.begin(), files.end());
     Digest digest;
     for (const std::string& file : files) {
-        auto one = digest_of_file((fs::path(path) / file).string());
+        auto one = of_file((fs::path(path) / file).string());
         if (!one) return one.error();
         digest.add(std::string_view(file)).add(std::string_view(*one));
     }

@@ -1,13 +1,18 @@
 // Content hashes of a recipe's inputs.
 #pragma once
 
+#include <functional>
 #include <string>
 
+#include "formats/digest.h"
 #include "formats/result.h"
 
 namespace sonocase::pipeline {
 
 // Of a file's bytes; of a folder, of the names and bytes of all files in it, at any depth.
-Result<std::string> digest_of_input(const std::string& path);
+// of_file hashes one file.
+Result<std::string> digest_of_input(
+    const std::string& path,
+    const std::function<Result<std::string>(const std::string&)>& of_file = digest_of_file);
 
 }  // namespace sonocase::pipeline

@@ -15,6 +15,8 @@ std::vector<StageReport> without_seconds(std::vector<StageReport> reports) {
     return reports;
 }
 
+constexpr std::string_view kSkinKind = "SKIN";
+constexpr std::array<std::string_view, 3> kSkinChunks{"surface", "rim", "box"};
 constexpr std::string_view kEchoKind = "ECHO";
 constexpr std::array<std::string_view, 5> kEchoChunks{"size", "table", "uniform", "pool", "report"};
 
@@ -28,6 +30,40 @@ Bytes LabelCodec::encode(const LabelFile& file) {
 
 Result<LabelFile> LabelCodec::decode(const Bytes& bytes, const std::string& where) {
     return read_label_file(bytes, where);
+}
+
+Bytes SkinCodec::encode(const SkinSurfaceResult& skin) {
+    const Bytes surface = write_surface_file({"ct", skin.skin, without_seconds({skin.report})});
+    const Point3 low = skin.box.lower, high = skin.box.upper;
+    const std::vector<double> box{low.x, low.y, low.z, high.x, high.y, high.z};
+    ChunkWriter writer{std::string(kSkinKind)};
+    writer.add_view("surface", true, surface);
+    writer.add_array("rim", true, skin.on_rim);
+    writer.add_array("box", true, box);
+    return writer.write();
+}
+
+Result<SkinSurfaceResult> SkinCodec::decode(const Bytes& bytes, const std::string& where) {
+    auto reader = ChunkReader::open(bytes, kSkinKind, kSkinChunks, where);
+    if (!reader) return reader.error();
+    auto inner = reader->read("surface", reader->raw_bytes("surface"));
+    if (!inner) return inner.error();
+    auto surface = read_surface_file(*inner, where);
+    if (!surface) return surface.error();
+    auto rim = reader->read_array<std::uint8_t>("rim", surface->surface.points.size());
+    if (!rim) return rim.error();
+    auto box = reader->read_array<double>("box", 6);
+    if (!box) return box.error();
+    if (surface->reports.size() != 1)
+        return Error{"a skin without its report", where, "remove the file"};
+    SkinSurfaceResult skin;
+    skin.skin = std::move(surface->surface);
+    skin.on_rim = std::move(*rim);
+    const std::vector<double>& b = *box;
+    skin.box.lower = {b[0], b[1], b[2]};
+    skin.box.upper = {b[3], b[4], b[5]};
+    skin.report = std::move(surface->reports[0]);
+    return skin;
 }
 
 Bytes TextureCodec::encode(const TextureFile& file) {

@@ -9,6 +9,7 @@
 #include "formats/registration.h"
 #include "formats/result.h"
 #include "formats/stage_files.h"
+#include "pipeline/registration/skin_surface.h"
 
 namespace sonocase::pipeline {
 
@@ -19,6 +20,13 @@ struct LabelCodec {
     static Bytes encode(const LabelFile& file);
     static Result<LabelFile> decode(const Bytes& bytes, const std::string& where);
     static const std::vector<StageReport>& reports(const LabelFile& file) { return file.reports; }
+};
+
+struct SkinCodec {
+    using Value = SkinSurfaceResult;
+    static Bytes encode(const SkinSurfaceResult& skin);
+    static Result<SkinSurfaceResult> decode(const Bytes& bytes, const std::string& where);
+    static std::vector<StageReport> reports(const SkinSurfaceResult& skin) { return {skin.report}; }
 };
 
 struct TextureCodec {

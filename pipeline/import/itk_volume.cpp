@@ -120,6 +120,19 @@ std::string volume_stem(const std::string& path) {
     return name;
 }
 
+std::uint64_t voxel_bytes_in_header(const std::string& path) {
+    const QuietLibrary quiet;
+    itk::Object::GlobalWarningDisplayOff();
+    try {
+        const itk::ImageIOBase::Pointer io = reader_for(path);
+        io->SetFileName(path);
+        io->ReadImageInformation();
+        return static_cast<std::uint64_t>(io->GetImageSizeInBytes());
+    } catch (const std::exception&) {  // reading it will tell
+        return 0;
+    }
+}
+
 Result<NativeVolume> read_itk_volume(const std::string& path) {
     const char* todo = "check that the file is complete; export it again";
     const QuietLibrary quiet;  // the C libraries below ITK print as well as throw

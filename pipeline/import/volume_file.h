@@ -38,6 +38,10 @@ struct ScalarVolume {
 
 Result<ScalarVolume> read_scalar_volume(const std::string& path);
 
+// Bytes of voxels that a file's header speaks of, nothing else being read; 0 where it cannot be
+// told.
+std::uint64_t voxel_bytes_in_header(const std::string& path);
+
 // True for names that read_label_layers takes as a single file.
 bool is_volume_file_name(const std::string& path);
 // File name without folder and without its volume ending: "a/liver.nii.gz" -> "liver".

@@ -22,6 +22,7 @@ struct Verb {
 // The one table of verbs, in the order in which help shows them.
 [[maybe_unused]] constexpr const char* kCase = "Make and look at a case";
 [[maybe_unused]] constexpr const char* kStage = "One stage, files in and files out";
+[[maybe_unused]] constexpr const char* kFarm = "Many cases at once";
 [[maybe_unused]] constexpr const char* kSession = "Trackers and sessions";
 
 const std::vector<Verb>& verbs() {
@@ -41,6 +42,8 @@ const std::vector<Verb>& verbs() {
         {kStage, "smooth", "take the steps out of labels", verb_smooth},
         {kStage, "texture", "learn solid textures from example images", verb_texture},
         {kStage, "pack", "put the stages' files into a bundle", verb_pack},
+        {kFarm, "plan", "find what a build farm has to run", verb_plan},
+        {kFarm, "cache", "tidy a folder of stage results", verb_cache},
         {kSession, "calibrate", "find tips, axes and frames of tracked tools", verb_calibrate},
         {kSession, "review", "make a page of a recorded session", verb_review},
         {kSession, "score", "score a recording of this or another trainer", verb_score},

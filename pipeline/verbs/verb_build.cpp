@@ -1,4 +1,7 @@
 // sonocase build: a recipe becomes a case bundle.
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
@@ -25,6 +28,9 @@ struct BuildOptions {
     std::string out;
     std::string cache;
     double cache_limit_mb = 0;
+    std::string until;
+    std::string plan_key;
+    std::string preview;
     bool list_keys = false;
     Wish wish;
     RecipeOverrides overrides;
@@ -64,6 +70,13 @@ Result<Choice> choose_for(const Wish& wish, Recipe& recipe) {
     return choice;
 }
 
+// Peak of this process so far, MB.
+double peak_memory_mb() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return static_cast<double>(usage.ru_maxrss) * 1024 / 1e6;
+}
+
 // What a build reports: the stages as they ran, and which of them came from the cache.
 std::string build_report(const CookResult& cooked,
                          const std::string& out,
@@ -73,10 +86,13 @@ std::string build_report(const CookResult& cooked,
                          const std::optional<Choice>& choice,
                          const std::optional<double>& achieved_error_mm) {
     nlohmann::ordered_json json;
-    json["bundle"] = out;
+    if (!out.empty()) json["bundle"] = out;
     json["digest"] = digest;
-    json["bytes"] = bytes;
+    if (bytes > 0) json["bytes"] = bytes;
     json["seconds"] = seconds;
+    json["peak_mb"] = peak_memory_mb();
+    char host[64] = "";
+    if (gethostname(host, sizeof host - 1) == 0) json["host"] = host;
     if (choice) {
         json["choice"] = {{"settings", settings_text(choice->settings)},
                           {"predicted_error_mm", choice->predicted_error_mm},
@@ -119,12 +135,24 @@ int build(const BuildOptions& options) {
     cook.cache_folder = options.cache;
     cook.cache_bytes = static_cast<std::uint64_t>(options.cache_limit_mb * 1e6);
     cook.producer = producer();
+    cook.until = options.until;
+    cook.plan_key = options.plan_key;
     Result<CookResult> cooked = Error{};
     {
         ProgressBar bar(options.common);
         cooked = cook_case(*recipe, cook, bar.progress());
     }
     if (!cooked) return fail("build", cooked.error());
+    if (!options.until.empty() && options.until != "pack") {
+        const std::string report =
+            build_report(*cooked, "", cooked->digest, 0, watch.seconds(), choice, std::nullopt);
+        if (!options.common.report_path.empty())
+            if (auto status = write_text_file(options.common.report_path, report); !status)
+                return fail("build", status.error());
+        std::printf("%s of %s, %.1f s\n", options.until.c_str(), recipe->name.c_str(),
+                    watch.seconds());
+        return kDone;
+    }
     // Only the analytic torso's truth is known.
     std::optional<double> achieved_error_mm;
     if (choice && recipe->inputs.analytic)
@@ -133,6 +161,10 @@ int build(const BuildOptions& options) {
     const std::vector<std::uint8_t> bytes = write_bundle(cooked->bundle);
     if (auto status = pipeline::write_file(out, bytes); !status)
         return fail("build", status.error());
+    if (!options.preview.empty())
+        if (auto status = pipeline::write_file(options.preview, cooked->bundle.preview_png);
+            !status)
+            return fail("build", status.error());
     for (const StageRun& run : cooked->stages) print_warnings("build", run.report);
     const std::string report = build_report(*cooked, out, digest_of(bytes), bytes.size(),
                                             watch.seconds(), choice, achieved_error_mm);
@@ -176,6 +208,15 @@ int verb_build(int argc, char** argv) {
                    "Bound of the cache folder; 0 means none")
         ->check(CLI::NonNegativeNumber)
         ->type_name("MB");
+    app.add_option("--preview", options.preview, "Write the case's picture as well")
+        ->type_name("FILE.png");
+    app.add_option("--until", options.until,
+                   "Stop at a stage, which stays in --cache: import, surface, warp, resample, "
+                   "smooth, texture, structure, pack")
+        ->type_name("STAGE");
+    app.add_option("--plan-key", options.plan_key,
+                   "Fail if recipe and inputs are not those of this key from plan.json")
+        ->type_name("KEY");
     app.add_option("--tolerance-mm", options.wish.tolerance_mm,
                    "Take the cheapest settings whose measured error is within X")
         ->check(CLI::PositiveNumber)

@@ -29,11 +29,13 @@
 namespace sonocase::pipeline {
 
 int verb_build(int argc, char** argv);
+int verb_cache(int argc, char** argv);
 int verb_export(int argc, char** argv);
 int verb_calibrate(int argc, char** argv);
 int verb_import(int argc, char** argv);
 int verb_inspect(int argc, char** argv);
 int verb_pack(int argc, char** argv);
+int verb_plan(int argc, char** argv);
 int verb_progress(int argc, char** argv);
 int verb_resample(int argc, char** argv);
 int verb_review(int argc, char** argv);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <map>
 
 #include "formats/exercise.h"
@@ -84,37 +85,116 @@ TEST(CookCase, OnlyWhatAChangeReachesIsMadeAgain) {
     using Map = std::map<std::string, bool>;
     const Map nothing = cook("");
     EXPECT_EQ(nothing, (Map{{"import", false},
+                            {"surface", false},
                             {"warp", false},
                             {"resample", false},
                             {"texture", false},
                             {"structure", false}}));
     EXPECT_EQ(cook(""), (Map{{"import", true},
+                             {"surface", true},
                              {"warp", true},
                              {"resample", true},
                              {"texture", true},
                              {"structure", true}}));
     EXPECT_EQ(cook("", {"structure.kidney=false"}), (Map{{"import", true},
+                                                         {"surface", true},
                                                          {"warp", true},
                                                          {"resample", true},
                                                          {"texture", true},
                                                          {"structure", false}}));
     EXPECT_EQ(cook("", {"resample.voxel_mm=5"}), (Map{{"import", true},
+                                                      {"surface", true},
                                                       {"warp", true},
                                                       {"resample", false},
                                                       {"texture", true},
                                                       {"structure", false}}));
     // Early cut-off: another way of fitting that comes to the same map stops there.
     EXPECT_EQ(cook("", {"warp.trials=7"}), (Map{{"import", true},
+                                                {"surface", true},
                                                 {"warp", false},
                                                 {"resample", true},
                                                 {"texture", true},
                                                 {"structure", true}}));
     // Another tissue for a label reaches textures and structure, not the volumes.
     EXPECT_EQ(cook("[labels]\nspleen = \"liver\"\n"), (Map{{"import", true},
+                                                           {"surface", true},
                                                            {"warp", true},
                                                            {"resample", true},
                                                            {"texture", false},
                                                            {"structure", false}}));
+}
+
+// Whichever recipe fills a cache, the next one gets its own tissues.
+TEST(CookCase, TissuesOfAnotherRecipeDoNotComeThroughTheCache) {
+    const TemporaryFolder folder;
+    CookOptions options;
+    options.cache_folder = folder.path();
+    ASSERT_TRUE(cook_case(*coarse_recipe("[labels]\nspleen = \"liver\"\n"), options).has_value());
+    const auto after = cook_case(*coarse_recipe(), options);
+    ASSERT_TRUE(after.has_value()) << after.error().message();
+    EXPECT_EQ(write_bundle(after->bundle), write_bundle(cook_case(*coarse_recipe())->bundle));
+}
+
+TEST(CookCase, StageByStageThroughTheCacheGivesTheSameBundle) {
+    const TemporaryFolder folder;
+    const auto recipe = coarse_recipe("[smooth]\nmethod = \"joint\"\n");
+    ASSERT_TRUE(recipe.has_value());
+    CookOptions options;
+    options.cache_folder = folder.path();
+    for (const char* stage :
+         {"import", "surface", "warp", "resample", "smooth", "texture", "structure"}) {
+        options.until = stage;
+        const auto made = cook_case(*recipe, options);
+        ASSERT_TRUE(made.has_value()) << stage << ": " << made.error().message();
+        ASSERT_FALSE(made->stages.empty());
+        EXPECT_EQ(made->stages.back().report.stage, stage);
+        // What stands in the cache is used and not made again.
+        for (std::size_t i = 0; i + 1 < made->stages.size(); ++i)
+            EXPECT_TRUE(made->stages[i].from_cache) << stage;
+        EXPECT_FALSE(made->stages.back().from_cache) << stage;
+        EXPECT_FALSE(made->digest.empty());
+        const auto again = cook_case(*recipe, options);
+        ASSERT_TRUE(again.has_value());
+        EXPECT_TRUE(again->stages.back().from_cache) << stage;
+        EXPECT_EQ(again->digest, made->digest);
+    }
+    options.until = "pack";
+    const auto packed = cook_case(*recipe, options);
+    ASSERT_TRUE(packed.has_value()) << packed.error().message();
+    EXPECT_EQ(write_bundle(packed->bundle), write_bundle(cook_case(*recipe)->bundle));
+}
+
+TEST(CookCase, StageRunsThoughWhatItNeedsHasLeftTheCache) {
+    const TemporaryFolder folder;
+    const auto recipe = coarse_recipe();
+    CookOptions options;
+    options.cache_folder = folder.path();
+    options.until = "structure";
+    const auto first = cook_case(*recipe, options);
+    ASSERT_TRUE(first.has_value());
+    for (const char* stage : {"import", "resample", "structure"})
+        std::filesystem::remove_all(folder / stage);
+    const auto second = cook_case(*recipe, options);
+    ASSERT_TRUE(second.has_value()) << second.error().message();
+    EXPECT_EQ(second->digest, first->digest);
+}
+
+TEST(CookCase, StopsOnlyAtStagesThatTheCaseHasAndWithACache) {
+    CookOptions options;
+    options.until = "warp";
+    const auto without = cook_case(*coarse_recipe(), options);
+    ASSERT_FALSE(without.has_value());
+    EXPECT_NE(without.error().message().find("--cache"), std::string::npos);
+    const TemporaryFolder folder;
+    options.cache_folder = folder.path();
+    options.until = "smooth";
+    EXPECT_FALSE(cook_case(*coarse_recipe(), options).has_value());
+    options.until = "import";
+    options.plan_key = "0123";
+    const auto other = cook_case(*coarse_recipe(), options);
+    ASSERT_FALSE(other.has_value());
+    EXPECT_NE(other.error().message().find("plan again"), std::string::npos);
+    EXPECT_TRUE(folder.names().empty());
 }
 
 TEST(CookCase, DamagedCacheEntryIsMadeAgainAndToldOf) {

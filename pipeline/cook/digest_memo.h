@@ -1,0 +1,35 @@
+// Content hashes of files that need not be read again.
+//
+// A file is known by path, inode, size, modification and change time, to the nanosecond. The change
+// time is the system's own and moves with every write, also where a tool sets the modification time
+// back. What was written less than ten seconds before it was hashed is not kept, since another
+// write might fall into the same tick of the file system's clock.
+#pragma once
+
+#include <string>
+#include <unordered_map>
+
+#include "formats/result.h"
+
+namespace sonocase::pipeline {
+
+class DigestMemo {
+  public:
+    // Reads what save() wrote; a missing or strange file is an empty memo.
+    explicit DigestMemo(std::string path);
+
+    // Of a file's bytes; of a folder as digest_of_input has it.
+    Result<std::string> digest(const std::string& path);
+    // Writes what was asked for since it was made, if that differs from what the file holds.
+    Status save() const;
+
+  private:
+    Result<std::string> of_file(const std::string& path);
+
+    std::string path_;
+    std::string saved_;                                     // the file's text
+    std::unordered_map<std::string, std::string> known_;    // signature and path -> digest
+    std::unordered_map<std::string, std::string> current_;  // those asked for
+};
+
+}  // namespace sonocase::pipeline

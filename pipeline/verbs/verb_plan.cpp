@@ -1,0 +1,78 @@
+// sonocase plan, sonocase cache: what a build farm asks before and after its jobs.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+
+#include "pipeline/cook/plan_cases.h"
+#include "pipeline/cook/stage_cache.h"
+#include "pipeline/files.h"
+#include "pipeline/verbs/command_line.h"
+#include "pipeline/verbs/verbs.h"
+
+namespace sonocase::pipeline {
+
+int verb_plan(int argc, char** argv) {
+    CLI::App app(
+        "Find out which stages of which cases a build farm has to run, by content alone; see "
+        "docs/farm.md");
+    std::vector<std::string> recipes;
+    std::string folder;
+    RecipeOverrides overrides;
+    app.add_option("RECIPE", recipes, "case.toml or its folder")->required();
+    app.add_option("-o,--output", folder, "The farm's folder; plan.json is written there")
+        ->type_name("DIR")
+        ->required();
+    app.add_option("--data", overrides.data, "Folder that the recipes' input paths start from")
+        ->type_name("DIR");
+    app.add_option("--set", overrides.sets, "Set an option of a stage; may be repeated")
+        ->type_name("SECTION.KEY=VALUE")
+        ->expected(1)
+        ->take_all();
+    app.add_option("--preset", overrides.preset, "draft, balanced or accurate")->type_name("NAME");
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    if (!overrides.data.empty()) overrides.data = std::filesystem::absolute(overrides.data);
+    remove_leftovers(folder);
+    auto plans = plan_cases(recipes, overrides, folder);
+    if (!plans) return fail("plan", plans.error());
+    const std::string path = (std::filesystem::path(folder) / "plan.json").string();
+    if (auto status = write_text_file(path, plan_json(*plans, overrides)); !status)
+        return fail("plan", status.error());
+    std::size_t bad = 0, waiting = 0;
+    for (const CasePlan& plan : *plans) {
+        if (plan.error.empty())
+            waiting += plan.done ? 0 : 1;
+        else
+            ++bad;
+        if (!plan.error.empty())
+            std::fprintf(stderr, "sonocase plan: warning: case %s is left out: %s\n",
+                         plan.name.c_str(), plan.error.c_str());
+    }
+    std::printf("%zu cases: %zu done, %zu to build, %zu left out\n", plans->size(),
+                plans->size() - waiting - bad, waiting, bad);
+    return kDone;
+}
+
+int verb_cache(int argc, char** argv) {
+    CLI::App app("Tidy a folder of finished stage results, while others use it or not");
+    std::string folder;
+    double limit_mb = 0;
+    bool verify = false;
+    app.add_option("DIR", folder, "The folder given to build as --cache")
+        ->required()
+        ->check(CLI::ExistingDirectory);
+    app.add_option("--limit-mb", limit_mb, "Remove what was not used for longest; 0 means no limit")
+        ->check(CLI::NonNegativeNumber)
+        ->type_name("MB");
+    app.add_flag("--verify", verify, "Read every entry and remove the damaged ones");
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    const StageCache cache(folder, static_cast<std::uint64_t>(limit_mb * 1e6));
+    const CacheSummary summary = cache.tidy(verify);
+    std::printf("%zu entries, %.1f MB; removed: %zu over the limit, %zu left by killed writers",
+                summary.entries, static_cast<double>(summary.bytes) / 1e6, summary.evicted,
+                summary.leftovers);
+    if (verify) std::printf(", %zu damaged", summary.damaged);
+    std::printf("\n");
+    return kDone;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,194 @@
+#include "pipeline/cook/plan_cases.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "pipeline/cook/digest_memo.h"
+#include "pipeline/cook/input_files.h"
+#include "support/temporary_folder.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using testing::TemporaryFolder;
+namespace fs = std::filesystem;
+
+const std::string kRecipe = "name = \"one\"\n[inputs]\nlabels = \"l.nrrd\"\nsurface = \"s.csv\"\n";
+
+std::map<std::string, std::string> keys(const Recipe& recipe, const InputDigests& inputs) {
+    std::map<std::string, std::string> map;
+    for (const PlannedStage& stage : plan_stages(recipe, inputs)) map[stage.stage] = stage.plan_key;
+    return map;
+}
+
+std::set<std::string> changed(const std::string& extra,
+                              const InputDigests& inputs,
+                              std::vector<std::string> sets = {}) {
+    const std::vector<EmbeddedExercise> none;
+    RecipeOverrides overrides;
+    overrides.sets = std::move(sets);
+    const auto before =
+        keys(*parse_recipe(kRecipe, "r.toml", {}, &none), {"L", "", "S", "", "", {}});
+    const auto recipe = parse_recipe(kRecipe + extra, "r.toml", overrides, &none);
+    EXPECT_TRUE(recipe.has_value()) << recipe.error().message();
+    std::set<std::string> names;
+    for (const auto& [stage, key] : keys(*recipe, inputs))
+        if (!before.contains(stage) || before.at(stage) != key) names.insert(stage);
+    return names;
+}
+
+using Names = std::set<std::string>;
+const InputDigests kInputs{"L", "", "S", "", "", {}};
+
+TEST(PlanStages, ChangeReachesItsStageAndAllThatFollow) {
+    EXPECT_EQ(changed("", kInputs), Names{});
+    EXPECT_EQ(changed("", {"other", "", "S", "", "", {}}),
+              (Names{"import", "surface", "warp", "resample", "texture", "structure", "pack"}));
+    EXPECT_EQ(changed("", {"L", "", "other", "", "", {}}),
+              (Names{"warp", "resample", "texture", "structure", "pack"}));
+    EXPECT_EQ(changed("", {"L", "", "S", "other", "", {}}), (Names{"texture", "pack"}));
+    EXPECT_EQ(changed("", kInputs, {"structure.kidney=false"}), (Names{"structure", "pack"}));
+    EXPECT_EQ(changed("", kInputs, {"smooth.method=joint"}),
+              (Names{"smooth", "texture", "structure", "pack"}));
+    EXPECT_EQ(changed("# a comment\n", kInputs), Names{"pack"});  // the bundle holds the recipe
+    EXPECT_EQ(changed("[labels]\nspleen = \"liver\"\n", kInputs),
+              (Names{"texture", "structure", "pack"}));
+}
+
+TEST(PlanStages, EveryOptionIsInTheKeyOfItsStage) {
+    const std::map<std::string, std::string> stage_of{{"align", "warp"}, {"case", "warp"}};
+    for (const OptionKey& key : option_keys()) {
+        const std::vector<EmbeddedExercise> none;
+        auto recipe = parse_recipe(kRecipe, "r.toml", {}, &none);
+        ASSERT_TRUE(recipe.has_value());
+        // With all stages there, and a value that is not the one it has.
+        recipe->options.smooth_method = "joint";
+        const auto before = keys(*recipe, kInputs);
+        const std::string old = option_value(key, recipe->options);
+        std::vector<std::string> values{"true", "false", "none", "pyramid", "nearest", "level_set"};
+        for (const double value : {key.low, key.high}) values.push_back(std::to_string(int(value)));
+        bool set = false;
+        for (const std::string& value : values)
+            if (!set && value != old && set_option(key, value, recipe->options, "test"))
+                set = option_value(key, recipe->options) != old &&
+                      recipe->options.smooth_method != "none";
+        ASSERT_TRUE(set) << key.section << "." << key.key;
+        const std::string section = key.section;
+        const std::string stage = stage_of.contains(section) ? stage_of.at(section) : section;
+        const auto after = keys(*recipe, kInputs);
+        EXPECT_NE(after.at(stage), before.at(stage)) << section << "." << key.key;
+        EXPECT_NE(after.at("pack"), before.at("pack")) << section << "." << key.key;
+        EXPECT_EQ(after.at("import"), before.at("import")) << section << "." << key.key;
+    }
+}
+
+// A farm's folder with one case of two input files.
+struct Farm {
+    TemporaryFolder folder;
+    std::string recipe = folder.write("one.toml", kRecipe);
+    std::string out = folder / "farm";
+
+    Farm() {
+        folder.write("l.nrrd", "labels");
+        folder.write("s.csv", "surface");
+    }
+    CasePlan plan() const {
+        auto plans = plan_cases({recipe}, {}, out);
+        EXPECT_TRUE(plans.has_value()) << plans.error().message();
+        return (*plans)[0];
+    }
+    // As if the jobs had run.
+    void finish() const {
+        const CasePlan plan = this->plan();
+        folder.write("farm/cases/one.sonocase", "bundle");
+        for (const PlannedStage& stage : plan.stages)
+            folder.write("farm/state/one/" + stage.stage + "." + stage.plan_key + ".json",
+                         "{\"digest\": \"" + *digest_of_input(out + "/cases/one.sonocase") + "\"}");
+    }
+    std::size_t states() const {
+        return static_cast<std::size_t>(
+            std::distance(fs::directory_iterator(out + "/state/one"), fs::directory_iterator()));
+    }
+};
+
+TEST(PlanCases, ContentDecidesAndTimesDoNot) {
+    const Farm farm;
+    EXPECT_FALSE(farm.plan().done);
+    EXPECT_EQ(farm.plan().costs.size(), farm.plan().stages.size());
+    farm.finish();
+    EXPECT_TRUE(farm.plan().done);
+    for (const char* name : {"l.nrrd", "s.csv", "one.toml"})
+        fs::last_write_time(farm.folder / name, fs::file_time_type::clock::now());
+    EXPECT_TRUE(farm.plan().done);
+    // Same size, same modification time, other bytes.
+    const auto time = fs::last_write_time(farm.folder / "s.csv");
+    farm.folder.write("s.csv", "SURFACE");
+    fs::last_write_time(farm.folder / "s.csv", time);
+    EXPECT_FALSE(farm.plan().done);
+    EXPECT_EQ(farm.states(), 2u);  // import and surface stay done
+}
+
+TEST(PlanCases, ChangeThatIsTakenBackIsBuiltAgain) {
+    const Farm farm;
+    farm.finish();
+    farm.folder.write("l.nrrd", "others");
+    EXPECT_FALSE(farm.plan().done);
+    farm.folder.write("l.nrrd", "labels");
+    EXPECT_FALSE(farm.plan().done);
+}
+
+TEST(PlanCases, BundleThatIsMissingOrNotTheOneWrittenIsPackedAgain) {
+    const Farm farm;
+    farm.finish();
+    farm.folder.write("farm/cases/one.sonocase", "bundlE");
+    EXPECT_FALSE(farm.plan().done);
+    EXPECT_EQ(farm.states(), 6u);
+    farm.finish();
+    EXPECT_TRUE(farm.plan().done);
+    fs::remove(farm.out + "/cases/one.sonocase");
+    EXPECT_FALSE(farm.plan().done);
+}
+
+TEST(PlanCases, BadRecipeIsItsCasesFaultAlone) {
+    const Farm farm;
+    const std::string typo = farm.folder.write("typo.toml", "nam = \"x\"\n");
+    const std::string missing = farm.folder.write(
+        "missing.toml", "name = \"m\"\n[inputs]\nlabels = \"no\"\nsurface = \"s.csv\"\n");
+    const std::string twin = farm.folder.write("twin.toml", kRecipe);
+    const std::string path =
+        farm.folder.write("path.toml", "name = \"../x\"\n" + kRecipe.substr(kRecipe.find('[')));
+    const auto plans = plan_cases({farm.recipe, typo, missing, twin, path}, {}, farm.out);
+    ASSERT_TRUE(plans.has_value());
+    EXPECT_EQ((*plans)[0].error, "");
+    EXPECT_NE((*plans)[1].error.find("unknown key 'nam'"), std::string::npos);
+    EXPECT_NE((*plans)[2].error.find("no such file"), std::string::npos);
+    EXPECT_NE((*plans)[3].error.find("another case is called 'one'"), std::string::npos);
+    EXPECT_NE((*plans)[4].error.find("file name"), std::string::npos);
+}
+
+TEST(DigestMemo, RemembersOldFilesAndNeverFreshOnes) {
+    const TemporaryFolder folder;
+    const std::string file = folder.write("a", "text");
+    const auto digest = digest_of_input(file);
+    {
+        DigestMemo memo(folder / "digests");
+        EXPECT_EQ(*memo.digest(file), *digest);
+        ASSERT_TRUE(memo.save().has_value());
+    }
+    EXPECT_FALSE(fs::exists(folder / "digests"));  // written just now: nothing to remember
+    folder.write("digests", "strange\n\n");
+    EXPECT_EQ(*DigestMemo(folder / "digests").digest(file), *digest);
+    // A file of the system, older than any test: remembered, and read back.
+    const std::string old = "/proc/self/exe";
+    DigestMemo memo(folder / "digests");
+    const auto first = memo.digest(fs::canonical(old).string());
+    ASSERT_TRUE(first.has_value());
+    EXPECT_EQ(*DigestMemo(folder / "digests").digest(fs::canonical(old).string()), *first);
+    EXPECT_FALSE(memo.digest(folder / "none").has_value());
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
