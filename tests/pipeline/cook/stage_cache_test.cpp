@@ -74,7 +74,7 @@ TEST(StageCache, DigestIsLookedUpWithoutItsBytesAndNeverFromADamagedLine) {
     ASSERT_TRUE(cache.store("warp", kKey, entry).has_value());
     EXPECT_EQ(cache.digest_in("warp", kKey), entry.digest);
     const std::string path = cache.path_of("warp", kKey);
-    const std::string whole = testing::file_bytes(path);
+    const std::string whole = testing::read_text(path);
     const std::string name = std::filesystem::relative(path, folder.path()).string();
     for (std::size_t length = 0; length < whole.size(); ++length) {
         folder.write(name, whole.substr(0, length));
@@ -146,7 +146,7 @@ TEST(StageCache, TidyRemovesDamagedEntriesAndKeepsTheRest) {
     other[0] = 'f';
     ASSERT_TRUE(cache.store("warp", kKey, entry_of("one")).has_value());
     ASSERT_TRUE(cache.store("warp", other, entry_of("two")).has_value());
-    std::string bytes = testing::file_bytes(cache.path_of("warp", other));
+    std::string bytes = testing::read_text(cache.path_of("warp", other));
     bytes.back() = static_cast<char>(bytes.back() ^ 1);
     std::ofstream(cache.path_of("warp", other), std::ios::binary) << bytes;
     EXPECT_EQ(cache.tidy(false).damaged, 0u);
