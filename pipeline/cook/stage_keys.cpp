@@ -38,12 +38,12 @@ std::string analytic_labels(const AnalyticInput& in) {
 }
 std::string analytic_mannequin(const AnalyticInput& in) {
     return numbers_text(
-        "analytic", {in.body.width_scale, in.body.depth_scale, in.body.belly_mm,
-                     in.mannequin.noise_mm, in.mannequin.strength,
-                     static_cast<double>(in.mannequin.points), in.mannequin.mesh ? 1.0 : 0.0,
-                     in.mannequin.front_only ? 1.0 : 0.0, static_cast<double>(in.mannequin.seed),
-                     static_cast<double>(in.body.warp), static_cast<double>(in.landmarks),
-                     in.landmark_noise_mm});
+        "analytic",
+        {in.body.width_scale, in.body.depth_scale, in.body.belly_mm, in.mannequin.noise_mm,
+         in.mannequin.strength, static_cast<double>(in.mannequin.points),
+         in.mannequin.mesh ? 1.0 : 0.0, in.mannequin.front_only ? 1.0 : 0.0,
+         static_cast<double>(in.mannequin.seed), static_cast<double>(in.body.warp),
+         static_cast<double>(in.landmarks), in.landmark_noise_mm});
 }
 
 std::string hint_text(const RecipeInputs& in) {
