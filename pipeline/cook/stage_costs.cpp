@@ -20,9 +20,9 @@ struct CostRow {
     double base, per_label_mb, per_label_voxel, per_cooked_voxel;
 };
 constexpr CostRow kCosts[] = {
-    {"import", 1, 350, 1.2, 3, 0},   {"surface", 1, 350, 0, 8, 0}, {"warp", 1, 350, 0, 0, 0},
-    {"resample", 2, 350, 0, 10, 40}, {"smooth", 2, 350, 0, 0, 60}, {"texture", 1, 350, 0, 0, 8},
-    {"structure", 2, 350, 0, 0, 20}, {"pack", 1, 350, 0, 0, 40},
+    {"import", 1, 240, 1.2, 4, 0},  {"surface", 1, 240, 0, 4, 0}, {"warp", 1, 240, 0, 0, 0},
+    {"resample", 2, 340, 0, 10, 6}, {"smooth", 2, 340, 0, 0, 12}, {"texture", 1, 240, 0, 0, 3.5},
+    {"structure", 2, 240, 0, 0, 5}, {"pack", 1, 240, 0, 0, 4.5},
 };
 
 // Voxels of the file; of a folder, those of its first volume, else the bytes of a series.
