@@ -232,7 +232,7 @@ class RecipeParser {
             else if (name == "up")
                 status = direction(node, full, &recipe_.inputs.up);
             else if (name == "landmarks") {
-                status = whole(node, full, 0, 9, &value);
+                status = whole(node, full, 0, 14, &value);
                 in.landmarks = static_cast<int>(value);
             } else if (name == "landmark_noise_mm")
                 status = number(node, full, 0, 50, &in.landmark_noise_mm);

@@ -488,11 +488,20 @@ std::vector<AnalyticLandmark> analytic_torso_landmarks(int count,
     const struct {
         const char* name;
         double theta, z;  // direction from the axis, 0 right, pi/2 front; height, mm
-    } places[] = {{"navel", 0.5 * kPi, -40},          {"xiphoid", 0.5 * kPi, 105},
-                  {"spinous_process_L4", 1.5 * kPi, -80}, {"hip_bone_right", 0.12 * kPi, -105},
-                  {"hip_bone_left", 0.88 * kPi, -105},    {"costal_margin_right", 0.2 * kPi, 35},
-                  {"costal_margin_left", 0.8 * kPi, 35},  {"spinous_process_T10", 1.5 * kPi, 120},
-                  {"pubis", 0.5 * kPi, -145}};
+    } places[] = {{"navel", 0.5 * kPi, -40},
+                  {"xiphoid", 0.5 * kPi, 105},
+                  {"spinous_process_L4", 1.5 * kPi, -80},
+                  {"hip_bone_right", 0.12 * kPi, -105},
+                  {"hip_bone_left", 0.88 * kPi, -105},
+                  {"costal_margin_right", 0.2 * kPi, 35},
+                  {"costal_margin_left", 0.8 * kPi, 35},
+                  {"spinous_process_T10", 1.5 * kPi, 120},
+                  {"pubis", 0.5 * kPi, -145},
+                  {"rib_9_right", 0, 90},
+                  {"rib_9_left", kPi, 90},
+                  {"loin_right", 1.72 * kPi, -20},
+                  {"loin_left", 1.28 * kPi, -20},
+                  {"sacrum", 1.5 * kPi, -145}};
     const Registration truth = analytic_torso_truth(options.strength, body);
     Gaussian noise(options.seed + 1000);
     std::vector<AnalyticLandmark> marks;

@@ -66,9 +66,9 @@ struct AnalyticMannequinOptions {
 Surface analytic_torso_mannequin(const AnalyticMannequinOptions& options = {},
                                  const AnalyticBody& body = {});
 
-// Places of the skin that a case author would mark on both bodies: navel, tip of the breastbone,
-// costal margins, hip bones, pubis, two spinous processes. At most nine; noise_mm per axis is the
-// error of pointing, added on the mannequin's side.
+// Places of the skin that carry a marker on both bodies: navel, tip of the breastbone, costal
+// margins, hip bones, pubis, ribs, loins, spinous processes. At most fourteen; noise_mm per axis is
+// the error of pointing, added on the mannequin's side.
 struct AnalyticLandmark {
     std::string name;
     Point3 ct, mannequin;

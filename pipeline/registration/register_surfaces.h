@@ -48,7 +48,7 @@ struct RegisterOptions {
     // Weight of eqs. (4)-(6) in mm. 0: sqrt(2) e / strain with the standard error e of the gaps,
     // so that directions which the readings determine are hardly held and the others are.
     double constraint_mm = 0;
-    double strain = 0.05;  // expected slopes of the map beyond a rotation, standard deviation
+    double strain = 0.03;  // expected slopes of the map beyond a rotation, standard deviation
     double least_constraint_mm = 0.3;
     double wanted_det = 0.35;  // a weight whose proven det J is below this is not taken
     bool residual_warp = true;
