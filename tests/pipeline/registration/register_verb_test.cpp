@@ -11,7 +11,7 @@
 #include "formats/registration_file.h"
 #include "pipeline/import/surface_file.h"
 #include "support/random.h"
-#include "support/scratch_folder.h"
+#include "support/run_command.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
@@ -20,14 +20,13 @@ namespace {
 using sonocase::testing::CommandResult;
 using sonocase::testing::read_text;
 using sonocase::testing::TemporaryFolder;
-using sonocase::testing::write_text;
 
 const std::string kLabels = SONOCASE_DATA "/ct/labels.nii.gz";
 const std::string kSweep = SONOCASE_DATA "/mannequin/sweep.csv";
 
 CommandResult run(const std::string& arguments, const TemporaryFolder& folder) {
-    return sonocase::testing::run_command(
-        "cd " + folder.path() + " && " SONOCASE_BIN "/sonocase " + arguments, folder);
+    return sonocase::testing::run_command("cd " + folder.path() + " && " SONOCASE_BIN "/sonocase " +
+                                          arguments);
 }
 
 std::vector<Point3> sweep() {
@@ -37,11 +36,13 @@ std::vector<Point3> sweep() {
 #define NEEDS_SWEEP() \
     if (sweep().empty()) GTEST_SKIP() << "no " SONOCASE_DATA
 
-void write_points(const std::string& path, const std::vector<Point3>& points) {
+void write_points(const TemporaryFolder& folder,
+                  const std::string& name,
+                  const std::vector<Point3>& points) {
     std::string csv = "x,y,z\n";
     for (Point3 p : points)
         csv += number_text(p.x) + "," + number_text(p.y) + "," + number_text(p.z) + "\n";
-    write_text(path, csv);
+    folder.write(name, csv);
 }
 
 TEST(RegisterVerb, SweepsThatCannotBeFittedFailWithOneLineAndNothingWritten) {
@@ -57,7 +58,7 @@ TEST(RegisterVerb, SweepsThatCannotBeFittedFailWithOneLineAndNothingWritten) {
         const char* says;
     } cases[] = {{metres, "metres"}, {flat, "plane"}, {straight, "line"}, {once, "distinct"}};
     for (const auto& c : cases) {
-        write_points(folder / "s.csv", c.points);
+        write_points(folder, "s.csv", c.points);
         const CommandResult r =
             run("register --labels " + kLabels + " --surface s.csv -o r.json", folder);
         EXPECT_EQ(r.status, 1) << c.says;
@@ -79,7 +80,7 @@ TEST(RegisterVerb, ASpoiltSweepFarAwayIsFittedAndWhatWasWrongIsSaid) {
         points.push_back(points[11 * i]);
         points.push_back({std::nan(""), 1, 2});
     }
-    write_points(folder / "s.csv", points);
+    write_points(folder, "s.csv", points);
     const CommandResult r = run(
         "register --labels " + kLabels + " --surface s.csv -o r.json --report rep.json", folder);
     ASSERT_EQ(r.status, 0) << r.error;
@@ -98,7 +99,7 @@ TEST(RegisterVerb, FiftyReadingsOfTheFrontGiveAnAnswerAndTheHintsToAdd) {
     const std::vector<Point3> all = sweep();
     std::vector<Point3> few;
     for (std::size_t i = 0; i < 50; ++i) few.push_back(all[i * all.size() / 50]);
-    write_points(folder / "s.csv", few);
+    write_points(folder, "s.csv", few);
     const CommandResult r =
         run("register --labels " + kLabels + " --surface s.csv -o r.json", folder);
     ASSERT_EQ(r.status, 0) << r.error;
@@ -120,7 +121,7 @@ TEST(MapVerb, AFifthOfTheTargetsWithoutPreimageAndPointsOnTheFoldAreMarked) {
     for (int i = 0; i < 100; ++i) targets.push_back({-149.5 + 2.5 * i, 10, -20});
     for (int i = 0; i < 5; ++i) targets.push_back({-100, 10.0 * i, 0});  // on the fold
     targets.push_back({std::nan(""), 0, 0});
-    write_points(folder / "y.csv", targets);
+    write_points(folder, "y.csv", targets);
     const CommandResult back =
         run("map fold.json --from mannequin --to ct --points y.csv -o x.csv", folder);
     ASSERT_EQ(back.status, 0) << back.error;
