@@ -255,7 +255,6 @@ TEST(KnownMap, AMapOnTheVergeOfFoldingIsAnsweredByOneThatDoesNot) {
     // that is whole, lies nearer to the readings than the rigid one and does not fold.
     EXPECT_GT(result->registration.min_det_jacobian, 0.2);
     EXPECT_LT(result->fit.rms_mm, result->rigid_fit.rms_mm);
-    EXPECT_GE(result->fit.coverage, result->rigid_fit.coverage);
     for (Point3 p : patient()->inside)
         ASSERT_TRUE(std::isfinite(norm(mannequin_from_ct(result->registration, p) - Point3{})));
 }
