@@ -6,18 +6,11 @@
 #include <array>
 #include <cmath>
 
+#include "runtime/display/shapes.h"
 #include "runtime/display/skin_mesh.h"
 
 namespace sonocase::runtime {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-
-struct Vertex {
-    float position[3];
-    float normal[3];
-    float texture[2];
-};
 
 struct Mesh {
     GLuint vertex_array = 0, vertices = 0, indices = 0;
@@ -100,7 +93,9 @@ GLuint compile(GLenum kind, const char* source) {
     return shader;
 }
 
-void upload(Mesh& mesh, const std::vector<Vertex>& vertices, const std::vector<GLuint>& indices) {
+void upload(Mesh& mesh,
+            const std::vector<Vertex>& vertices,
+            const std::vector<std::uint32_t>& indices) {
     if (mesh.vertex_array == 0) {
         glGenVertexArrays(1, &mesh.vertex_array);
         glGenBuffers(1, &mesh.vertices);
@@ -127,76 +122,6 @@ void free_mesh(Mesh& mesh) {
     if (mesh.vertices) glDeleteBuffers(1, &mesh.vertices);
     if (mesh.indices) glDeleteBuffers(1, &mesh.indices);
     mesh = {};
-}
-
-// A body lofted through rounded rings about z: (z, half width x, half width y), first and last
-// closed.
-struct Ring {
-    double z, half_x, half_y;
-};
-void loft(const std::vector<Ring>& rings,
-          double exponent,
-          std::vector<Vertex>& vertices,
-          std::vector<GLuint>& indices) {
-    constexpr int kAround = 32;
-    const auto base = static_cast<GLuint>(vertices.size());
-    for (std::size_t r = 0; r < rings.size(); ++r) {
-        const Ring& before = rings[r > 0 ? r - 1 : r];
-        const Ring& after = rings[r + 1 < rings.size() ? r + 1 : r];
-        for (int i = 0; i < kAround; ++i) {
-            const double a = 2 * kPi * i / kAround, c = std::cos(a), s = std::sin(a);
-            const double power = 2 / exponent;
-            const double x = std::copysign(std::pow(std::abs(c), power), c);
-            const double y = std::copysign(std::pow(std::abs(s), power), s);
-            const double widening =
-                0.5 * (after.half_x - before.half_x + after.half_y - before.half_y);
-            const Vector3 n = normalized(Vector3{c, s * rings[r].half_x / rings[r].half_y,
-                                                 -widening / std::max(after.z - before.z, 1e-3)});
-            vertices.push_back(
-                {{float(x * rings[r].half_x), float(y * rings[r].half_y), float(rings[r].z)},
-                 {float(n.x), float(n.y), float(n.z)},
-                 {0, 0}});
-        }
-    }
-    const auto at = [&](std::size_t ring, int i) {
-        return base + static_cast<GLuint>(ring) * kAround + static_cast<GLuint>(i % kAround);
-    };
-    for (std::size_t r = 0; r + 1 < rings.size(); ++r) {
-        for (int i = 0; i < kAround; ++i) {
-            for (GLuint v : {at(r, i), at(r, i + 1), at(r + 1, i + 1), at(r, i), at(r + 1, i + 1),
-                             at(r + 1, i)}) {
-                indices.push_back(v);
-            }
-        }
-    }
-    for (std::size_t r : {std::size_t{0}, rings.size() - 1}) {
-        const float up = r == 0 ? -1.0f : 1.0f;
-        const auto middle = static_cast<GLuint>(vertices.size());
-        vertices.push_back({{0, 0, float(rings[r].z)}, {0, 0, up}, {0, 0}});
-        for (int i = 0; i < kAround; ++i) {
-            for (GLuint v : {middle, at(r, i), at(r, i + 1)}) indices.push_back(v);
-        }
-    }
-}
-
-void sphere(std::vector<Vertex>& vertices, std::vector<GLuint>& indices) {
-    constexpr int kRows = 10, kAround = 20;
-    for (int r = 0; r <= kRows; ++r) {
-        for (int i = 0; i <= kAround; ++i) {
-            const double b = kPi * r / kRows, a = 2 * kPi * i / kAround;
-            const float n[3] = {float(std::sin(b) * std::cos(a)), float(std::sin(b) * std::sin(a)),
-                                float(std::cos(b))};
-            vertices.push_back({{n[0], n[1], n[2]}, {n[0], n[1], n[2]}, {0, 0}});
-        }
-    }
-    for (int r = 0; r < kRows; ++r) {
-        for (int i = 0; i < kAround; ++i) {
-            const auto p = static_cast<GLuint>(r * (kAround + 1) + i);
-            for (GLuint v : {p, p + 1, p + kAround + 2, p, p + kAround + 2, p + kAround + 1}) {
-                indices.push_back(v);
-            }
-        }
-    }
 }
 
 }  // namespace
@@ -243,7 +168,7 @@ View3d::View3d() : impl_(std::make_unique<Impl>()) {
     d.u_mode = glGetUniformLocation(d.program, "mode");
     d.u_image = glGetUniformLocation(d.program, "image");
     std::vector<Vertex> vertices;
-    std::vector<GLuint> indices;
+    std::vector<std::uint32_t> indices;
     sphere(vertices, indices);
     upload(d.ball, vertices, indices);
 }
@@ -297,7 +222,7 @@ void View3d::set_case(const CaseBundle& bundle) {
     // 6 mm: some ten thousand triangles for a torso, and shoulders and breasts keep their shape.
     const Surface mesh = skin_mesh(bundle, 6);
     std::vector<Vertex> vertices;
-    std::vector<GLuint> indices;
+    std::vector<std::uint32_t> indices;
     d.box = {};
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
         const Point3 p = mesh.points[i];
@@ -331,7 +256,7 @@ void View3d::set_exercise(const Exercise& exercise) {
     d.plane_layout = {};
 
     std::vector<Vertex> vertices;
-    std::vector<GLuint> indices;
+    std::vector<std::uint32_t> indices;
     const double length = std::max(exercise.needle.length_mm, 20.0);
     // Drawn thicker than life, or it would vanish at this size.
     loft({{-length, 1.1, 1.1}, {-4, 1.1, 1.1}, {0, 0.15, 0.15}}, 2, vertices, indices);
@@ -351,7 +276,7 @@ void View3d::Impl::build_probe() {
     half = std::clamp(half, 8.0, 45.0) + 3;
     const double grip = std::clamp(0.55 * half, 9.0, 17.0);
     std::vector<Vertex> vertices;
-    std::vector<GLuint> indices;
+    std::vector<std::uint32_t> indices;
     loft({{-158, 4, 4},
           {-132, 5, 5},
           {-128, grip - 4, 9},
@@ -375,7 +300,7 @@ void View3d::Impl::build_plane(const View3dInput& input) {
     const Probe& p = exercise.probe;
     constexpr int kSteps = 32;
     std::vector<Vertex> vertices;
-    std::vector<GLuint> indices;
+    std::vector<std::uint32_t> indices;
     const double mm = input.layout.mm_per_px > 0 ? input.layout.mm_per_px : 0.3;
     for (int i = 0; i <= kSteps; ++i) {
         const double t = double(i) / kSteps - 0.5;
@@ -429,16 +354,12 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
         d.plane_flipped = input.flipped;
         d.build_plane(input);
     }
-    // Camera
-    const double cy = std::cos(orbit_.yaw_rad), sy = std::sin(orbit_.yaw_rad);
-    const double cp = std::cos(orbit_.pitch_rad), sp = std::sin(orbit_.pitch_rad);
-    const Vector3 back_home{sy * cp, sp, cy * cp};
-    const Vector3 back = d.home * back_home;
-    const Vector3 right = normalized(cross(d.home.column(1), back));
-    const Vector3 up = cross(back, right);
-    const Point3 eye = d.interest + orbit_.distance_mm * back;
+    const bool from_probe = from_ == ViewFrom::probe && input.has_probe;
+    const bool from_needle = from_ == ViewFrom::needle && input.has_needle;
     d.view_from_mannequin =
-        inverse(Rigid{Matrix3::from_columns(right, up, back), {eye.x, eye.y, eye.z}});
+        inverse(from_probe    ? mannequin_from_probe_camera(input.mannequin_from_probe)
+                : from_needle ? mannequin_from_needle_camera(input.mannequin_from_needle)
+                              : mannequin_from_outside_camera(d.home, d.interest, orbit_));
     const double aspect = double(d.width_px) / d.height_px, near = 10, far = 5000;
     d.clip_from_view = {};
     d.clip_from_view[0] = static_cast<float>(1 / (d.tan_half * aspect));
@@ -464,8 +385,10 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
 
     const Rigid identity;
     if (input.has_probe) {
-        d.draw_mesh(d.probe, input.mannequin_from_probe, 1, 0xD8DEE4, 1, 0);
-        d.draw_mesh(d.mark, input.mannequin_from_probe, 1, 0x48BAD6, 1, 0);
+        if (!from_needle) {  // it would stand in the way
+            d.draw_mesh(d.probe, input.mannequin_from_probe, 1, 0xD8DEE4, 1, 0);
+            d.draw_mesh(d.mark, input.mannequin_from_probe, 1, 0x48BAD6, 1, 0);
+        }
         d.draw_mesh(d.plane, input.mannequin_from_probe, 1, input.in_contact ? 0x6FB7CC : 0x39444E,
                     1, input.image_texture ? 2 : 3);
     }
@@ -477,7 +400,9 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
         for (std::size_t i = 0; i < d.exercise.targets.size(); ++i) {
             const Target& target = d.exercise.targets[i];
             Rigid place;
-            place.translation = {target.centre.x, target.centre.y, target.centre.z};
+            const Point3 centre =
+                i < input.target_centres.size() ? input.target_centres[i] : target.centre;
+            place.translation = centre - Point3{};
             const bool hit = i < input.hit.size() && input.hit[i];
             d.draw_mesh(d.ball, place, std::max(target.radius_mm, 3.0), hit ? 0x60C882 : 0xFFC850,
                         1, 0);

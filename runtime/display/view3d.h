@@ -8,15 +8,10 @@
 
 #include "formats/case_bundle.h"
 #include "formats/exercise.h"
+#include "runtime/display/camera.h"
 #include "runtime/imaging/renderer.h"
 
 namespace sonocase::runtime {
-
-// Turned about a point of interest; angles in radians, lengths in mm.
-struct Orbit {
-    double yaw_rad = 0.6, pitch_rad = 0.62;
-    double distance_mm = 620;
-};
 
 struct View3dInput {
     bool has_probe = false, has_needle = false, in_contact = true;
@@ -28,7 +23,8 @@ struct View3dInput {
     int image_width_px = 0, image_height_px = 0;
     unsigned image_texture = 0;  // OpenGL name; 0: a plain plane
     bool show_targets = true;
-    std::vector<bool> hit;  // # targets
+    std::vector<bool> hit;               // # targets
+    std::vector<Point3> target_centres;  // # targets, where they are now; empty: at rest
 };
 
 struct ViewRay {
@@ -48,6 +44,8 @@ class View3d {
     void set_exercise(const Exercise& exercise);
     Orbit& orbit() { return orbit_; }
     void home() { orbit_ = {}; }
+    // From a tool that is not there: from outside.
+    ViewFrom& from() { return from_; }
 
     // Draws at width x height pixels and returns the texture, for ImGui::Image with v upside down.
     void* draw(int width_px, int height_px, const View3dInput& input);
@@ -58,6 +56,7 @@ class View3d {
     struct Impl;
     std::unique_ptr<Impl> impl_;
     Orbit orbit_;
+    ViewFrom from_ = ViewFrom::outside;
 };
 
 }  // namespace sonocase::runtime

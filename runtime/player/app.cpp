@@ -43,6 +43,8 @@ void rebuild_engine(App& app, bool goes_on) {
     render.scanlines = app.arguments.scanlines;
     render.samples = app.arguments.samples;
     render.effects = app.arguments.effects.empty() ? app.current().effects : app.arguments.effects;
+    // A recording is replayed to the same pixels, which a governor would not give.
+    render.frame_budget_ms = app.exact ? 0 : app.arguments.frame_budget_ms;
     options.depth_mm = app.depth_mm;
     options.focus_mm = app.focus_mm;
     Result<ScanEngine> engine = ScanEngine::create(app.open->bundle, app.current(), options);
@@ -58,6 +60,7 @@ void rebuild_engine(App& app, bool goes_on) {
     app.controls.frozen = false;
     app.cine_back = app.controls.cine_back = 0;
     app.scan->set_controls(app.controls);
+    app.anatomy = engine->anatomy();
     app.scan->set_engine(std::make_unique<ScanEngine>(std::move(*engine)), goes_on);
 }
 
@@ -70,6 +73,8 @@ void close_bundle(App& app) {
     app.guide.reset();
     app.mouse.reset();
     app.mouse_feed.reset();
+    app.paced.reset();
+    app.anatomy.reset();
     app.skin.reset();
     app.open.reset();
 }
@@ -124,6 +129,8 @@ void choose_tracker(App& app, const std::string& spec) {
     app.scan->set_tracker(nullptr);
     app.mouse.reset();
     app.mouse_feed.reset();
+    app.paced.reset();
+    app.checked_device.clear();
     app.tracker_spec = spec;
     if (spec == "mouse") {
         app.mouse = std::make_unique<MouseTracker>(*app.skin, app.current());
@@ -137,13 +144,33 @@ void choose_tracker(App& app, const std::string& spec) {
     const double start_s = app.clock_start_s;
     context.clock = [start_s] { return steady_seconds() - start_s; };
     context.loop = true;
+    context.needle_lag_s = app.calibrations.needle_lag_s;
     Result<std::unique_ptr<Tracker>> made = make_tracker(spec, context);
     if (!made) {
         notify(app, Notice::Kind::error, made.error().message());
         if (spec != "mouse") choose_tracker(app, "mouse");
         return;
     }
+    if ((*made)->duration_s() > 0) {
+        app.paced = std::make_shared<PacedTracker>(std::move(*made));
+        app.scan->set_tracker(app.paced);
+        return;
+    }
     app.scan->set_tracker(std::shared_ptr<Tracker>(std::move(*made)));
+}
+
+void change_pace(App& app, int steps) {
+    if (!app.paced) return;
+    constexpr double kSpeeds[] = {0, 0.1, 0.25, 0.5, 1, 2, 4, 8};
+    constexpr int kCount = static_cast<int>(std::size(kSpeeds));
+    int at = 0;
+    while (at + 1 < kCount && kSpeeds[at] < app.paced->speed()) ++at;
+    app.paced->set_speed(kSpeeds[std::clamp(at + steps, 0, kCount - 1)]);
+}
+
+Point3 target_now(const App& app, std::size_t target) {
+    const Point3 centre = app.current().targets[target].centre;
+    return app.anatomy ? app.anatomy->moved(centre, app.frame().record.input.time_s) : centre;
 }
 
 void change_depth(App& app, double by_mm) {
@@ -218,6 +245,9 @@ void start_attempt(App& app, const std::string& path) {
                "There is no folder to record to: set HOME or XDG_DATA_HOME.");
         return;
     }
+    const bool governed = app.arguments.frame_budget_ms > 0;
+    app.exact = true;
+    if (governed) rebuild_engine(app);
     Result<std::unique_ptr<SessionRun>> run = Error{"there is no picture to record", file, ""};
     const double now_s = steady_seconds() - app.clock_start_s;
     app.scan->with_engine([&](ScanEngine& engine) {
@@ -225,6 +255,8 @@ void start_attempt(App& app, const std::string& path) {
     });
     if (!run) {
         notify(app, Notice::Kind::error, run.error().message());
+        app.exact = false;
+        if (governed) rebuild_engine(app);
         return;
     }
     app.attempt = std::make_shared<Attempt>(*app.open, app.current(), std::move(*run));
@@ -237,6 +269,8 @@ void finish_attempt(App& app) {
     if (!app.attempt) return;
     const std::shared_ptr<Attempt> attempt = std::move(app.attempt);
     watch_frames(app);  // returns when the scan thread has let go of the attempt
+    app.exact = false;
+    if (app.arguments.frame_budget_ms > 0) rebuild_engine(app);
     Result<SessionScore> score = attempt->finish();
     if (score) {
         app.score = std::move(*score);
@@ -294,6 +328,22 @@ void draw(App& app) {
     if (app.show_setup && app.open && app.page == Page::scan) draw_setup(app);
     if (app.show_score && app.score && app.page == Page::scan) draw_score_window(app);
     draw_notices(app);
+}
+
+// What the tracker has to say, and once for each device whether the calibrations in use are its
+// own.
+void check_device(App& app) {
+    if (app.mouse || app.paced || !app.open) return;
+    const TrackerHealth health = app.scan->tracker_health();
+    // The tracker's panel shows it; who started the player from a terminal reads it there.
+    if (!health.message.empty() && app.told.insert(health.message).second) {
+        std::fprintf(stderr, "sonoplay: %s\n", health.message.c_str());
+    }
+    if (health.phase != TrackerPhase::streaming || health.device == app.checked_device) return;
+    app.checked_device = health.device;
+    for (const std::string& doubt : other_sensor(app.calibrations, health.device)) {
+        notify(app, Notice::Kind::warning, doubt);
+    }
 }
 
 void advance_cine(App& app) {
@@ -384,13 +434,14 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
         const double seconds = std::min(now_s - last_s, 0.1);
         last_s = std::max(due_s, now_s - 1 / 60.0);
         app.now_s = now_s - app.clock_start_s;
-        if (now_s > last_shown_s) app.ui_rate += 0.08 * (1 / (now_s - last_shown_s) - app.ui_rate);
+        const double between_s = now_s - last_shown_s;
+        if (between_s > 0) app.ui_rate += 0.08 * (1 / between_s - app.ui_rate);
         last_shown_s = now_s;
 
         std::string shot;
         bool quit = false;
         InjectedInput input;
-        if (app.script.active()) input = app.script.next(shot, quit);
+        if (app.script.active()) input = app.script.next(app.now_s, shot, quit);
         app.window->begin_frame(input);
         const bool fresh = app.scan->refresh();
         if (fresh && app.frame().width_px > 0) {
@@ -398,6 +449,7 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
         }
         handle_keys(app, seconds);
         advance_cine(app);
+        check_device(app);
         draw(app);
         if (app.mouse && app.mouse_feed) {
             TrackerReading reading;
@@ -410,7 +462,12 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
         if (arguments.frames > 0 && shown >= static_cast<std::uint64_t>(arguments.frames))
             quit = true;
         const bool last = quit || app.window->should_close();
+        const double drawn_s = steady_seconds();
         app.window->end_frame(!shot.empty() || (last && !arguments.screenshot.empty()));
+        if (shown > 1) {
+            app.window_stats.add(between_s, 1e3 * (drawn_s - now_s),
+                                 1e3 * (steady_seconds() - drawn_s));
+        }
         if (fresh) {
             app.screen_ms =
                 1e3 * (steady_seconds() - app.clock_start_s - app.frame().record.reading_time_s);
@@ -429,7 +486,8 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
     if (!arguments.stats.empty()) {
         const std::string score =
             app.score && app.open ? score_json(*app.score, app.current()) : "";
-        const Status written = write_text_file(arguments.stats, app.scan->stats_json(score));
+        const Status written =
+            write_text_file(arguments.stats, app.scan->stats_json(score, app.window_stats.json()));
         if (!written) std::fprintf(stderr, "sonoplay: %s\n", written.error().message().c_str());
     }
     keep_settings(app);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "runtime/player/settings.h"
 #include "runtime/player/setup_guide.h"
 #include "runtime/tracking/mouse_tracker.h"
+#include "runtime/tracking/paced_tracker.h"
 #include "runtime/tracking/push_tracker.h"
 
 namespace sonocase::runtime {
@@ -54,6 +56,10 @@ struct App {
     std::string tracker_spec = "mouse";
     std::unique_ptr<MouseTracker> mouse;  // while tracker_spec is mouse
     std::shared_ptr<PushTracker> mouse_feed;
+    std::shared_ptr<PacedTracker> paced;     // while it is a recording or a script
+    std::string checked_device;              // whose calibrations were compared with it
+    std::shared_ptr<const Anatomy> anatomy;  // of the open case, as the picture breathes
+    bool exact = false;                      // a session is recorded: no accuracy is given up
     std::unique_ptr<ScanThread> scan;
     ScanControls controls;
 
@@ -77,6 +83,8 @@ struct App {
     double view_drawn_s = -1;
     double screen_ms = 0;  // pose to the picture handed to the display, of the last frame shown
     double ui_rate = 0;
+    WindowStats window_stats;
+    std::set<std::string> told;  // of the tracker, on standard error: each sentence once
 
     std::unique_ptr<SetupGuide> guide;  // of the open case
     bool show_help = false, show_setup = false;
@@ -100,6 +108,8 @@ void change_focus(App& app, double by_mm);
 void set_frozen(App& app, bool frozen);
 void step_cine(App& app, int frames);
 void toggle_needle(App& app, bool in_plane);
+void change_pace(App& app, int steps);                  // of a recording or script: slower, faster
+Point3 target_now(const App& app, std::size_t target);  // where breathing has taken it
 void start_attempt(App& app, const std::string& path);  // "": a new file of the user's
 void finish_attempt(App& app);
 Status save_screenshot(App& app, const std::string& path);

@@ -32,7 +32,8 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     app.add_option("--tracker", arguments.tracker,
                    "mouse | sweep:NAME | replay:FILE[,NEEDLE_FILE] | igtl:HOST:PORT | "
                    "igtl:listen:PORT | viper | 3dg | liberty | null");
-    app.add_option("--calibration", arguments.calibrations, "Calibration file; may be repeated")
+    app.add_option("--calibration", arguments.calibrations,
+                   "Calibration file, also of a lag; may be repeated")
         ->allow_extra_args(false);
     app.add_flag("--headless", arguments.headless, "No window: render frames and stop")
         ->group("Headless");
@@ -59,6 +60,11 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         ->group("Picture");
     app.add_option("--samples", arguments.samples, "Samples along a beam; default: the model's")
         ->check(CLI::Range(16, 4096))
+        ->group("Picture");
+    app.add_option("--frame-budget", arguments.frame_budget_ms,
+                   "In a window: milliseconds that a frame may take before accuracy is given up; "
+                   "0: never. Recordings are always exact")
+        ->check(CLI::Range(0.0, 1000.0))
         ->group("Picture");
     app.add_option("--threads", arguments.threads, "Rendering threads")
         ->check(CLI::Range(1, 256))

@@ -17,11 +17,12 @@ struct PlayerArguments {
     std::string stats;                // JSON file, "-" for standard output
     std::string record;
     std::string trainee;  // a chosen name for the progress book; empty: keep no progress
-    std::string model;  // "", "paper", "physical"
+    std::string model;    // "", "paper", "physical"
     std::vector<std::string> effects;
     std::string renderer = "fast";
     int threads = 1;
     int scanlines = 0, samples = 0;  // 0: the model's own
+    double frame_budget_ms = 15;     // window: what a frame may take; 0: full accuracy always
     std::vector<std::string> calibrations;
     std::string serve;       // [ADDRESS:]PORT of the OpenIGTLink server; empty: none
     double ui_scale = 0;     // 0: the settings' or the monitor's

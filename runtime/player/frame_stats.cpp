@@ -60,7 +60,8 @@ void FrameStats::add(double frame_ms, std::span<const EffectCost> costs) {
 }
 
 std::string FrameStats::json(const std::string& score_json,
-                             const TimeHistogram* pose_to_pixel_ms) const {
+                             const TimeHistogram* pose_to_pixel_ms,
+                             const std::string& window_json) const {
     nlohmann::ordered_json out;
     out["frames"] = frame_ms_.count();
     out["frame_ms"]["median"] = rounded(frame_ms_.quantile(0.5));
@@ -81,11 +82,33 @@ std::string FrameStats::json(const std::string& score_json,
         out["pose_to_pixel_ms"]["median"] = rounded(pose_to_pixel_ms->quantile(0.5));
         out["pose_to_pixel_ms"]["p99"] = rounded(pose_to_pixel_ms->quantile(0.99));
     }
-    if (!score_json.empty()) {
-        const auto score = nlohmann::ordered_json::parse(score_json, nullptr, false);
-        if (score.is_object()) out.update(score);
+    for (const std::string& more : {window_json, score_json}) {
+        const auto object = nlohmann::ordered_json::parse(more, nullptr, false);
+        if (object.is_object()) out.update(object);
     }
     return out.dump(2) + "\n";
+}
+
+void WindowStats::add(double between_s, double work_ms, double show_ms) {
+    seconds_ += between_s;
+    between_ms_.add(between_s * 1e3);
+    work_ms_.add(work_ms);
+    show_ms_.add(show_ms);
+}
+
+std::string WindowStats::json() const {
+    nlohmann::ordered_json out;
+    auto& window = out["window"];
+    window["frames"] = between_ms_.count();
+    window["frames_per_s"] =
+        rounded(seconds_ > 0 ? static_cast<double>(between_ms_.count()) / seconds_ : 0);
+    const std::pair<const char*, const TimeHistogram*> times[] = {
+        {"between_ms", &between_ms_}, {"work_ms", &work_ms_}, {"show_ms", &show_ms_}};
+    for (const auto& [name, histogram] : times) {
+        window[name]["median"] = rounded(histogram->quantile(0.5));
+        window[name]["p99"] = rounded(histogram->quantile(0.99));
+    }
+    return out.dump();
 }
 
 double resident_mb() {

@@ -28,6 +28,20 @@ class TimeHistogram {
     double largest_ = 0;
 };
 
+// What the pictures of a window cost.
+class WindowStats {
+  public:
+    // between_s: since the picture before; work_ms: panels and drawing commands; show_ms: until the
+    // display had taken it, which on a machine without a graphics card includes the painting.
+    void add(double between_s, double work_ms, double show_ms);
+    // {"window": {"frames", "frames_per_s", "between_ms", "work_ms", "show_ms"}}
+    std::string json() const;
+
+  private:
+    TimeHistogram between_ms_, work_ms_, show_ms_;
+    double seconds_ = 0;
+};
+
 class FrameStats {
   public:
     // Effects in order of execution.
@@ -38,7 +52,10 @@ class FrameStats {
     const TimeHistogram& frame_ms() const { return frame_ms_; }
     // The JSON of --stats. score_json: of a recorded session (formats/session/session_score.h); its
     // entries, "metrics" first, are put in as they are.
-    std::string json(const std::string& score_json, const TimeHistogram* pose_to_pixel_ms) const;
+    // window_json: an object whose entries come before those.
+    std::string json(const std::string& score_json,
+                     const TimeHistogram* pose_to_pixel_ms,
+                     const std::string& window_json = {}) const;
 
   private:
     struct Effect {

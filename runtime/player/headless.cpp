@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <condition_variable>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <thread>
 
+#include "formats/atomic_file.h"
 #include "runtime/player/contact_sheet.h"
 #include "runtime/player/frame_stats.h"
 #include "runtime/player/open_case.h"
@@ -20,6 +19,7 @@
 #include "runtime/player/serve.h"
 #include "runtime/player/session_run.h"
 #include "runtime/player/setup_guide.h"
+#include "runtime/session/bell.h"
 #include "runtime/session/settings_text.h"
 #include "runtime/tracking/make_tracker.h"
 
@@ -49,29 +49,6 @@ int frame_count(const PlayerArguments& arguments, const Tracker& tracker) {
     return tracker.is_device() ? 300 : 1;
 }
 
-// Rung by a tracker's thread when a reading has come.
-class Bell {
-  public:
-    void ring() {
-        {
-            const std::lock_guard lock(mutex_);
-            rung_ = true;
-        }
-        condition_.notify_one();
-    }
-    // Until it is rung, at most a twentieth of a second.
-    void wait() {
-        std::unique_lock lock(mutex_);
-        condition_.wait_for(lock, std::chrono::milliseconds(50), [this] { return rung_; });
-        rung_ = false;
-    }
-
-  private:
-    std::mutex mutex_;
-    std::condition_variable condition_;
-    bool rung_ = false;
-};
-
 }  // namespace
 
 Status write_text_file(const std::string& path, const std::string& text) {
@@ -98,7 +75,15 @@ double steady_seconds() {
 Result<Calibrations> load_calibrations(const std::vector<std::string>& files) {
     Calibrations calibrations;
     for (const std::string& file : files) {
-        Result<Calibration> calibration = load_calibration(file);
+        const Result<std::string> text = read_text_file(file);
+        if (!text) return text.error();
+        const Result<std::optional<double>> lag = parse_lag_s(*text, file);
+        if (!lag) return lag.error();
+        if (*lag) {
+            calibrations.needle_lag_s = **lag;
+            continue;
+        }
+        Result<Calibration> calibration = parse_calibration(*text, file);
         if (!calibration) return calibration.error();
         std::optional<Calibration>* place = nullptr;
         if (calibration->kind == "probe") place = &calibrations.probe;
@@ -160,6 +145,7 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     const double clock_start_s = steady_seconds();
     context.clock = [clock_start_s] { return steady_seconds() - clock_start_s; };
     context.loop = true;
+    context.needle_lag_s = calibrations->needle_lag_s;
     std::string spec = arguments.tracker;
     if (spec.empty()) spec = exercise.sweeps.empty() ? "null" : "sweep";
     Result<std::unique_ptr<Tracker>> made = make_tracker(spec, context);
@@ -191,8 +177,8 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     if (spec.compare(0, 7, "replay:") == 0) replay = session_replay(spec.substr(7));
     std::unique_ptr<SessionRun> session;
     if (!arguments.record.empty()) {
-        auto started = SessionRun::start(arguments.record, open, *engine, arguments.trainee,
-                                         utc_now(), 0);
+        auto started =
+            SessionRun::start(arguments.record, open, *engine, arguments.trainee, utc_now(), 0);
         if (!started) return started.error();
         session = std::move(*started);
     }
@@ -214,7 +200,7 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
             const double give_up_s = context.clock() + kDeviceWait;
             while (!(fresh = tracker.poll(context.clock(), reading)) &&
                    context.clock() < give_up_s && tracker.health().phase != TrackerPhase::failed) {
-                bell.wait();
+                bell.wait(0.05);
             }
             now_s = context.clock();
             if (!fresh) {
@@ -226,6 +212,11 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
             fresh = tracker.poll(now_s, reading);
         }
         if (fresh) engine->observe(reading, tracker.is_device());
+        if (i == 0 && tracker.is_device()) {
+            for (const std::string& doubt : other_sensor(*calibrations, tracker.health().device)) {
+                std::fprintf(stderr, "sonoplay: %s\n", doubt.c_str());
+            }
+        }
         if (replay && static_cast<std::size_t>(i) < replay->settings.size()) {
             apply_settings_text(replay->settings[static_cast<std::size_t>(i)], settings);
         }

@@ -68,8 +68,15 @@ void change_console(App& app, double seconds) {
         return;
     }
     if (pressed(GLFW_KEY_0)) image.tgc_db = {};
-    if (pressed(GLFW_KEY_COMMA, true)) step_cine(app, 1);
-    if (pressed(GLFW_KEY_PERIOD, true)) step_cine(app, -1);
+    const ImGuiIO& io = ImGui::GetIO();
+    const int step = pressed(GLFW_KEY_PERIOD, true) - pressed(GLFW_KEY_COMMA, true);
+    if (step != 0 && io.KeyCtrl) {
+        if (app.paced) app.paced->jump(5.0 * step);
+    } else if (step != 0 && io.KeyShift) {
+        change_pace(app, step);
+    } else if (step != 0) {
+        step_cine(app, -step);
+    }
     if (pressed(GLFW_KEY_LEFT_BRACKET, true)) change_depth(app, -10);
     if (pressed(GLFW_KEY_RIGHT_BRACKET, true)) change_depth(app, 10);
     if (pressed(GLFW_KEY_SEMICOLON, true)) change_focus(app, -5);
@@ -153,6 +160,12 @@ void handle_keys(App& app, double seconds) {
         }
     }
     if (pressed(GLFW_KEY_N)) toggle_needle(app, !io.KeyShift);
+    if (pressed(GLFW_KEY_O)) {
+        ViewFrom& from = app.view3d->from();
+        from = from == ViewFrom::outside ? ViewFrom::probe
+               : from == ViewFrom::probe ? ViewFrom::needle
+                                         : ViewFrom::outside;
+    }
     if (pressed(GLFW_KEY_V)) app.settings.show_3d = !app.settings.show_3d;
     move_probe(app, seconds);
     change_console(app, seconds);

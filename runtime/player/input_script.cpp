@@ -22,14 +22,14 @@ Result<InputScript> InputScript::load(const std::string& path) {
         const bool fine =
             (verb == "wait" && n == 2) || (verb == "move" && n == 3) ||
             (verb == "wheel" && n == 2) || (verb == "shot" && n == 2) ||
-            (verb == "quit" && n == 1) ||
+            (verb == "loop" && n == 2) || (verb == "quit" && n == 1) ||
             ((verb == "down" || verb == "up") && n == 2 && line.words[1].size() == 1 &&
              line.words[1][0] >= '0' && line.words[1][0] <= '2') ||
             (verb == "key" && n >= 2 && key_code(line.words[1]) >= 0) ||
             (verb == "hold" && n >= 3 && key_code(line.words[1]) >= 0);
         if (!fine) {
             return Error{"line not understood: " + text, path + ":" + std::to_string(number),
-                         "verbs are wait, key, hold, move, down, up, wheel, shot and quit"};
+                         "verbs are wait, key, hold, move, down, up, wheel, shot, loop and quit"};
         }
         script.lines_.push_back(std::move(line));
     }
@@ -37,7 +37,7 @@ Result<InputScript> InputScript::load(const std::string& path) {
     return script;
 }
 
-InjectedInput InputScript::next(std::string& shot, bool& quit) {
+InjectedInput InputScript::next(double now_s, std::string& shot, bool& quit) {
     input_.wheel = 0;
     if (waiting_ > 0) {
         --waiting_;
@@ -80,6 +80,8 @@ InjectedInput InputScript::next(std::string& shot, bool& quit) {
         input_.wheel = static_cast<float>(number(1));
     } else if (verb == "shot") {
         shot = line.words[1];
+    } else if (verb == "loop") {
+        if (now_s < number(1)) next_ = 0;
     } else if (verb == "quit") {
         quit = true;
     }

@@ -7,6 +7,7 @@
 //   down B | up B       button 0 left, 1 right, 2 middle
 //   wheel DY
 //   shot FILE           save the window as PNG
+//   loop S              again from the first line until the clock says S seconds
 //   quit
 // Empty lines and lines that start with # do nothing.
 #pragma once
@@ -25,7 +26,8 @@ class InputScript {
 
     bool active() const { return next_ < lines_.size() || waiting_ > 0; }
     // Input of the next picture. `shot` is set to a file to save after it, `quit` when it is over.
-    InjectedInput next(std::string& shot, bool& quit);
+    // now_s: the clock of loop.
+    InjectedInput next(double now_s, std::string& shot, bool& quit);
 
   private:
     struct Line {

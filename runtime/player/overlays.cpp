@@ -5,48 +5,17 @@
 
 #include "runtime/display/theme.h"
 #include "runtime/player/app.h"
+#include "runtime/player/shortcuts.h"
 
 namespace sonocase::runtime {
 
 void draw_help(App& app) {
-    static const struct {
-        const char* keys;
-        const char* does;
-    } kKeys[] = {
-        {nullptr, "Probe (mouse tracker)"},
-        {"Arrows", "slide on the skin; Alt for slow"},
-        {"Shift + arrows", "rock and fan"},
-        {"Q  E", "rotate"},
-        {"Page Down  Page Up", "press and lift"},
-        {"Home", "back to the start"},
-        {"Left drag, right drag, wheel",
-         "on the picture: slide, tilt, rotate; Ctrl + wheel presses"},
-        {"Right drag in 3-D", "put the probe there; with Shift the needle"},
-        {nullptr, "Needle"},
-        {"N  Shift + N", "take or withdraw, in plane or across"},
-        {"W  S", "advance and pull back"},
-        {"A  D  Z  X", "aim in the plane and out of it"},
-        {"Shift + I J K L", "move its entry while it is outside"},
-        {nullptr, "Picture"},
-        {"Space", "freeze"},
-        {",  .  P", "cine back, forward, play"},
-        {"[  ]  ;  '", "depth and focus"},
-        {"-  =", "gain"},
-        {"1 ... 8 held with , .", "TGC; 0 levels it"},
-        {"M  C  F", "measure, clear, flip"},
-        {nullptr, "Program"},
-        {"B", "start and finish an attempt"},
-        {"F2  F3", "cases, set-up"},
-        {"F5  F6  F7", "next exercise, image model, tracker"},
-        {"F8  F9  F10  V", "show exercise, tracker, effects, 3-D view"},
-        {"F11  Ctrl + / -  Ctrl + Q", "full screen, size of words, quit"},
-    };
     const float s = app.window->scale();
     const ImGuiIO& io = ImGui::GetIO();
     ImGui::SetNextWindowPos({0.5f * io.DisplaySize.x, 0.5f * io.DisplaySize.y}, ImGuiCond_Always,
                             {0.5f, 0.5f});
     ImGui::SetNextWindowSize(
-        {std::min(620 * s, io.DisplaySize.x - 20), std::min(630 * s, io.DisplaySize.y - 20)});
+        {std::min(660 * s, io.DisplaySize.x - 20), std::min(680 * s, io.DisplaySize.y - 20)});
     ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 7 * s);
     ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1);
     ImGui::PushStyleColor(ImGuiCol_WindowBg, colour::rgba(24, 29, 36, 252));
@@ -58,7 +27,7 @@ void draw_help(App& app) {
         if (ImGui::BeginTable("keys", 2)) {
             ImGui::TableSetupColumn("keys", ImGuiTableColumnFlags_WidthFixed, 218 * s);
             ImGui::TableSetupColumn("does");
-            for (const auto& entry : kKeys) {
+            for (const Shortcut& entry : shortcuts()) {
                 ImGui::TableNextRow();
                 ImGui::TableNextColumn();
                 if (!entry.keys) {

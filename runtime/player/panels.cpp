@@ -127,6 +127,26 @@ void calibration_row(const char* tool,
     for (const std::string& warning : calibration->warnings) coloured(colour::kWarn, warning);
 }
 
+// Where a recording or script is, and how fast it runs.
+void draw_pace(PacedTracker& paced) {
+    char text[48];
+    const double at = paced.at_s(), whole = paced.duration_s();
+    std::snprintf(text, sizeof text,
+                  paced.speed() == 0 ? "%.1f of %.1f s, still" : "%.1f of %.1f s", at, whole);
+    float place = static_cast<float>(at);
+    ImGui::SetNextItemWidth(-1);
+    if (ImGui::SliderFloat("##place", &place, 0, static_cast<float>(whole), text)) {
+        paced.jump(place - at);
+    }
+    float speed = static_cast<float>(paced.speed());
+    ImGui::SetNextItemWidth(-1);
+    if (ImGui::SliderFloat("##speed", &speed, 0, 8, "%.2f times as fast",
+                           ImGuiSliderFlags_Logarithmic)) {
+        paced.set_speed(speed);
+    }
+    if (ImGui::IsItemClicked(1)) paced.set_speed(1);
+}
+
 void draw_attempt(const AttemptView& view) {
     ImGui::Separator();
     char clock[32];
@@ -174,14 +194,15 @@ void draw_exercise_panel(App& app) {
         const Target& target = exercise.targets[i];
         const std::string name =
             target.name.empty() ? "Target " + std::to_string(i + 1) : target.name;
+        const double to_target_mm = distance(tip, target_now(app, i));
         if (record.tools.has_needle && i < app.hits.size() &&
-            distance(tip, target.centre) <= target.hit_radius_mm) {
+            to_target_mm <= target.hit_radius_mm) {
             app.hits[i] = true;
         }
         const bool hit = i < app.hits.size() && app.hits[i];
         if (record.tools.has_needle) {
-            row_distance((name + (hit ? ", reached" : ", tip at")).c_str(),
-                         distance(tip, target.centre), target.hit_radius_mm);
+            row_distance((name + (hit ? ", reached" : ", tip at")).c_str(), to_target_mm,
+                         target.hit_radius_mm);
         } else {
             row(name.c_str(), hit ? "reached" : "to reach", hit ? colour::kGood : colour::kDim);
         }
@@ -235,6 +256,7 @@ void draw_tracker_panel(App& app) {
         }
         ImGui::EndCombo();
     }
+    if (app.paced) draw_pace(*app.paced);
     const TrackerHealth health = app.scan->tracker_health();
     if (health.phase == TrackerPhase::streaming) {
         if (health.rate_hz > 0) row("Rate", "%.0f Hz", health.rate_hz);
@@ -343,6 +365,11 @@ void draw_effects_panel(App& app) {
     ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(total).x);
     ImGui::TextDisabled("%s", total);
     ImGui::PushFont(fonts().small);
+    const Renderer::Accuracy& accuracy = frame.accuracy;
+    char lines[48];
+    std::snprintf(lines, sizeof lines, "%s, %d x %d", accuracy.level == 0 ? "full" : "reduced",
+                  accuracy.scanlines, accuracy.samples);
+    row("Accuracy", lines, accuracy.level == 0 ? colour::kText : colour::kWarn);
     const float right = ImGui::GetWindowContentRegionMax().x;
     for (int i = 0; i < frame.cost_count; ++i) {
         const EffectCost& cost = frame.costs[static_cast<std::size_t>(i)];
@@ -388,6 +415,8 @@ void draw_view3d_panel(App& app, float height) {
     input.flipped = app.controls.settings.flip_left_right;
     input.image_texture = app.texture->name();
     input.hit = app.hits;
+    for (std::size_t i = 0; i < app.current().targets.size() && i < 64; ++i)
+        input.target_centres.push_back(target_now(app, i));
     // Every second picture is often enough for a small view, and halves its cost on a machine
     // without a graphics card.
     if (!app.view_texture || app.now_s - app.view_drawn_s > 0.03) {
@@ -410,7 +439,17 @@ void draw_view3d_panel(App& app, float height) {
         double& d = app.view3d->orbit().distance_mm;
         d = std::clamp(d * std::pow(0.9, io.MouseWheel), 150.0, 3000.0);
     }
-    if (ImGui::IsItemHovered() && ImGui::IsMouseDoubleClicked(0)) app.view3d->home();
+    if (ImGui::IsItemHovered() && ImGui::IsMouseDoubleClicked(0)) {
+        app.view3d->home();
+        app.view3d->from() = ViewFrom::outside;
+    }
+    if (app.view3d->from() != ViewFrom::outside) {
+        ImGui::SetCursorPos({6 * app.window->scale(), 4 * app.window->scale()});
+        ImGui::PushFont(fonts().small);
+        ImGui::TextDisabled(app.view3d->from() == ViewFrom::probe ? "from the probe (O)"
+                                                                  : "from the needle (O)");
+        ImGui::PopFont();
+    }
     if (ImGui::IsItemActive() && ImGui::IsMouseDown(1) && app.mouse) {
         // The right button puts the probe, or with Shift the needle, where it points.
         const ViewRay ray = app.view3d->ray(io.MousePos.x - corner.x, io.MousePos.y - corner.y);

@@ -92,9 +92,10 @@ TrackerHealth ScanThread::tracker_health() const {
     return tracker ? tracker->health() : TrackerHealth{};
 }
 
-std::string ScanThread::stats_json(const std::string& score_json) const {
+std::string ScanThread::stats_json(const std::string& score_json,
+                                   const std::string& window_json) const {
     const std::lock_guard lock(mutex_);
-    return stats_.json(score_json, &pose_to_pixel_);
+    return stats_.json(score_json, &pose_to_pixel_, window_json);
 }
 
 void ScanThread::run() {
@@ -105,9 +106,10 @@ void ScanThread::run() {
         if (stop_) return;
         // A script is a function of time: it has news at every look, so it is looked at at the idle
         // rate, like breathing and noise.
-        const double wait_s = rendered
-                                  ? 1 / kIdleRate
-                                  : std::clamp(last_frame_s_ + 1 / kIdleRate - clock_(), 5e-4, 0.1);
+        double wait_s = rendered ? 1 / kIdleRate
+                                 : std::clamp(last_frame_s_ + 1 / kIdleRate - clock_(), 5e-4, 0.1);
+        // A recording is looked at when its next reading is due.
+        if (next_reading_s_ >= 0) wait_s = std::clamp(next_reading_s_ - clock_(), 0.0, wait_s);
         wake_condition_.wait_for(lock, duration<double>(wait_s), [this] { return work_ || stop_; });
         work_ = false;
         if (stop_) return;
@@ -129,9 +131,11 @@ bool ScanThread::step() {
     double now_s = clock_();
     TrackerReading reading;
     bool arrived = false, is_device = false;
+    next_reading_s_ = -1;
     if (tracker_) {
         is_device = tracker_->is_device();
         arrived = tracker_->poll(now_s, reading);
+        next_reading_s_ = tracker_->next_s();
         if (arrived) {
             reading_ = reading;
             engine_->observe(reading_, is_device);
@@ -174,6 +178,7 @@ bool ScanThread::step() {
     out.layout = engine_->renderer().layout();
     out.depth_mm = engine_->exercise().probe.depth_mm;
     out.focus_mm = engine_->exercise().probe.focus_mm;
+    out.accuracy = engine_->renderer().accuracy();
     const auto costs = engine_->renderer().costs();
     out.cost_count = static_cast<int>(std::min<std::size_t>(costs.size(), kMaxEffects));
     std::copy_n(costs.begin(), out.cost_count, out.costs.begin());

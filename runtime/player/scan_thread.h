@@ -43,6 +43,7 @@ struct ScanFrame {
     TrackerReading reading;
     Renderer::Layout layout;
     double depth_mm = 0, focus_mm = 0;
+    Renderer::Accuracy accuracy;
     std::array<EffectCost, kMaxEffects> costs{};
     int cost_count = 0;
     SensorVerdict probe_verdict = SensorVerdict::absent, needle_verdict = SensorVerdict::absent;
@@ -83,7 +84,7 @@ class ScanThread {
 
     TrackerHealth tracker_health() const;
     // JSON of --stats over the thread's life.
-    std::string stats_json(const std::string& score_json) const;
+    std::string stats_json(const std::string& score_json, const std::string& window_json) const;
     void set_first_frame_origin_s(double start_s) { start_s_ = start_s; }
     double first_frame_s() const { return first_frame_s_.load(); }
 
@@ -112,6 +113,7 @@ class ScanThread {
     TrackerReading reading_;
     FrameStats stats_;
     TimeHistogram pose_to_pixel_;
+    double next_reading_s_ = -1;  // of a recording
     double rate_ = 0, last_median_ms_ = 0, last_p99_ms_ = 0;
     std::uint64_t number_ = 0;
     double start_s_ = -1;

@@ -285,15 +285,26 @@ std::vector<std::string> doubts(const Calibrations& calibrations,
         for (const std::string& concern : calibration_concerns(*calibration, now)) {
             sentences.push_back("Calibration of the " + calibration->kind + ": " + concern);
         }
-        if (!calibration->sensor.empty() && !device.empty() && calibration->sensor != device) {
-            sentences.push_back("The calibration of the " + calibration->kind + " was made with " +
-                                calibration->sensor + ", and " + device +
-                                " is in use; calibrate again.");
-        }
     };
     look(calibrations.probe);
     look(calibrations.needle);
     look(calibrations.mannequin);
+    for (std::string& sentence : other_sensor(calibrations, device))
+        sentences.push_back(std::move(sentence));
+    return sentences;
+}
+
+std::vector<std::string> other_sensor(const Calibrations& calibrations, const std::string& device) {
+    std::vector<std::string> sentences;
+    for (const auto* calibration :
+         {&calibrations.probe, &calibrations.needle, &calibrations.mannequin}) {
+        if (!*calibration || (*calibration)->sensor.empty() || device.empty()) continue;
+        // A serial number or a short name is part of what the device calls itself.
+        if (device.find((*calibration)->sensor) != std::string::npos) continue;
+        sentences.push_back("The calibration of the " + (*calibration)->kind + " was made with " +
+                            (*calibration)->sensor + ", and " + device +
+                            " is in use; calibrate again.");
+    }
     return sentences;
 }
 

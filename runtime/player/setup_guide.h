@@ -83,4 +83,7 @@ std::vector<std::string> doubts(const Calibrations& calibrations,
                                 const std::string& device,
                                 const std::string& now);
 
+// Those of another sensor alone.
+std::vector<std::string> other_sensor(const Calibrations& calibrations, const std::string& device);
+
 }  // namespace sonocase::runtime

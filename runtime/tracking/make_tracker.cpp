@@ -40,6 +40,10 @@ Made make_tracker(const std::string& spec, const TrackerContext& context) {
     if (kind == "replay" && !rest.empty()) {
         Result<Recording> recording = load_recording(rest);
         if (!recording) return recording.error();
+        // What was recorded here was seen together.
+        if (!recording->in_mannequin) {
+            for (Pose& pose : recording->needle) pose.timestamp_s -= context.needle_lag_s;
+        }
         return Made(std::make_unique<ReplayTracker>(std::move(*recording), context.loop));
     }
     if (spec == "mouse") {

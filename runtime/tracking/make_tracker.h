@@ -14,8 +14,9 @@ namespace sonocase::runtime {
 struct TrackerContext {
     const Skin* skin = nullptr;  // both outlive the tracker's making; the bundle outlives it
     const Exercise* exercise = nullptr;
-    SessionClock clock;  // for trackers with a thread
-    bool loop = true;    // scripts and recordings start over when they end
+    SessionClock clock;       // for trackers with a thread
+    bool loop = true;         // scripts and recordings start over when they end
+    double needle_lag_s = 0;  // of a recording: the needle's readings come so much late
 };
 
 // spec  mouse | sweep:NAME | sweep | replay:FILE[,NEEDLE_FILE] | igtl:HOST:PORT | igtl:listen:PORT

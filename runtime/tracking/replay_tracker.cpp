@@ -132,12 +132,19 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
                          [](double time, const Pose& pose) { return time < pose.timestamp_s; });
     const std::size_t i =
         later == probe.begin() ? 0 : static_cast<std::size_t>(later - probe.begin()) - 1;
+    // Laps are counted from the clock, so that the next reading is due when it was taken.
+    const double lap_s = start_s_ + static_cast<double>(lap) * duration;
+    const bool has_next = i + 1 < probe.size();
+    next_s_ = has_next                ? lap_s + recorded_time_s(static_cast<int>(i) + 1)
+              : loop_ && duration > 0 ? lap_s + duration
+                                      : -1;
     if (i == last_ && lap == laps_) return false;
     last_ = i;
     laps_ = lap;
     reading = {};
     reading.sequence = ++sequence_;
-    reading.time_s = now_s;
+    // It came when it was due, however late it is looked at.
+    reading.time_s = std::min(lap_s + recorded_time_s(static_cast<int>(i)), now_s);
     reading.device_time_s = probe[i].timestamp_s;
     reading.in_mannequin = recording_.in_mannequin;
     reading.sensor_count = recording_.needle.empty() ? 1 : 2;

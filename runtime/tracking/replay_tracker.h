@@ -25,13 +25,14 @@ class ReplayTracker final : public Tracker {
     double duration_s() const override;
     int recorded_readings() const override { return static_cast<int>(recording_.probe.size()); }
     double recorded_time_s(int i) const override;
+    double next_s() const override { return next_s_; }
 
   private:
     Recording recording_;
     std::vector<std::size_t> needle_of_probe_;  // nearest in time
     bool loop_;
     bool started_ = false;
-    double start_s_ = 0;
+    double start_s_ = 0, next_s_ = -1;
     std::uint64_t laps_ = 0;
     std::size_t last_ = ~std::size_t{0};
     std::uint64_t sequence_ = 0, not_ok_ = 0;

@@ -74,6 +74,9 @@ class Tracker {
     virtual int recorded_readings() const { return 0; }
     // Time of recorded reading i, from 0 at the first.
     virtual double recorded_time_s(int) const { return 0; }
+    // When the next reading of a recording is due, on the session's clock, after a poll; negative:
+    // not known.
+    virtual double next_s() const { return -1; }
     // True for hardware and networks, whose readings carry noise, so that a pose that stays equal
     // to the last bit means a frozen sensor.
     virtual bool is_device() const { return false; }

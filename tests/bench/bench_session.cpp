@@ -36,9 +36,9 @@ Session one_hour() {
     return s;
 }
 
-void score(benchmark::State& state, int targets) {
+void score(benchmark::State& state, int targets, double breathing_mm) {
     const CaseBundle& bundle = bench_bundle();
-    const CaseAnatomy anatomy(bundle);
+    const CaseAnatomy anatomy(bundle, {.amplitude_mm = breathing_mm});
     const Session session = one_hour();
     Exercise exercise;
     exercise.needle.length_mm = 150;
@@ -58,11 +58,15 @@ void score(benchmark::State& state, int targets) {
     }
 }
 
-BENCHMARK_CAPTURE(score, one_hour, 3)
+BENCHMARK_CAPTURE(score, one_hour, 3, 0.0)
     ->Name("Session/score_one_hour")
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
-BENCHMARK_CAPTURE(score, one_hour_10000_targets, 10000)
+BENCHMARK_CAPTURE(score, one_hour_breathing, 3, 8.0)
+    ->Name("Session/score_one_hour_breathing")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(score, one_hour_10000_targets, 10000, 0.0)
     ->Name("Session/score_one_hour_10000_targets")
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();

@@ -6,6 +6,7 @@
 #include "formats/session/metric_table.h"
 #include "pipeline/review/review_page.h"
 #include "pipeline/review/review_plots.h"
+#include "support/run_command.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
 
@@ -95,6 +96,39 @@ TEST(Review, ThePageHasEverythingAndNeedsNothing) {
     }
     EXPECT_NE(read_text_file(out + "/scores.json")->find("\"targets_hit\": 1"), std::string::npos);
     EXPECT_TRUE(report->warnings.empty());
+}
+
+// Opened in a browser with a line of script at its end that counts the pictures that were drawn.
+TEST(Review, ABrowserShowsThePageWithAllItsPicturesAndNoComplaint) {
+    Files files;
+    if (testing::run_command("command -v chromium").status != 0)
+        GTEST_SKIP() << "chromium is not installed";
+    files.add_pictures();
+    ReviewOptions options;
+    options.width_px = 160;
+    options.height_px = 120;
+    const std::string out = files.folder / "review";
+    const auto report = make_review(files.session, files.bundle, out, options);
+    ASSERT_TRUE(report) << report.error().message();
+    const std::string page = testing::read_text(out + "/review.html");
+    const std::string counter =
+        "<script>addEventListener('load', () => { const all = [...document.images];"
+        "document.title = 'drawn ' + all.filter(i => i.naturalWidth > 0).length + ' of ' +"
+        "all.length + ', plots ' + [...document.querySelectorAll('svg')].filter("
+        "s => s.getBoundingClientRect().width > 50).length; });</script></body>";
+    const std::size_t end = page.rfind("</body>");
+    ASSERT_NE(end, std::string::npos);
+    files.folder.write("counted.html", page.substr(0, end) + counter);
+    const auto seen = testing::run_command(
+        "env HOME=" + files.folder.path() +
+        " timeout 120 chromium --headless --no-sandbox --disable-gpu --disable-dev-shm-usage"
+        " --enable-logging=stderr --user-data-dir=" +
+        (files.folder / "profile") + " --dump-dom file://" + (files.folder / "counted.html"));
+    ASSERT_EQ(seen.status, 0) << seen.error;
+    EXPECT_NE(seen.out.find("<title>drawn 6 of 6, plots "), std::string::npos)
+        << seen.out.substr(seen.out.find("<title>"), 80);
+    EXPECT_EQ(seen.out.find("plots 0<"), std::string::npos);
+    EXPECT_EQ(seen.error.find("CONSOLE"), std::string::npos) << seen.error;
 }
 
 TEST(Review, ComparesWithEarlierSessionsOfTheSameTrainee) {

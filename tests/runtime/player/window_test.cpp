@@ -1,12 +1,15 @@
 // The window under a virtual display, driven by injected input: every panel opened, an exercise
 // attempted, pictures taken and looked into.
 #include <gtest/gtest.h>
-#include <png.h>
 
+#include <cctype>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "formats/case_bundle.h"
+#include "runtime/player/shortcuts.h"
+#include "runtime/player/window_picture.h"
 #include "support/run_command.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
@@ -15,44 +18,8 @@ namespace sonocase::runtime {
 namespace {
 
 using sonocase::testing::CommandResult;
-
-struct Picture {
-    int width = 0, height = 0;
-    std::vector<std::uint8_t> rgb;
-    // Mean brightness of a rectangle, [0, 255].
-    double mean(int x0, int y0, int x1, int y1) const {
-        double sum = 0;
-        for (int y = y0; y < y1; ++y) {
-            for (int x = x0; x < x1; ++x)
-                sum += rgb[3 * (static_cast<std::size_t>(y) * width + x) + 1];
-        }
-        return sum / ((x1 - x0) * (y1 - y0));
-    }
-    // Share of pixels of a rectangle that differ by more than 8 levels.
-    double difference(const Picture& other, int x0, int y0, int x1, int y1) const {
-        int changed = 0;
-        for (int y = y0; y < y1; ++y) {
-            for (int x = x0; x < x1; ++x) {
-                const std::size_t i = 3 * (static_cast<std::size_t>(y) * width + x) + 1;
-                changed += std::abs(rgb[i] - other.rgb[i]) > 8;
-            }
-        }
-        return double(changed) / ((x1 - x0) * (y1 - y0));
-    }
-};
-
-Picture load(const std::string& path) {
-    Picture picture;
-    png_image image{};
-    image.version = PNG_IMAGE_VERSION;
-    if (!png_image_begin_read_from_file(&image, path.c_str())) return picture;
-    image.format = PNG_FORMAT_RGB;
-    picture.width = static_cast<int>(image.width);
-    picture.height = static_cast<int>(image.height);
-    picture.rgb.resize(PNG_IMAGE_SIZE(image));
-    png_image_finish_read(&image, nullptr, picture.rgb.data(), 0, nullptr);
-    return picture;
-}
+using sonocase::testing::load_picture;
+using sonocase::testing::Picture;
 
 class WindowOnVirtualDisplay : public ::testing::Test {
   protected:
@@ -97,7 +64,7 @@ TEST_F(WindowOnVirtualDisplay, PlaysAnExerciseFromInjectedInput) {
             "1280x720");
     ASSERT_EQ(result.status, 0) << result.error;
     EXPECT_EQ(result.error, "");
-    const auto shot = [&](const char* name) { return load(shots + name + ".png"); };
+    const auto shot = [&](const char* name) { return load_picture(shots + name + ".png"); };
     const Picture start = shot("start"), needle = shot("needle"), frozen = shot("frozen"),
                   still = shot("still"), lifted = shot("lifted");
     for (const char* name : {"start", "needle", "frozen", "still", "measured", "scores", "help",
@@ -131,7 +98,7 @@ TEST_F(WindowOnVirtualDisplay, IsTheSameLayoutAtFourTimesTheSize) {
         run(bundle_ + " --size 3840x2160 --ui-scale 3 --model paper",
             "wait 6\nshot " + (folder_ / "big.png") + "\nquit\n", "3840x2160");
     ASSERT_EQ(result.status, 0) << result.error;
-    const Picture big = load(folder_ / "big.png");
+    const Picture big = load_picture(folder_ / "big.png");
     ASSERT_EQ(big.width, 3840);
     ASSERT_EQ(big.height, 2160);
     EXPECT_GT(big.mean(1500, 750, 2250, 1500), 25);
@@ -151,6 +118,63 @@ TEST_F(WindowOnVirtualDisplay, GoesOnAfterWhatIsWrong) {
     result = run(bundle_ + " --model paper", "wait 4\nquit\n", "1280x720");
     EXPECT_EQ(result.status, 0);
     EXPECT_NE(result.error.find("player.json"), std::string::npos) << result.error;
+}
+
+TEST_F(WindowOnVirtualDisplay, SaysWhatATrackerAndABundleLack) {
+    CommandResult result =
+        run(bundle_ + " --tracker viper --model paper", "wait 60\nquit\n", "1280x720");
+    EXPECT_EQ(result.status, 0);
+    EXPECT_NE(result.error.find("plugged in"), std::string::npos) << result.error;
+    result = run(SONOCASE_SOURCE "/tests/data/versions/case-future.sonocase", "wait 4\nquit\n",
+                 "1280x720");
+    EXPECT_EQ(result.status, 0);  // the list of bundles is there
+    EXPECT_NE(result.error.find("format version 9"), std::string::npos) << result.error;
+}
+
+TEST_F(WindowOnVirtualDisplay, WithoutOpenGl33SaysSoInOneLine) {
+    ::setenv("MESA_GL_VERSION_OVERRIDE", "2.1", 1);
+    const CommandResult result = run(bundle_, "quit\n", "1280x720");
+    ::unsetenv("MESA_GL_VERSION_OVERRIDE");
+    EXPECT_EQ(result.status, 1);
+    EXPECT_NE(result.error.find("OpenGL"), std::string::npos) << result.error;
+    EXPECT_NE(result.error.find("--headless"), std::string::npos) << result.error;
+    EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
+}
+
+// The help lists every key that the window reads, and docs/player.md every line of the help.
+TEST(Shortcuts, EveryKeyOfTheWindowIsInTheHelpAndEveryLineOfItInTheDocument) {
+    const std::string source =
+        sonocase::testing::read_text(SONOCASE_SOURCE "/runtime/player/input.cpp");
+    const std::string document = sonocase::testing::read_text(SONOCASE_SOURCE "/docs/player.md");
+    std::string help;
+    for (const Shortcut& s : shortcuts()) {
+        if (!s.keys) continue;
+        help += std::string(" ") + s.keys + " " + s.does + " ";
+        EXPECT_NE(document.find(std::string("| `") + s.keys + "` |"), std::string::npos) << s.keys;
+    }
+    const std::map<std::string, std::string> written = {
+        {"LEFT", "rrows"},        {"RIGHT", "rrows"},
+        {"UP", "rrows"},          {"DOWN", "rrows"},
+        {"PAGE_UP", "Page Up"},   {"PAGE_DOWN", "Page Down"},
+        {"HOME", "Home"},         {"SPACE", "Space"},
+        {"ESCAPE", "Escape"},     {"ENTER", "Enter"},
+        {"COMMA", " , "},         {"PERIOD", " . "},
+        {"LEFT_BRACKET", " [ "},  {"RIGHT_BRACKET", " ] "},
+        {"SEMICOLON", " ; "},     {"APOSTROPHE", " ' "},
+        {"MINUS", " - "},         {"EQUAL", " = "},
+        {"KP_ADD", "Ctrl + / -"}, {"KP_SUBTRACT", "Ctrl + / -"}};
+    int keys = 0;
+    const std::string mark = "GLFW_KEY_";
+    for (std::size_t at = source.find(mark); at != std::string::npos;
+         at = source.find(mark, at + 1), ++keys) {
+        std::size_t end = at + mark.size();
+        while (end < source.size() && (std::isalnum(source[end]) || source[end] == '_')) ++end;
+        const std::string key = source.substr(at + mark.size(), end - at - mark.size());
+        const auto special = written.find(key);
+        const std::string words = special != written.end() ? special->second : " " + key + " ";
+        EXPECT_NE(help.find(words), std::string::npos) << key;
+    }
+    EXPECT_GT(keys, 40);
 }
 
 TEST_F(WindowOnVirtualDisplay, WithoutADisplaySaysSoInOneLine) {

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "runtime/tracking/make_tracker.h"
+#include "runtime/tracking/paced_tracker.h"
+#include "support/temporary_folder.h"
+
 namespace sonocase::runtime {
 namespace {
 
@@ -30,6 +34,63 @@ TEST(ReplayTracker, StepsThroughEveryRowAtItsRecordedTime) {
                   i == 3 ? SensorState::lost : SensorState::ok);
     }
     EXPECT_EQ(replay.health().bad_frames, 1u);
+}
+
+TEST(ReplayTracker, ACalibratedLagBringsTheNeedleToItsOwnMoment) {
+    const sonocase::testing::TemporaryFolder folder;
+    std::string probe = "frame,timestamp_s,status,tx,ty,tz,r00,r01,r02,r10,r11,r12,r20,r21,r22\n",
+                needle = probe;
+    for (int i = 0; i < 40; ++i) {  // both move together; the needle is told of 0.15 s late
+        const std::string rest = ",0,0,1,0,0,0,1,0,0,0,1\n";
+        const double t = 0.05 * i;
+        probe += std::to_string(i) + "," + std::to_string(t) + ",OK," + std::to_string(i) + rest;
+        needle +=
+            std::to_string(i) + "," + std::to_string(t + 0.15) + ",OK," + std::to_string(i) + rest;
+    }
+    folder.write("probe.csv", probe);
+    folder.write("needle.csv", needle);
+    for (const double lag_s : {0.0, 0.15}) {
+        TrackerContext context;
+        context.needle_lag_s = lag_s;
+        auto tracker = make_tracker(
+            "replay:" + (folder / "probe.csv") + "," + (folder / "needle.csv"), context);
+        ASSERT_TRUE(tracker) << tracker.error().message();
+        TrackerReading reading;
+        ASSERT_TRUE((*tracker)->poll(0, reading));
+        ASSERT_TRUE((*tracker)->poll(1, reading));
+        EXPECT_EQ(reading.sensors[kProbeSensor].world_from_sensor.translation.x, 20);
+        EXPECT_EQ(reading.sensors[kNeedleSensor].world_from_sensor.translation.x,
+                  lag_s > 0 ? 20 : 17);
+    }
+}
+
+TEST(PacedTracker, RunsSlowerFasterStandsStillAndJumps) {
+    PacedTracker paced(std::make_unique<ReplayTracker>(recording(101, 0.1), true));
+    TrackerReading reading;
+    const auto x = [&] { return reading.sensors[kProbeSensor].world_from_sensor.translation.x; };
+    EXPECT_EQ(paced.duration_s(), paced.recorded_time_s(100));
+    ASSERT_TRUE(paced.poll(5, reading));
+    EXPECT_EQ(x(), 0);
+    EXPECT_TRUE(paced.poll(6.02, reading));  // as fast as life
+    EXPECT_EQ(x(), 10);
+    EXPECT_NEAR(reading.time_s, 6, 1e-9);  // when it was due
+    paced.set_speed(0.25);
+    EXPECT_TRUE(paced.poll(8.02, reading));
+    EXPECT_EQ(x(), 15);
+    paced.set_speed(4);
+    EXPECT_TRUE(paced.poll(9.02, reading));
+    EXPECT_EQ(x(), 55);
+    paced.set_speed(0);
+    EXPECT_FALSE(paced.poll(100, reading));
+    paced.jump(-3);
+    EXPECT_TRUE(paced.poll(101, reading));
+    EXPECT_EQ(x(), 25);
+    EXPECT_NEAR(paced.at_s(), 2.52, 1e-9);
+    paced.jump(-5);  // past the start: the end of the round before
+    EXPECT_TRUE(paced.poll(102, reading));
+    EXPECT_EQ(x(), 75);
+    paced.set_speed(NAN);
+    EXPECT_EQ(paced.speed(), 1);
 }
 
 TEST(ReplayTracker, HasNothingNewBetweenTwoRows) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "runtime/session/bell.h"
 #include "runtime/tracking/igtl_message.h"
 #include "runtime/tracking/igtl_server.h"
 #include "runtime/tracking/igtl_tracker.h"
@@ -22,16 +23,35 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Looks until it is so, at most for so long: no fixed waits.
+// Looks until it is so, at most for so long: whenever the tracker has something new, and now and
+// then, since its health has no bell.
 template <class Predicate>
-bool eventually(Predicate predicate, double seconds = 15) {
+bool eventually(Bell& bell, Predicate predicate, double seconds = 15) {
     const auto start = Clock::now();
     while (!predicate()) {
         if (seconds_since(start) > seconds) return false;
-        std::this_thread::yield();
+        bell.wait(0.005);
     }
     return true;
 }
+
+// A tracker that rings; silent again before the bell is gone.
+struct RingingTracker {
+    explicit RingingTracker(std::unique_ptr<Tracker> made) : tracker(std::move(made)) {
+        tracker->set_wake([this] { bell.ring(); });
+    }
+    ~RingingTracker() { tracker->set_wake({}); }
+    RingingTracker(const RingingTracker&) = delete;
+    RingingTracker& operator=(const RingingTracker&) = delete;
+    Tracker* operator->() const { return tracker.get(); }
+    Tracker& operator*() const { return *tracker; }
+    template <class Predicate>
+    bool eventually(Predicate predicate) {
+        return runtime::eventually(bell, predicate);
+    }
+    Bell bell;
+    std::unique_ptr<Tracker> tracker;
+};
 
 SessionClock clock_from_now() {
     return [start = Clock::now()] { return seconds_since(start); };
@@ -137,14 +157,14 @@ int free_port() {
     return socket ? socket->port() : 0;
 }
 
-std::unique_ptr<Tracker> start_tracker(int port, bool listening) {
+RingingTracker start_tracker(int port, bool listening) {
     IgtlTrackerOptions options;
     options.port = port;
     options.listening = listening;
     options.retry_s = 0.05;
     Result<std::unique_ptr<Tracker>> tracker = IgtlTracker::start(options, clock_from_now());
     EXPECT_TRUE(tracker);
-    return std::move(*tracker);
+    return RingingTracker(std::move(*tracker));
 }
 
 void expect_pose(const SensorReading& sensor, double x) {
@@ -159,7 +179,8 @@ TEST(IgtlTracker, FollowsAServerOfTheLibrary) {
     Peer peer("serve", port, 400);
     EXPECT_EQ(peer.line(), "ready\n");
     TrackerReading reading;
-    ASSERT_TRUE(eventually([&] { return tracker->poll(0, reading) && reading.sensor_count == 4; }));
+    ASSERT_TRUE(
+        tracker.eventually([&] { return tracker->poll(0, reading) && reading.sensor_count == 4; }));
     expect_pose(reading.sensors[kProbeSensor], 100);
     expect_pose(reading.sensors[kNeedleSensor], 200);
     expect_pose(reading.sensors[2], 300);
@@ -167,7 +188,8 @@ TEST(IgtlTracker, FollowsAServerOfTheLibrary) {
     EXPECT_EQ(tracker->health().phase, TrackerPhase::streaming);
     EXPECT_EQ(tracker->health().bad_frames, 0u);
     EXPECT_EQ(peer.close(), 0);
-    ASSERT_TRUE(eventually([&] { return tracker->health().phase == TrackerPhase::searching; }));
+    ASSERT_TRUE(
+        tracker.eventually([&] { return tracker->health().phase == TrackerPhase::searching; }));
 }
 
 TEST(IgtlTracker, ConnectsAgainAfterTheServerWentAway) {
@@ -179,7 +201,7 @@ TEST(IgtlTracker, ConnectsAgainAfterTheServerWentAway) {
         ASSERT_TRUE(guest.open()) << round;
         guest.write(igtl::encode_transform("ProbeToTracker", 1, {}));
         const auto readings = static_cast<std::uint64_t>(round + 1);
-        ASSERT_TRUE(eventually([&] { return tracker->health().readings >= readings; }));
+        ASSERT_TRUE(tracker.eventually([&] { return tracker->health().readings >= readings; }));
     }
     EXPECT_EQ(tracker->health().connects, 3u);
 }
@@ -189,7 +211,8 @@ TEST(IgtlTracker, ListensToAClientOfTheLibrary) {
     const int port = static_cast<IgtlTracker&>(*tracker).port();
     Peer peer("send", port, 50);
     TrackerReading reading;
-    ASSERT_TRUE(eventually([&] { return tracker->poll(0, reading) && reading.sensor_count == 2; }));
+    ASSERT_TRUE(
+        tracker.eventually([&] { return tracker->poll(0, reading) && reading.sensor_count == 2; }));
     expect_pose(reading.sensors[kProbeSensor], 100);
     EXPECT_EQ(peer.close(), 0);
 }
@@ -199,6 +222,7 @@ TEST(IgtlServer, IsFollowedByAClientOfTheLibrary) {
     ASSERT_TRUE(server) << server.error().message();
     Peer peer("follow", (*server)->port(), 5);
     std::atomic<bool> stop{false};
+    Bell pace;
     std::thread sender([&] {
         while (!stop) {
             ServedFrame& frame = (*server)->slot();
@@ -209,12 +233,13 @@ TEST(IgtlServer, IsFollowedByAClientOfTheLibrary) {
             frame.mannequin_from_probe.translation = {1, 2, 33.5};
             frame.pixels.assign(64 * 48, 9);
             (*server)->publish();
-            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+            pace.wait(0.002);
         }
     });
     const auto seen = nlohmann::json::parse(peer.line(), nullptr, false);
     EXPECT_EQ(peer.close(), 0);
     stop = true;
+    pace.ring();
     sender.join();
     ASSERT_TRUE(seen.is_object());
     EXPECT_EQ(seen["bad"], 0);
@@ -249,7 +274,7 @@ TEST(IgtlTracker, SurvivesHostilePeers) {
         const std::uint64_t before = tracker->health().readings;
         Result<Socket> honest = Socket::connect("127.0.0.1", port, 5);
         ASSERT_TRUE(honest);
-        ASSERT_TRUE(eventually([&] {
+        ASSERT_TRUE(tracker.eventually([&] {
             honest->write(good);
             return tracker->health().readings > before;
         }));
@@ -265,7 +290,8 @@ TEST(IgtlServer, SurvivesAThousandConnects) {
         ASSERT_TRUE(socket) << i << " " << socket.error().message();
         if (i % 3 == 0) socket->write(Bytes(100, 0xFF));
     }
-    EXPECT_TRUE(eventually([&] { return (*server)->guests() == 0; }));
+    Bell never;  // guests come and go unannounced
+    EXPECT_TRUE(eventually(never, [&] { return (*server)->guests() == 0; }));
     auto tracker = start_tracker(0, true);
     for (int i = 0; i < 200; ++i) {
         Result<Socket> socket =

@@ -2,9 +2,11 @@
 
 #include <umockdev-1.0/umockdev.h>
 // ioctl.h before the usbdevice_fs numbers that are built from it.
+#include <linux/capability.h>
 #include <linux/usbdevice_fs.h>
 #include <poll.h>
 #include <sys/ioctl.h>
+#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -20,10 +22,15 @@
 #include <mutex>
 #include <thread>
 
+#include "runtime/session/bell.h"
+
 namespace sonocase::testing {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+// The firmware's clock: fine against the 4 ms between two readings of a real device.
+constexpr double kTickS = 0.0002;
 
 class EmulatedDevice final : public DevicePort {
   public:
@@ -303,6 +310,11 @@ ClientResult run_with_device(const DeviceSpec& spec,
     if (::pipe(pipe_ends) != 0) std::abort();
     const pid_t child = ::fork();
     if (child == 0) {
+        // Root may open what nobody may: the program goes without that right.
+        if (spec.no_permission) {
+            ::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE);
+            ::prctl(PR_CAPBSET_DROP, CAP_DAC_READ_SEARCH);
+        }
         ::dup2(pipe_ends[1], STDOUT_FILENO);
         ::close(pipe_ends[0]);
         const char* before = std::getenv("SONOCASE_PRELOAD");  // a sanitizer's runtime comes first
@@ -318,10 +330,11 @@ ClientResult run_with_device(const DeviceSpec& spec,
     }
     ::close(pipe_ends[1]);
     std::atomic<bool> stop{false};
+    runtime::Bell bell;
     std::thread player([&] {
         Clock::time_point replug_at = Clock::time_point::max();
         while (!stop) {
-            std::this_thread::sleep_for(std::chrono::microseconds(200));
+            bell.wait(kTickS);
             for (std::size_t i = 0; i < devices.size(); ++i) {
                 if (devices[i]->tick() && spec.replug_after_s >= 0) {
                     replug_at = Clock::now() + std::chrono::microseconds(
@@ -345,6 +358,7 @@ ClientResult run_with_device(const DeviceSpec& spec,
     ::waitpid(child, &status, 0);
     result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     stop = true;
+    bell.ring();
     player.join();
     g_object_unref(testbed);
     return result;

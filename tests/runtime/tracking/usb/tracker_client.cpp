@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "runtime/player/frame_stats.h"
+#include "runtime/session/bell.h"
 #include "runtime/tracking/make_tracker.h"
 
 using namespace sonocase;
@@ -35,6 +35,8 @@ int main(int argc, char** argv) {
     TrackerReading reading, last;
     std::uint64_t gaps = 0, lost = 0;
     TimeHistogram delivery;
+    Bell bell;
+    tracker.set_wake([&bell] { bell.ring(); });
     while (clock() < seconds) {
         const double now_s = clock();
         if (tracker.poll(now_s, reading)) {
@@ -52,8 +54,9 @@ int main(int argc, char** argv) {
             messages.push_back(health.message);
         }
         if (health.readings >= enough) break;
-        std::this_thread::sleep_for(std::chrono::microseconds(200));
+        bell.wait(0.005);  // the health has no bell
     }
+    tracker.set_wake({});
     const TrackerHealth health = tracker.health();
     out["device"] = health.device;
     out["readings"] = health.readings;

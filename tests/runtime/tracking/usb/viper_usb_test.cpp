@@ -1,14 +1,13 @@
-// The USB drivers against emulated devices, under an unmodified libusb in a process of its own.
+// Polhemus Viper against an emulated device, under an unmodified libusb in a process of its own.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
 #include <iostream>
-#include <nlohmann/json.hpp>
 
 #include "formats/calibration.h"
 #include "runtime/tracking/byte_fields.h"
-#include "runtime/tracking/usb/emulated_device.h"
+#include "runtime/tracking/usb/usb_run.h"
 #include "runtime/tracking/viper_protocol.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
@@ -20,8 +19,11 @@ using sonocase::testing::Bytes;
 using sonocase::testing::ClientResult;
 using sonocase::testing::DevicePort;
 using sonocase::testing::DeviceSpec;
+using sonocase::testing::expect_poses;
 using sonocase::testing::Firmware;
+using sonocase::testing::run_client;
 using sonocase::testing::run_with_device;
+using sonocase::testing::says;
 
 // What goes wrong, and when, in numbers of position frames; -1: never.
 struct Trouble {
@@ -149,42 +151,15 @@ class ViperFirmware final : public Firmware {
     Bytes pending_;
 };
 
-nlohmann::json run(const char* spec,
-                   const DeviceSpec& device,
-                   const std::function<std::unique_ptr<Firmware>()>& make,
-                   double seconds,
-                   int readings = 0) {
-    std::vector<std::string> command = {SONOCASE_BIN "/tracker_client", spec,
-                                        std::to_string(seconds)};
-    if (readings > 0) command.push_back(std::to_string(readings));
-    const ClientResult result = run_with_device(device, make, command);
-    EXPECT_EQ(result.status, 0) << result.out;
-    auto json = nlohmann::json::parse(result.out, nullptr, false);
-    EXPECT_TRUE(json.is_object()) << result.out;
-    return json;
-}
-
 nlohmann::json run_viper(const Trouble& trouble,
                          double seconds,
                          int readings = 0,
                          DeviceSpec device = {}) {
     device.vendor = 0x0F44;
     device.product = 0xBF01;
-    return run(
+    return run_client(
         "viper", device, [&] { return std::make_unique<ViperFirmware>(trouble); }, seconds,
         readings);
-}
-
-bool says(const nlohmann::json& seen, const char* words) {
-    return seen["messages"].dump().find(words) != std::string::npos;
-}
-
-void expect_poses(const nlohmann::json& seen) {
-    ASSERT_EQ(seen["sensors"].size(), 2u) << seen;
-    EXPECT_NEAR(seen["sensors"][0]["position"][0].get<double>(), 100, 1e-3);
-    EXPECT_NEAR(seen["sensors"][1]["position"][0].get<double>(), 110, 1e-3);
-    EXPECT_NEAR(seen["sensors"][0]["position"][1].get<double>(), -50, 1e-3);
-    EXPECT_NEAR(seen["sensors"][0]["x_axis"][1].get<double>(), 1, 1e-6);
 }
 
 TEST(ViperOverUsb, StartsAndStreamsAt240Hz) {
@@ -330,195 +305,25 @@ TEST(ViperOverUsb, TellsOfTwoAlike) {
     EXPECT_TRUE(says(seen, "Two are plugged in")) << seen;
 }
 
+TEST(ViperOverUsb, WithoutPermissionNamesTheRuleAndHowToInstallIt) {
+    DeviceSpec device;
+    device.no_permission = true;
+    const auto seen = run_viper({}, 1, 0, device);
+    EXPECT_TRUE(says(seen, "No permission for the Polhemus Viper")) << seen;
+    EXPECT_TRUE(says(seen, "60-sonocase-trackers.rules in /etc/udev/rules.d")) << seen;
+    EXPECT_TRUE(says(seen, "udevadm control --reload")) << seen;
+    EXPECT_EQ(seen["phases"].back(), "failed");
+    EXPECT_EQ(seen["readings"], 0);
+}
+
 TEST(ViperOverUsb, NamesARelativeThatItCannotUse) {
     DeviceSpec device;
     device.vendor = 0x0F44;
     device.product = 0x0001;
-    const auto seen = run(
+    const auto seen = run_client(
         "viper", device, [] { return std::make_unique<ViperFirmware>(Trouble{}); }, 0.5);
     EXPECT_TRUE(says(seen, "0f44:0001")) << seen;
     EXPECT_EQ(seen["phases"].back(), "searching");
-}
-
-// 3D Guidance: polled, two sensors.
-class GuidanceFirmware final : public Firmware {
-  public:
-    explicit GuidanceFirmware(int unplug_at = -1,
-                              bool no_transmitter = false,
-                              int error = 0,
-                              int slip_at = -1)
-        : unplug_at_(unplug_at),
-          no_transmitter_(no_transmitter),
-          error_(error),
-          slip_at_(slip_at) {}
-    void on_out(const Bytes& request, DevicePort& port) override {
-        const auto is = [&](std::initializer_list<int> bytes) {
-            return request.size() == bytes.size() &&
-                   std::equal(bytes.begin(), bytes.end(), request.begin(),
-                              [](int a, std::uint8_t b) { return a < 0 || a == b; });
-        };
-        if (is({0x4F, 0x03})) return port.send({1, 0});  // 72 inches
-        if (is({0x4F, 0x0A})) return port.send({static_cast<std::uint8_t>(error_)});
-        if (is({0xF1, 0x4F, 0x1B})) {
-            return port.send(no_transmitter_ ? Bytes{0, 0} : Bytes{0x34, 0x12});
-        }
-        if (is({-1, 0x4F, 0x1A})) return port.send(request[0] <= 0xF2 ? Bytes{7, 1} : Bytes{0, 0});
-        if (is({-1, 0x59})) angles_ = true;
-        if (is({-1, 0x42})) {
-            if (polls_++ == unplug_at_) return port.unplug();
-            Bytes record;
-            const double inches = request[0] == 0xF1 ? 9 : -18;
-            for (double part : {inches / 72, -inches / 72, 0.0, 0.5, 0.0, 0.0}) {
-                const auto bits =
-                    static_cast<std::uint16_t>(static_cast<std::int16_t>(part * 32768)) >> 2;
-                record.push_back(bits & 0x7F);
-                record.push_back(bits >> 7 & 0x7F);
-            }
-            record[0] |= 0x80;
-            if (polls_ == slip_at_) record.insert(record.begin(), 0x11);  // out of phase
-            if (angles_) port.send(record);
-        }
-    }
-    void on_tick(double, DevicePort&) override {}
-
-  private:
-    int unplug_at_;
-    bool no_transmitter_;
-    int error_;
-    int slip_at_;
-    bool angles_ = false;
-    int polls_ = 0;
-};
-
-nlohmann::json run_guidance(double seconds,
-                            int readings,
-                            const std::function<std::unique_ptr<Firmware>()>& make) {
-    DeviceSpec device;
-    device.vendor = 0x04B4;
-    device.product = 0x1005;
-    device.endpoint_in = 0x86;
-    return run("3dg", device, make, seconds, readings);
-}
-
-TEST(GuidanceOverUsb, StartsAndPolls) {
-    const auto seen = run_guidance(20, 100, [] { return std::make_unique<GuidanceFirmware>(); });
-    EXPECT_GE(seen["readings"].get<int>(), 100);
-    EXPECT_EQ(seen["bad_frames"], 0);
-    ASSERT_EQ(seen["sensors"].size(), 2u);
-    // 0.3 mm: half a step of 14 bits over 72 inches is 0.06 mm, and the words are cut, not rounded.
-    EXPECT_NEAR(seen["sensors"][0]["position"][0].get<double>(), 9 * 25.4, 0.3);
-    EXPECT_NEAR(seen["sensors"][1]["position"][0].get<double>(), -18 * 25.4, 0.3);
-    EXPECT_NEAR(seen["sensors"][0]["x_axis"][1].get<double>(), 1, 1e-3);
-}
-
-TEST(GuidanceOverUsb, FindsItsPhaseAgain) {
-    const auto seen =
-        run_guidance(20, 60, [] { return std::make_unique<GuidanceFirmware>(-1, false, 0, 21); });
-    EXPECT_GE(seen["readings"].get<int>(), 60);
-    EXPECT_GE(seen["bad_frames"].get<int>(), 1);
-    EXPECT_NEAR(seen["sensors"][0]["position"][0].get<double>(), 9 * 25.4, 0.3);
-}
-
-TEST(GuidanceOverUsb, TellsOfAMissingTransmitterAndOfAFault) {
-    auto seen = run_guidance(2, 0, [] { return std::make_unique<GuidanceFirmware>(-1, true); });
-    EXPECT_TRUE(says(seen, "transmitter")) << seen;
-    seen = run_guidance(2, 0, [] { return std::make_unique<GuidanceFirmware>(-1, false, 21); });
-    EXPECT_TRUE(says(seen, "error 21")) << seen;
-    EXPECT_EQ(seen["readings"], 0);
-}
-
-TEST(GuidanceOverUsb, SurvivesAnUnplugInTheMiddle) {
-    const auto seen = run_guidance(3, 0, [] { return std::make_unique<GuidanceFirmware>(41); });
-    EXPECT_GE(seen["readings"].get<int>(), 15);
-    EXPECT_TRUE(says(seen, "unplugged")) << seen;
-}
-
-// Liberty: streams two stations.
-class LibertyFirmware final : public Firmware {
-  public:
-    explicit LibertyFirmware(int unplug_at = -1) : unplug_at_(unplug_at) {}
-    void on_out(const Bytes& transfer, DevicePort&) override {
-        for (std::uint8_t c : transfer) {
-            if (line_.empty() && c == 'p') {
-                streaming_ = false;
-                continue;
-            }
-            if (c != '\r') {
-                line_ += static_cast<char>(c);
-                continue;
-            }
-            if (line_ == "f1") binary_ = true;
-            if (line_ == "U1") centimetres_ = true;
-            if (line_ == "O*,8,9,11,3,7") listed_ = true;
-            if (line_ == "c") streaming_ = binary_ && centimetres_ && listed_;
-            line_.clear();
-        }
-    }
-    void on_tick(double now_s, DevicePort& port) override {
-        if (next_s_ < 0) next_s_ = now_s;
-        while (now_s >= next_s_) {
-            next_s_ += 1 / 240.0;
-            if (!streaming_) continue;
-            if (static_cast<int>(frame_) == unplug_at_) return port.unplug();
-            Bytes both;
-            for (int station : {1, 2}) {
-                Bytes record = {'L', 'Y', static_cast<std::uint8_t>(station), 'C', ' ', 0, 40, 0};
-                put_u32_le(record, frame_ * 4);
-                put_u32_le(record, frame_);
-                put_u32_le(record, 0);
-                for (double v :
-                     {9.0 + station, -5.0, 0.01 * frame_, 0.70710678, 0.0, 0.0, 0.70710678}) {
-                    put_f32_le(record, static_cast<float>(v));
-                }
-                both.insert(both.end(), record.begin(), record.end());
-            }
-            ++frame_;
-            port.send(both);
-        }
-    }
-
-  private:
-    int unplug_at_;
-    std::string line_;
-    bool binary_ = false, centimetres_ = false, listed_ = false, streaming_ = false;
-    double next_s_ = -1;
-    std::uint32_t frame_ = 0;
-};
-
-nlohmann::json run_liberty(std::uint16_t product,
-                           double seconds,
-                           int readings,
-                           int unplug_at = -1) {
-    DeviceSpec device;
-    device.vendor = 0x0F44;
-    device.product = product;
-    device.endpoint_in = product == 0xEF12 ? 0x82 : 0x88;
-    device.endpoint_out = product == 0xEF12 ? 0x02 : 0x04;
-    return run(
-        "liberty", device, [&] { return std::make_unique<LibertyFirmware>(unplug_at); }, seconds,
-        readings);
-}
-
-TEST(LibertyOverUsb, StartsAndStreams) {
-    for (const std::uint16_t product :
-         std::initializer_list<std::uint16_t>{0xFF20, 0xEF12, 0xEF20}) {
-        const auto seen = run_liberty(product, 20, 100);
-        EXPECT_GE(seen["readings"].get<int>(), 100) << product;
-        EXPECT_EQ(seen["bad_frames"], 0);
-        expect_poses(seen);
-    }
-}
-
-TEST(LibertyOverUsb, TellsOfADeviceThatWaitsForFirmware) {
-    const auto seen = run_liberty(0xFF21, 1, 0);
-    EXPECT_TRUE(says(seen, "firmware")) << seen;
-    EXPECT_EQ(seen["phases"].back(), "failed");
-}
-
-TEST(LibertyOverUsb, SurvivesAnUnplugInTheMiddle) {
-    const auto seen = run_liberty(0xFF20, 2, 0, 50);
-    EXPECT_GE(seen["readings"].get<int>(), 40);
-    EXPECT_TRUE(says(seen, "unplugged")) << seen;
 }
 
 }  // namespace
