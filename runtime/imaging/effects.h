@@ -21,7 +21,8 @@ enum class Pass { contact, beams, needle, filter, grey, convert };
 struct EffectEntry {
     const char* name;
     Pass pass;
-    double weight;                        // of the pass's time, relative
+    double weight;          // of the pass's time, relative
+    double gathers, bytes;  // scattered reads, and bytes moved, a sample where it shows
     bool PaperEffects::*paper = nullptr;  // switch; null: always on
     bool PhysicalEffects::*physical = nullptr;
 };

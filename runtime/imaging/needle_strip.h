@@ -49,9 +49,9 @@ class NeedleStrip {
     bool near_plane() const { return near_; }
 
     // Samples [k0, k1) of a beam that can show the needle; false if none.
-    bool range(const ScanGeometry& g, double line, int& k0, int& k1) const {
+    bool range(const ScanGeometry& g, int line, int& k0, int& k1) const {
         if (!near_) return false;
-        const PlanePoint o = g.beam_origin(line), d = g.beam_direction(line);
+        const auto& [o, d] = g.beams[static_cast<std::size_t>(line)];
         const double ox = o.x - origin_.x, oz = o.z - origin_.z;
         double r0 = 0, r1 = g.depth_mm;
         const auto clip = [&](double at0, double slope, double low, double high) {
@@ -95,7 +95,7 @@ class NeedleStrip {
         if (k0 >= k1) return false;
         for (int v = 0; v < kBeamBlock; ++v) {
             const int l = std::min(line + v, g.scanlines - 1);
-            const PlanePoint o = g.beam_origin(l), d = g.beam_direction(l);
+            const auto& [o, d] = g.beams[static_cast<std::size_t>(l)];
             row.origin_x[v] = static_cast<float>(o.x - n.tip.x);
             row.origin_z[v] = static_cast<float>(o.z - n.tip.z);
             row.direction_x[v] = static_cast<float>(d.x);

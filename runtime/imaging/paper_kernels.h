@@ -28,4 +28,18 @@ struct PaperBlock {
     int image_stride = 0;
 };
 
+// Vectorised; integer or single precision in fixed order.
+// Fills the stage; returns the union of all its values.
+std::uint32_t sample_paper_block(const PaperBlock& block);
+// The needle over the stage, samples [row_begin, row_end). Same formula as needle_share().
+void draw_paper_needle(const PaperBlock& block,
+                       const NeedleRow& needle,
+                       int row_begin,
+                       int row_end);
+// Noise, shadow and brightness of the stage, into the image.
+void finish_paper_block(const PaperBlock& block);
+// One row: taps across beams. `in` has a margin of `reach` values before and behind.
+void blur_paper_row(
+    const std::uint8_t* in, int count, const std::uint16_t* taps, int reach, std::uint8_t* out);
+
 }  // namespace sonocase::runtime

@@ -28,6 +28,9 @@ class PhysicalFast {
                  const PhysicalNoise& noise,
                  WorkerPool& workers);
 
+    PhysicalFast(const PhysicalFast&) = delete;
+    PhysicalFast& operator=(const PhysicalFast&) = delete;
+
     // keep_all: also run what cannot show; the pixels are the same.
     void render(const PhysicalFrame& frame,
                 const BreathingField& breathing,
@@ -59,15 +62,17 @@ class PhysicalFast {
     std::vector<std::int32_t> looks_, pairs_word_;  // packed
     std::vector<float> r_, contact_, elevation_, interface_scale_, gain_;
     std::vector<float> elevation_off_, fine_frames_;
+    std::vector<float> dim_, dim_off_;  // per look: light that one sample leaves
     std::vector<PhysicalTarget> targets_, near_targets_;
     std::vector<std::uint32_t> elevation_start_, lookup_start_, clutter_start_, haze_start_,
         noise_start_;
 
     std::vector<float> gaps_, beams_, breathing_;
-    std::vector<float> re_, im_, light_, tail_;  // samples x stride
+    std::vector<float> planes_;  // holds the four below, samples x stride each
+    std::int32_t* echoes_ = nullptr;
+    float *light_ = nullptr, *tail_ = nullptr, *power_ = nullptr;
     std::vector<std::int32_t> tail_from_;        // per block
     std::vector<float> work_, ring_;             // per thread
-    std::vector<float> power_;
     std::vector<float> envelope_, mean_, wide_;  // haze
     std::vector<std::uint8_t> shade_;            // per thread: two rows
     std::vector<std::uint16_t> pairs_;

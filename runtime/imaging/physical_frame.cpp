@@ -63,7 +63,7 @@ int find_gaps(const PhysicalScene& scene,
     float raw[4096];
     for (int l = 0; l < g.scanlines; ++l) {
         raw[l] = -1;
-        const PlanePoint o = g.beam_origin(l), d = g.beam_direction(l);
+        const auto& [o, d] = g.beams[static_cast<std::size_t>(l)];
         const Point3 p = scene.grid.voxel_from_point(frame.volume_from_probe * Point3{o.x, 0, o.z});
         const Vector3 v = (physical::kGapStepMm / scene.voxel_mm) *
                           (frame.volume_from_probe.rotation * Vector3{d.x, 0, d.z});

@@ -5,6 +5,7 @@
 
 #include "formats/geometry.h"
 #include "runtime/imaging/needle_strip.h"
+#include "runtime/imaging/physical_model.h"
 
 namespace sonocase::runtime {
 
@@ -20,8 +21,9 @@ enum PackedKind : std::uint32_t {
 
 inline constexpr int kLookFine = 1 << 19;
 
-// A pair's echo in one word: log2 of the amplitude (bits 0-11, 1/128, + 2048; 0: none), thickness
-// (12-19, 1/200 mm), hard (20), refracts (21), own label pulses (22), second label pulses (23).
+// A pair's echo in one word: log2 of the amplitude (bits 0-11, 1/128, + 2048; 0: none), one over
+// the thickness (12-19, 1/32 per mm), hard (20), refracts (21), own label pulses (22), second label
+// pulses (23).
 inline constexpr int kPairHard = 1 << 20, kPairRefracts = 1 << 21, kPairOwnPulse = 1 << 22,
                      kPairSecondPulse = 1 << 23;
 
@@ -36,11 +38,14 @@ enum BeamNumber {
     kBeamNumbers = 16
 };
 
+inline constexpr int kRowSlack = 64;   // behind rows and buffers: the widest vector
+inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 3
+
 inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
 
 struct PhysicalTarget {
     float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels
-    std::int32_t look = 0;                     // packed
+    std::int32_t look = 0;                     // index
     float wall = 0;
     bool fluid = false;
 };
@@ -67,14 +72,22 @@ struct PhysicalBlock {
     int target_count = 0;
     Int3 size;
     int bricks_x = 0, bricks_xy = 0, label_count = 0;
+    const float *dim = nullptr, *dim_off = nullptr;  // per look: light that one sample leaves
+    float dead_light = 0;
+    struct {
+        float bone = 0, bone_slow = 0, bone_floor = 0, gas = 0;
+    } decay;  // of the tails, a sample
     float voxel_mm = 1, rough_per_voxel = 2, step_mm = 0.3f;
     bool structure = true, speckled = true, interfaces = true, edge_shadow = true,
          attenuation = true;
     bool bone_tail = true, gas_tail = true;
     bool keep_all = false;
+    bool hard_scene = true;  // some label is bone or gas
 
-    float *re = nullptr, *im = nullptr, *light = nullptr,
-          *tail = nullptr;  // at the block's first beam
+    // At the block's first beam. Echoes are complex amplitudes of 8 bits' precision each: the upper
+    // halves of two floats in one word, real part on top. What fits in the second cache counts.
+    std::int32_t* echoes = nullptr;
+    float *light = nullptr, *tail = nullptr;
     int stride = 0;
     int tail_from = 0;  // out: first sample with a tail; samples if none
     bool boundary_met = false, refraction_met = false, hard_met = false, fine_met = false,
@@ -84,7 +97,8 @@ struct PhysicalBlock {
 // A row's filter across the beams, and the noise that reaches the receiver with it.
 struct PhysicalRowTask {
     int lines = 0, scanlines = 0;
-    const float *re = nullptr, *im = nullptr, *light = nullptr;
+    const std::int32_t* echoes = nullptr;
+    const float* light = nullptr;
     const float* lateral = nullptr;  // centre tap
     int reach = 0;
     bool point_spread = true;
@@ -114,6 +128,7 @@ struct PhysicalPowerTask {
     float* power = nullptr;
 };
 
+// Haze, log compression and the post-filter's lateral half.
 struct PhysicalGreyTask {
     int lines = 0, scanlines = 0;
     const float* power = nullptr;
@@ -126,6 +141,14 @@ struct PhysicalGreyTask {
     bool post_filter = true;
     float* work = nullptr;  // with margins
     float* out = nullptr;
+};
+
+// The post-filter's axial half, the grey map, and bytes.
+struct PhysicalShadeTask {
+    int lines = 0;
+    const float *above = nullptr, *here = nullptr, *below = nullptr;  // grey rows
+    bool post_filter = true, grey_map = true;
+    std::uint8_t* out = nullptr;
 };
 
 }  // namespace sonocase::runtime

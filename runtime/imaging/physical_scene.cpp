@@ -106,6 +106,9 @@ Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
         s.looks.push_back(
             {t.echo_db, t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind});
     }
+    s.has_hard = std::any_of(s.looks.begin(), s.looks.end(), [](const LabelLook& l) {
+        return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
+    });
     for (const Target& t : targets) {
         if (t.look == TargetLook::none || !(t.radius_mm > 0) || s.targets.size() >= kMaxTargets ||
             s.looks.size() >= 255)

@@ -54,6 +54,7 @@ struct PhysicalScene {
     std::vector<LabelLook> looks;  // # labels
     std::vector<PairEcho> pairs;   // # labels^2, [own * # labels + second]
     bool has_boundary = false, has_echo = false;
+    bool has_hard = true;  // some label is bone or gas: what plans for scenes without go by
 
     // Boundary roughness and glint, kRoughEdge^3: byte 0 roughness (/ 32), byte 1 log2 of the glint
     // (/ 32), bytes 2 and 3 cosine and sine of its phase (/ 127); all signed.

@@ -331,9 +331,13 @@ std::span<const EffectCost> Renderer::costs() const {
 }
 
 Renderer::Accuracy Renderer::accuracy() const {
-    const ScanGeometry& g = impl_->now().geometry;
-    return {impl_->governor.level(), static_cast<int>(impl_->levels.size()), g.scanlines,
-            g.samples};
+    const ScanGeometry &g = impl_->now().geometry, &full = impl_->levels.front()->geometry;
+    return {impl_->governor.level(),
+            static_cast<int>(impl_->levels.size()),
+            g.scanlines,
+            g.samples,
+            full.scanlines,
+            full.samples};
 }
 
 Renderer::Layout Renderer::layout() const {

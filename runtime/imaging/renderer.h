@@ -91,7 +91,8 @@ class Renderer {
     // What the governor gives up at present: level 0 is full accuracy. For the screen.
     struct Accuracy {
         int level = 0, levels = 1;
-        int scanlines = 0, samples = 0;
+        int scanlines = 0, samples = 0;  // now
+        int full_scanlines = 0, full_samples = 0;
     };
     Accuracy accuracy() const;
 

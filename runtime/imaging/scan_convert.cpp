@@ -50,6 +50,20 @@ void convert_run(const std::uint16_t* pairs,
     }
 }
 
+void pair_bytes(const std::uint8_t* upper,
+                const std::uint8_t* lower,
+                int count,
+                std::uint16_t* out) {
+    const hn::ScalableTag<std::uint16_t> d;
+    const hn::Rebind<std::uint8_t, decltype(d)> d8;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    for (int i = 0; i < count; i += lanes) {
+        const auto a = hn::PromoteTo(d, hn::LoadU(d8, upper + i)),
+                   b = hn::PromoteTo(d, hn::LoadU(d8, lower + i));
+        hn::StoreU(hn::Or(a, hn::ShiftLeft<8>(b)), d, out + i);
+    }
+}
+
 }  // namespace sonocase::runtime::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -57,6 +71,14 @@ HWY_AFTER_NAMESPACE();
 namespace sonocase::runtime {
 
 HWY_EXPORT(convert_run);
+HWY_EXPORT(pair_bytes);
+
+void pair_rows(const std::uint8_t* upper,
+               const std::uint8_t* lower,
+               int count,
+               std::uint16_t* out) {
+    HWY_DYNAMIC_DISPATCH(pair_bytes)(upper, lower, count, out);
+}
 
 void scan_convert(const ScanConversionTable& table,
                   std::span<const std::uint16_t> pairs,

@@ -8,6 +8,10 @@
 
 namespace sonocase::runtime {
 
+// Two neighbouring rows of samples as one of pairs, upper in the low byte. Every row may be written
+// up to a vector's width beyond `count`.
+void pair_rows(const std::uint8_t* upper, const std::uint8_t* lower, int count, std::uint16_t* out);
+
 // Converts the picture's rows [row_begin, row_end) and blackens what lies outside the scanned area.
 // pairs   samples x stride values: grey of a sample (low byte) and of the next deeper one (high
 // byte) pixels  # width * height, row by row

@@ -52,6 +52,8 @@ ScanGeometry make_scan_geometry(
     g.width_px = width_px;
     g.height_px = height_px;
 
+    for (int l = 0; l < scanlines; ++l) g.beams.push_back({g.beam_origin(l), g.beam_direction(l)});
+
     double half_width = g.half_extent, top = 0, bottom = g.depth_mm;
     if (g.fan) {
         const double reach = g.radius_mm + g.depth_mm;

@@ -29,6 +29,10 @@ struct ScanGeometry {
     double line_step = 0;  // between beams: rad (fan) or mm (linear)
     int width_px = 0, height_px = 0;
     double mm_per_px = 0, origin_x_px = 0, origin_y_px = 0;  // pixel of the plane's origin
+    struct Beam {
+        PlanePoint origin, direction;
+    };
+    std::vector<Beam> beams;  // # scanlines
 
     PlanePoint beam_origin(double line) const;
     PlanePoint beam_direction(double line) const;  // unit

@@ -59,6 +59,11 @@ void FrameStats::add(double frame_ms, std::span<const EffectCost> costs) {
     }
 }
 
+void FrameStats::set_accuracy(const Renderer::Accuracy& accuracy) {
+    accuracy_ = accuracy;
+    if (accuracy.level > 0) ++reduced_frames_;
+}
+
 std::string FrameStats::json(const std::string& score_json,
                              const TimeHistogram* pose_to_pixel_ms,
                              const std::string& window_json) const {
@@ -68,6 +73,15 @@ std::string FrameStats::json(const std::string& score_json,
     out["frame_ms"]["p99"] = rounded(frame_ms_.quantile(0.99));
     out["first_frame_ms"] = rounded(first_frame_ms_);
     out["resident_mb"] = rounded(resident_mb());
+    if (accuracy_.levels > 1) {
+        auto& a = out["accuracy"];
+        a["level"] = accuracy_.level;
+        a["beams"] = accuracy_.scanlines;
+        a["samples"] = accuracy_.samples;
+        a["dropped_beams"] = accuracy_.full_scanlines - accuracy_.scanlines;
+        a["dropped_samples"] = accuracy_.full_samples - accuracy_.samples;
+        a["reduced_frames"] = reduced_frames_;
+    }
     out["effects"] = nlohmann::ordered_json::array();
     for (const Effect& effect : effects_) {
         nlohmann::ordered_json entry;

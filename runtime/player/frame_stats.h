@@ -47,6 +47,8 @@ class FrameStats {
     // Effects in order of execution.
     void set_effects(std::span<const EffectCost> costs);
     void add(double frame_ms, std::span<const EffectCost> costs);
+    // What the governor gave up for the frame just added.
+    void set_accuracy(const Renderer::Accuracy& accuracy);
     void set_first_frame_ms(double ms) { first_frame_ms_ = ms; }
 
     const TimeHistogram& frame_ms() const { return frame_ms_; }
@@ -66,6 +68,8 @@ class FrameStats {
     };
     TimeHistogram frame_ms_;
     double first_frame_ms_ = 0;
+    Renderer::Accuracy accuracy_;
+    std::uint64_t reduced_frames_ = 0;
     std::vector<Effect> effects_;
 };
 

@@ -186,6 +186,7 @@ bool ScanThread::step() {
     out.needle_verdict = engine_->needle_verdict(now_s);
     if (!again) {
         stats_.add(out.frame_ms, costs);
+        stats_.set_accuracy(out.accuracy);
         if (arrived) pose_to_pixel_.add((after_s - reading_.time_s) * 1e3);
         if (last_frame_s_ >= 0 && now_s > last_frame_s_) {
             rate_ += 0.1 * (1 / (now_s - last_frame_s_) - rate_);

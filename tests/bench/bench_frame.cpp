@@ -8,50 +8,11 @@
 #include <algorithm>
 #include <chrono>
 
-#include "bench_bundle.h"
+#include "bench_scene.h"
 #include "peer_vtk.h"
-#include "runtime/imaging/renderer.h"
 
 namespace sonocase::bench {
 namespace {
-
-using runtime::ImageModel;
-using runtime::RendererKind;
-using runtime::RenderOptions;
-
-Exercise bench_exercise() {
-    Exercise e;
-    e.name = "bench";
-    e.probe.depth_mm = 150;
-    e.needle.gauge = 18;
-    return e;
-}
-
-RenderOptions options_of(ImageModel model,
-                         std::vector<std::string> effects = {"auto"},
-                         int threads = 1,
-                         int size = 512) {
-    RenderOptions o;
-    o.model = model;
-    o.effects = std::move(effects);
-    o.threads = threads;
-    o.width_px = o.height_px = size;
-    return o;
-}
-
-runtime::FrameInput input_of(std::size_t i, bool needle) {
-    runtime::FrameInput input;
-    input.mannequin_from_probe = bench_poses()[i % bench_poses().size()];
-    input.frame = static_cast<std::uint32_t>(i);
-    input.time_s = static_cast<double>(i) / 60;
-    if (needle) {  // in the plane, slanting across it
-        input.has_needle = true;
-        input.needle.tip = input.mannequin_from_probe * Point3{15, 0, 70};
-        input.needle.direction =
-            input.mannequin_from_probe.rotation * normalized(Vector3{0.7, 0, 0.7});
-    }
-    return input;
-}
 
 // Times of single frames, kept beside the library's own mean.
 class Laps {
@@ -159,17 +120,6 @@ void first_frame(benchmark::State& state, ImageModel model) {
     benchmark::RegisterBenchmark("Start/physical", [](benchmark::State& s) {
         first_frame(s, ImageModel::physical);
     })->Unit(benchmark::kMillisecond);
-    // A frame without one effect: the difference to Frame/physical is what it costs.
-    for (const auto model : {paper, physical}) {
-        const std::string prefix =
-            model == paper ? "Effect/paper/without/" : "Effect/physical/without/";
-        for (const char* name : runtime::effect_names(model)) {
-            if (const std::string n = name;
-                n == "slice" || n == "scan_conversion" || n == "compression")
-                continue;
-            add(prefix + name, options_of(model, {std::string("-") + name}), true);
-        }
-    }
     return true;
 }();
 

@@ -63,5 +63,23 @@ TEST(FrameStats, CountsCostAndSkippedFramesPerEffect) {
     EXPECT_EQ(json["metrics"]["hits"], 2);
 }
 
+TEST(FrameStats, NamesWhatTheGovernorDropped) {
+    FrameStats stats;
+    stats.add(5, {});
+    stats.set_accuracy({0, 4, 192, 512, 192, 512});
+    stats.add(5, {});
+    stats.set_accuracy({2, 4, 128, 384, 192, 512});
+    const auto accuracy = nlohmann::json::parse(stats.json("", nullptr))["accuracy"];
+    EXPECT_EQ(accuracy["level"], 2);
+    EXPECT_EQ(accuracy["dropped_beams"], 64);
+    EXPECT_EQ(accuracy["dropped_samples"], 128);
+    EXPECT_EQ(accuracy["reduced_frames"], 1);
+    // Without a budget nothing can be dropped, and nothing is said.
+    FrameStats full;
+    full.add(5, {});
+    full.set_accuracy({0, 1, 192, 512, 192, 512});
+    EXPECT_FALSE(nlohmann::json::parse(full.json("", nullptr)).contains("accuracy"));
+}
+
 }  // namespace
 }  // namespace sonocase::runtime
