@@ -3,8 +3,8 @@
 #include <new>
 
 #include "formats/atomic_file.h"
-#include "formats/boundary_record.h"
 #include "formats/detail/bundle_parts.h"
+#include "formats/detail/packed_volumes.h"
 
 namespace sonocase {
 namespace {
@@ -13,9 +13,9 @@ using detail::Json;
 using detail::JsonFault;
 using detail::JsonObject;
 
-constexpr std::string_view kKnownChunks[] = {
-    "manifest", "lab.t", "lab.u",    "lab.p",   "echo.t",   "echo.u",   "echo.p", "bnd.t",
-    "bnd.u",    "bnd.p", "textures", "speckle", "skin.pat", "skin.man", "preview"};
+constexpr std::string_view kKnownChunks[] = {"manifest", SONOCASE_VOLUME_CHUNKS, "textures",
+                                             "speckle",  "skin.pat",             "skin.man",
+                                             "preview"};
 constexpr std::size_t kMaxPreviewBytes = std::size_t{64} << 20;
 
 Json manifest_of(const CaseBundle& bundle) {
@@ -29,8 +29,6 @@ Json manifest_of(const CaseBundle& bundle) {
     out["tissues"] = detail::json_of(bundle.tissues);
     out["textures"] = detail::json_of_textures(bundle.textures);
     out["speckle_edge"] = bundle.speckle.edge;
-    out["echo_offset"] = !bundle.echo_offset.table.empty();
-    out["boundary"] = !bundle.boundary.table.empty();
     Json exercises = Json::array();
     for (const EmbeddedExercise& exercise : bundle.exercises) {
         Json item = Json::object();
@@ -88,46 +86,6 @@ void read_manifest_into(CaseBundle& bundle, JsonObject& manifest) {
     }
 }
 
-template <class T, class Good>
-bool all_values(const BrickVolume<T>& bricks, Good good) {
-    bool fine = true;
-    for (const T v : bricks.uniform) fine &= good(v);
-    for (const T v : bricks.pool) fine &= good(v);
-    return fine;
-}
-
-Status read_volumes(CaseBundle& bundle,
-                    const ChunkReader& reader,
-                    JsonObject& manifest,
-                    int threads) {
-    auto labels = detail::read_bricks<std::uint8_t>(reader, "lab", bundle.grid.size, threads);
-    if (!labels) return labels.error();
-    bundle.label_bricks = std::move(*labels);
-    const std::size_t palette = bundle.labels.size();
-    if (!all_values(bundle.label_bricks, [&](std::uint8_t v) { return v < palette; })) {
-        return reader.fault("a voxel has a label beyond the palette", "make the file again");
-    }
-    if (manifest.flag_or("echo_offset", false)) {
-        auto echo = detail::read_bricks<std::int8_t>(reader, "echo", bundle.grid.size, threads);
-        if (!echo) return echo.error();
-        bundle.echo_offset = std::move(*echo);
-    }
-    if (manifest.flag_or("boundary", false)) {
-        auto boundary =
-            detail::read_bricks<std::uint32_t>(reader, "bnd", bundle.grid.size, threads);
-        if (!boundary) return boundary.error();
-        bundle.boundary = std::move(*boundary);
-        const auto good = [&](std::uint32_t v) {
-            return (v & 0xFFu) < palette || v == kNoBoundary;
-        };
-        if (!all_values(bundle.boundary, good)) {
-            return reader.fault("a boundary record has a label beyond the palette",
-                                "make the file again");
-        }
-    }
-    return Done{};
-}
-
 Result<CaseBundle> read_checked(std::span<const std::uint8_t> bytes,
                                 const std::string& where,
                                 int threads) {
@@ -140,8 +98,12 @@ Result<CaseBundle> read_checked(std::span<const std::uint8_t> bytes,
     JsonObject manifest(*json, "", fault);
     read_manifest_into(bundle, manifest);
     if (fault.error) return *fault.error;
-    if (Status volumes = read_volumes(bundle, *reader, manifest, threads); !volumes)
-        return volumes.error();
+    auto volumes =
+        detail::read_volumes(*reader, manifest, bundle.grid.size, bundle.labels.size(), threads);
+    if (!volumes) return volumes.error();
+    bundle.label_bricks = std::move(volumes->labels);
+    bundle.boundary = std::move(volumes->boundary);
+    bundle.echo_offset = std::move(volumes->echo_offset);
     auto textures = detail::read_textures(*reader, manifest, threads);
     if (!textures) return textures.error();
     bundle.textures = std::move(*textures);
@@ -189,11 +151,8 @@ Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,
 
 std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle) {
     ChunkWriter writer("CASE");
-    detail::add_manifest(writer, manifest_of(bundle));
-    detail::add_bricks(writer, "lab", true, bundle.label_bricks);
-    if (!bundle.echo_offset.table.empty())
-        detail::add_bricks(writer, "echo", false, bundle.echo_offset);
-    if (!bundle.boundary.table.empty()) detail::add_bricks(writer, "bnd", false, bundle.boundary);
+    Json manifest = manifest_of(bundle);
+    detail::add_volumes(writer, manifest, bundle.label_bricks, bundle.boundary, bundle.echo_offset);
     if (!bundle.textures.empty()) detail::add_textures(writer, bundle.textures);
     if (bundle.speckle.edge != 0) writer.add_array("speckle", false, bundle.speckle.voxels);
     if (!bundle.patient_skin.points.empty())

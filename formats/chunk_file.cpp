@@ -9,8 +9,8 @@
 #include <bit>
 #include <cassert>
 #include <cstring>
-#include <functional>
-#include <thread>
+
+#include "formats/detail/run_jobs.h"
 
 namespace sonocase {
 namespace {
@@ -27,6 +27,8 @@ constexpr std::uint32_t kRequired = 1;
 constexpr std::uint32_t kZstd = 2;
 constexpr int kZstdLevel = 6;
 
+using detail::run_jobs;
+
 template <class T>
 T get(std::span<const std::uint8_t> bytes, std::size_t offset) {
     T value;
@@ -40,32 +42,6 @@ void put(std::span<std::uint8_t> bytes, std::size_t offset, T value) {
 
 std::size_t aligned(std::size_t offset) {
     return (offset + kChunkAlignment - 1) / kChunkAlignment * kChunkAlignment;
-}
-
-// Runs job(0) .. job(count - 1), in any order, on up to `threads` threads; the caller's is one of
-// them.
-void run_jobs(std::size_t count, int threads, const std::function<void(std::size_t)>& job) {
-    std::atomic<std::size_t> next{0};
-    const auto work = [&] {
-        for (std::size_t i = next++; i < count; i = next++) job(i);
-    };
-#if !defined(__EMSCRIPTEN__) || defined(__EMSCRIPTEN_PTHREADS__)
-    if (threads <= 0) threads = static_cast<int>(std::min(8u, std::thread::hardware_concurrency()));
-    std::vector<std::thread> helpers;
-    for (std::size_t t = 1; t < std::min(count, static_cast<std::size_t>(std::max(threads, 1)));
-         ++t) {
-        try {
-            helpers.emplace_back(work);
-        } catch (...) {
-            break;  // no more threads to be had: the ones there do the work
-        }
-    }
-    work();
-    for (std::thread& helper : helpers) helper.join();
-#else
-    (void)threads;
-    work();
-#endif
 }
 
 // Independent zstd frames of kFrameBytes each, so that they pack and unpack side by side. Empty

@@ -3,8 +3,8 @@
 #include <new>
 
 #include "formats/atomic_file.h"
-#include "formats/boundary_record.h"
 #include "formats/detail/bundle_parts.h"
+#include "formats/detail/packed_volumes.h"
 
 namespace sonocase {
 namespace {
@@ -13,8 +13,7 @@ using detail::Json;
 using detail::JsonFault;
 using detail::JsonObject;
 
-constexpr std::string_view kLabelChunks[] = {"manifest", "lab.t",  "lab.u", "lab.p", "echo.t",
-                                             "echo.u",   "echo.p", "bnd.t", "bnd.u", "bnd.p"};
+constexpr std::string_view kLabelChunks[] = {"manifest", SONOCASE_VOLUME_CHUNKS};
 constexpr std::string_view kTextureChunks[] = {"manifest", "textures", "speckle"};
 constexpr std::string_view kSurfaceChunks[] = {"manifest", "surface"};
 
@@ -49,31 +48,11 @@ Status fill_labels(LabelFile& file, const ChunkReader& reader, JsonObject& manif
     file.reports = detail::reports_from(manifest, "stages");
     if (!manifest.ok()) return Done{};
     const Int3 size = file.volume.grid.size;
-    const auto labels = detail::read_bricks<std::uint8_t>(reader, "lab", size, 0);
-    if (!labels) return labels.error();
-    file.volume.voxels = dense_from_bricks(*labels);
-    const std::size_t palette = file.volume.labels.size();
-    bool good = true;
-    for (const std::uint8_t v : file.volume.voxels) good &= v < palette;
-    if (!good) return reader.fault("a voxel has a label beyond the palette", "make the file again");
-    if (manifest.flag_or("boundary", false)) {
-        auto boundary = detail::read_bricks<std::uint32_t>(reader, "bnd", size, 0);
-        if (!boundary) return boundary.error();
-        file.boundary = std::move(*boundary);
-        const auto check = [&](std::uint32_t v) {
-            good &= (v & 0xFFu) < palette || v == kNoBoundary;
-        };
-        for (const std::uint32_t v : file.boundary.uniform) check(v);
-        for (const std::uint32_t v : file.boundary.pool) check(v);
-        if (!good)
-            return reader.fault("a boundary record has a label beyond the palette",
-                                "make it again");
-    }
-    if (manifest.flag_or("echo_offset", false)) {
-        auto echo = detail::read_bricks<std::int8_t>(reader, "echo", size, 0);
-        if (!echo) return echo.error();
-        file.echo_offset = std::move(*echo);
-    }
+    auto volumes = detail::read_volumes(reader, manifest, size, file.volume.labels.size(), 0);
+    if (!volumes) return volumes.error();
+    file.volume.voxels = dense_from_bricks(volumes->labels);
+    file.boundary = std::move(volumes->boundary);
+    file.echo_offset = std::move(volumes->echo_offset);
     return Done{};
 }
 
@@ -114,17 +93,11 @@ std::vector<std::uint8_t> write_label_file(const LabelFile& file) {
     manifest["frame"] = file.frame;
     manifest["grid"] = detail::json_of(file.volume.grid);
     manifest["labels"] = detail::json_of(file.volume.labels);
-    manifest["echo_offset"] = !file.echo_offset.table.empty();
-    manifest["boundary"] = !file.boundary.table.empty();
     manifest["stages"] = detail::json_of(file.reports);
     const BrickVolume<std::uint8_t> bricks =
         bricks_from_dense<std::uint8_t>(file.volume.voxels, file.volume.grid.size);
     ChunkWriter writer("LABL");
-    detail::add_manifest(writer, manifest);
-    detail::add_bricks(writer, "lab", true, bricks);
-    if (!file.echo_offset.table.empty())
-        detail::add_bricks(writer, "echo", false, file.echo_offset);
-    if (!file.boundary.table.empty()) detail::add_bricks(writer, "bnd", false, file.boundary);
+    detail::add_volumes(writer, manifest, bricks, file.boundary, file.echo_offset);
     return writer.write();
 }
 

@@ -8,6 +8,7 @@
 #include "pipeline/cook/pack_case.h"
 #include "pipeline/cook/stage_codecs.h"
 #include "pipeline/cook/stage_runner.h"
+#include "pipeline/cook/structure_cells.h"
 #include "pipeline/import/label_map.h"
 #include "pipeline/import/plausible_size.h"
 #include "pipeline/import/surface_file.h"
@@ -312,7 +313,7 @@ Result<CookResult> cook_case(const Recipe& recipe,
         [&](const Progress& p) -> Result<EchoOffsets> {
             BakeStructureOptions bake = option.structure;
             bake.seed = static_cast<std::uint64_t>(option.seed);
-            auto result = bake_structure(cooked.volume, tissues, bake, p);
+            auto result = bake_structure_in_cells(cooked.volume, tissues, bake, p);
             if (!result) return result.error();
             return EchoOffsets{std::move(result->echo_offset), {result->report}};
         });

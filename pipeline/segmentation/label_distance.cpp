@@ -213,7 +213,12 @@ LabelDistance::LabelDistance(const LabelVolume& labels, const LabelDistanceOptio
         const double per_vx = std::sqrt(h.x * h.y) / nodes_.spacing_mm[a];
         const bool across = a == 2 && factor_ > 1;
         double sigma = options.sigma_vx * per_vx;
-        if (across && options.sigma_slices > 0) sigma = options.sigma_slices * factor_;
+        if (across && options.sigma_slices > 0) {
+            sigma = options.sigma_slices * factor_;
+        } else if (across && h.z >= 3.5 * pixel) {
+            // Slices this far apart hold no noise that more would average, only curvature to lose.
+            sigma = std::min(sigma, 0.3 * factor_);
+        }
         wide_.axis[a] = smoothing_kernel(sigma);
         fine_.axis[a] = smoothing_kernel(std::min(options.detail_vx * per_vx, sigma));
         // What is thin in one slice is thin half-way to the next.

@@ -9,6 +9,7 @@
 #include "pipeline/segmentation/label_prices.h"
 #include "pipeline/segmentation/nearest_labels.h"
 #include "pipeline/segmentation/read_field.h"
+#include "pipeline/segmentation/snap_surfaces.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -52,8 +53,14 @@ FieldRead through_field(const ResampleInput& input,
     map.jacobian = [&](Point3 ct) { return inverse(jacobian(registration, ct)); };
     map.forward = [&](Point3 ct) { return mannequin_from_ct(registration, ct); };
     FieldRead read = read_field(field, grid, map, {options.record_band_vx}, progress);
-    lap(&result->seconds.voxels);
     StageReport* report = &result->report;
+    if (options.snap_vx > 0 && !read.boundary.table.empty()) {
+        const SnapReport snapped = snap_surfaces(
+            &read.volume, &read.boundary,
+            {.band_vx = options.record_band_vx, .distance_vx = options.snap_vx});
+        add_measures(snapped, report);
+    }
+    lap(&result->seconds.voxels);
     report->measures.push_back({"slice_factor", static_cast<double>(field.factor())});
     report->measures.push_back({"volume_steps", static_cast<double>(prices.iterations)});
     report->measures.push_back({"volume_miss", prices.largest_miss});

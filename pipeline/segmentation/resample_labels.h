@@ -38,17 +38,18 @@ struct ResampleOptions {
     double voxel_mm = 1;           // edge of the cubic voxels, [0.2, 10]
     double margin_mm = 4;          // air kept round the body
     std::string method = "shape";  // shape | nearest | paper
-    double sigma_vx = 1.5;         // shape: smoothing, voxels of the map in the plane, [0, 4]
+    double sigma_vx = 1.7;         // shape: smoothing, voxels of the map in the plane, [0, 4]
     double detail_vx = 0.5;        // shape: smoothing of what sigma_vx would wipe out, [0, 4]
-    double sigma_slices = 0;       // shape: along thick slices, slices; 0: as in the plane, in mm
+    double sigma_slices = 0;       // shape: along thick slices, slices; 0: label_distance.h
     int volume_iterations = 8;     // shape: Newton steps of the volumes, [0, 50]; 0: not kept
     bool follow_shift = true;      // shape: oblique vessels through thick slices
     double record_band_vx = 1.5;   // shape: boundary records up to this distance, [0, 2.6]; 0: none
+    double snap_vx = 0.07;         // shape: surfaces may move so far to be kept short; 0: not at all
     LevelSetOptions level_set;     // paper
 };
 
 // Raised whenever the same input and options give other bytes than before.
-inline constexpr int kResampleVersion = 3;
+inline constexpr int kResampleVersion = 4;
 
 struct ResampleSeconds {  // method shape; wall clock
     double distances = 0, volumes = 0, voxels = 0;

@@ -7,6 +7,7 @@
 #include "pipeline/segmentation/label_field.h"
 #include "pipeline/segmentation/label_prices.h"
 #include "pipeline/segmentation/read_field.h"
+#include "pipeline/segmentation/snap_surfaces.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -55,6 +56,8 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
     result.volume = volume;
     std::vector<int> rescued;
     LabelPriceReport prices;
+    SnapReport snapped;
+    bool last = false;
     for (int i = 0; i < std::max(1, options.iterations); ++i) {
         LabelFieldOptions field_options;
         field_options.distance = {
@@ -62,11 +65,16 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
         LabelField field(result.volume, field_options, progress);
         prices = set_label_prices(&field, [](Point3) { return 1.0; },
                                   {.iterations = options.volume_iterations});
-        const bool last = i + 1 >= options.iterations;
+        last = i + 1 >= options.iterations;
         FieldRead read = read_on_itself(field, volume.grid,
                                         last && cubic ? options.record_band_vx : 0, progress);
         result.volume.voxels = std::move(read.volume.voxels);
         result.boundary = std::move(read.boundary);
+        if (options.snap_vx > 0 && !result.boundary.table.empty()) {
+            snapped = snap_surfaces(
+                &result.volume, &result.boundary,
+                {.band_vx = options.record_band_vx, .distance_vx = options.snap_vx});
+        }
         rescued.insert(rescued.end(), read.rescued.begin(), read.rescued.end());
     }
     result.changes =
@@ -77,10 +85,11 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
         }
     }
     result.report.stage = "smooth";
-    result.report.version = 2;
+    result.report.version = 3;
     result.report.measures = {{"sigma_vx", options.sigma_vx},
                               {"volume_steps", static_cast<double>(prices.iterations)},
                               {"volume_miss", prices.largest_miss}};
+    if (snapped.bricks > 0) add_measures(snapped, &result.report);
     if (!cubic && options.record_band_vx > 0) {
         result.report.warnings.emplace_back(
             "the voxels are not cubic, so that no boundary records were made; resample first");

@@ -28,6 +28,7 @@ struct SmoothOptions {
     int iterations = 1;            // joint: times over, [1, 20]
     int volume_iterations = 8;     // joint: Newton steps of the volumes, [0, 50]; 0: not kept
     double record_band_vx = 1.5;   // joint: boundary records up to this distance, [0, 2.6]; 0: none
+    double snap_vx = 0.07;         // joint: as in resample_labels.h
     LevelSetOptions level_set;
 };
 

@@ -85,8 +85,8 @@ Suite smooth_suite() {
         "the suite warp.";
     suite.knobs = {
         {"resample.sigma_vx",
-         {"0", "0.5", "1", "1.5", "2", "3"},
-         "1.5",
+         {"0", "0.5", "1", "1.7", "2", "3"},
+         "1.7",
          "voxels of the map",
          "standard deviation of the joint smoothing in the plane",
          "steps of the map's voxels",
@@ -99,6 +99,14 @@ Suite smooth_suite() {
          "volume lost by smoothing",
          "converged after a few steps"},
     };
+    suite.knobs.push_back(
+        {"resample.snap_vx",
+         {"0", "0.03", "0.07", "0.15"},
+         "0.07",
+         "voxels",
+         "most that surfaces move onto quadrics",
+         "surfaces inside voxels, against the size of the bundle",
+         "bricks where no quadric is that near are kept as they are"});
     suite.pairs = {{"resample.sigma_vx", "resample.volume_iterations"}};
     suite.named = {{TrialRole::paper,
                     "paper, eq. (10), K0 = 0.1",

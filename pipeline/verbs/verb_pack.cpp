@@ -6,9 +6,9 @@
 #include "formats/registration_file.h"
 #include "formats/stage_files.h"
 #include "pipeline/cook/pack_case.h"
+#include "pipeline/cook/structure_cells.h"
 #include "pipeline/import/surface_file.h"
 #include "pipeline/parallel.h"
-#include "pipeline/texture/bake_structure.h"
 #include "pipeline/texture/tissue_table.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/verbs.h"
@@ -72,7 +72,7 @@ Result<PackResult> pack(const PackFiles& files, const Progress& progress) {
     if (files.structure && labels->echo_offset.table.empty()) {
         BakeStructureOptions options;
         options.seed = files.seed;
-        auto baked = bake_structure(labels->volume, tissues, options, progress);
+        auto baked = bake_structure_in_cells(labels->volume, tissues, options, progress);
         if (!baked) return baked.error();
         labels->echo_offset = std::move(baked->echo_offset);
         labels->reports.push_back(baked->report);

@@ -146,13 +146,16 @@ void add(const std::string& name, const ResampleOptions& options, bool real = fa
         add("paper/iterations:" + std::to_string(n),
             with([&](auto& o) { o.method = "paper", o.level_set.iterations = n; }));
     }
-    for (const char* sigma : {"0.5", "1", "1.5", "2", "3"}) {
+    for (const char* sigma : {"0.5", "1", "1.7", "2", "3"}) {
         add(std::string("sigma_vx:") + sigma,
             with([&](auto& o) { o.sigma_vx = std::stod(sigma); }));
     }
     for (const char* detail : {"0.3", "0.5", "0.8", "1.5"}) {
         add(std::string("detail_vx:") + detail,
             with([&](auto& o) { o.detail_vx = std::stod(detail); }));
+    }
+    for (const char* snap : {"0", "0.03", "0.07", "0.15"}) {
+        add(std::string("snap_vx:") + snap, with([&](auto& o) { o.snap_vx = std::stod(snap); }));
     }
     for (const int n : {0, 2, 4, 8, 16}) {
         add("volume_iterations:" + std::to_string(n),

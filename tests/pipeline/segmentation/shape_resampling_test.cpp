@@ -95,8 +95,8 @@ TEST(ShapeResampling, BoundaryPlanesOfATurnedSphereAreExact) {
     ASSERT_TRUE(result);
     const RecordErrors errors = record_errors(result->volume, result->boundary, motion, distance);
     ASSERT_GT(errors.distance_mm.size(), 4000u);  // 4 pi r^2 times 3 mm is 8482
-    // A fifth of a voxel: the six facets that voxels leave on a sphere this small; 8 degrees.
-    EXPECT_LT(percentile(errors.distance_mm, 0.95), 0.2);
+    // What the bar for organs asks; the six facets that voxels leave on a sphere are most of it.
+    EXPECT_LT(percentile(errors.distance_mm, 0.95), 0.15);
     EXPECT_LT(percentile(errors.normal_deg, 0.95), 8.0);
     // Against the voxels of the map; counting voxels on another grid adds 0.3 %.
     EXPECT_NEAR(result->changes.at(0).change(), 0, 0.01);
@@ -150,8 +150,8 @@ TEST(ShapeResampling, SlicesMayLieAlongAnyAxis) {
         for (std::size_t v = 0; v < truth.voxels.size(); ++v) {
             wrong += truth.voxels[v] != result->volume.voxels[v];
         }
-        // A shell of 0.3 mm: less than a tenth of the slice spacing.
-        EXPECT_LT(static_cast<double>(wrong), 0.3 * 4 * 3.1416 * 14 * 14);
+        // A shell of 0.25 mm: a sixteenth of the slice spacing.
+        EXPECT_LT(static_cast<double>(wrong), 0.25 * 4 * 3.1416 * 14 * 14);
     }
 }
 

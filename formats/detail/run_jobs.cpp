@@ -1,0 +1,34 @@
+#include "formats/detail/run_jobs.h"
+
+#include <algorithm>
+#include <atomic>
+#include <thread>
+#include <vector>
+
+namespace sonocase::detail {
+
+void run_jobs(std::size_t count, int threads, const std::function<void(std::size_t)>& job) {
+    std::atomic<std::size_t> next{0};
+    const auto work = [&] {
+        for (std::size_t i = next++; i < count; i = next++) job(i);
+    };
+#if !defined(__EMSCRIPTEN__) || defined(__EMSCRIPTEN_PTHREADS__)
+    if (threads <= 0) threads = static_cast<int>(std::min(8u, std::thread::hardware_concurrency()));
+    std::vector<std::thread> helpers;
+    for (std::size_t t = 1; t < std::min(count, static_cast<std::size_t>(std::max(threads, 1)));
+         ++t) {
+        try {
+            helpers.emplace_back(work);
+        } catch (...) {
+            break;  // no more threads to be had: the ones there do the work
+        }
+    }
+    work();
+    for (std::thread& helper : helpers) helper.join();
+#else
+    (void)threads;
+    work();
+#endif
+}
+
+}  // namespace sonocase::detail
