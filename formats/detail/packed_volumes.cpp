@@ -439,8 +439,9 @@ class OffsetGuess {
                                : (a + b) / 2;
         // Of three values the middle one: a, b, and the plane through them.
         const int plane = std::max(std::min(a, b), std::min(std::max(a, b), a + b - ab));
-        if (k == 0) return static_cast<std::uint8_t>(plane);
-        return static_cast<std::uint8_t>((plane + value(i, j, k - 1)) >> 1);
+        const int guess = k == 0 ? plane : (plane + value(i, j, k - 1)) >> 1;
+        // Values of one label are whole dB apart.
+        return static_cast<std::uint8_t>(a + 4 * ((guess - a + 2) >> 2));
     }
 
   private:

@@ -392,8 +392,25 @@ void LabelDistance::keep_detail(std::uint8_t label,
                                 const VoxelBox& box,
                                 const std::vector<float>& smooth,
                                 std::vector<float>* phi) const {
-    const float tolerance = static_cast<float>(options_.tolerance_vx *
-                                               std::max(nodes_.spacing_mm.x, nodes_.spacing_mm.y));
+    const float pixel = static_cast<float>(std::max(nodes_.spacing_mm.x, nodes_.spacing_mm.y));
+    const float tolerance = static_cast<float>(options_.tolerance_vx) * pixel;
+    // What is one voxel thick has no depth to give: it must stay inside by a tenth of a voxel. Between
+    // thick slices it is the interpolation by shape that keeps what is thin.
+    const float thin = -0.1f * pixel;
+    const Grid& g = labels_.grid;
+    const std::size_t step[3] = {1, static_cast<std::size_t>(g.size.x),
+                                 static_cast<std::size_t>(g.size.x) *
+                                     static_cast<std::size_t>(g.size.y)};
+    const auto one_voxel_thick = [&](Int3 v) {
+        if (factor_ > 1) return false;
+        const std::uint8_t* at = labels_.voxels.data() + g.index(v.x, v.y, v.z);
+        for (int a = 0; a < 3; ++a) {  // a label goes on beyond the border
+            if (v[a] == 0 || v[a] + 1 == g.size[a]) continue;
+            if (at[-static_cast<std::ptrdiff_t>(step[a])] != label && at[step[a]] != label)
+                return true;
+        }
+        return false;
+    };
     std::vector<float> across(phi->size(), 0.0f), other;
     bool any = false;
     for (int k = 0; k < box.size.z; ++k) {
@@ -404,8 +421,12 @@ void LabelDistance::keep_detail(std::uint8_t label,
                 labels_.grid.index(box.first.x, box.first.y + j, (box.first.z + k) / factor_);
             const std::size_t at = box.index(0, j, k);
             for (std::size_t i = 0; i < static_cast<std::size_t>(box.size.x); ++i) {
-                const float d = row[i] == label ? smooth[at + i] : -smooth[at + i];
-                if (d > tolerance) {
+                const bool own = row[i] == label;
+                const float d = own ? smooth[at + i] : -smooth[at + i];
+                if (d > tolerance ||
+                    (own && d > thin &&
+                     one_voxel_thick({box.first.x + static_cast<int>(i), box.first.y + j,
+                                      box.first.z + k}))) {
                     across[at + i] = 1;
                     any = true;
                 }

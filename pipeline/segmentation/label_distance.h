@@ -21,7 +21,7 @@ namespace sonocase::pipeline {
 struct LabelDistanceOptions {
     double sigma_vx = 1.7;       // smoothing, in-plane voxels of the map; 0: none
     double detail_vx = 0.5;      // smoothing where sigma_vx would carry voxels across the surface
-    double tolerance_vx = 0.25;  // how far across they may come to lie
+    double tolerance_vx = 0.25;  // how far across they may come to lie; what is one voxel thick not
     double sigma_slices = 0;  // smoothing along thick slices, in slices; 0: as in the plane, in mm,
                               // but at most 0.3 slices of 3.5 pixels and more
     double thick_ratio =

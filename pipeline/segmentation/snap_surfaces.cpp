@@ -121,7 +121,12 @@ SnapReport snap_surfaces(LabelVolume* volume,
                          const SnapOptions& options) {
     const Grid& g = volume->grid;
     const Int3 bricks = brick_count(g.size);
-    const Snapper snap(options);
+    SnapOptions allowed = options;
+    if (g.spacing_mm.x < 1) {
+        allowed.distance_vx =
+            std::max(options.distance_vx, std::min(0.2, options.distance_vx / g.spacing_mm.x));
+    }
+    const Snapper snap(allowed);
     std::vector<Change> changes(static_cast<std::size_t>(bricks.z));
     parallel_for(changes.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t bz = begin; bz < end; ++bz) {

@@ -14,7 +14,8 @@ namespace sonocase::pipeline {
 
 struct SnapOptions {
     double band_vx = 1.5;       // records exist up to this distance
-    double distance_vx = 0.07;  // the most that a record's distance may change
+    double distance_vx = 0.07;  // the most that a record's distance may change, voxels; where voxels
+                                // are smaller than 1 mm as many mm, up to 0.2 voxels
     double normal_deg = 5;      // and its normal
 };
 

@@ -183,6 +183,35 @@ TEST(ShapeResampling, ThinLabelsSurvive) {
     }
 }
 
+// A skin of one voxel round a ball: default smoothing must neither thin nor pierce it.
+TEST(ShapeResampling, SkinOfOneVoxelStaysWhole) {
+    const LabelVolume ct = sample_labels(cubic_grid(54), 3, [](Point3 p) {
+        const double r = norm_of(p);
+        return r > 22 ? 0 : r > 21 ? 1 : 2;
+    });
+    const auto result = resample_labels({ct, registration_of({}, ct.grid)});
+    ASSERT_TRUE(result);
+    EXPECT_NEAR(result->changes.at(0).change(), 0, 0.2);
+    const std::uint64_t seed = 7;
+    SCOPED_TRACE(seed);
+    Random random(seed);
+    const Grid& g = result->volume.grid;
+    int pierced = 0;
+    for (int n = 0; n < 4000; ++n) {
+        const Vector3 along = random.direction();
+        bool met = false;
+        for (double r = 18; r < 26 && !met; r += 0.1) {
+            const Point3 v = g.voxel_from_point(Point3{} + r * along);
+            met = result->volume.voxels[g.index(static_cast<int>(std::lround(v.x)),
+                                                static_cast<int>(std::lround(v.y)),
+                                                static_cast<int>(std::lround(v.z)))] == 1;
+        }
+        pierced += !met;
+    }
+    // The input's own voxels, where they meet at edges alone, leave gaps for a straight line.
+    EXPECT_LT(pierced, 80);
+}
+
 TEST(ShapeResampling, LabelSmallerThanAVoxelIsKeptAndNamed) {
     const LabelVolume ct = sample_labels(cubic_grid(24), 3, [](Point3 p) {
         return norm(p - Point3{1.5, 1.5, 1.5}) < 0.4 ? 2 : 1;
