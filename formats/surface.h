@@ -15,4 +15,8 @@ struct Surface {
     std::vector<std::array<std::uint32_t, 3>> triangles;  // empty for a cloud; outside counter-clockwise
 };
 
+// Unit normals from the triangles around each point, weighted by their area; zero where a point has
+// no triangle of any area. Replaces those that the surface has.
+void add_vertex_normals(Surface& surface);
+
 }  // namespace sonocase

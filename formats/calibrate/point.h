@@ -33,7 +33,7 @@ struct PointOptions {
     bool reject_outliers = true;
     double outlier_sigmas =
         5;             // a pose is left out beyond this many robust standard deviations, > 3
-    int trials = 400;  // random starts of the robust fit, >= 1
+    int trials = 100;  // random starts of the robust fit, >= 1
     std::uint64_t seed = 1;
 };
 

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "formats/nearest_name.h"
+#include "pipeline/cook/error_budget.h"
 #include "pipeline/cook/input_files.h"
 #include "pipeline/cook/pack_case.h"
 #include "pipeline/cook/stage_codecs.h"
@@ -57,6 +58,7 @@ Result<LabelFile> import_labels(const Recipe& recipe, const Progress& progress) 
         report.version = kImportVersion;
         const Vector3 extent = body_box(file.volume).extent();
         report.measures = {{"labels", static_cast<double>(file.volume.labels.size() - 1)},
+                           {"voxel_volume_mm3", file.volume.grid.voxel_volume_mm3()},
                            {"body_width_mm", extent.x},
                            {"body_depth_mm", extent.y},
                            {"body_height_mm", extent.z}};
@@ -334,6 +336,13 @@ Result<CookResult> cook_case(const Recipe& recipe,
                              *registration, *mannequin, cooked, **bank, tissues});
     if (!packed) return packed.error();
     packed->report.seconds = pack_clock.seconds();
+    std::vector<StageReport> so_far;
+    for (const StageRun& run : cook.runs) so_far.push_back(run.report);
+    const ErrorBudget budget = error_budget(so_far);
+    for (const BudgetEntry& entry : budget.entries)
+        if (std::isfinite(entry.mm))
+            packed->report.measures.push_back({entry.stage + "_error_mm", entry.mm});
+    packed->report.measures.push_back({"known_error_mm", budget.known_mm});
     cook.runs.push_back({packed->report, "", false});
 
     CookResult result{std::move(packed->bundle), std::move(cook.runs), ""};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -36,6 +37,42 @@ Json stage_json(const StageReport& stage, double seconds) {
     for (const Measure& measure : stage.measures) json["errors"][measure.name] = measure.value;
     json["warnings"] = stage.warnings;
     return json;
+}
+
+Json budget_json(const ErrorBudget& budget, const NextStep& next) {
+    Json json;
+    json["entries"] = Json::array();
+    for (const BudgetEntry& e : budget.entries) {
+        Json entry{{"stage", e.stage}, {"cause", e.cause}, {"mm", nullptr}, {"basis", e.basis}};
+        if (std::isfinite(e.mm)) entry["mm"] = e.mm;
+        json["entries"].push_back(entry);
+    }
+    json["known_mm"] = budget.known_mm;
+    json["next"] = nullptr;
+    if (!next.settings.empty())
+        json["next"] = {{"settings", next.settings},
+                        {"error_from_mm", next.error_from_mm},
+                        {"error_to_mm", next.error_to_mm},
+                        {"more_seconds", next.more_seconds}};
+    return json;
+}
+
+std::string budget_text(const ErrorBudget& budget, const NextStep& next) {
+    std::string text = "\nerror budget, mean displacement of surfaces\n";
+    for (const BudgetEntry& e : budget.entries) {
+        char mm[16] = "     ?";
+        if (std::isfinite(e.mm)) std::snprintf(mm, sizeof mm, "%6.2f", e.mm);
+        text += line("  %-10s %s mm  %s (%s)", e.stage.c_str(), mm, e.cause.c_str(),
+                     e.basis.c_str());
+    }
+    text += line("  %-10s %6.2f mm", "known", budget.known_mm);
+    if (next.settings.empty())
+        text += "  no setting that was measured does better\n";
+    else
+        text += line("  next: %s, from %.2f to %.2f mm on the synthetic bodies for %.0f s more",
+                     next.settings.c_str(), next.error_from_mm, next.error_to_mm,
+                     next.more_seconds);
+    return text;
 }
 
 Json tissue_json(const Tissue& tissue) {
@@ -131,6 +168,8 @@ std::string inspection_json(const CaseBundle& bundle, const Inspection& inspecti
     json["stages"] = Json::array();
     for (std::size_t i = 0; i < bundle.manifest.stages.size(); ++i)
         json["stages"].push_back(stage_json(bundle.manifest.stages[i], inspection.seconds[i]));
+    json["error_budget"] =
+        budget_json(error_budget(bundle.manifest.stages), inspection.next);
     json["exercises"] = Json::array();
     for (const EmbeddedExercise& embedded : bundle.exercises) {
         Json exercise{{"name", embedded.name}};
@@ -203,6 +242,7 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
         text += line("  %-10s %8.2f s", "all", sum);
     else
         text += "  (seconds stand in BUNDLE.report.json, which is not beside this bundle)\n";
+    text += budget_text(error_budget(bundle.manifest.stages), inspection.next);
     text += "\nexercises\n";
     for (const EmbeddedExercise& embedded : bundle.exercises) {
         const auto exercise = parse_exercise(embedded.toml, embedded.name);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "formats/case_bundle.h"
+#include "pipeline/cook/error_budget.h"
 
 namespace sonocase::pipeline {
 
@@ -25,11 +26,14 @@ struct Inspection {
     std::string digest;
     std::size_t bytes = 0;
     std::vector<double> seconds;  // see recorded_seconds
+    NextStep next;
 };
 
 // {"case", "producer", "bytes", "digest", "grid": {"size", "voxel_mm", "origin_mm"}, "labels":
 // [{"index", "name", "tissue", "volume_ml"}], "tissues": [...], "stages": [{"name", "version",
-// "seconds", "errors": {measure: value}, "warnings"}], "exercises", "inputs", "chunks"}.
+// "seconds", "errors": {measure: value}, "warnings"}], "error_budget": {"entries": [{"stage", "cause",
+// "mm" or null, "basis"}], "known_mm", "next": null or {"settings", "error_from_mm", "error_to_mm",
+// "more_seconds"}}, "exercises", "inputs", "surfaces", "textures", "has"}.
 std::string inspection_json(const CaseBundle& bundle, const Inspection& inspection);
 std::string inspection_text(const CaseBundle& bundle, const Inspection& inspection);
 

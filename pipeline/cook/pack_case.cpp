@@ -53,16 +53,6 @@ void check_exercise(const Exercise& exercise,
             warnings->push_back(exercise.name + ": no-go label '" + name + "' is not in this case");
 }
 
-void add_triangle_normals(Surface& surface) {
-    surface.normals.assign(surface.points.size(), Vector3{});
-    for (const auto& t : surface.triangles) {
-        const Point3 a = surface.points[t[0]], b = surface.points[t[1]], c = surface.points[t[2]];
-        const Vector3 twice_area = cross(b - a, c - a);
-        for (const std::uint32_t v : t) surface.normals[v] = surface.normals[v] + twice_area;
-    }
-    for (Vector3& normal : surface.normals) normal = normalized(normal);
-}
-
 }  // namespace
 
 Surface mapped_surface(const Surface& surface, const Registration& registration) {
@@ -77,7 +67,7 @@ Surface mapped_surface(const Surface& surface, const Registration& registration)
                                        n.y * cross(j.column(2), j.column(0)) +
                                        n.z * cross(j.column(0), j.column(1)));
     }
-    if (!surface.triangles.empty()) add_triangle_normals(mapped);
+    if (!surface.triangles.empty()) add_vertex_normals(mapped);
     return mapped;
 }
 

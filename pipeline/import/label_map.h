@@ -22,7 +22,7 @@ struct ImportedLabels {
         report;  // stage "import": labels, unnamed_labels, body_width_mm, body_volume_ml, ...
 };
 
-inline constexpr int kImportVersion = 1;
+inline constexpr int kImportVersion = 2;
 
 // path  NIfTI, NRRD, .seg.nrrd, MetaImage; a folder of one binary mask a structure (file name =
 //       structure); a folder with a DICOM series whose pixels are label values; or a .labels that

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "pipeline/pictures/markup.h"
+
 namespace sonocase::pipeline {
 namespace {
 
@@ -18,22 +20,6 @@ std::string colour_text(const char* what, CanvasColour c) {
     std::snprintf(text, sizeof text, " %s=\"#%02x%02x%02x\"", what, c[0], c[1], c[2]);
     std::string out = text;
     if (c[3] < 255) out += std::string(" ") + what + "-opacity=\"" + number(c[3] / 255.0) + "\"";
-    return out;
-}
-
-std::string escaped(const std::string& s) {
-    std::string out;
-    for (char c : s) {
-        if (c == '<') {
-            out += "&lt;";
-        } else if (c == '&') {
-            out += "&amp;";
-        } else if (c == '>') {
-            out += "&gt;";
-        } else {
-            out += c;
-        }
-    }
     return out;
 }
 
@@ -193,7 +179,7 @@ void Canvas::text(std::span<const std::uint8_t> mask,
         body_ += " transform=\"rotate(" + number(-t.degrees) + " " + number(t.at.x) + " " +
                  number(height_ - t.at.y) + ")\"";
     }
-    body_ += ">" + escaped(t.text) + "</text>\n";
+    body_ += ">" + escaped_html(t.text) + "</text>\n";
 }
 
 void Canvas::clip(double x, double y, double w, double h) {

@@ -8,6 +8,7 @@
 #include "formats/atomic_file.h"
 #include "formats/number_text.h"
 #include "formats/session/metric_table.h"
+#include "pipeline/pictures/markup.h"
 #include "pipeline/review/review_plots.h"
 
 namespace sonocase::pipeline {

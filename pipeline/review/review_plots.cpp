@@ -6,6 +6,7 @@
 #include "formats/number_text.h"
 #include "formats/session/metric_table.h"
 #include "formats/session/session_monitor.h"
+#include "pipeline/pictures/markup.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -133,32 +134,6 @@ std::string lane_svg(
 }
 
 }  // namespace
-
-std::string escaped_html(std::string_view text) {
-    std::string out;
-    for (const char c : text) {
-        switch (c) {
-            case '<':
-                out += "&lt;";
-                break;
-            case '>':
-                out += "&gt;";
-                break;
-            case '&':
-                out += "&amp;";
-                break;
-            case '"':
-                out += "&quot;";
-                break;
-            case '\'':
-                out += "&#39;";
-                break;
-            default:
-                out += c;
-        }
-    }
-    return out;
-}
 
 std::string timeline_svg(const ReviewInput& input) {
     const auto& samples = input.session.samples;

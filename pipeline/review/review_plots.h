@@ -14,7 +14,4 @@ std::string timeline_svg(const ReviewInput& input);
 // A score over this trainee's sessions of the exercise, this one last; empty without earlier ones.
 std::string progress_svg(const ReviewInput& input, const std::string& metric);
 
-// Text made safe for HTML.
-std::string escaped_html(std::string_view text);
-
 }  // namespace sonocase::pipeline

@@ -25,6 +25,15 @@ double voxels(double volume_mm3, const Settings& settings) {
     return volume_mm3 / (h * h * h);
 }
 
+// Of a row, for a case of another volume. What does not depend on the voxels stays.
+double seconds_at(const FrontRow& row,
+                  const FrontTable& table,
+                  const CostModel& model,
+                  double volume_mm3) {
+    const double more = voxels(volume_mm3, row.settings) - voxels(table.volume_mm3, row.settings);
+    return std::max(0.1 * row.seconds, row.seconds + model.per_voxel_s * more);
+}
+
 }  // namespace
 
 const FrontTable& measured_front() {
@@ -61,20 +70,31 @@ CostModel fit_cost_model(const FrontTable& table) {
 }
 
 std::string format_front(const std::vector<Trial>& trials,
+                         const std::string& timed_body,
                          double volume_mm3,
                          double probe_seconds) {
     std::string text =
-        "// Written by scripts/accuracy; do not edit. Error in mm and seconds of the suite "
-        "\"case\" on the demo\n"
-        "// torso, the volume of its grid, and the seconds of the probe on the machine of the "
-        "sweep.\n";
+        "// Written by scripts/accuracy; do not edit. The suite \"case\": settings, greatest error "
+        "of the bodies\n"
+        "// in mm, seconds on " +
+        timed_body +
+        "; the volume of its grid, and the seconds of the probe on that machine.\n";
     text += "t.volume_mm3 = " + number_text(volume_mm3, 6) +
             ";\nt.probe_seconds = " + number_text(probe_seconds, 4) + ";\n";
+    const auto of_case = [](const Trial& trial) {
+        const bool ours = trial.role == TrialRole::knob || trial.role == TrialRole::pair ||
+                          trial.role == TrialRole::preset;
+        return trial.suite == "case" && ours;
+    };
     for (const Trial& trial : trials) {
-        const bool of_knobs = trial.role == TrialRole::knob || trial.role == TrialRole::pair;
-        if (trial.suite != "case" || !of_knobs || !std::isfinite(trial.error)) continue;
-        text += "row(\"" + settings_text(trial.settings) + "\", " + number_text(trial.error, 4) +
-                ", " + number_text(trial.seconds, 4) + ");\n";
+        if (!of_case(trial) || trial.body != timed_body) continue;
+        double error = trial.error;
+        for (const Trial& other : trials)
+            if (of_case(other) && other.settings == trial.settings)
+                error = std::isfinite(other.error) ? std::max(error, other.error) : NAN;
+        if (!std::isfinite(error)) continue;
+        text += "row(\"" + settings_text(trial.settings) + "\", " + number_text(error, 4) + ", " +
+                number_text(trial.seconds, 4) + ");\n";
     }
     return text;
 }
@@ -94,7 +114,7 @@ Choice choose_settings(const FrontTable& table, const Wish& wish, double volume_
     assert(!table.rows.empty());
     const CostModel model = fit_cost_model(table);
     const auto seconds = [&](const FrontRow& row) {
-        return speed * (model.fixed_s + model.per_voxel_s * voxels(volume_mm3, row.settings));
+        return speed * seconds_at(row, table, model, volume_mm3);
     };
     std::vector<FrontRow> rows = table.rows;
     std::stable_sort(rows.begin(), rows.end(),
@@ -132,6 +152,33 @@ Choice choose_settings(const FrontTable& table, const Wish& wish, double volume_
     choice.predicted_error_mm = chosen->error_mm;
     choice.predicted_seconds = seconds(*chosen);
     return choice;
+}
+
+NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3) {
+    const CostModel model = fit_cost_model(table);
+    const auto seconds = [&](const FrontRow& row) {
+        return seconds_at(row, table, model, volume_mm3);
+    };
+    // The row that the case was cooked with: of its voxel, and among several the cheapest.
+    const FrontRow* now = nullptr;
+    for (const FrontRow& row : table.rows) {
+        const double off = std::abs(voxel_mm_of(row.settings) - voxel_mm);
+        const double best = now ? std::abs(voxel_mm_of(now->settings) - voxel_mm) : 1e300;
+        if (off < best || (off == best && seconds(row) < seconds(*now))) now = &row;
+    }
+    NextStep step;
+    if (now == nullptr) return step;
+    const FrontRow* next = nullptr;
+    for (const FrontRow& row : table.rows) {
+        if (row.error_mm >= now->error_mm * 0.99) continue;  // a hundredth is no step
+        if (next == nullptr || seconds(row) < seconds(*next)) next = &row;
+    }
+    if (next == nullptr) return step;
+    step.settings = settings_text(next->settings);
+    step.error_from_mm = now->error_mm;
+    step.error_to_mm = next->error_mm;
+    step.more_seconds = seconds(*next) - seconds(*now);
+    return step;
 }
 
 }  // namespace sonocase::pipeline

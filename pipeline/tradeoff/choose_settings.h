@@ -1,9 +1,9 @@
 // Which settings for a wanted accuracy, or for the time there is?
 //
 // The table of measured settings (measured_front.inc, written by scripts/accuracy from a sweep of
-// the whole case on the demo torso) gives the error; seconds follow a model fitted to the same
-// sweep,
-//     seconds = speed * (a + b * volume / voxel^3)
+// the whole case on the synthetic bodies) gives the error, the worst of the bodies'. Seconds are
+// those of the sweep, moved to the volume of the case at hand by a cost per voxel fitted to it,
+//     seconds = speed * (row + b * (volume - volume of the sweep) / voxel^3)
 // with `speed` from a probe of about a second on this machine.
 #pragma once
 
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "formats/result.h"
+#include "pipeline/cook/error_budget.h"
 #include "pipeline/cook/stage_options.h"
 #include "pipeline/tradeoff/trial.h"
 
@@ -18,8 +19,8 @@ namespace sonocase::pipeline {
 
 struct FrontRow {
     Settings settings;
-    double error_mm = 0;  // mean displacement of surfaces, demo torso
-    double seconds = 0;   // on the machine of the sweep
+    double error_mm = 0;  // mean displacement of surfaces, the worst of the bodies swept
+    double seconds = 0;   // for the demo torso, on the machine of the sweep
 };
 
 struct FrontTable {
@@ -29,15 +30,19 @@ struct FrontTable {
 };
 const FrontTable& measured_front();
 
-// a and b of the model above by least squares over the rows; both >= 0.
+// seconds = a + b voxels by least squares over the rows; both >= 0.
 struct CostModel {
     double fixed_s = 0;
     double per_voxel_s = 0;
 };
 CostModel fit_cost_model(const FrontTable& table);
 
-// measured_front.inc from a sweep of the suite "case" on the demo torso.
-std::string format_front(const std::vector<Trial>& trials, double volume_mm3, double probe_seconds);
+// measured_front.inc from sweeps of the suite "case": every setting that was tried on all bodies,
+// with the greatest of its errors and its seconds on `timed_body`, whose grid has volume_mm3.
+std::string format_front(const std::vector<Trial>& trials,
+                         const std::string& timed_body,
+                         double volume_mm3,
+                         double probe_seconds);
 
 // Seconds of a fixed piece of the pipeline's own work on this machine, with the threads now
 // allowed.
@@ -58,5 +63,9 @@ struct Choice {
 // volume_mm3: of the case's cooked grid, about the mannequin's bounding box; speed: probe_seconds()
 // over the table's. The table has at least one row.
 Choice choose_settings(const FrontTable& table, const Wish& wish, double volume_mm3, double speed);
+
+// What would lower the error next: the cheapest row that is better than the one a case was cooked
+// with (by its voxel).
+NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3);
 
 }  // namespace sonocase::pipeline

@@ -5,7 +5,9 @@
 
 #include "formats/atomic_file.h"
 #include "formats/number_text.h"
+#include "pipeline/cook/stage_options.h"
 #include "pipeline/pictures/chart.h"
+#include "pipeline/pictures/markup.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -21,26 +23,6 @@ std::vector<Trial> trials_of(const PageInput& input, const Suite& suite) {
 std::string number(double value) {
     if (!std::isfinite(value)) return "failed";
     return number_text(value, 3);
-}
-
-std::string escape(const std::string& text) {
-    std::string out;
-    for (char c : text) {
-        switch (c) {
-            case '<':
-                out += "&lt;";
-                break;
-            case '>':
-                out += "&gt;";
-                break;
-            case '&':
-                out += "&amp;";
-                break;
-            default:
-                out += c;
-        }
-    }
-    return out;
 }
 
 Chart suite_chart(const Suite& suite, const std::vector<Trial>& trials) {
@@ -111,12 +93,12 @@ std::string knob_rows(const Suite& suite, const std::vector<Trial>& trials, doub
     std::string html;
     for (const Knob& knob : suite.knobs) {
         const std::vector<Trial> curve = trials_of_knob(trials, knob);
-        html += "<tr><td><code>" + escape(knob.key) + "</code></td><td>" + escape(knob.meaning) +
-                "</td><td>" + escape(knob.standard + (knob.unit.empty() ? "" : " " + knob.unit)) +
-                "</td><td>" + escape(knob.trades) + "</td><td>";
+        html += "<tr><td><code>" + escaped_html(knob.key) + "</code></td><td>" + escaped_html(knob.meaning) +
+                "</td><td>" + escaped_html(knob.standard + (knob.unit.empty() ? "" : " " + knob.unit)) +
+                "</td><td>" + escaped_html(knob.trades) + "</td><td>";
         for (const Trial& t : curve) {
-            html += escape(t.settings.empty() ? "" : t.settings.front().value) + ": " +
-                    number(t.error) + " " + escape(suite.error_unit) + " in " + number(t.seconds) +
+            html += escaped_html(t.settings.empty() ? "" : t.settings.front().value) + ": " +
+                    number(t.error) + " " + escaped_html(suite.error_unit) + " in " + number(t.seconds) +
                     " s<br>";
         }
         html += "</td><td>";
@@ -124,14 +106,36 @@ std::string knob_rows(const Suite& suite, const std::vector<Trial>& trials, doub
         if (verdict.monotone) {
             html += "more time, less error (within noise)";
         } else {
-            html += "not monotone (" + escape(verdict.worst) + "). " +
-                    escape(knob.why_not_monotone.empty()
+            html += "not monotone (" + escaped_html(verdict.worst) + "). " +
+                    escaped_html(knob.why_not_monotone.empty()
                                ? "No reason is known; look before trusting it."
                                : knob.why_not_monotone);
         }
         html += "</td></tr>\n";
     }
     return html;
+}
+
+// Every option of every stage; what no suite above sweeps is a choice rather than a price.
+std::string options_table() {
+    std::string text =
+        "\n## Every option of the stages\n\nSet in a recipe's section or by `--set KEY=VALUE`; "
+        "`sonocase build --list-options` prints the same.\n\n"
+        "| key | default | range | meaning |\n|---|---|---|---|\n";
+    StageOptions defaults;
+    for (const OptionKey& key : option_keys()) {
+        std::string range = key.choices;
+        for (std::size_t bar = 0; (bar = range.find('|', bar)) != std::string::npos; bar += 2)
+            range.replace(bar, 1, ", ");
+        const std::string value = option_value(key, defaults);
+        if (value == "true" || value == "false") range = "true, false";
+        if (range.empty())
+            range = number_text(key.low, 6) + " to " + number_text(key.high, 6) +
+                    (*key.unit ? std::string(" ") + key.unit : std::string());
+        text += std::string("| `") + key.section + "." + key.key + "` | " + value + " | " + range +
+                " | " + key.meaning + " |\n";
+    }
+    return text;
 }
 
 constexpr const char* kStyle =
@@ -157,7 +161,7 @@ Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
         "The "
         "blue line is the Pareto front: no other setting tried is both faster and better. Measured "
         "on " +
-        escape(input.machine) + "; another machine moves all points sideways alike.</p>\n";
+        escaped_html(input.machine) + "; another machine moves all points sideways alike.</p>\n";
     for (const Suite& suite : input.suites) {
         const std::vector<Trial> trials = trials_of(input, suite);
         if (trials.empty()) continue;
@@ -165,8 +169,8 @@ Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
         const ChartSheet sheet{{suite_chart(suite, trials)}, 1, 900, 560};
         if (const Status s = write_chart_png(sheet, folder + "/" + stem + ".png"); !s) return s;
         if (const Status s = write_chart_svg(sheet, folder + "/" + stem + ".svg"); !s) return s;
-        html += "<h2>" + escape(suite.title) + " <small>(" + escape(suite.body) +
-                ")</small></h2><p>" + escape(suite.truth) + "</p>\n<a href=\"" + stem +
+        html += "<h2>" + escaped_html(suite.title) + " <small>(" + escaped_html(suite.body) +
+                ")</small></h2><p>" + escaped_html(suite.truth) + "</p>\n<a href=\"" + stem +
                 ".svg\"><img src=\"" + stem + ".png\" alt=\"error against seconds\"></a>\n";
         const Trial* cheaper = cheaper_than_standard(trials, input.noise);
         html +=
@@ -174,8 +178,8 @@ Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
                 ? std::string(
                       "<p>No setting tried is cheaper than the standard one at equal error.</p>\n")
                 : "<p>Cheaper than the standard setting at equal error: <code>" +
-                      escape(settings_text(cheaper->settings)) + "</code>, " +
-                      number(cheaper->error) + " " + escape(suite.error_unit) + " in " +
+                      escaped_html(settings_text(cheaper->settings)) + "</code>, " +
+                      number(cheaper->error) + " " + escaped_html(suite.error_unit) + " in " +
                       number(cheaper->seconds) + " s.</p>\n";
         html +=
             "<table><tr><th>knob</th><th>meaning</th><th>standard</th><th>error it "
@@ -187,7 +191,7 @@ Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
         html +=
             "<h3>The front, presets, the paper and "
             "peers</h3><table><tr><th>what</th><th>settings</th><th>" +
-            escape(suite.error_name + ", " + suite.error_unit) +
+            escaped_html(suite.error_name + ", " + suite.error_unit) +
             "</th><th>seconds (low to high)</th><th>note"
             "</th></tr>\n";
         for (std::size_t i = 0; i < trials.size(); ++i) {
@@ -195,10 +199,10 @@ Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
             const bool named = t.role != TrialRole::knob && t.role != TrialRole::pair;
             if (!front[i] && !named) continue;
             html += std::string("<tr") + (front[i] ? " class=\"front\"" : "") + "><td>" +
-                    (named ? escape(t.name) : std::string("on the front")) + "</td><td><code>" +
-                    escape(settings_text(t.settings)) + "</code></td><td>" + number(t.error) +
+                    (named ? escaped_html(t.name) : std::string("on the front")) + "</td><td><code>" +
+                    escaped_html(settings_text(t.settings)) + "</code></td><td>" + number(t.error) +
                     "</td><td>" + number(t.seconds) + " (" + number(t.seconds_low) + " to " +
-                    number(t.seconds_high) + ")</td><td>" + escape(t.note) + "</td></tr>\n";
+                    number(t.seconds_high) + ")</td><td>" + escaped_html(t.note) + "</td></tr>\n";
         }
         html += "</table>\n";
     }
@@ -235,7 +239,7 @@ std::string format_accuracy_markdown(const PageInput& input) {
             text += "| " + t.name + " | " + number(t.error) + " | " + number(t.seconds) + " |\n";
         }
     }
-    return text;
+    return text + options_table();
 }
 
 }  // namespace sonocase::pipeline

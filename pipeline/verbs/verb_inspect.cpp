@@ -6,6 +6,7 @@
 #include "formats/digest.h"
 #include "pipeline/cook/inspect_case.h"
 #include "pipeline/files.h"
+#include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/verbs.h"
 
@@ -25,8 +26,11 @@ int verb_inspect(int argc, char** argv) {
     if (!bytes) return fail("inspect", bytes.error());
     auto bundle = read_bundle(*bytes, path, common.threads);
     if (!bundle) return fail("inspect", bundle.error());
-    Inspection inspection{path, digest_of(*bytes), bytes->size(), {}};
+    Inspection inspection{path, digest_of(*bytes), bytes->size(), {}, {}};
     inspection.seconds = recorded_seconds(*bundle, path, inspection.digest);
+    const Vector3 extent = bundle->grid.bounds().extent();
+    inspection.next = next_step(measured_front(), bundle->grid.spacing_mm.x,
+                                extent.x * extent.y * extent.z);
     const std::string text =
         json ? inspection_json(*bundle, inspection) : inspection_text(*bundle, inspection);
     std::fputs(text.c_str(), stdout);

@@ -1,0 +1,48 @@
+// Where the millimetres of a case's error come from, read off the reports of its stages.
+//
+// Every entry is a mean displacement of surfaces, so that they can be compared and added (as the root
+// of the sum of squares: the causes have nothing to do with one another). What lies deep in the body
+// cannot be seen by a fit of skins; that entry says so and has no number, except where the map is
+// known (the analytic torso).
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/stage_report.h"
+
+namespace sonocase::pipeline {
+
+struct BudgetEntry {
+    std::string stage;  // whose error it is
+    std::string cause;
+    double mm = 0;      // mean displacement of surfaces; NaN: unknown
+    std::string basis;  // how the number was come by
+};
+
+struct ErrorBudget {
+    std::vector<BudgetEntry> entries;  // in the order of the stages
+    double known_mm = 0;               // of the entries with a number
+};
+
+// What would lower the error next, and what it would cost; from the measured settings
+// (pipeline/tradeoff/choose_settings.h).
+struct NextStep {
+    std::string settings;  // "resample.voxel_mm=1"; empty: nothing measured is better
+    double error_from_mm = 0;
+    double error_to_mm = 0;
+    double more_seconds = 0;  // on the machine of the sweep
+};
+
+// An entry is left out where its stage did not report what it is computed from.
+ErrorBudget error_budget(std::span<const StageReport> stages);
+
+// Mean displacement of surfaces through a map that is known, as a share of the map's own voxel (cube
+// root of its volume) and of the cooked voxel: measured on the analytic torso
+// (tests/pipeline/tradeoff/error_budget_test.cpp repeats it).
+inline constexpr double kSampledShare = 0.1;
+inline constexpr double kCookedShare = 0.05;
+
+}  // namespace sonocase::pipeline

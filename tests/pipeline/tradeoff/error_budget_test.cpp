@@ -1,0 +1,67 @@
+#include "pipeline/cook/error_budget.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pipeline/segmentation/resample_labels.h"
+#include "pipeline/tradeoff/boundary_error.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+StageReport report(const char* stage, std::vector<Measure> measures) {
+    StageReport r;
+    r.stage = stage;
+    r.measures = std::move(measures);
+    return r;
+}
+
+TEST(ErrorBudget, AddsWhatIsKnownAndNamesWhatIsNot) {
+    const std::vector<StageReport> stages{report("import", {{"voxel_volume_mm3", 8}}),
+                                          report("warp", {{"skin_median_mm", 0.3}}),
+                                          report("resample", {{"voxel_mm", 1}})};
+    const ErrorBudget budget = error_budget(stages);
+    ASSERT_EQ(budget.entries.size(), 4u);
+    EXPECT_DOUBLE_EQ(budget.entries[0].mm, 2 * kSampledShare);
+    EXPECT_DOUBLE_EQ(budget.entries[1].mm, 0.3);
+    EXPECT_TRUE(std::isnan(budget.entries[2].mm));
+    EXPECT_DOUBLE_EQ(budget.entries[3].mm, kCookedShare);
+    EXPECT_NEAR(budget.known_mm, std::sqrt(0.04 + 0.09 + 0.0025), 1e-12);
+}
+
+TEST(ErrorBudget, LeavesOutWhatWasNotReported) {
+    EXPECT_TRUE(error_budget({}).entries.empty());
+    EXPECT_TRUE(error_budget(std::vector{report("import", {{"voxel_volume_mm3", NAN}})})
+                    .entries.empty());
+    // A known map has no fit to speak of.
+    EXPECT_TRUE(error_budget(std::vector{report("warp", {})}).entries.empty());
+}
+
+// The shares are measurements. Bodies sampled finely and coarsely, in thick slices and in cubes,
+// cooked finely and coarsely: the budget is within a factor of 1.5 of the error that the truth
+// shows, which is what a reader needs to see which stage to spend time on.
+TEST(ErrorBudget, IsWhatTheAnalyticTorsoShows) {
+    struct Setting {
+        Vector3 spacing_mm;
+        double voxel_mm;
+    };
+    const Registration truth = analytic_torso_truth();
+    for (const Setting s : {Setting{{2, 2, 3}, 1.5}, {{1.5, 1.5, 5}, 1.5}, {{3, 3, 3}, 3}, {{2,2,2}, 4}}) {
+        const LabelVolume ct = sample_analytic_torso(analytic_torso_grid(s.spacing_mm));
+        ResampleOptions options;
+        options.voxel_mm = s.voxel_mm;
+        const auto made = resample_labels({ct, truth}, options);
+        ASSERT_TRUE(made);
+        const double error =
+            measure_boundary_error(made->volume, made->boundary, truth, {}, 100000).displaced_mm;
+        const ErrorBudget budget = error_budget(
+            std::vector{report("import", {{"voxel_volume_mm3", ct.grid.voxel_volume_mm3()}}),
+                        made->report});
+        EXPECT_GT(error, budget.known_mm / 1.5) << s.spacing_mm.z << " " << s.voxel_mm;
+        EXPECT_LT(error, budget.known_mm * 1.5) << s.spacing_mm.z << " " << s.voxel_mm;
+    }
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
