@@ -66,7 +66,7 @@ std::vector<NamedSuite> suites() {
         {"calibrate", calibrate_suite},
         {"render", render_suite},
         {"case", [] { return case_suite({}, kTimedBody); }},
-        {"case", [] { return case_suite({0.88, 1.12, 24}, "stout-torso"); }},
+        {"case", [] { return case_suite(*analytic_body("slender"), "slender"); }},
     };
 }
 
