@@ -30,6 +30,16 @@ bool same_trial(const Trial& a, const Trial& b) {
            a.settings == b.settings;
 }
 
+// Without what is at its standard value anyway: settings that come to the same compare equal.
+Settings in_effect(const Suite& suite, const Settings& settings) {
+    Settings own;
+    for (const Setting& s : settings) {
+        const Knob* knob = find_knob(suite, s.key);
+        if (knob == nullptr || knob->standard != s.value) own.push_back(s);
+    }
+    return own;
+}
+
 double now_s() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
         .count();
@@ -107,6 +117,20 @@ std::vector<Trial> run_sweep(const Suite& suite,
                                         [&](const Trial& t) { return same_trial(t, plan[i]); });
         if (known != done.end()) {
             measured.push_back(*known);
+            continue;
+        }
+        // The standard setting stands in every knob's row, and presets are settings too.
+        const Settings effect = in_effect(suite, plan[i].settings);
+        const auto same = std::find_if(measured.begin(), measured.end(), [&](const Trial& t) {
+            return in_effect(suite, t.settings) == effect;
+        });
+        if (same != measured.end()) {
+            Trial trial = *same;
+            trial.role = plan[i].role;
+            trial.name = plan[i].name;
+            trial.settings = plan[i].settings;
+            measured.push_back(trial);
+            if (each) each(trial);
             continue;
         }
         if (options.limit_s > 0 && now_s() - start > options.limit_s) break;

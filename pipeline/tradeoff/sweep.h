@@ -18,7 +18,8 @@ struct SweepOptions {
 // The settings of a suite, each once: standard, knobs one at a time, pairs, named ones.
 std::vector<Trial> plan_sweep(const Suite& suite, const SweepOptions& options);
 
-// Measures what `plan` asks for and `done` does not already hold; `each` is called after every
+// Measures what `plan` asks for and `done` does not already hold, settings that differ only in naming
+// a standard value once; `each` is called after every
 // trial, so that a killed sweep can go on. A setting that fails is kept with its message as note
 // and error NaN.
 std::vector<Trial> run_sweep(const Suite& suite,

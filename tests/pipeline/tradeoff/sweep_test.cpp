@@ -49,6 +49,23 @@ TEST(Sweep, ResumedSweepMeasuresOnlyWhatIsMissing) {
     EXPECT_EQ(again.size(), first.size());
 }
 
+TEST(Sweep, SettingsThatComeToTheSameAreMeasuredOnce) {
+    int runs = 0;
+    const Suite s = suite(runs);
+    SweepOptions options;
+    options.repeats = 1;
+    const auto plan = plan_sweep(s, options);
+    const auto trials = run_sweep(s, plan, {}, options, {}, {});
+    EXPECT_EQ(trials.size(), plan.size());
+    // Standard, toy.n = 2 and toy.m = 1 are one; the preset and toy.n = 1 another.
+    EXPECT_EQ(runs, static_cast<int>(plan.size()) - 3);
+    for (std::size_t i = 0; i < plan.size(); ++i) {
+        EXPECT_EQ(trials[i].settings, plan[i].settings);
+        EXPECT_EQ(trials[i].role, plan[i].role);
+        EXPECT_EQ(trials[i].name, plan[i].name);
+    }
+}
+
 TEST(Sweep, FailedSettingIsKeptWithItsMessage) {
     int runs = 0;
     const Suite s = suite(runs);
