@@ -127,7 +127,7 @@ const std::vector<OptionKey>& table() {
 
 constexpr PresetSetting kDraft[] = {{"resample.voxel_mm", "2"}, {"texture.edge", "32"}};
 constexpr PresetSetting kBalanced[] = {{"resample.voxel_mm", "1"}};
-constexpr PresetSetting kAccurate[] = {{"resample.voxel_mm", "0.75"}};
+constexpr PresetSetting kAccurate[] = {{"resample.voxel_mm", "0.75"}, {"surface.working_mm", "2"}};
 
 std::string shortest(double value) {
     char text[32];

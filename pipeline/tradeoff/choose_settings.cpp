@@ -92,9 +92,10 @@ std::string format_front(const std::vector<Trial>& trials,
         for (const Trial& other : trials)
             if (of_case(other) && other.settings == trial.settings)
                 error = std::isfinite(other.error) ? std::max(error, other.error) : NAN;
-        if (!std::isfinite(error)) continue;
-        text += "row(\"" + settings_text(trial.settings) + "\", " + number_text(error, 4) + ", " +
-                number_text(trial.seconds, 4) + ");\n";
+        // A preset may be a knob's row as well.
+        const std::string row = "row(\"" + settings_text(trial.settings) + "\",";
+        if (!std::isfinite(error) || text.find(row) != std::string::npos) continue;
+        text += row + " " + number_text(error, 4) + ", " + number_text(trial.seconds, 4) + ");\n";
     }
     return text;
 }
