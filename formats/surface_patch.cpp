@@ -1,6 +1,7 @@
 #include "formats/surface_patch.h"
 
 #include <algorithm>
+#include <climits>
 #include <cmath>
 
 #include "formats/boundary_record.h"
@@ -73,22 +74,37 @@ std::uint32_t packed_plane(std::int32_t steps, std::int32_t x, std::int32_t y, s
            (static_cast<std::uint32_t>(b) & 0xFFu) << 24;
 }
 
+// What a patch says of voxel v.
+std::uint32_t record_at(const SurfacePatch& patch,
+                        const PatchValues& value,
+                        std::size_t v,
+                        std::uint32_t label,
+                        int reach_steps) {
+    const std::uint32_t low = patch.low, high = patch.high;
+    const bool in_low = label == low, in_high = label == high;
+    const std::int32_t side = in_low ? 1 : -1;
+    const std::int32_t steps = steps_of(std::max(side * value.q[v], 0));
+    const std::uint32_t plane =
+        packed_plane(steps, side * value.x[v], side * value.y[v], side * value.z[v]);
+    const bool there = (in_low || in_high) && steps <= reach_steps;
+    return there ? plane | (in_low ? high : low) : kNoBoundary;
+}
+
 void records_from_one(const SurfacePatch& patch,
                       const std::uint8_t* labels,
                       int reach_steps,
                       std::uint32_t* records) {
     PatchValues value;
     evaluate(patch, &value);
-    const std::uint32_t low = patch.low, high = patch.high;
-    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
-        const bool in_low = labels[v] == low, in_high = labels[v] == high;
-        const std::int32_t side = in_low ? 1 : -1;
-        const std::int32_t steps = steps_of(std::max(side * value.q[v], 0));
-        const std::uint32_t plane =
-            packed_plane(steps, side * value.x[v], side * value.y[v], side * value.z[v]);
-        const bool there = (in_low || in_high) && steps <= reach_steps;
-        records[v] = there ? plane | (in_low ? high : low) : kNoBoundary;
-    }
+    for (std::size_t v = 0; v < kBrickVoxels; ++v)
+        records[v] = record_at(patch, value, v, labels[v], reach_steps);
+}
+
+// Of two patches' records the nearer, the earlier at equal distance.
+std::uint32_t nearer_of(std::uint32_t record, std::uint32_t other) {
+    if (other == kNoBoundary) return record;
+    const bool nearer = record == kNoBoundary || (other >> 8 & 0xFFu) < (record >> 8 & 0xFFu);
+    return nearer ? other : record;
 }
 
 // The 10 monomials of q are fitted in voxels; the sums of the normal equations.
@@ -162,12 +178,7 @@ void records_from_patches(std::span<const SurfacePatch> patches,
     BrickRecords one;
     for (const SurfacePatch& patch : patches) {
         records_from_one(patch, labels, reach_steps, one.data());
-        for (std::size_t v = 0; v < kBrickVoxels; ++v) {
-            if (one[v] == kNoBoundary) continue;
-            const bool nearer =
-                records[v] == kNoBoundary || (one[v] >> 8 & 0xFFu) < (records[v] >> 8 & 0xFFu);
-            if (nearer) records[v] = one[v];
-        }
+        for (std::size_t v = 0; v < kBrickVoxels; ++v) records[v] = nearer_of(records[v], one[v]);
     }
 }
 
@@ -235,49 +246,56 @@ std::vector<SurfacePatch> find_patches(const BrickLabels& labels,
         patches.size() == 1 && std::all_of(labels.begin(), labels.end(), [&](std::uint8_t l) {
             return l == patches[0].low || l == patches[0].high;
         });
-    BrickRecords made;
-    BrickLabels sides;
-    const auto wrong = [&] {  // 0 where all is right, else about the squared steps between them
+    std::vector<PatchValues> values(patches.size());
+    for (std::size_t k = 0; k < patches.size(); ++k) evaluate(patches[k], &values[k]);
+    // 0 where all is right, else about the squared steps between made and wanted; `enough` or more
+    // stands for itself, since most tries are worse within a few voxels.
+    const auto wrong = [&](int enough) {
         int count = 0;
-        records_from_patches(patches, labels.data(), reach_steps, made.data());
-        for (std::size_t v = 0; v < kBrickVoxels; ++v) {
-            if (made[v] == records[v]) continue;
-            const bool both = made[v] != kNoBoundary && records[v] != kNoBoundary;
+        for (std::size_t v = 0; v < kBrickVoxels && count < enough; ++v) {
+            std::uint32_t made = kNoBoundary;
+            for (std::size_t k = 0; k < patches.size(); ++k)
+                made = nearer_of(made, record_at(patches[k], values[k], v, labels[v], reach_steps));
+            if (by_side)
+                count += (values[0].q[v] >= 0 ? patches[0].low : patches[0].high) != labels[v];
+            if (made == records[v]) continue;
+            const bool both = made != kNoBoundary && records[v] != kNoBoundary;
             for (int shift = 8; both && shift < 32; shift += 8) {
-                const int d = static_cast<std::int8_t>(made[v] >> shift) -
+                const int d = static_cast<std::int8_t>(made >> shift) -
                               static_cast<std::int8_t>(records[v] >> shift);
                 count += d * d;
             }
             count += both ? 1 : 10;
         }
-        if (by_side) {
-            labels_from_patch(patches[0], sides.data());
-            for (std::size_t v = 0; v < kBrickVoxels; ++v) count += sides[v] != labels[v];
-        }
         return count;
     };
     constexpr int kSteps = 8;
-    int least = wrong();
+    int least = wrong(INT_MAX);
     for (int step = 0; least > 0 && step < kSteps; ++step) {
         std::int16_t* best = nullptr;
         std::int16_t best_value = 0;
-        for (SurfacePatch& patch : patches) {
-            for (std::int16_t& c : patch.c) {
+        std::size_t best_patch = 0;
+        for (std::size_t k = 0; k < patches.size(); ++k) {
+            for (std::int16_t& c : patches[k].c) {
                 const std::int16_t was = c;
                 for (const int change : {-1, 1}) {
                     c = static_cast<std::int16_t>(was + change);
-                    const int count = wrong();
+                    evaluate(patches[k], &values[k]);
+                    const int count = wrong(least);
                     if (count < least) {
                         least = count;
                         best = &c;
                         best_value = c;
+                        best_patch = k;
                     }
                 }
                 c = was;
             }
+            evaluate(patches[k], &values[k]);
         }
         if (best == nullptr) return {};
         *best = best_value;
+        evaluate(patches[best_patch], &values[best_patch]);
     }
     if (least > 0) return {};
     return patches;
