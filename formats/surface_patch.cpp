@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <climits>
 #include <cmath>
+#include <numeric>
 
 #include "formats/boundary_record.h"
 
@@ -84,10 +85,9 @@ std::uint32_t record_at(const SurfacePatch& patch,
     const bool in_low = label == low, in_high = label == high;
     const std::int32_t side = in_low ? 1 : -1;
     const std::int32_t steps = steps_of(std::max(side * value.q[v], 0));
-    const std::uint32_t plane =
-        packed_plane(steps, side * value.x[v], side * value.y[v], side * value.z[v]);
-    const bool there = (in_low || in_high) && steps <= reach_steps;
-    return there ? plane | (in_low ? high : low) : kNoBoundary;
+    if (!(in_low || in_high) || steps > reach_steps) return kNoBoundary;
+    return packed_plane(steps, side * value.x[v], side * value.y[v], side * value.z[v]) |
+           (in_low ? high : low);
 }
 
 void records_from_one(const SurfacePatch& patch,
@@ -249,23 +249,30 @@ std::vector<SurfacePatch> find_patches(const BrickLabels& labels,
     std::vector<PatchValues> values(patches.size());
     for (std::size_t k = 0; k < patches.size(); ++k) evaluate(patches[k], &values[k]);
     // 0 where all is right, else about the squared steps between made and wanted; `enough` or more
-    // stands for itself, since most tries are worse within a few voxels.
+    // stands for itself. Voxels that were wrong last time come first: most tries leave them so.
+    std::array<std::uint8_t, kBrickVoxels> order;
+    std::iota(order.begin(), order.end(), std::uint8_t{0});
     const auto wrong = [&](int enough) {
         int count = 0;
-        for (std::size_t v = 0; v < kBrickVoxels && count < enough; ++v) {
+        std::size_t front = 0;
+        for (std::size_t n = 0; n < kBrickVoxels && count < enough; ++n) {
+            const std::size_t v = order[n];
+            const int before = count;
             std::uint32_t made = kNoBoundary;
             for (std::size_t k = 0; k < patches.size(); ++k)
                 made = nearer_of(made, record_at(patches[k], values[k], v, labels[v], reach_steps));
             if (by_side)
                 count += (values[0].q[v] >= 0 ? patches[0].low : patches[0].high) != labels[v];
-            if (made == records[v]) continue;
-            const bool both = made != kNoBoundary && records[v] != kNoBoundary;
-            for (int shift = 8; both && shift < 32; shift += 8) {
-                const int d = static_cast<std::int8_t>(made >> shift) -
-                              static_cast<std::int8_t>(records[v] >> shift);
-                count += d * d;
+            if (made != records[v]) {
+                const bool both = made != kNoBoundary && records[v] != kNoBoundary;
+                for (int shift = 8; both && shift < 32; shift += 8) {
+                    const int d = static_cast<std::int8_t>(made >> shift) -
+                                  static_cast<std::int8_t>(records[v] >> shift);
+                    count += d * d;
+                }
+                count += both ? 1 : 10;
             }
-            count += both ? 1 : 10;
+            if (count > before) std::swap(order[n], order[front++]);
         }
         return count;
     };
