@@ -19,6 +19,7 @@
 #include "runtime/player/serve.h"
 #include "runtime/player/settings.h"
 #include "runtime/player/setup_guide.h"
+#include "runtime/player/view_pace.h"
 #include "runtime/tracking/mouse_tracker.h"
 #include "runtime/tracking/paced_tracker.h"
 #include "runtime/tracking/push_tracker.h"
@@ -80,7 +81,7 @@ struct App {
     double cine_clock_s = 0;
     std::vector<bool> hits;  // targets reached in free scanning or in the attempt
     void* view_texture = nullptr;
-    double view_drawn_s = -1;
+    ViewPace view_pace;
     double screen_ms = 0;  // pose to the picture handed to the display, of the last frame shown
     double ui_rate = 0;
     WindowStats window_stats;

@@ -417,13 +417,9 @@ void draw_view3d_panel(App& app, float height) {
     input.hit = app.hits;
     for (std::size_t i = 0; i < app.current().targets.size() && i < 64; ++i)
         input.target_centres.push_back(target_now(app, i));
-    // Every second picture is often enough for a small view, and halves its cost on a machine
-    // without a graphics card.
-    if (!app.view_texture || app.now_s - app.view_drawn_s > 0.03) {
+    if (app.view_pace.due(app.now_s) || !app.view_texture)
         app.view_texture =
             app.view3d->draw(static_cast<int>(size.x), static_cast<int>(size.y), input);
-        app.view_drawn_s = app.now_s;
-    }
     ImGui::GetWindowDrawList()->AddImageRounded(app.view_texture, corner,
                                                 {corner.x + size.x, corner.y + size.y}, {0, 1},
                                                 {1, 0}, 0xFFFFFFFF, 5 * app.window->scale());
