@@ -7,15 +7,15 @@
 namespace sonocase {
 namespace {
 
-struct Run {
+struct Outcome {
     int pictures = 0, drawings = 0;
     double longest_gap_s = 0;
 };
 
 // `seconds` of pictures that take plain_s, and drawing_s more where the view is drawn.
-Run run(double plain_s, double drawing_s, double seconds) {
+Outcome watch(double plain_s, double drawing_s, double seconds) {
     ViewPace pace;
-    Run out;
+    Outcome out;
     double now = 0, drawn = 0;
     while (now < seconds) {
         const bool draw = pace.due(now);
@@ -31,18 +31,18 @@ Run run(double plain_s, double drawing_s, double seconds) {
 }
 
 TEST(ViewPace, CheapDrawingsComeWithEverySecondPicture) {
-    const Run r = run(1.0 / 60, 0, 10);
+    const Outcome r = watch(1.0 / 60, 0, 10);
     EXPECT_NEAR(r.drawings, r.pictures / 2, 2);
 }
 
 TEST(ViewPace, DearDrawingsTakeAFifthOfTheTime) {
-    const Run r = run(0.012, 0.06, 10);
+    const Outcome r = watch(0.012, 0.06, 10);
     EXPECT_NEAR(r.drawings * 0.06 / 10, 0.2, 0.03);
 }
 
 TEST(ViewPace, TheViewNeverSeemsToHang) {
-    EXPECT_LT(run(0.02, 1.0, 30).longest_gap_s, 1.6);  // half a second, a drawing, a picture
-    EXPECT_LT(run(0.2, 0.0, 30).longest_gap_s, 0.5);
+    EXPECT_LT(watch(0.02, 1.0, 30).longest_gap_s, 1.6);  // half a second, a drawing, a picture
+    EXPECT_LT(watch(0.2, 0.0, 30).longest_gap_s, 0.5);
 }
 
 TEST(ViewPace, DrawsAtOnce) {
