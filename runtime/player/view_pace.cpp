@@ -6,13 +6,13 @@ namespace sonocase {
 
 bool ViewPace::due(double now_s) {
     constexpr double kLeast_s = 0.03, kMost_s = 0.5;  // beyond, the view would seem to hang
-    constexpr double kRest = 4;                       // times what a drawing adds to its picture
+    constexpr double kShare = 0.2;                    // of the time, for drawings
     if (last_s_ >= 0) {
         const double took = now_s - last_s_;
         if (!drew_)
             plain_s_ = plain_s_ < 0 ? took : 0.8 * plain_s_ + 0.2 * took;
         else if (plain_s_ >= 0)
-            wait_s_ = std::clamp(kRest * (took - plain_s_), kLeast_s, kMost_s);
+            wait_s_ = std::clamp((took - plain_s_) / kShare, kLeast_s, kMost_s);
     }
     last_s_ = now_s;
     // Never in two pictures running: one without is what a drawing's cost is measured against.
