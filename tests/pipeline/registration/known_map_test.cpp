@@ -135,6 +135,39 @@ TEST(KnownMap, TheFrontHalfAloneStaysWithinTwoMillimetres) {
     EXPECT_NE(warnings_of(f.result).find("cover only"), std::string::npos) << warnings_of(f.result);
 }
 
+// A sweep of the front of a body unlike the patient's leaves upside down and slides open. A head
+// direction some 12 degrees off and one point low on the body, touched to 5 mm, settle both.
+TEST(KnownMap, HeadDirectionAndALowLandmarkPlaceAFrontSweep) {
+    NEEDS_PATIENT();
+    for (const std::uint64_t seed : {11, 12, 13, 14}) {
+        SCOPED_TRACE(::testing::Message() << "seed " << seed);
+        Random random(seed);
+        const Registration truth = testing::random_quadratic_map(
+            patient()->skin.box, patient()->skin.skin, random, 14);
+        SweepPlan front;
+        front.part = SweptPart::front;
+        const Surface sweep = testing::sweep_of(patient()->skin.skin, truth, random, front);
+        const Vector3 head = truth.mannequin_from_ct.rotation * Vector3{0, 0, 1};
+        const Vector3 across = truth.mannequin_from_ct.rotation * Vector3{0.6, 0.8, 0};
+        RegisterOptions options;
+        options.up = normalized(head + 0.2 * across);
+        const auto lowest =
+            *std::min_element(patient()->skin.skin.points.begin(), patient()->skin.skin.points.end(),
+                              [](Point3 a, Point3 b) { return a.z < b.z; });
+        options.landmarks = {{"low", lowest, mannequin_from_ct(truth, lowest) + 5 * across}};
+        const auto fitted = register_surfaces({patient()->skin, sweep}, options);
+        ASSERT_TRUE(fitted) << fitted.error().message();
+        const Registration& map = fitted->registration;
+        EXPECT_GT(dot(map.mannequin_from_ct.rotation * Vector3{0, 0, 1}, head), 0.9);
+        Vector3 offset;
+        for (const Point3 p : patient()->inside)
+            offset = offset + (1.0 / static_cast<double>(patient()->inside.size())) *
+                                  (mannequin_from_ct(map, p) - mannequin_from_ct(truth, p));
+        EXPECT_LT(norm(offset - dot(offset, head) * head), 10);
+        RecordProperty("lateral_mm", std::to_string(norm(offset - dot(offset, head) * head)));
+    }
+}
+
 TEST(KnownMap, OneSideGivesNumbersAndAWarning) {
     NEEDS_PATIENT();
     SweepPlan side;
