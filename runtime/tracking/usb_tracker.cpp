@@ -8,6 +8,7 @@ namespace sonocase::runtime {
 namespace {
 
 constexpr const char* kUnplugged = "The tracker was unplugged; plug it in again.";
+constexpr const char* kSilent = "No reading comes; the device is being started again.";
 
 }  // namespace
 
@@ -81,7 +82,8 @@ void UsbTracker::run() {
         note_ = found > 1 ? "Two are plugged in; the one at " + (*pipe)->place() +
                                 " is used. Unplug the other to be sure."
                           : "";
-        say(TrackerPhase::starting, note_);
+        // What was said of a device that fell silent stands until a reading comes.
+        say(TrackerPhase::starting, silent_ ? std::string(kSilent) : note_);
         std::string name = (*pipe)->id().name;
         const Status started = driver_->start(**pipe, options_, name);
         if (!started) {
@@ -94,7 +96,7 @@ void UsbTracker::run() {
             const std::lock_guard lock(mutex_);
             health_.phase = TrackerPhase::streaming;
             health_.device = name;
-            health_.message = note_;
+            health_.message = silent_ ? std::string(kSilent) : note_;
             ++health_.connects;
         }
         stream(**pipe);
@@ -117,6 +119,7 @@ void UsbTracker::stream(UsbPipe& pipe) {
             reading.sequence = sequence + 1;
             reading.time_s = now_s;
             box_.publish(reading);
+            silent_ = false;
             const std::string warning = driver_->warning();
             const std::lock_guard lock(mutex_);
             ++health_.readings;
@@ -134,7 +137,8 @@ void UsbTracker::stream(UsbPipe& pipe) {
         }
         if (outcome == UsbOutcome::ok || outcome == UsbOutcome::timeout) {
             if (now_s - last_s > options_.silence_s) {
-                say(TrackerPhase::starting, "No reading comes; the device is being started again.");
+                silent_ = true;
+                say(TrackerPhase::starting, kSilent);
                 return;
             }
             continue;

@@ -67,6 +67,7 @@ class UsbTracker final : public Tracker {
     TrackerHealth health_;
     std::string note_;        // two alike
     bool unplugged_ = false;  // and not back yet
+    bool silent_ = false;     // started again since the last reading
     double mean_period_s_ = 0;
     std::function<void()> wake_;
     std::thread thread_;
