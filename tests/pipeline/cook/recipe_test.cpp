@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "support/temporary_folder.h"
@@ -188,6 +189,12 @@ TEST(Recipe, AnalyticBodiesAndHintsAreNamed) {
     ASSERT_FALSE(bad.has_value());
     EXPECT_NE(bad.error().message().find("slender"), std::string::npos) << bad.error().message();
     EXPECT_NE(bad.error().message().find("x.toml:3"), std::string::npos) << bad.error().message();
+}
+
+TEST(StageOptions, EverySectionIsListedOnce) {
+    std::vector<std::string> sections = option_sections();
+    std::sort(sections.begin(), sections.end());
+    EXPECT_EQ(std::adjacent_find(sections.begin(), sections.end()), sections.end());
 }
 
 TEST(StageOptions, EveryKeyKeepsItsDefaultThroughText) {
