@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "pipeline/tradeoff/trial_file.h"
+
 namespace sonocase::pipeline {
 namespace {
 
@@ -47,6 +49,20 @@ TEST(Sweep, ResumedSweepMeasuresOnlyWhatIsMissing) {
     const auto again = run_sweep(s, plan, first, options, {}, {});
     EXPECT_EQ(runs, once);
     EXPECT_EQ(again.size(), first.size());
+}
+
+TEST(Sweep, ResumesFromItsFileWhateverTheNames) {
+    int runs = 0;
+    Suite s = suite(runs);
+    s.named.push_back({TrialRole::paper, "paper, eq. (10), K0 = 1", {{"toy.k", "1"}}});
+    const auto plan = plan_sweep(s, {});
+    const auto first = run_sweep(s, plan, {}, {}, {}, {});
+    const auto kept = parse_trials_csv(format_trials_csv(first), "kept.csv");
+    ASSERT_TRUE(kept);
+    const int once = runs;
+    const auto again = run_sweep(s, plan, *kept, {}, {}, {});
+    EXPECT_EQ(runs, once);
+    for (std::size_t i = 0; i < plan.size(); ++i) EXPECT_EQ(again[i].name, plan[i].name);
 }
 
 TEST(Sweep, SettingsThatComeToTheSameAreMeasuredOnce) {
