@@ -87,30 +87,24 @@ PaperFast::PaperFast(const PaperScene& scene,
     pairs_.resize(samples * static_cast<std::size_t>(pair_stride_) + kSlack);
 }
 
-void PaperFast::render(const PaperFrame& frame,
-                       bool flip,
-                       bool keep_all,
-                       std::span<std::uint8_t> pixels) {
+// Where each beam of a block starts and how far a sample steps, in voxels and in texture periods;
+// true if all its samples lie in the volume.
+bool PaperFast::place_block(const Rigid& volume_from_probe, int first_line) {
     const ScanGeometry& g = geometry_;
-    auto clock = std::chrono::steady_clock::now();
-    passes_ = {};
-
-    // Where each beam starts and how far a sample steps, in voxels and in texture periods.
     const double edge_mm = static_cast<double>(1 << scene_.edge_log2) * scene_.texture_voxel_mm;
-    std::array<bool, 4096 / kPaperBlock> block_inside;
-    for (int l = 0; l < lines_; ++l) {
-        const double line = std::min(l, g.scanlines - 1);
-        const PlanePoint o = g.point(line, 0), e = g.point(line, g.samples - 1);
-        const Point3 first = frame.volume_from_probe * Point3{o.x, 0, o.z};
-        const Point3 last = frame.volume_from_probe * Point3{e.x, 0, e.z};
+    const double first_r = 0.5 * g.step_mm, last_r = (g.samples - 0.5) * g.step_mm;
+    const double steps = std::max(g.samples - 1, 1);
+    bool inside = true;
+    for (int l = first_line; l < first_line + kPaperBlock; ++l) {
+        const auto& [o, d] = g.beams[static_cast<std::size_t>(std::min(l, g.scanlines - 1))];
+        const Point3 first = volume_from_probe * Point3{o.x + first_r * d.x, 0, o.z + first_r * d.z};
+        const Point3 last = volume_from_probe * Point3{o.x + last_r * d.x, 0, o.z + last_r * d.z};
         const Point3 a = scene_.grid.voxel_from_point(first),
                      b = scene_.grid.voxel_from_point(last);
         const Vector3 from_origin = first - scene_.grid.origin_mm;
-        bool inside = true;
         for (int axis = 0; axis < 3; ++axis) {
             const auto i = static_cast<std::size_t>(axis * lines_ + l);
             const auto t = static_cast<std::size_t>((axis + 3) * lines_ + l);
-            const double steps = std::max(g.samples - 1, 1);
             start_[i] = fixed_voxel(a[axis] + 0.5);
             step_[i] = fixed_voxel((b[axis] - a[axis]) / steps);
             start_[t] = static_cast<std::int32_t>(fixed_phase(from_origin[axis] / edge_mm));
@@ -120,9 +114,18 @@ void PaperFast::render(const PaperFrame& frame,
             for (const double v : {a[axis], b[axis]})
                 inside = inside && v > 1 && v < scene_.grid.size[axis] - 2;
         }
-        bool& whole = block_inside[static_cast<std::size_t>(l / kPaperBlock)];
-        whole = l % kPaperBlock == 0 ? inside : whole && inside;
     }
+    return inside;
+}
+
+void PaperFast::render(const PaperFrame& frame,
+                       bool flip,
+                       bool keep_all,
+                       std::span<std::uint8_t> pixels) {
+    const ScanGeometry& g = geometry_;
+    auto clock = std::chrono::steady_clock::now();
+    passes_ = {};
+
     for (int k = 0; k < g.samples; ++k) {
         const auto i = static_cast<std::size_t>(k);
         noise_start_[i] = noise_row_start(frame.seed, frame.frame, static_cast<std::uint32_t>(k));
@@ -163,37 +166,34 @@ void PaperFast::render(const PaperFrame& frame,
     std::atomic<bool> shadow_met{false}, needle_met{false};
     std::atomic<std::int64_t> needle_ns{0};
     const int blocks = lines_ / kPaperBlock;
-    std::atomic<int> next_block{0};
-    workers_.run([&](int part, int) {
-        for (int block = next_block.fetch_add(1); block < blocks; block = next_block.fetch_add(1)) {
-            PaperBlock b = base;
-            const int line = block * kPaperBlock;
-            b.start = start_.data() + line;
-            b.step = step_.data() + line;
-            b.stage = stage_.data() + static_cast<std::size_t>(part) *
-                                          static_cast<std::size_t>(g.samples) * kPaperBlock;
-            b.image = image_.data() + margin_ + line;
-            b.noise = noise_.data() + line;
-            b.inside = block_inside[static_cast<std::size_t>(block)];
-            const std::uint32_t met = sample_paper_block(b);
-            if (needle) {
-                NeedleRow row;
-                int k0 = 0, k1 = 0;
-                if (strip.prepare_block(*frame.needle, g, line, keep_all, row, k0, k1)) {
-                    const auto start = std::chrono::steady_clock::now();
-                    draw_paper_needle(b, row, k0, k1);
-                    needle_ns.fetch_add((std::chrono::steady_clock::now() - start).count());
-                    needle_met.store(true, std::memory_order_relaxed);
-                }
+    workers_.for_each(blocks, [&](int part, int block) {
+        PaperBlock b = base;
+        const int line = block * kPaperBlock;
+        b.start = start_.data() + line;
+        b.step = step_.data() + line;
+        b.stage = stage_.data() + static_cast<std::size_t>(part) *
+                                      static_cast<std::size_t>(g.samples) * kPaperBlock;
+        b.image = image_.data() + margin_ + line;
+        b.noise = noise_.data() + line;
+        b.inside = place_block(frame.volume_from_probe, line);
+        const std::uint32_t met = sample_paper_block(b);
+        if (needle) {
+            NeedleRow row;
+            int k0 = 0, k1 = 0;
+            if (strip.prepare_block(*frame.needle, g, line, keep_all, row, k0, k1)) {
+                const auto start = std::chrono::steady_clock::now();
+                draw_paper_needle(b, row, k0, k1);
+                needle_ns.fetch_add((std::chrono::steady_clock::now() - start).count());
+                needle_met.store(true, std::memory_order_relaxed);
             }
-            b.with_shadow = frame.effects.shadow && ((met & 0x100u) != 0 || keep_all);
-            if (b.with_shadow) shadow_met.store(true, std::memory_order_relaxed);
-            finish_paper_block(b);
-            if (line == 0) repeat_edge(b.image, -margin_, margin_, 0);
-            if (block == blocks - 1) {
-                const int last = g.scanlines - 1 - line;
-                repeat_edge(b.image, last + 1, lines_ - g.scanlines + margin_, last);
-            }
+        }
+        b.with_shadow = frame.effects.shadow && ((met & 0x100u) != 0 || keep_all);
+        if (b.with_shadow) shadow_met.store(true, std::memory_order_relaxed);
+        finish_paper_block(b);
+        if (line == 0) repeat_edge(b.image, -margin_, margin_, 0);
+        if (block == blocks - 1) {
+            const int last = g.scanlines - 1 - line;
+            repeat_edge(b.image, last + 1, lines_ - g.scanlines + margin_, last);
         }
     });
     passes_.shadow_met = shadow_met.load();
@@ -202,8 +202,9 @@ void PaperFast::render(const PaperFrame& frame,
     passes_.beams_ms = std::max(milliseconds_since(clock) - passes_.needle_ms, 0.0);
     clock = std::chrono::steady_clock::now();
 
-    workers_.run([&](int part, int parts) {
-        const int begin = g.samples * part / parts, end = g.samples * (part + 1) / parts;
+    constexpr int kRows = 32;  // that a thread takes at a time
+    workers_.for_each((g.samples + kRows - 1) / kRows, [&](int part, int item) {
+        const int begin = item * kRows, end = std::min(begin + kRows, g.samples);
         std::uint8_t* rows[2];
         rows[0] = blurred_.data() +
                   static_cast<std::size_t>(part) * 2 * static_cast<std::size_t>(lines_ + kSlack);
@@ -217,7 +218,6 @@ void PaperFast::render(const PaperFrame& frame,
             blur_paper_row(in, lines_, blur_taps_.data(), margin_, out);
             return out;
         };
-        if (begin == end) return;
         const std::uint8_t* upper = filtered(begin);
         for (int k = begin; k < end; ++k) {
             const std::uint8_t* lower = k + 1 < g.samples ? filtered(k + 1) : upper;
@@ -230,10 +230,7 @@ void PaperFast::render(const PaperFrame& frame,
     passes_.blur_ms = milliseconds_since(clock);
     clock = std::chrono::steady_clock::now();
 
-    workers_.run([&](int part, int parts) {
-        scan_convert(table_, pairs_, g.width_px, g.height_px * part / parts,
-                     g.height_px * (part + 1) / parts, flip, pixels);
-    });
+    scan_convert(workers_, table_, pairs_, g, flip, pixels);
     passes_.convert_ms = milliseconds_since(clock);
 }
 

@@ -34,6 +34,8 @@ class PaperFast {
     std::span<const std::int8_t> noise_tile() const { return noise_; }
 
   private:
+    bool place_block(const Rigid& volume_from_probe, int first_line);
+
     const PaperScene& scene_;
     const ScanGeometry geometry_;
     WorkerPool& workers_;

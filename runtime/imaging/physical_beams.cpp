@@ -12,12 +12,24 @@ namespace sonocase::runtime {
 
 using namespace physical;
 
-void PhysicalFast::place_beams(const PhysicalFrame& f, const BreathingField& breathing) {
+void PhysicalFast::find_contact(const PhysicalFrame& f) {
+    const int lines = geometry_.scanlines;
+    workers_.for_each(lines_ / kBeamBlock, [&](int, int block) {
+        const int first = block * kBeamBlock;
+        find_gaps(scene_, geometry_, f, first, std::min(first + kBeamBlock, lines), raw_gaps_);
+    });
+    passes_.beams_in_contact = smooth_gaps(lines, raw_gaps_, gaps_);
+    if (!f.effects.contact) std::fill(gaps_.begin(), gaps_.end(), 0.0f);
+    passes_.gap_met = std::any_of(gaps_.begin(), gaps_.begin() + lines,
+                                  [](float gap) { return gap != 0.0f; });
+}
+
+void PhysicalFast::place_beams(const PhysicalFrame& f, const BreathingField* breathing, int first) {
     const ScanGeometry& g = geometry_;
     const Matrix3 turn = speckle_rotation();
     const double inverse_scatter = 1 / tables_.scatter_mm, inverse_voxel = 1 / scene_.voxel_mm;
     const auto limited = [](double v) { return static_cast<float>(std::clamp(v, -1e6, 1e6)); };
-    for (int l = 0; l < lines_; ++l) {
+    for (int l = first; l < first + kBeamBlock; ++l) {
         const int line = std::min(l, g.scanlines - 1);
         const auto& [o, d] = g.beams[static_cast<std::size_t>(line)];
         const Point3 origin = f.volume_from_probe * Point3{o.x, 0, o.z};
@@ -38,32 +50,35 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, const BreathingField& bre
         }
         put(kGap, static_cast<double>(gaps_[static_cast<std::size_t>(line)]));
     }
-    if (!f.effects.breathing || !f.motion.breathes() || breathing.empty()) return;
+    if (breathing == nullptr) return;
     // The weight is smooth over centimetres: every fourth beam, linear in between.
+    constexpr int kEvery = 4;
     const int nodes = g.samples / kBreathingNode + 2;
     for (int node = 0; node < nodes; ++node) {
-        float* row = breathing_.data() + static_cast<std::ptrdiff_t>(node) * lines_;
+        float* row = breathing_.data() + static_cast<std::ptrdiff_t>(node) * lines_ + first;
         const int k = std::min(node * kBreathingNode, g.samples - 1);
         const double r = r_[static_cast<std::size_t>(k)];
         float left = 0;
-        for (int l = 0; l <= lines_; l += 4) {
-            const int line = std::min(l, g.scanlines - 1);
+        for (int l = 0; l <= kBeamBlock; l += kEvery) {
+            const int line = std::min(first + l, g.scanlines - 1);
             const auto& [o, d] = g.beams[static_cast<std::size_t>(line)];
             const double s =
                 r + static_cast<double>(std::max(gaps_[static_cast<std::size_t>(line)], 0.0f)) *
                         tables_.rows[static_cast<std::size_t>(k)].contact;
             const auto right = static_cast<float>(
-                breathing.weight(f.volume_from_probe * Point3{o.x + s * d.x, 0, o.z + s * d.z}));
+                breathing->weight(f.volume_from_probe * Point3{o.x + s * d.x, 0, o.z + s * d.z}));
             if (l > 0) {
-                for (int j = 0; j < 4; ++j)
-                    row[l - 4 + j] = left + (right - left) * static_cast<float>(j) / 4;
+                for (int j = 0; j < kEvery; ++j)
+                    row[l - kEvery + j] = left + (right - left) * static_cast<float>(j) / kEvery;
             }
             left = right;
         }
     }
 }
 
-void PhysicalFast::sample_beams(const PhysicalFrame& f, bool keep_all) {
+void PhysicalFast::sample_beams(const PhysicalFrame& f,
+                                const BreathingField& field,
+                                bool keep_all) {
     const ScanGeometry& g = geometry_;
     for (int k = 0; k < g.samples; ++k) {
         const auto i = static_cast<std::size_t>(k);
@@ -82,7 +97,8 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f, bool keep_all) {
         (1 / scene_.voxel_mm) * (f.volume_from_probe.rotation * Vector3{0, 1, 0});
     const Vector3 sideways =
         (kLookupJitter / 32) * (f.volume_from_probe.rotation * Vector3{1, 0, 0});
-    const bool breathes = f.effects.breathing && f.motion.breathes();
+    const bool breathes = f.effects.breathing && f.motion.breathes() && !field.empty();
+    const BreathingField* breathing = breathes ? &field : nullptr;
     const Vector3 shift = (1 / scene_.voxel_mm) * f.motion.breathing_mm;
     const Vector3 shift_speckle =
         (1 / tables_.scatter_mm) * (speckle_rotation() * f.motion.breathing_mm);
@@ -156,47 +172,45 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f, bool keep_all) {
         fine{false}, target{false};
     std::atomic<std::int64_t> needle_ns{0};
     const int blocks = lines_ / kBeamBlock;
-    std::atomic<int> next{0};
-    workers_.run([&](int, int) {
-        for (int block = next.fetch_add(1); block < blocks; block = next.fetch_add(1)) {
-            PhysicalBlock b = base;
-            const int line = block * kBeamBlock;
-            b.beams = beams_.data() + line;
-            b.white = noise_.white.data() + line;
-            b.breathing = breathes ? breathing_.data() + line : nullptr;
-            b.echoes = echoes_ + kRowMargin + line;
-            b.light = light_ + kRowMargin + line;
-            b.tail = tail_ + kRowMargin + line;
-            sample_beam_block(b);
-            if (b.boundary_met) boundary.store(true, std::memory_order_relaxed);
-            if (b.refraction_met) refraction.store(true, std::memory_order_relaxed);
-            if (b.hard_met) hard.store(true, std::memory_order_relaxed);
-            if (b.fine_met) fine.store(true, std::memory_order_relaxed);
-            if (b.target_met) target.store(true, std::memory_order_relaxed);
-            if (needle) {
-                NeedleRow row;
-                int k0 = 0, k1 = 0;
-                if (strip.prepare_block(*f.needle, g, line, keep_all, row, k0, k1)) {
-                    const auto start = std::chrono::steady_clock::now();
-                    draw_physical_needle(b, row, k0, k1);
-                    needle_ns.fetch_add((std::chrono::steady_clock::now() - start).count());
-                    needle_met.store(true, std::memory_order_relaxed);
-                }
+    workers_.for_each(blocks, [&](int, int block) {
+        PhysicalBlock b = base;
+        const int line = block * kBeamBlock;
+        place_beams(f, breathing, line);
+        b.beams = beams_.data() + line;
+        b.white = noise_.white.data() + line;
+        b.breathing = breathing != nullptr ? breathing_.data() + line : nullptr;
+        b.echoes = echoes_ + kRowMargin + line;
+        b.light = light_ + kRowMargin + line;
+        b.tail = tail_ + kRowMargin + line;
+        sample_beam_block(b);
+        if (b.boundary_met) boundary.store(true, std::memory_order_relaxed);
+        if (b.refraction_met) refraction.store(true, std::memory_order_relaxed);
+        if (b.hard_met) hard.store(true, std::memory_order_relaxed);
+        if (b.fine_met) fine.store(true, std::memory_order_relaxed);
+        if (b.target_met) target.store(true, std::memory_order_relaxed);
+        if (needle) {
+            NeedleRow row;
+            int k0 = 0, k1 = 0;
+            if (strip.prepare_block(*f.needle, g, line, keep_all, row, k0, k1)) {
+                const auto start = std::chrono::steady_clock::now();
+                draw_physical_needle(b, row, k0, k1);
+                needle_ns.fetch_add((std::chrono::steady_clock::now() - start).count());
+                needle_met.store(true, std::memory_order_relaxed);
             }
-            tail_from_[static_cast<std::size_t>(block)] = b.tail_from;
-            // Beyond the outermost beams the light mirrors, for the aperture's boxes.
+        }
+        tail_from_[static_cast<std::size_t>(block)] = b.tail_from;
+        // Beyond the outermost beams the light mirrors, for the aperture's boxes.
+        if (line == 0) {
+            for (int k = 0; k < g.samples; ++k) {
+                float* light = b.light + static_cast<std::ptrdiff_t>(k) * stride_;
+                for (int j = 0; j < 3; ++j) light[-1 - j] = light[std::min(j, g.scanlines - 1)];
+            }
+        }
+        if (block == blocks - 1) {
             for (int k = 0; k < g.samples; ++k) {
                 float* light = b.light + static_cast<std::ptrdiff_t>(k) * stride_ - line;
-                if (line == 0) {
-                    for (int j = 0; j < 3; ++j) light[-1 - j] = light[std::min(j, g.scanlines - 1)];
-                }
-            }
-            if (block == blocks - 1) {
-                for (int k = 0; k < g.samples; ++k) {
-                    float* light = b.light + static_cast<std::ptrdiff_t>(k) * stride_ - line;
-                    for (int j = 0; j < 3; ++j)
-                        light[g.scanlines + j] = light[std::max(g.scanlines - 1 - j, 0)];
-                }
+                for (int j = 0; j < 3; ++j)
+                    light[g.scanlines + j] = light[std::max(g.scanlines - 1 - j, 0)];
             }
         }
     });

@@ -103,6 +103,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     noise_start_.resize(2 * kPersistedFrames * samples);
 
     const auto lines = static_cast<std::size_t>(lines_);
+    raw_gaps_.assign(lines + kSlack, 0.0f);
     gaps_.assign(lines + kSlack, 0.0f);
     beams_.assign(kBeamNumbers * lines + kSlack, 0.0f);
     breathing_.assign((samples / kBreathingNode + 2) * lines + kSlack, 0.0f);
@@ -123,9 +124,9 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     work_.assign(threads * 2 * static_cast<std::size_t>(stride_), 0.0f);
     const auto ring_rows = static_cast<std::size_t>(std::max(2 * tables.axial_reach + 1, 3));
     ring_.assign(threads * 2 * ring_rows * static_cast<std::size_t>(stride_), 0.0f);
+    next_row_.assign(threads, -1);
     envelope_.assign(threads * static_cast<std::size_t>(stride_), 0.0f);
-    mean_.assign(static_cast<std::size_t>(cells_k_) * static_cast<std::size_t>(cells_l_), 0.0f);
-    wide_.assign(static_cast<std::size_t>(cells_k_) * static_cast<std::size_t>(stride_), 0.0f);
+    haze_.assign(static_cast<std::size_t>(cells_k_) * static_cast<std::size_t>(stride_), 0.0f);
     shade_.assign(threads * 2 * static_cast<std::size_t>(lines_ + kSlack), 0);
     pairs_.assign(samples * static_cast<std::size_t>(pair_stride_) + kSlack, 0);
 }
@@ -147,25 +148,15 @@ void PhysicalFast::render(const PhysicalFrame& f,
                           std::span<std::uint8_t> pixels) {
     auto clock = std::chrono::steady_clock::now();
     passes_ = {};
-    std::fill(gaps_.begin(), gaps_.end(), 0.0f);
-    passes_.beams_in_contact = find_gaps(scene_, geometry_, f, gaps_);
-    if (!f.effects.contact) std::fill(gaps_.begin(), gaps_.end(), 0.0f);
-    for (int l = 0; l < geometry_.scanlines; ++l)
-        passes_.gap_met = passes_.gap_met || gaps_[static_cast<std::size_t>(l)] != 0.0f;
-    place_beams(f, breathing);
+    find_contact(f);
     passes_.contact_ms = lap_ms(clock);
-    sample_beams(f, keep_all);
+    sample_beams(f, breathing, keep_all);
     passes_.beams_ms = std::max(lap_ms(clock) - passes_.needle_ms, 0.0);
     filter_rows(f);
     passes_.filter_ms = lap_ms(clock);
-    if (f.effects.haze) spread_haze();
     make_grey(f);
     passes_.grey_ms = lap_ms(clock);
-    const ScanGeometry& g = geometry_;
-    workers_.run([&](int part, int parts) {
-        scan_convert(conversion_, pairs_, g.width_px, g.height_px * part / parts,
-                     g.height_px * (part + 1) / parts, flip, pixels);
-    });
+    scan_convert(workers_, conversion_, pairs_, geometry_, flip, pixels);
     passes_.convert_ms = lap_ms(clock);
 }
 

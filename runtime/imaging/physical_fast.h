@@ -2,6 +2,7 @@
 // precision in fixed order, or integer: the same pixels on every instruction set and thread count.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -45,11 +46,14 @@ class PhysicalFast {
     int shade(int sample, int line) const;
 
   private:
-    void place_beams(const PhysicalFrame& frame, const BreathingField& breathing);
-    void sample_beams(const PhysicalFrame& frame, bool keep_all);
+    void find_contact(const PhysicalFrame& frame);
+    // breathing: null where nothing moves. first: of a block of beams.
+    void place_beams(const PhysicalFrame& frame, const BreathingField* breathing, int first);
+    void sample_beams(const PhysicalFrame& frame, const BreathingField& breathing, bool keep_all);
     void filter_rows(const PhysicalFrame& frame);
-    void spread_haze();
+    void spread_haze(int cell_row, float level, const float* envelope);
     void make_grey(const PhysicalFrame& frame);
+    void start_rows() { std::fill(next_row_.begin(), next_row_.end(), -1); }
 
     const PhysicalScene& scene_;
     const ScanGeometry geometry_;
@@ -67,13 +71,14 @@ class PhysicalFast {
     std::vector<std::uint32_t> elevation_start_, lookup_start_, clutter_start_, haze_start_,
         noise_start_;
 
-    std::vector<float> gaps_, beams_, breathing_;
+    std::vector<float> raw_gaps_, gaps_, beams_, breathing_;
     std::vector<float> planes_;  // holds the four below, samples x stride each
     std::int32_t* echoes_ = nullptr;
     float *light_ = nullptr, *tail_ = nullptr, *power_ = nullptr;
     std::vector<std::int32_t> tail_from_;        // per block
     std::vector<float> work_, ring_;             // per thread
-    std::vector<float> envelope_, mean_, wide_;  // haze
+    std::vector<int> next_row_;  // per thread: what its ring can go on with
+    std::vector<float> envelope_, haze_;  // per thread: sum of a row of cells; # cells x stride
     std::vector<std::uint8_t> shade_;            // per thread: two rows
     std::vector<std::uint16_t> pairs_;
     PhysicalPasses passes_;

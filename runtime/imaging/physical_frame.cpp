@@ -55,14 +55,15 @@ int label_at(const PhysicalScene& s, int i, int j, int k) {
               static_cast<std::size_t>((i & 3) + 4 * (j & 3) + 16 * (k & 3))];
 }
 
-int find_gaps(const PhysicalScene& scene,
-              const ScanGeometry& g,
-              const PhysicalFrame& frame,
-              std::span<float> gaps) {
-    int touching = 0;
-    float raw[4096];
-    for (int l = 0; l < g.scanlines; ++l) {
-        raw[l] = -1;
+void find_gaps(const PhysicalScene& scene,
+               const ScanGeometry& g,
+               const PhysicalFrame& frame,
+               int first,
+               int last,
+               std::span<float> raw) {
+    for (int l = first; l < last; ++l) {
+        float& gap = raw[static_cast<std::size_t>(l)];
+        gap = -1;
         const auto& [o, d] = g.beams[static_cast<std::size_t>(l)];
         const Point3 p = scene.grid.voxel_from_point(frame.volume_from_probe * Point3{o.x, 0, o.z});
         const Vector3 v = (physical::kGapStepMm / scene.voxel_mm) *
@@ -74,19 +75,24 @@ int find_gaps(const PhysicalScene& scene,
                                        static_cast<int>(std::floor(q.y + 0.5)),
                                        static_cast<int>(std::floor(q.z + 0.5)));
             if (label == 0) continue;
-            raw[l] = static_cast<float>(step * physical::kGapStepMm);
-            ++touching;
+            gap = static_cast<float>(step * physical::kGapStepMm);
             break;
         }
     }
-    for (int l = 0; l < g.scanlines; ++l) {
+}
+
+int smooth_gaps(int scanlines, std::span<const float> raw, std::span<float> gaps) {
+    int touching = 0;
+    for (int l = 0; l < scanlines; ++l) {
         gaps[static_cast<std::size_t>(l)] = -1;
-        if (raw[l] < 0) continue;
+        if (raw[static_cast<std::size_t>(l)] < 0) continue;
+        ++touching;
         float sum = 0;
         int n = 0;
-        for (int j = std::max(l - 4, 0); j <= std::min(l + 4, g.scanlines - 1); ++j) {
-            if (raw[j] < 0) continue;
-            sum += raw[j];
+        for (int j = std::max(l - 4, 0); j <= std::min(l + 4, scanlines - 1); ++j) {
+            const float gap = raw[static_cast<std::size_t>(j)];
+            if (gap < 0) continue;
+            sum += gap;
             ++n;
         }
         gaps[static_cast<std::size_t>(l)] = sum / static_cast<float>(n);

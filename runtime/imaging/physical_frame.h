@@ -78,12 +78,16 @@ inline std::uint32_t noise_start(std::uint32_t seed, NoiseUse use, std::uint32_t
 inline constexpr int kPersistedFrames = 4;
 inline constexpr std::array<double, kPersistedFrames> kPersistence{0.40, 0.30, 0.20, 0.10};
 
-// Gap between probe face and skin on every beam, mm, smoothed over neighbours; negative: no skin
-// within reach, so that the beam sees air. Returns the number of beams in contact.
-int find_gaps(const PhysicalScene& scene,
-              const ScanGeometry& geometry,
-              const PhysicalFrame& frame,
-              std::span<float> gaps);
+// Gap between probe face and skin on the beams [first, last), mm; negative: no skin within reach, so
+// that the beam sees air. raw: # scanlines.
+void find_gaps(const PhysicalScene& scene,
+               const ScanGeometry& geometry,
+               const PhysicalFrame& frame,
+               int first,
+               int last,
+               std::span<float> raw);
+// The mean over neighbouring beams that have skin. Returns the number of beams in contact.
+int smooth_gaps(int scanlines, std::span<const float> raw, std::span<float> gaps);
 
 int label_at(const PhysicalScene& scene, int i, int j, int k);
 

@@ -132,7 +132,11 @@ BeamSamples reference_beams(const PhysicalScene& s,
                     std::vector<double>(count, 1.0), std::vector<double>(count, 0.0)};
     auto& [q_re, q_im, light, tail] = out;
     std::vector<float> gaps(static_cast<std::size_t>(lines), 0.0f);
-    if (on.contact) find_gaps(s, g, f, gaps);
+    if (on.contact) {
+        std::vector<float> raw(gaps.size());
+        find_gaps(s, g, f, 0, g.scanlines, raw);
+        smooth_gaps(g.scanlines, raw, gaps);
+    }
     const BreathingField breathing =
         on.breathing && f.motion.breathes() ? BreathingField(*s.bundle) : BreathingField();
     const auto tile = [&](const std::vector<std::int8_t>& t, NoiseUse use, std::uint32_t frame,

@@ -12,6 +12,12 @@ namespace sonocase::runtime {
 
 using namespace physical;
 
+namespace {
+// Rows that a thread takes at a time.
+constexpr int kCellsAtOnce = 2;  // of haze
+constexpr int kGreyRows = 16;
+}  // namespace
+
 void PhysicalFast::filter_rows(const PhysicalFrame& f) {
     const ScanGeometry& g = geometry_;
     const int reach = f.effects.point_spread ? tables_.axial_reach : 0;
@@ -19,9 +25,11 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
     const bool tails = f.effects.bone_tail || f.effects.gas_ring_down || f.effects.needle;
     const int persisted = f.effects.persistence ? kPersistedFrames : 1;
     static constexpr std::array<float, 1> kOneTap{1.0f};
-    workers_.run([&](int part, int parts) {
-        const int begin = cells_k_ * part / parts * kHazeCell;
-        const int end = std::min(cells_k_ * (part + 1) / parts * kHazeCell, g.samples);
+    const auto haze_level = static_cast<float>(std::pow(10.0, kHazeDb / 20));
+    start_rows();
+    workers_.for_each((cells_k_ + kCellsAtOnce - 1) / kCellsAtOnce, [&](int part, int item) {
+        const int begin = item * kCellsAtOnce * kHazeCell;
+        const int end = std::min(begin + kCellsAtOnce * kHazeCell, g.samples);
         float* work = work_.data() + static_cast<std::ptrdiff_t>(part) * 2 * stride_;
         float* ring = ring_.data() + static_cast<std::ptrdiff_t>(part) * 2 * ring_rows * stride_;
         float* envelope = envelope_.data() + static_cast<std::ptrdiff_t>(part) * stride_;
@@ -68,8 +76,12 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             row_task.out_im = ring_im(k);
             filter_row_across(row_task);
         };
-        for (int k = std::max(begin - reach, 0); k < std::min(begin + reach, g.samples); ++k)
-            fill(k);
+        int& next = next_row_[static_cast<std::size_t>(part)];
+        if (next != begin) {
+            for (int k = std::max(begin - reach, 0); k < std::min(begin + reach, g.samples); ++k)
+                fill(k);
+        }
+        next = end;
         PhysicalPowerTask t;
         const float* rows_re[2 * kMaxAxial + 1];
         const float* rows_im[2 * kMaxAxial + 1];
@@ -93,58 +105,51 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             t.gain = static_cast<float>(row.gain);
             t.power = power_ + at;
             make_power_row(t);
-            if (f.effects.haze && (k % kHazeCell == kHazeCell - 1 || k == g.samples - 1)) {
-                const int rows = k % kHazeCell + 1;
-                for (int cell = 0; cell < cells_l_; ++cell) {
-                    const int l0 = cell * kHazeCell, l1 = std::min(l0 + kHazeCell, g.scanlines);
-                    float sum = 0;
-                    for (int l = l0; l < l1; ++l) sum += envelope[l];
-                    mean_[static_cast<std::size_t>(k / kHazeCell * cells_l_ + cell)] =
-                        sum / static_cast<float>(rows * (l1 - l0));
-                }
-            }
+            if (f.effects.haze && (k % kHazeCell == kHazeCell - 1 || k == g.samples - 1))
+                spread_haze(k / kHazeCell, haze_level / static_cast<float>(k % kHazeCell + 1),
+                            envelope);
         }
     });
 }
 
-void PhysicalFast::spread_haze() {
-    const auto level = static_cast<float>(std::pow(10.0, kHazeDb / 20));
-    const int lines = geometry_.scanlines;
-    std::array<float, 4096 / kHazeCell + 1> wide;
-    for (int ck = 0; ck < cells_k_; ++ck) {
-        const float* mean = mean_.data() + static_cast<std::ptrdiff_t>(ck) * cells_l_;
-        for (int cl = 0; cl < cells_l_; ++cl) {
-            float sum = 0, beams = 0;
-            for (int j = std::max(cl - kHazeReach, 0); j <= std::min(cl + kHazeReach, cells_l_ - 1);
-                 ++j) {
-                const auto n =
-                    static_cast<float>(std::min((j + 1) * kHazeCell, lines) - j * kHazeCell);
-                sum += mean[j] * n;
-                beams += n;
-            }
-            wide[static_cast<std::size_t>(cl)] = level * sum / beams;
-        }
-        float* row = wide_.data() + static_cast<std::ptrdiff_t>(ck) * stride_;
-        for (int l = 0; l < lines; ++l) {
-            const float at = std::clamp((static_cast<float>(l) + 0.5f) / kHazeCell - 0.5f, 0.0f,
-                                        static_cast<float>(cells_l_ - 1));
-            const int l0 = std::min(static_cast<int>(at), std::max(cells_l_ - 2, 0)),
-                      l1 = std::min(l0 + 1, cells_l_ - 1);
-            const float mix = at - static_cast<float>(l0);
-            row[l] =
-                wide[static_cast<std::size_t>(l0)] +
-                (wide[static_cast<std::size_t>(l1)] - wide[static_cast<std::size_t>(l0)]) * mix;
-        }
+// The mean over cells of a row, `level` times its sum over the cell's samples, spread to both sides
+// and brought back to beams.
+void PhysicalFast::spread_haze(int cell_row, float level, const float* envelope) {
+    const int lines = geometry_.scanlines, last = cells_l_ - 1;
+    std::array<float, 4096 / kHazeCell + 1> sums, wide{};
+    for (int cell = 0; cell <= last; ++cell) {
+        float sum = 0;
+        for (int l = cell * kHazeCell; l < std::min((cell + 1) * kHazeCell, lines); ++l)
+            sum += envelope[l];
+        sums[static_cast<std::size_t>(cell)] = sum;
     }
+    for (int cell = 0; cell <= last; ++cell) {
+        const int first = std::max(cell - kHazeReach, 0), end = std::min(cell + kHazeReach, last);
+        float sum = 0;
+        for (int j = first; j <= end; ++j) sum += sums[static_cast<std::size_t>(j)];
+        const int beams = std::min((end + 1) * kHazeCell, lines) - first * kHazeCell;
+        wide[static_cast<std::size_t>(cell)] = level * sum / static_cast<float>(beams);
+    }
+    // Between the middles of the cells.
+    constexpr int kHalf = kHazeCell / 2;
+    float* row = haze_.data() + static_cast<std::ptrdiff_t>(cell_row) * stride_;
+    std::fill_n(row, kHalf, wide[0]);
+    for (int cell = 0; cell < last; ++cell) {
+        const float from = wide[static_cast<std::size_t>(cell)],
+                    step = (wide[static_cast<std::size_t>(cell) + 1] - from) / kHazeCell;
+        for (int j = 0; j < kHazeCell; ++j)
+            row[cell * kHazeCell + kHalf + j] = from + step * (static_cast<float>(j) + 0.5f);
+    }
+    std::fill_n(row + last * kHazeCell + kHalf, kHalf, wide[static_cast<std::size_t>(last)]);
 }
 
 void PhysicalFast::make_grey(const PhysicalFrame& f) {
     const ScanGeometry& g = geometry_;
     const int ring_rows = std::max(2 * tables_.axial_reach + 1, 3);
     const double per_db = 255 / f.dynamic_range_db;
-    workers_.run([&](int part, int parts) {
-        const int begin = g.samples * part / parts, end = g.samples * (part + 1) / parts;
-        if (begin == end) return;
+    start_rows();
+    workers_.for_each((g.samples + kGreyRows - 1) / kGreyRows, [&](int part, int item) {
+        const int begin = item * kGreyRows, end = std::min(begin + kGreyRows, g.samples);
         float* ring = ring_.data() + static_cast<std::ptrdiff_t>(part) * 2 * ring_rows * stride_;
         const auto ring_at = [&](int k) {
             return ring + static_cast<std::ptrdiff_t>(k % 3) * stride_;
@@ -167,8 +172,8 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
                 const double at = std::clamp((k + 0.5) / kHazeCell - 0.5, 0.0, cells_k_ - 1.0);
                 const int k0 = std::min(static_cast<int>(at), std::max(cells_k_ - 2, 0)),
                           k1 = std::min(k0 + 1, cells_k_ - 1);
-                t.haze_above = wide_.data() + static_cast<std::ptrdiff_t>(k0) * stride_;
-                t.haze_below = wide_.data() + static_cast<std::ptrdiff_t>(k1) * stride_;
+                t.haze_above = haze_.data() + static_cast<std::ptrdiff_t>(k0) * stride_;
+                t.haze_below = haze_.data() + static_cast<std::ptrdiff_t>(k1) * stride_;
                 t.haze_mix = static_cast<float>(at - k0);
                 for (int j = 0; j < 2; ++j) {
                     t.haze_re[j] = noise_.streak.data() +
@@ -193,8 +198,13 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
                                  f.effects.post_filter, f.effects.grey_map, shade_at(k)});
         };
         // Shade row k needs grey rows k - 1 .. k + 1; pair row k needs shade rows k and k + 1.
-        for (int k = std::max(begin - 1, 0); k <= std::min(begin + 1, g.samples - 1); ++k) fill(k);
-        shade(begin);
+        int& next = next_row_[static_cast<std::size_t>(part)];
+        if (next != begin) {
+            for (int k = std::max(begin - 1, 0); k <= std::min(begin + 1, g.samples - 1); ++k)
+                fill(k);
+            shade(begin);
+        }
+        next = end;
         for (int k = begin; k < end; ++k) {
             int lower = k;
             if (k + 1 < g.samples) {
@@ -203,7 +213,7 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
                 shade(k + 1);
             }
             pair_rows(shade_at(k), shade_at(lower), lines_,
-                                 pairs_.data() + static_cast<std::ptrdiff_t>(k) * pair_stride_);
+                      pairs_.data() + static_cast<std::ptrdiff_t>(k) * pair_stride_);
         }
     });
 }

@@ -105,5 +105,18 @@ void scan_convert(const ScanConversionTable& table,
     }
 }
 
+void scan_convert(WorkerPool& workers,
+                  const ScanConversionTable& table,
+                  std::span<const std::uint16_t> pairs,
+                  const ScanGeometry& g,
+                  bool flip_left_right,
+                  std::span<std::uint8_t> pixels) {
+    constexpr int kStrip = 16;
+    workers.for_each((g.height_px + kStrip - 1) / kStrip, [&](int, int strip) {
+        scan_convert(table, pairs, g.width_px, strip * kStrip,
+                     std::min((strip + 1) * kStrip, g.height_px), flip_left_right, pixels);
+    });
+}
+
 }  // namespace sonocase::runtime
 #endif

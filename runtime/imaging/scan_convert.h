@@ -5,6 +5,7 @@
 #include <span>
 
 #include "runtime/imaging/scan_geometry.h"
+#include "runtime/imaging/worker_pool.h"
 
 namespace sonocase::runtime {
 
@@ -20,6 +21,14 @@ void scan_convert(const ScanConversionTable& table,
                   int width_px,
                   int row_begin,
                   int row_end,
+                  bool flip_left_right,
+                  std::span<std::uint8_t> pixels);
+
+// The whole picture, strip by strip.
+void scan_convert(WorkerPool& workers,
+                  const ScanConversionTable& table,
+                  std::span<const std::uint16_t> pairs,
+                  const ScanGeometry& geometry,
                   bool flip_left_right,
                   std::span<std::uint8_t> pixels);
 
