@@ -1,47 +1,60 @@
 #include "formats/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <cerrno>
+#include <chrono>
+#include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <new>
 
 namespace sonocase {
 namespace {
 
+namespace fs = std::filesystem;
+
+// Closes on destruction, which gives back a lock on it.
 class Descriptor {
   public:
     explicit Descriptor(int fd) : fd_(fd) {}
-    ~Descriptor() {
-        if (fd_ >= 0) ::close(fd_);
-    }
+    ~Descriptor() { close(); }
     Descriptor(const Descriptor&) = delete;
     Descriptor& operator=(const Descriptor&) = delete;
     int get() const { return fd_; }
-    bool close() {
-        const int fd = fd_;
+    void open(const std::string& path, int flags) {
+        close();
+        fd_ = ::open(path.c_str(), flags | O_CLOEXEC, 0666);
+    }
+    void close() {
+        if (fd_ >= 0) ::close(fd_);
         fd_ = -1;
-        return ::close(fd) == 0;
     }
 
   private:
     int fd_;
 };
 
-std::string reason(const char* doing, int fault) {
-    return std::string(doing) + ": " + std::strerror(fault);
+Error system_error(const char* doing, int fault, const std::string& path, const char* expected) {
+    if (fault == ENOENT) return {"no such file", path, "check the path"};
+    return {std::string(doing) + ": " + std::strerror(fault), path, expected};
 }
 
 template <class Bytes>
 Result<Bytes> read_whole(const std::string& path) {
     const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-    if (file.get() < 0) return Error{reason("cannot open", errno), path, ""};
+    if (file.get() < 0)
+        return system_error("cannot open", errno, path, "check that it may be read");
     struct stat status {};
-    if (::fstat(file.get(), &status) != 0) return Error{reason("cannot read", errno), path, ""};
-    if (S_ISDIR(status.st_mode)) return Error{"is a folder", path, "name a file"};
+    if (::fstat(file.get(), &status) != 0)
+        return system_error("cannot read", errno, path, "check the disk");
+    if (S_ISDIR(status.st_mode)) return Error{"is a folder", path, "expected a file"};
     Bytes bytes;
     std::size_t filled = 0;
     try {
@@ -50,7 +63,7 @@ Result<Bytes> read_whole(const std::string& path) {
             if (filled == bytes.size()) bytes.resize(2 * bytes.size());
             const ssize_t n = ::read(file.get(), bytes.data() + filled, bytes.size() - filled);
             if (n < 0 && errno == EINTR) continue;
-            if (n < 0) return Error{reason("cannot read", errno), path, ""};
+            if (n < 0) return system_error("cannot read", errno, path, "check the disk");
             if (n == 0) break;
             filled += static_cast<std::size_t>(n);
         }
@@ -71,10 +84,59 @@ bool write_all(int fd, std::span<const std::uint8_t> bytes) {
     return true;
 }
 
-std::string folder_of(const std::string& path) {
-    const std::size_t slash = path.rfind('/');
-    if (slash == std::string::npos) return ".";
-    return slash == 0 ? "/" : path.substr(0, slash);
+// A pipe or a device, or /dev/stdout, which may lead to a file: renaming would replace it.
+bool is_special(const std::string& path) {
+    struct stat status {};
+    const bool exists = ::stat(path.c_str(), &status) == 0;
+    return (exists && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode)) ||
+           path.starts_with("/dev/") || path.starts_with("/proc/");
+}
+
+// Unlike any other name in use: by this process (counter), on this machine (process number), and,
+// with a folder shared by machines, anywhere (host name).
+std::string temporary_name(const std::string& path) {
+    static std::atomic<unsigned> counter{0};
+    char host[64] = "host";
+    ::gethostname(host, sizeof host - 1);
+    const fs::path whole(path);
+    std::string name = whole.filename().string();
+    const std::string ending =
+        name.size() > 7 && name.ends_with(".nii.gz") ? ".nii.gz" : whole.extension().string();
+    name = "." + name + "." + host + "." + std::to_string(::getpid()) + "." +
+           std::to_string(counter++) + ".tmp" + ending;
+    return (whole.parent_path() / name).string();
+}
+
+// Whether temporary_name made it: ".NAME.HOST.PID.COUNT.tmp", an ending perhaps.
+bool is_temporary_name(const std::string& name) {
+    const std::size_t tmp = name.rfind(".tmp");
+    if (!name.starts_with('.') || tmp == std::string::npos || tmp < 2) return false;
+    const std::size_t dot = name.rfind('.', tmp - 1);
+    return dot != std::string::npos && dot + 1 < tmp &&
+           std::all_of(name.begin() + static_cast<std::ptrdiff_t>(dot) + 1,
+                       name.begin() + static_cast<std::ptrdiff_t>(tmp),
+                       [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+// Opens a temporary and locks it against remove_leftovers, which may have taken it in between: the
+// file then has no name any more, and another is made.
+bool open_locked(const std::string& path, Descriptor* file) {
+    for (;;) {
+        file->open(path, O_WRONLY | O_CREAT | O_TRUNC);
+        if (file->get() < 0) return false;
+        // A file system without locks: remove_leftovers goes by age there.
+        if (::flock(file->get(), LOCK_EX) != 0) return true;
+        struct stat status {};
+        if (::fstat(file->get(), &status) != 0 || status.st_nlink > 0) return true;
+    }
+}
+
+// The new name reaches the disk with its folder; failing to flush that is not a failed write.
+void flush_folder_of(const std::string& path) {
+    const fs::path parent = fs::path(path).parent_path();
+    const Descriptor folder(::open(parent.empty() ? "." : parent.c_str(),
+                                   O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (folder.get() >= 0) (void)::fsync(folder.get());
 }
 
 }  // namespace
@@ -88,32 +150,74 @@ Result<std::string> read_text_file(const std::string& path) {
 }
 
 Status write_file(const std::string& path, std::span<const std::uint8_t> bytes) {
-    // Process and count, so that two writers of the same path never share a temporary file.
-    static std::atomic<unsigned> count{0};
-    const std::string temporary =
-        path + ".part-" + std::to_string(::getpid()) + "-" + std::to_string(count++);
-    Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-    if (file.get() < 0) {
-        return Error{reason("cannot write", errno), path,
-                     "check that the folder exists and is writable"};
+    Descriptor file(-1);
+    if (is_special(path)) {
+        file.open(path, O_WRONLY | O_APPEND);
+        if (file.get() < 0 || !write_all(file.get(), bytes))
+            return system_error("cannot write", errno, path, "check that it may be written");
+        return Done{};
     }
-    const auto give_up = [&](int fault) -> Status {
-        ::unlink(temporary.c_str());
-        return Error{reason("cannot write", fault), path, "nothing was written"};
-    };
-    if (!write_all(file.get(), bytes)) return give_up(errno);
-    if (::fsync(file.get()) != 0 && errno != EINVAL && errno != EROFS) return give_up(errno);
-    if (!file.close()) return give_up(errno);
-    if (::rename(temporary.c_str(), path.c_str()) != 0) return give_up(errno);
-    // The new name reaches the disk with its folder; failing to flush that is not a failed write.
-    const Descriptor folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (folder.get() >= 0) (void)::fsync(folder.get());
+    OutputFile output(path);
+    if (!open_locked(output.temporary(), &file)) {
+        return Error{std::string("cannot write: ") + std::strerror(errno), path,
+                     "check that the folder may be written"};
+    }
+    const bool written = write_all(file.get(), bytes) &&
+                         (::fsync(file.get()) == 0 || errno == EINVAL || errno == EROFS);
+    if (!written) {
+        return Error{std::string("cannot write: ") + std::strerror(errno), path,
+                     "nothing was written; check the free space"};
+    }
+    // The lock is held until the file has its name.
+    if (const Status status = output.commit(); !status) return status;
+    flush_folder_of(path);
     return Done{};
 }
 
 Status write_file(const std::string& path, std::string_view text) {
     return write_file(path,
                       std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+OutputFile::OutputFile(std::string path)
+    : path_(std::move(path)), temporary_(temporary_name(path_)) {
+    std::error_code code;  // a folder that cannot be made shows when the file is opened
+    const fs::path parent = fs::path(path_).parent_path();
+    if (!parent.empty()) fs::create_directories(parent, code);
+}
+
+OutputFile::~OutputFile() {
+    if (!committed_) ::unlink(temporary_.c_str());
+}
+
+Status OutputFile::commit() {
+    if (::rename(temporary_.c_str(), path_.c_str()) != 0) {
+        return Error{std::string("cannot write: ") + std::strerror(errno), path_,
+                     "check that the folder may be written"};
+    }
+    committed_ = true;
+    return Done{};
+}
+
+std::size_t remove_leftovers(const std::string& folder) {
+    std::size_t removed = 0;
+    std::error_code code;
+    const auto now = fs::file_time_type::clock::now();
+    for (auto it = fs::recursive_directory_iterator(folder, code);
+         !code && it != fs::recursive_directory_iterator(); it.increment(code)) {
+        std::error_code item_code;
+        if (!is_temporary_name(it->path().filename().string()) || !it->is_regular_file(item_code))
+            continue;
+        const Descriptor file(::open(it->path().c_str(), O_RDONLY | O_CLOEXEC));
+        if (file.get() < 0) continue;
+        if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0) {
+            if (errno == EWOULDBLOCK) continue;
+            const auto touched = it->last_write_time(item_code);
+            if (item_code || now - touched < std::chrono::hours(1)) continue;
+        }
+        if (fs::remove(it->path(), item_code)) ++removed;
+    }
+    return removed;
 }
 
 }  // namespace sonocase

@@ -3,6 +3,7 @@
 // system.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -16,9 +17,33 @@ namespace sonocase {
 Result<std::vector<std::uint8_t>> read_file(const std::string& path);
 Result<std::string> read_text_file(const std::string& path);
 
-// Writes a temporary name in the same folder, flushes it to the disk and renames it over `path`. On
-// failure nothing is left behind and what `path` held before stays.
+// Writes a temporary name in the same folder, flushes it to the disk and renames it over `path`;
+// makes missing folders. On failure nothing is left behind and what `path` held before stays.
+// Devices, pipes and what leads to them (/dev/stdout) are appended to instead.
 Status write_file(const std::string& path, std::span<const std::uint8_t> bytes);
 Status write_file(const std::string& path, std::string_view text);
+
+// For libraries that write files themselves: they write temporary(), which lies in the same folder
+// with the same ending, and commit() renames it. Without commit() the temporary is removed.
+class OutputFile {
+  public:
+    explicit OutputFile(std::string path);  // makes missing folders
+    ~OutputFile();
+    OutputFile(const OutputFile&) = delete;
+    OutputFile& operator=(const OutputFile&) = delete;
+
+    const std::string& temporary() const { return temporary_; }
+    Status commit();
+
+  private:
+    std::string path_;
+    std::string temporary_;
+    bool committed_ = false;
+};
+
+// Removes the temporaries of write_file that killed programs left in `folder` and below; their
+// number. One in use holds a lock (flock), on whatever machine, and stays; where the file system
+// knows no locks, one that was touched in the last hour counts as in use.
+std::size_t remove_leftovers(const std::string& folder);
 
 }  // namespace sonocase

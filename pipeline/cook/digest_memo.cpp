@@ -9,7 +9,7 @@
 
 #include "formats/digest.h"
 #include "pipeline/cook/input_files.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -76,7 +76,7 @@ Status DigestMemo::save() const {
     std::string text;
     for (const std::string& line : lines) text += line;
     if (text == saved_) return Done{};
-    return write_text_file(path_, text);
+    return write_file(path_, text);
 }
 
 }  // namespace sonocase::pipeline

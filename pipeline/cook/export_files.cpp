@@ -11,7 +11,7 @@
 
 #include "formats/brick_volume.h"
 #include "pipeline/cook/inspect_case.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/segmentation/export_seg_nrrd.h"
 
 namespace sonocase::pipeline {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/exercise.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 
 namespace sonocase::pipeline {
 namespace {

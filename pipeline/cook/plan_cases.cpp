@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cook/digest_memo.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -14,7 +14,7 @@
 #include "formats/nearest_name.h"
 #include "pipeline/cook/embedded_scenario.h"
 #include "pipeline/cook/exercise_frame.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/texture/tissue_table.h"
 
 namespace sonocase::pipeline {

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "formats/digest.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/import/delimited_text.h"
 #include "pipeline/texture/tissue_table.h"
 

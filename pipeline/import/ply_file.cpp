@@ -5,7 +5,7 @@
 #include <cstring>
 #include <sstream>
 
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/import/delimited_text.h"
 
 namespace sonocase::pipeline {

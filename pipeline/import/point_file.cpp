@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/import/delimited_text.h"
 #include "pipeline/import/surface_readers.h"
 

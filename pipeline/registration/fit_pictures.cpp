@@ -27,7 +27,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/pictures/offscreen_display.h"
 #include "pipeline/registration/fit_measure.h"
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/import/delimited_text.h"
 
 namespace sonocase::pipeline {

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "formats/nearest_name.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/segmentation/label_distance.h"
 
 namespace sonocase::pipeline {

@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "pipeline/cook/export_files.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/segmentation/signed_distance.h"
 
 namespace sonocase::pipeline {

@@ -8,7 +8,7 @@
 
 #include "formats/boundary_record.h"
 #include "pipeline/cook/preview_picture.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/registration/inverse_map.h"
 
 namespace sonocase::pipeline {

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -139,7 +139,7 @@ std::string report_json(std::span<const StageReport> reports) {
 
 Status write_report(const CommonOptions& options, const StageReport& report) {
     if (options.report_path.empty()) return Done{};
-    return write_text_file(options.report_path, report_json(report));
+    return write_file(options.report_path, report_json(report));
 }
 
 Stopwatch::Stopwatch() : start_ns_(std::chrono::steady_clock::now().time_since_epoch().count()) {}

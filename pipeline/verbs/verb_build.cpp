@@ -12,7 +12,7 @@
 #include "formats/build_facts.h"
 #include "formats/digest.h"
 #include "pipeline/cook/cook_case.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/parallel.h"
 #include "pipeline/tradeoff/boundary_error.h"
 #include "pipeline/tradeoff/choose_settings.h"
@@ -147,7 +147,7 @@ int build(const BuildOptions& options) {
         const std::string report =
             build_report(*cooked, "", cooked->digest, 0, watch.seconds(), choice, std::nullopt);
         if (!options.common.report_path.empty())
-            if (auto status = write_text_file(options.common.report_path, report); !status)
+            if (auto status = write_file(options.common.report_path, report); !status)
                 return fail("build", status.error());
         std::printf("%s of %s, %.1f s\n", options.until.c_str(), recipe->name.c_str(),
                     watch.seconds());
@@ -159,10 +159,10 @@ int build(const BuildOptions& options) {
         achieved_error_mm =
             measure_boundary_error(cooked->bundle, recipe->inputs.torso).displaced_mm;
     const std::vector<std::uint8_t> bytes = write_bundle(cooked->bundle);
-    if (auto status = pipeline::write_file(out, bytes); !status)
+    if (auto status = write_file(out, bytes); !status)
         return fail("build", status.error());
     if (!options.preview.empty())
-        if (auto status = pipeline::write_file(options.preview, cooked->bundle.preview_png);
+        if (auto status = write_file(options.preview, cooked->bundle.preview_png);
             !status)
             return fail("build", status.error());
     for (const StageRun& run : cooked->stages) print_warnings("build", run.report);
@@ -172,7 +172,7 @@ int build(const BuildOptions& options) {
     // change from run to run.
     for (const std::string& path : {out + ".report.json", options.common.report_path})
         if (!path.empty())
-            if (auto status = write_text_file(path, report); !status)
+            if (auto status = write_file(path, report); !status)
                 return fail("build", status.error());
     std::printf("%s  %.1f MB, %d x %d x %d voxels of %g mm, %zu labels, %.1f s\n", out.c_str(),
                 static_cast<double>(bytes.size()) / 1e6, cooked->bundle.grid.size.x,

@@ -5,7 +5,7 @@
 
 #include "formats/digest.h"
 #include "pipeline/cook/inspect_case.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/verbs.h"
@@ -35,7 +35,7 @@ int verb_inspect(int argc, char** argv) {
         json ? inspection_json(*bundle, inspection) : inspection_text(*bundle, inspection);
     std::fputs(text.c_str(), stdout);
     if (!common.report_path.empty())
-        if (auto status = write_text_file(common.report_path, inspection_json(*bundle, inspection));
+        if (auto status = write_file(common.report_path, inspection_json(*bundle, inspection));
             !status)
             return fail("inspect", status.error());
     return kDone;
@@ -77,7 +77,7 @@ int verb_validate(int argc, char** argv) {
     }
     if (json) std::printf("%s\n", all.dump(2).c_str());
     if (!common.report_path.empty())
-        if (auto status = write_text_file(common.report_path, all.dump(2) + "\n"); !status)
+        if (auto status = write_file(common.report_path, all.dump(2) + "\n"); !status)
             return fail("validate", status.error());
     return all_valid ? kDone : kFailed;
 }

@@ -6,7 +6,7 @@
 
 #include "formats/number_text.h"
 #include "formats/registration_file.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/import/delimited_text.h"
 #include "pipeline/parallel.h"
 #include "pipeline/registration/inverse_map.h"
@@ -119,7 +119,7 @@ int verb_map(int argc, char** argv) {
         csv += '\n';
         ++counts[static_cast<std::size_t>(status[i])];
     }
-    if (auto s = write_text_file(out, csv); !s) return fail("map", s.error());
+    if (auto s = write_file(out, csv); !s) return fail("map", s.error());
     report.measures = {{"points", static_cast<double>(mapped.size())},
                        {"ok", counts[0]},
                        {"outside", counts[1]},

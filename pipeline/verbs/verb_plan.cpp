@@ -5,7 +5,7 @@
 
 #include "pipeline/cook/plan_cases.h"
 #include "pipeline/cook/stage_cache.h"
-#include "pipeline/files.h"
+#include "formats/atomic_file.h"
 #include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/verbs.h"
 
@@ -35,7 +35,7 @@ int verb_plan(int argc, char** argv) {
     auto plans = plan_cases(recipes, overrides, folder);
     if (!plans) return fail("plan", plans.error());
     const std::string path = (std::filesystem::path(folder) / "plan.json").string();
-    if (auto status = write_text_file(path, plan_json(*plans, overrides)); !status)
+    if (auto status = write_file(path, plan_json(*plans, overrides)); !status)
         return fail("plan", status.error());
     std::size_t bad = 0, waiting = 0;
     for (const CasePlan& plan : *plans) {

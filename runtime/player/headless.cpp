@@ -1,7 +1,6 @@
 #include "runtime/player/headless.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -56,15 +55,7 @@ Status write_text_file(const std::string& path, const std::string& text) {
         std::fwrite(text.data(), 1, text.size(), stdout);
         return Done{};
     }
-    const std::string temporary = path + ".part";
-    std::FILE* file = std::fopen(temporary.c_str(), "wb");
-    bool ok = file && std::fwrite(text.data(), 1, text.size(), file) == text.size();
-    if (file) ok = std::fclose(file) == 0 && ok;
-    if (ok) ok = std::rename(temporary.c_str(), path.c_str()) == 0;
-    if (ok) return Done{};
-    const std::string reason = std::strerror(errno);
-    std::remove(temporary.c_str());
-    return Error{"cannot write: " + reason, path, "check that the folder exists and is writable"};
+    return write_file(path, text);
 }
 
 double steady_seconds() {

@@ -3,9 +3,8 @@
 #include <png.h>
 
 #include <cassert>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
+
+#include "formats/atomic_file.h"
 
 namespace sonocase::runtime {
 
@@ -22,18 +21,12 @@ Status write_png(const std::string& path,
     image.height = static_cast<png_uint_32>(height);
     image.format = channels == 1 ? PNG_FORMAT_GRAY : PNG_FORMAT_RGB;
     image.flags = PNG_IMAGE_FLAG_FAST;
-    const std::string temporary = path + ".part";
-    if (!png_image_write_to_file(&image, temporary.c_str(), 0, pixels.data(), 0, nullptr)) {
-        std::remove(temporary.c_str());
+    OutputFile file(path);
+    if (!png_image_write_to_file(&image, file.temporary().c_str(), 0, pixels.data(), 0, nullptr)) {
         return Error{std::string("cannot write the picture: ") + image.message, path,
-                     "check that the folder exists, is writable and has room"};
+                     "check that the folder is writable and has room"};
     }
-    if (std::rename(temporary.c_str(), path.c_str()) != 0) {
-        std::remove(temporary.c_str());
-        return Error{std::string("cannot rename the finished picture: ") + std::strerror(errno),
-                     path, "check that the folder is writable"};
-    }
-    return Done{};
+    return file.commit();
 }
 
 }  // namespace sonocase::runtime

@@ -1,16 +1,15 @@
 #include "runtime/player/settings.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
+
+#include "formats/atomic_file.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -106,22 +105,8 @@ Status save_settings(const Settings& s, const std::string& path) {
                       {"calibrations", s.calibrations},
                       {"probe_sensor", s.probe_sensor},
                       {"needle_sensor", s.needle_sensor}};
-    std::error_code failed;
-    fs::create_directories(fs::path(path).parent_path(), failed);
-    const std::string temporary = path + ".part";
-    bool ok = false;
-    {
-        std::ofstream file(temporary, std::ios::binary);
-        // Names of files need not be UTF-8; what is not is replaced rather than refused.
-        file << out.dump(2, ' ', false, json::error_handler_t::replace) << "\n";
-        file.close();
-        ok = file.good();
-    }
-    if (ok) fs::rename(temporary, path, failed);
-    if (ok && !failed) return Done{};
-    const std::string reason = failed ? failed.message() : std::strerror(errno);
-    fs::remove(temporary, failed);
-    return Error{"cannot save the settings: " + reason, path, "check the folder's permissions"};
+    // Names of files need not be UTF-8; what is not is replaced rather than refused.
+    return write_file(path, out.dump(2, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
 std::vector<BundleEntry> find_bundles(const Settings& settings) {

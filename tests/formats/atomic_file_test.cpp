@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <csignal>
+#include <thread>
 
 #include "formats/digest.h"
 #include "support/temporary_folder.h"
@@ -45,9 +47,26 @@ TEST(AtomicFile, ErrorsNameThePath) {
     const TemporaryFolder folder;
     const auto missing = read_file(folder / "none");
     ASSERT_FALSE(missing);
-    EXPECT_NE(missing.error().message().find("none: cannot open"), std::string::npos);
+    EXPECT_NE(missing.error().message().find("none: no such file"), std::string::npos);
     EXPECT_FALSE(read_file(folder / ""));
-    EXPECT_FALSE(write_file(folder / "no/such/folder", std::string_view("x")));
+    // No folder can be made below a file.
+    ASSERT_TRUE(write_file(folder / "file", std::string_view("x")));
+    const Status below = write_file(folder / "file/below", std::string_view("x"));
+    ASSERT_FALSE(below);
+    EXPECT_NE(below.error().message().find("file/below"), std::string::npos);
+}
+
+TEST(AtomicFile, MakesMissingFoldersAndAppendsToPipes) {
+    const TemporaryFolder folder;
+    ASSERT_TRUE(write_file(folder / "some/new/folder/a", std::string_view("x")));
+    EXPECT_EQ(*read_text_file(folder / "some/new/folder/a"), "x");
+    const std::string pipe = folder / "pipe";
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    std::string read;
+    std::jthread reader([&] { read = *read_text_file(pipe); });
+    ASSERT_TRUE(write_file(pipe, std::string_view("through")));
+    reader.join();
+    EXPECT_EQ(read, "through");
 }
 
 TEST(Digest, IsTheOneOfXxh3AndTellsPartsApart) {
