@@ -89,7 +89,7 @@ bool is_special(const std::string& path) {
     struct stat status {};
     const bool exists = ::stat(path.c_str(), &status) == 0;
     return (exists && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode)) ||
-           path.starts_with("/dev/") || path.starts_with("/proc/");
+           path.starts_with("/dev/std") || path.starts_with("/dev/fd/") || path.starts_with("/proc/");
 }
 
 // Unlike any other name in use: by this process (counter), on this machine (process number), and,
