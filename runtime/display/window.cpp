@@ -6,10 +6,13 @@
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <map>
 
 #include "runtime/display/theme.h"
@@ -21,6 +24,19 @@ std::string g_glfw_error;  // GLFW reports through a plain function
 
 void on_glfw_error(int, const char* text) {
     g_glfw_error = text ? text : "";
+}
+
+// Without a graphics card Mesa paints on threads of ours, one a core. They give way to the thread
+// that renders the ultrasound, so that a pose does not wait for panels to be painted.
+void let_painters_yield() {
+    std::error_code code;
+    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", code)) {
+        std::string name;
+        std::ifstream(task.path() / "comm") >> name;
+        if (!name.starts_with("llvmpipe")) continue;
+        setpriority(PRIO_PROCESS, static_cast<id_t>(std::stoul(task.path().filename().string())),
+                    10);
+    }
 }
 
 }  // namespace
@@ -64,6 +80,7 @@ Result<std::unique_ptr<Window>> Window::open(const WindowOptions& options) {
                      "the window needs 3.3: update the driver, set LIBGL_ALWAYS_SOFTWARE=1, or use "
                      "--headless"};
     }
+    let_painters_yield();
     glfwSwapInterval(1);
     glfwSetWindowSizeLimits(impl.window, 960, 600, GLFW_DONT_CARE, GLFW_DONT_CARE);
     float scale = static_cast<float>(options.ui_scale);
