@@ -219,8 +219,8 @@ void View3d::Impl::resize(int width, int height) {
 
 void View3d::set_case(const CaseBundle& bundle) {
     Impl& d = *impl_;
-    // 6 mm: some ten thousand triangles for a torso, and shoulders and breasts keep their shape.
-    const Surface mesh = skin_mesh(bundle, 6);
+    // 10 mm: some ten thousand triangles for a torso, and shoulders and breasts keep their shape.
+    const Surface mesh = skin_mesh(bundle, 10);
     std::vector<Vertex> vertices;
     std::vector<std::uint32_t> indices;
     d.box = {};
@@ -409,6 +409,7 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
         }
     }
     // The skin's front only, then blended over what is inside.
+    glEnable(GL_CULL_FACE);
     glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
     d.draw_mesh(d.skin, identity, 1, 0xC99A80, 0.3f, 3);
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
@@ -416,6 +417,7 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
     glEnable(GL_BLEND);
     glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
     d.draw_mesh(d.skin, identity, 1, 0xE8C0A8, 0.42f, 1);
+    glDisable(GL_CULL_FACE);
     glDepthFunc(GL_LESS);
     glDisable(GL_DEPTH_TEST);
     glBindVertexArray(0);
