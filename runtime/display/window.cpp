@@ -6,14 +6,13 @@
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
+#include <cstdlib>
 #include <map>
+#include <thread>
 
 #include "runtime/display/theme.h"
 
@@ -26,17 +25,12 @@ void on_glfw_error(int, const char* text) {
     g_glfw_error = text ? text : "";
 }
 
-// Without a graphics card Mesa paints on threads of ours, one a core. They give way to the thread
-// that renders the ultrasound, so that a pose does not wait for panels to be painted.
-void let_painters_yield() {
-    std::error_code code;
-    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", code)) {
-        std::string name;
-        std::ifstream(task.path() / "comm") >> name;
-        if (!name.starts_with("llvmpipe")) continue;
-        setpriority(PRIO_PROCESS, static_cast<id_t>(std::stoul(task.path().filename().string())),
-                    10);
-    }
+// Without a graphics card Mesa paints on threads of ours, one a core. One fewer leaves a core to the
+// thread that renders the ultrasound, so that a pose does not wait for panels to be painted.
+void leave_a_core_to_imaging() {
+    const unsigned cores = std::thread::hardware_concurrency();
+    const std::string painters = std::to_string(std::max(1u, cores - std::min(cores, 1u)));
+    setenv("LP_NUM_THREADS", painters.c_str(), 0);
 }
 
 }  // namespace
@@ -50,6 +44,7 @@ struct Window::Impl {
 };
 
 Result<std::unique_ptr<Window>> Window::open(const WindowOptions& options) {
+    leave_a_core_to_imaging();
     glfwSetErrorCallback(on_glfw_error);
     if (!glfwInit()) {
         return Error{"no display can be opened (" + g_glfw_error + ")", "window",
@@ -80,7 +75,6 @@ Result<std::unique_ptr<Window>> Window::open(const WindowOptions& options) {
                      "the window needs 3.3: update the driver, set LIBGL_ALWAYS_SOFTWARE=1, or use "
                      "--headless"};
     }
-    let_painters_yield();
     glfwSwapInterval(1);
     glfwSetWindowSizeLimits(impl.window, 960, 600, GLFW_DONT_CARE, GLFW_DONT_CARE);
     float scale = static_cast<float>(options.ui_scale);
