@@ -34,4 +34,8 @@ void ImageTexture::upload(std::span<const std::uint8_t> pixels, int width_px, in
     }
 }
 
+void paint_opaque(const ImDrawList*, const ImDrawCmd*) {
+    glDisable(GL_BLEND);
+}
+
 }  // namespace sonocase::runtime

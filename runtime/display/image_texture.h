@@ -5,6 +5,9 @@
 #include <span>
 #include <vector>
 
+struct ImDrawList;
+struct ImDrawCmd;
+
 namespace sonocase::runtime {
 
 class ImageTexture {
@@ -24,5 +27,8 @@ class ImageTexture {
     int width_px_ = 0, height_px_ = 0;
     std::vector<std::uint32_t> rgba_;  // OpenGL ES 3 has no swizzle that WebGL keeps: expanded here
 };
+
+// For ImDrawList::AddCallback: what follows hides what is under it.
+void paint_opaque(const ImDrawList*, const ImDrawCmd*);
 
 }  // namespace sonocase::runtime

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "runtime/display/image_texture.h"
 #include "runtime/display/theme.h"
 
 namespace sonocase::runtime {
@@ -54,8 +55,6 @@ void ImageView::clear_measurements() {
 void ImageView::draw(float width, float height, const ImageViewInput& input) {
     const ImVec2 corner = ImGui::GetCursorScreenPos();
     ImDrawList* draw = ImGui::GetWindowDrawList();
-    draw->AddRectFilled(corner, {corner.x + width, corner.y + height}, colour::rgba(0, 0, 0),
-                        5 * input.scale);
     ImGui::InvisibleButton("picture", {std::max(width, 1.0f), std::max(height, 1.0f)},
                            ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight |
                                ImGuiButtonFlags_MouseButtonMiddle);
@@ -72,11 +71,22 @@ void ImageView::draw(float width, float height, const ImageViewInput& input) {
         place_.origin_x = place_.x + fit * frame.layout.origin_x_px;
         place_.origin_y = place_.y + fit * frame.layout.origin_y_px;
         draw->PushClipRect(corner, {corner.x + width, corner.y + height}, true);
-        draw->AddImage(input.texture, {place_.x, place_.y},
-                       {place_.x + place_.side_x, place_.y + place_.side_y});
+        // Black beside the picture alone, and the picture without blending: where the processor
+        // paints, every layer counts.
+        const float right = place_.x + place_.side_x, bottom = place_.y + place_.side_y;
+        const ImU32 black = colour::rgba(0, 0, 0);
+        draw->AddRectFilled(corner, {place_.x, corner.y + height}, black);
+        draw->AddRectFilled({right, corner.y}, {corner.x + width, corner.y + height}, black);
+        draw->AddRectFilled({place_.x, corner.y}, {right, place_.y}, black);
+        draw->AddRectFilled({place_.x, bottom}, {right, corner.y + height}, black);
+        draw->AddCallback(paint_opaque, nullptr);
+        draw->AddImage(input.texture, {place_.x, place_.y}, {right, bottom});
+        draw->AddCallback(ImDrawCallback_ResetRenderState, nullptr);
         draw_scales(input);
         draw_measurements(input);
         draw->PopClipRect();
+    } else {
+        draw->AddRectFilled(corner, {corner.x + width, corner.y + height}, colour::rgba(0, 0, 0));
     }
     ImGui::PushFont(fonts().small);
     const float line = ImGui::GetTextLineHeight() + 2 * input.scale, pad = 10 * input.scale;

@@ -6,7 +6,7 @@ namespace sonocase {
 
 bool ViewPace::due(double now_s) {
     constexpr double kLeast_s = 0.03, kMost_s = 0.5;  // beyond, the view would seem to hang
-    constexpr double kShare = 0.2;                    // of the time, for drawings
+    constexpr double kShare = 0.15;                   // of the time, for drawings
     if (last_s_ >= 0) {
         const double took = now_s - last_s_;
         if (!drew_)

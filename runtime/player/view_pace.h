@@ -1,5 +1,5 @@
 // When the small 3-D view is drawn anew. Where the processor paints, one drawing can cost more than
-// everything else on the screen; it is then drawn seldom enough to take a fifth of the time, so that
+// everything else on the screen; it is then drawn seldom enough to take a seventh of the time, so that
 // the ultrasound picture keeps its rate. Where a drawing costs nothing, every second picture has one.
 #pragma once
 
