@@ -1,7 +1,7 @@
 // Keeps frames within a time that was asked for by giving up accuracy in a stated order.
 //
-// Levels are points of measured work against precision: beams and samples shrink together, the
-// finest first (docs/effects.md). A level is left for a coarser one when the average frame takes
+// Levels lie on the front of measured work against precision, on which beams and samples shrink
+// together (docs/effects.md, sonocase_bench Accuracy/*), the finest first. A level is left for a coarser one when the average frame takes
 // longer than the budget, and for a finer one when that one is expected to take less than 85 % of
 // it. Constant time, no clock: the caller says how long a frame took.
 #pragma once
@@ -13,10 +13,11 @@ namespace sonocase::runtime {
 
 struct AccuracyLevel {
     double lines, samples;  // of the full number
+    double work;            // measured time of a frame, of the full one's
 };
 
 inline constexpr std::array<AccuracyLevel, 4> kAccuracyLevels{
-    {{1, 1}, {0.83, 0.875}, {0.67, 0.75}, {0.5, 0.5}}};
+    {{1, 1, 1}, {0.83, 0.875, 0.77}, {0.67, 0.75, 0.59}, {0.5, 0.5, 0.35}}};
 
 class Governor {
   public:
@@ -45,8 +46,7 @@ class Governor {
   private:
     static constexpr int kPatience = 12;  // frames between changes
     static double work(int level) {
-        const AccuracyLevel& a = kAccuracyLevels[static_cast<std::size_t>(level)];
-        return a.lines * a.samples;
+        return kAccuracyLevels[static_cast<std::size_t>(level)].work;
     }
     void move(int level) {
         level_ = level;

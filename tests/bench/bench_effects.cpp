@@ -1,26 +1,39 @@
-// What each effect costs, and what one costs that is not there. Two renderers take turns on the
-// same poses, so that whatever else the machine does weighs on both alike.
+// What each effect costs, and what one costs that is not there. One renderer does both sides by
+// turns on the same poses, with a switch thrown in between: the same memory, the same moment, so
+// that neither the machine's other work nor the luck of addresses tells them apart.
 //   Effect/MODEL/NAME   time: the whole frame; cost_ns: of the effect, a beam sample; share: of the
 //                       frame; gathers, bytes: what it must fetch, a sample where it shows;
 //                       floor_ns: how long that takes if nothing waits
-//   Off/...             ratio: with the code for what is off against without; the bar is 1.02
+//   Off/MODEL/NAME      a scene that calls for no effect that could be left out; percent: what the
+//                       effect costs there all the same, of the frame; the bar is 1
+//   Off/physical/compiled_in
+//                       the same, bone and gas compiled in against a version without them; the bar
+//                       is 2
+// noise: how far the two halves of the run disagree, in the unit of what the row measures.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <functional>
 #include <memory>
 
 #include "bench_scene.h"
 #include "runtime/imaging/effects.h"
+#include "runtime/imaging/paper_fast.h"
 #include "runtime/imaging/physical_fast.h"
 
 namespace sonocase::bench {
 namespace {
 
+using runtime::PaperEffects;
+using runtime::PhysicalEffects;
+
 // A gather that hits the second cache, and a byte streamed from it, on the machine that the
 // documents quote.
 constexpr double kGatherNs = 0.19, kByteNs = 0.03;
+
+constexpr int kPhysicalLines = 192, kPaperLines = 512, kSamples = 512, kPixels = 512;
 
 double timed_ms(const std::function<void()>& work) {
     const auto start = std::chrono::steady_clock::now();
@@ -29,63 +42,154 @@ double timed_ms(const std::function<void()>& work) {
         .count();
 }
 
-// Mean over poses of the fastest frame of each, for two renderers by turns.
-struct Pair {
-    std::vector<double> first, second;
-    Pair() : first(bench_poses().size(), 1e9), second(first) {}
-    void add(std::size_t i, double a, double b) {
-        double &best_a = first[i % first.size()], &best_b = second[i % second.size()];
-        best_a = std::min(best_a, a);
-        best_b = std::min(best_b, b);
+// Fastest frame of each pose, in two halves of the run.
+class Fastest {
+  public:
+    Fastest() : ms_(2 * bench_poses().size(), 1e9) {}
+    void add(std::size_t pose, std::size_t half, double ms) {
+        double& best = ms_[2 * pose + half];
+        best = std::min(best, ms);
     }
-    static double mean(const std::vector<double>& ms) {
+    double half(std::size_t which) const {
         double sum = 0;
-        int n = 0;
-        for (const double v : ms) {
-            if (v >= 1e9) continue;
-            sum += v;
-            ++n;
-        }
-        return sum / std::max(n, 1);
+        for (std::size_t i = which; i < ms_.size(); i += 2) sum += ms_[i];
+        return 2 * sum / static_cast<double>(ms_.size());
     }
+    double both() const {
+        double sum = 0;
+        for (std::size_t i = 0; i < ms_.size(); i += 2) sum += std::min(ms_[i], ms_[i + 1]);
+        return 2 * sum / static_cast<double>(ms_.size());
+    }
+
+  private:
+    std::vector<double> ms_;
 };
 
-void take_turns(benchmark::State& state,
-                Pair& pair,
-                const std::function<void(std::size_t)>& a,
-                const std::function<void(std::size_t)>& b) {
+struct Cost {
+    double with_ms, without_ms, noise_ms;
+    double ms() const { return with_ms - without_ms; }
+};
+
+// work(pose, on): a frame with what is measured, or without.
+Cost take_turns(benchmark::State& state, const std::function<void(std::size_t, bool)>& work) {
+    Fastest with, without;
     std::size_t i = 0;
     for (auto _ : state) {
-        double ms_a = 0, ms_b = 0;
-        const auto run_a = [&] { ms_a = timed_ms([&] { a(i); }); };
-        const auto run_b = [&] { ms_b = timed_ms([&] { b(i); }); };
-        // Who goes first finds colder caches: by turns, pose by pose.
-        if (i / bench_poses().size() % 2 == 0) {
-            run_a();
-            run_b();
-        } else {
-            run_b();
-            run_a();
-        }
-        pair.add(i++, ms_a, ms_b);
-        state.SetIterationTime(ms_a * 1e-3);
+        const std::size_t pose = i % bench_poses().size(), round = i / bench_poses().size();
+        double ms[2];
+        // Who goes first finds colder caches: by turns, round by round.
+        const bool first = round % 2 == 0;
+        for (const bool on : {first, !first}) ms[on] = timed_ms([&] { work(pose, on); });
+        with.add(pose, round / 2 % 2, ms[1]);
+        without.add(pose, round / 2 % 2, ms[0]);
+        state.SetIterationTime(ms[1] * 1e-3);
+        ++i;
     }
     state.SetLabel(bench_bundle_name());
+    const double noise =
+        std::abs((with.half(0) - without.half(0)) - (with.half(1) - without.half(1)));
+    return {with.both(), without.both(), noise};
+}
+
+runtime::NeedleShape needle_of(const Exercise& exercise) {
+    NeedleModel model = exercise.needle;
+    model.slab_mm = exercise.probe.elevation_mm;
+    return runtime::needle_shape(model, {15, 0, 70}, normalized(Vector3{0.7, 0, 0.7}));
+}
+
+// Both models' renderers, with the switches at hand.
+struct PhysicalRig {
+    explicit PhysicalRig(const CaseBundle& bundle, const std::vector<Target>& targets = {})
+        : scene(*runtime::make_physical_scene(bundle, targets)),
+          breathing(bundle),
+          fast(scene, geometry, tables, noise, workers) {}
+
+    void render(std::size_t pose,
+                const PhysicalEffects& effects,
+                bool needle,
+                const MotionState& motion = {}) {
+        runtime::PhysicalFrame frame;
+        frame.volume_from_probe = bench_poses()[pose];
+        frame.frame = static_cast<std::uint32_t>(pose);
+        frame.row_gain_db = gain;
+        frame.effects = effects;
+        frame.motion = motion;
+        if (needle) frame.needle = &shaft;
+        fast.render(frame, breathing, false, false, pixels);
+    }
+
+    const Exercise exercise = bench_exercise();
+    const runtime::ScanGeometry geometry =
+        runtime::make_scan_geometry(exercise.probe, kPhysicalLines, kSamples, kPixels, kPixels);
+    const runtime::physical::Tables tables = runtime::physical::make_tables(exercise.probe, geometry);
+    const runtime::PhysicalNoise noise = runtime::make_physical_noise(1, kPhysicalLines + 128);
+    const runtime::NeedleShape shaft = needle_of(exercise);
+    const std::vector<float> gain = std::vector<float>(kSamples, 0.0f);
+    std::vector<std::uint8_t> pixels = std::vector<std::uint8_t>(kPixels * kPixels);
+    runtime::WorkerPool workers{1};
+    runtime::PhysicalScene scene;
+    BreathingField breathing;
+    runtime::PhysicalFast fast;
+};
+
+struct PaperRig {
+    explicit PaperRig(const CaseBundle& bundle)
+        : scene(*runtime::make_paper_scene(bundle)), fast(scene, geometry, 1, workers) {}
+
+    void render(std::size_t pose, const PaperEffects& effects, bool needle) {
+        runtime::PaperFrame frame;
+        frame.volume_from_probe = bench_poses()[pose];
+        frame.frame = static_cast<std::uint32_t>(pose);
+        frame.row_gain = gain;
+        frame.effects = effects;
+        if (needle) frame.needle = &shaft;
+        fast.render(frame, false, false, pixels);
+    }
+
+    const Exercise exercise = bench_exercise();
+    const runtime::ScanGeometry geometry =
+        runtime::make_scan_geometry(exercise.probe, kPaperLines, kSamples, kPixels, kPixels);
+    const runtime::NeedleShape shaft = needle_of(exercise);
+    const std::vector<float> gain = std::vector<float>(kSamples, 1.0f);
+    std::vector<std::uint8_t> pixels = std::vector<std::uint8_t>(kPixels * kPixels);
+    runtime::WorkerPool workers{1};
+    runtime::PaperScene scene;
+    runtime::PaperFast fast;
+};
+
+// A lesion in the middle of what the probes aim at.
+std::vector<Target> a_target() {
+    Target t;
+    t.centre = bench_bundle().grid.bounds().centre();
+    t.radius_mm = 15;
+    t.look = TargetLook::lesion;
+    return {t};
 }
 
 void effect(benchmark::State& state, ImageModel model, const runtime::EffectEntry& entry) {
-    std::vector<std::uint8_t> pixels(512 * 512);
-    auto with = runtime::Renderer::create(bench_bundle(), bench_exercise(), options_of(model));
-    auto without = runtime::Renderer::create(bench_bundle(), bench_exercise(),
-                                             options_of(model, {std::string("-") + entry.name}));
-    Pair pair;
-    take_turns(
-        state, pair, [&](std::size_t i) { with->render(input_of(i, true), pixels); },
-        [&](std::size_t i) { without->render(input_of(i, true), pixels); });
-    const double full = Pair::mean(pair.first), less = Pair::mean(pair.second);
-    const double samples = model == ImageModel::paper ? 512.0 * 512 : 192.0 * 512;
-    state.counters["cost_ns"] = (full - less) * 1e6 / samples;
-    state.counters["share"] = (full - less) / full;
+    Cost cost{};
+    if (model == ImageModel::paper) {
+        static PaperRig rig(bench_bundle());
+        PaperEffects without;
+        without.*entry.paper = false;
+        cost = take_turns(state, [&](std::size_t pose, bool on) {
+            rig.render(pose, on ? PaperEffects{} : without, true);
+        });
+    } else {
+        static PhysicalRig rig(bench_bundle(), a_target());
+        PhysicalEffects without;
+        without.*entry.physical = false;
+        MotionState motion;
+        if (entry.physical == &PhysicalEffects::breathing) motion.breathing_mm = {0, 0, 8};
+        if (entry.physical == &PhysicalEffects::pulsation) motion.pulse_mm = 0.5;
+        cost = take_turns(state, [&](std::size_t pose, bool on) {
+            rig.render(pose, on ? PhysicalEffects{} : without, true, motion);
+        });
+    }
+    const double samples = kSamples * (model == ImageModel::paper ? kPaperLines : kPhysicalLines);
+    state.counters["cost_ns"] = cost.ms() * 1e6 / samples;
+    state.counters["share"] = cost.ms() / cost.with_ms;
+    state.counters["noise"] = cost.noise_ms / cost.with_ms;
     state.counters["gathers"] = entry.gathers;
     state.counters["bytes"] = entry.bytes;
     state.counters["floor_ns"] = entry.gathers * kGatherNs + entry.bytes * kByteNs;
@@ -107,33 +211,69 @@ const CaseBundle& soft_bundle() {
     return soft;
 }
 
+// The case as one lump of liver: no surface, no fluid, no fibre, nothing baked.
+const CaseBundle& plain_bundle() {
+    static const CaseBundle plain = [] {
+        CaseBundle b = soft_bundle();
+        Tissue liver;
+        liver.name = "liver";
+        liver.texture = b.tissues.back().texture;
+        b.tissues = {liver};
+        for (std::size_t l = 1; l < b.labels.size(); ++l) b.labels[l].tissue = "liver";
+        b.boundary = {};
+        b.echo_offset = {};
+        return b;
+    }();
+    return plain;
+}
+
+// Effects that a scene may not call for.
+bool optional_effect(const runtime::EffectEntry& e) {
+    using Y = PhysicalEffects;
+    for (const auto which :
+         {&Y::breathing, &Y::pulsation, &Y::boundaries, &Y::structure, &Y::fine_structure,
+          &Y::targets, &Y::interfaces, &Y::edge_shadow, &Y::bone_tail, &Y::gas_ring_down,
+          &Y::needle})
+        if (e.physical == which) return true;
+    return e.paper != nullptr && (e.paper == &PaperEffects::shadow || e.paper == &PaperEffects::needle);
+}
+
+void report_off(benchmark::State& state, const Cost& cost) {
+    state.counters["percent"] = 100 * cost.ms() / cost.without_ms;
+    state.counters["noise"] = 100 * cost.noise_ms / cost.without_ms;
+}
+
+// The switch of an effect that the scene does not call for. which: null takes all of them at once.
+void off(benchmark::State& state, ImageModel model, const runtime::EffectEntry* which) {
+    Cost cost{};
+    if (model == ImageModel::paper) {
+        static PaperRig rig(plain_bundle());
+        PaperEffects without;
+        without.*which->paper = false;
+        cost = take_turns(state, [&](std::size_t pose, bool on) {
+            rig.render(pose, on ? PaperEffects{} : without, false);
+        });
+    } else {
+        static PhysicalRig rig(plain_bundle());
+        PhysicalEffects without;
+        for (const runtime::EffectEntry& e : runtime::effect_table(model)) {
+            if (which != nullptr ? e.physical == which->physical : optional_effect(e))
+                without.*e.physical = false;
+        }
+        cost = take_turns(state, [&](std::size_t pose, bool on) {
+            rig.render(pose, on ? PhysicalEffects{} : without, false);
+        });
+    }
+    report_off(state, cost);
+}
+
 // A plan for scenes with bone and gas against one that has neither compiled in.
-void stripped(benchmark::State& state) {
-    const Exercise exercise = bench_exercise();
-    const auto geometry = runtime::make_scan_geometry(exercise.probe, 192, 512, 512, 512);
-    const auto tables = runtime::physical::make_tables(exercise.probe, geometry);
-    const auto noise = runtime::make_physical_noise(1, 192 + 128);
-    runtime::WorkerPool workers{1};
-    auto without = runtime::make_physical_scene(soft_bundle());
-    auto with = runtime::make_physical_scene(soft_bundle());
-    without->has_hard = false;
-    with->has_hard = true;
-    runtime::PhysicalFast lean(*without, geometry, tables, noise, workers),
-        whole(*with, geometry, tables, noise, workers);
-    const std::vector<float> gain(512, 0.0f);
-    std::vector<std::uint8_t> pixels(512 * 512);
-    const auto render = [&](runtime::PhysicalFast& renderer, std::size_t i) {
-        runtime::PhysicalFrame frame;
-        frame.volume_from_probe = bench_poses()[i % bench_poses().size()];
-        frame.frame = static_cast<std::uint32_t>(i);
-        frame.row_gain_db = gain;
-        renderer.render(frame, {}, false, false, pixels);
-    };
-    Pair pair;
-    take_turns(
-        state, pair, [&](std::size_t i) { render(whole, i); },
-        [&](std::size_t i) { render(lean, i); });
-    state.counters["ratio"] = Pair::mean(pair.first) / Pair::mean(pair.second);
+void compiled_in(benchmark::State& state) {
+    static PhysicalRig rig(soft_bundle());
+    report_off(state, take_turns(state, [&](std::size_t pose, bool on) {
+                   rig.scene.has_hard = on;
+                   rig.render(pose, {}, false);
+               }));
 }
 
 // The same case cooked finer, named by SONOCASE_BENCH_FINE, against the one of the other rows.
@@ -143,35 +283,44 @@ void finer(benchmark::State& state, ImageModel model, const char* path) {
         state.SkipWithError(fine.error().message().c_str());
         return;
     }
-    std::vector<std::uint8_t> pixels(512 * 512);
+    std::vector<std::uint8_t> pixels(kPixels * kPixels);
     auto a = runtime::Renderer::create(*fine, bench_exercise(), options_of(model));
     auto b = runtime::Renderer::create(bench_bundle(), bench_exercise(), options_of(model));
-    Pair pair;
-    take_turns(
-        state, pair, [&](std::size_t i) { a->render(input_of(i, true), pixels); },
-        [&](std::size_t i) { b->render(input_of(i, true), pixels); });
-    state.counters["ratio"] = Pair::mean(pair.first) / Pair::mean(pair.second);
+    const Cost cost = take_turns(state, [&](std::size_t pose, bool on) {
+        (on ? a : b)->render(input_of(pose, true), pixels);
+    });
+    state.counters["ratio"] = cost.with_ms / cost.without_ms;
+    state.counters["noise"] = cost.noise_ms / cost.without_ms;
 }
 
 [[maybe_unused]] const bool kRegistered = [] {
-    const auto add = [](const std::string& name, auto work) {
+    // Rounds over all poses: the fastest of so many frames is that of an undisturbed machine.
+    const auto add = [](const std::string& name, int rounds, auto work) {
         benchmark::RegisterBenchmark(name.c_str(), work)
             ->Unit(benchmark::kMillisecond)
-            ->UseManualTime();
+            ->UseManualTime()
+            ->Iterations(61 * rounds);
     };
     for (const auto model : {ImageModel::paper, ImageModel::physical}) {
         const std::string prefix = model == ImageModel::paper ? "paper/" : "physical/";
         for (const runtime::EffectEntry& e : runtime::effect_table(model)) {
             if (e.paper == nullptr && e.physical == nullptr) continue;  // always on
-            add("Effect/" + prefix + e.name,
+            add("Effect/" + prefix + e.name, 12,
                 [model, e](benchmark::State& s) { effect(s, model, e); });
         }
+        for (const runtime::EffectEntry& e : runtime::effect_table(model)) {
+            if (optional_effect(e))
+                add("Off/" + prefix + e.name, 24,
+                    [model, e](benchmark::State& s) { off(s, model, &e); });
+        }
         if (const char* path = std::getenv("SONOCASE_BENCH_FINE")) {
-            add("Fine/" + prefix + "ratio",
+            add("Fine/" + prefix + "ratio", 12,
                 [model, path](benchmark::State& s) { finer(s, model, path); });
         }
     }
-    add("Off/physical/bone_and_gas", stripped);
+    add("Off/physical/all_of_them", 24,
+        [](benchmark::State& s) { off(s, ImageModel::physical, nullptr); });
+    add("Off/physical/compiled_in", 40, compiled_in);
     return true;
 }();
 

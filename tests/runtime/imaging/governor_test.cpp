@@ -8,18 +8,29 @@ namespace sonocase::runtime {
 namespace {
 
 double took(int level, double full_ms) {
-    const AccuracyLevel& a = kAccuracyLevels[static_cast<std::size_t>(level)];
-    return full_ms * a.lines * a.samples;
+    return full_ms * kAccuracyLevels[static_cast<std::size_t>(level)].work;
 }
 
 TEST(Governor, SettlesOnTheFinestLevelThatFits) {
-    // Work of the levels is 1, 0.73, 0.50 and 0.25 of the full frame.
+    // Work of the levels is 1, 0.77, 0.59 and 0.35 of the full frame.
     const double budget = 10;
     for (const auto& [full_ms, expected] :
-         {std::pair{5.0, 0}, {13.0, 1}, {18.0, 2}, {30.0, 3}, {100.0, 3}}) {
+         {std::pair{5.0, 0}, {12.5, 1}, {16.5, 2}, {28.0, 3}, {100.0, 3}}) {
         Governor governor(budget);
         for (int i = 0; i < 400; ++i) governor.frame_took(took(governor.level(), full_ms));
         EXPECT_EQ(governor.level(), expected) << full_ms;
+    }
+}
+
+// Each level gives up something of both, and saves less than the samples that it leaves out: some of
+// a frame is the same for all.
+TEST(Governor, LevelsFallInEveryRespect) {
+    for (std::size_t i = 1; i < kAccuracyLevels.size(); ++i) {
+        const AccuracyLevel &finer = kAccuracyLevels[i - 1], &coarser = kAccuracyLevels[i];
+        EXPECT_LT(coarser.lines, finer.lines);
+        EXPECT_LT(coarser.samples, finer.samples);
+        EXPECT_LT(coarser.work, finer.work);
+        EXPECT_GE(coarser.work, coarser.lines * coarser.samples);
     }
 }
 
