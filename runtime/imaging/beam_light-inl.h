@@ -21,7 +21,8 @@ struct BeamLight {
     using I = hn::Vec<hn::RebindToSigned<D>>;
     V light;  // one way there and back; 0 once dead
     V bone, bone_slow, bone_floor, gas;
-    I before;  // kind of the sample above
+    V reverb, period, next;  // amplitude of the next line, mm between lines, depth of the next
+    I before, before_that;   // kinds of the two samples above
     int tail_from = 0;
 };
 
@@ -33,28 +34,48 @@ HWY_INLINE void fade_tails(D d, const PhysicalBlock& b, BeamLight<D>& t) {
     t.gas = hn::Mul(t.gas, hn::Set(d, b.decay.gas));
 }
 
+// Lines between the probe's face and one of gas.
 template <class D>
-HWY_INLINE hn::Vec<D> tail_power(D d, const PhysicalBlock& b, const BeamLight<D>& t) {
+HWY_INLINE hn::Vec<D> reverb_power(D d, const PhysicalBlock& b, float r, BeamLight<D>& t) {
+    const auto off = hn::Mul(hn::Sub(hn::Set(d, r), t.next), hn::Set(d, 1 / b.reverb_mm));
+    const auto one = hn::Set(d, 1.0f);
+    const auto pulse =
+        hn::Mul(t.reverb, hn::Max(hn::Sub(one, hn::Mul(off, off)), hn::Zero(d)));
+    const auto past = hn::Gt(off, one);
+    t.next = hn::Add(t.next, hn::IfThenElseZero(past, t.period));
+    t.reverb = hn::IfThenElse(
+        past, hn::Mul(t.reverb, hn::Set(d, static_cast<float>(physical::kReverbLoss))), t.reverb);
+    return hn::Mul(pulse, pulse);
+}
+
+template <class D>
+HWY_INLINE hn::Vec<D> tail_power(D d, const PhysicalBlock& b, int k, BeamLight<D>& t) {
     auto power = hn::Zero(d);
     if (b.bone_tail) {
         power = hn::Add(hn::Add(hn::Mul(t.bone, t.bone), hn::Mul(t.bone_slow, t.bone_slow)),
                         hn::Mul(t.bone_floor, t.bone_floor));
     }
-    if (b.gas_tail) power = hn::Add(power, hn::Mul(t.gas, t.gas));
+    if (b.gas_tail) {
+        power = hn::Add(power, hn::Mul(t.gas, t.gas));
+        power = hn::Add(power, reverb_power(d, b, b.r[k], t));
+    }
     return power;
 }
 
-// A face of bone or gas lights its tails.
+// A face of bone or gas lights its tails: of gas from the second sample on, as one alone is a
+// neighbour's that a random look-up brought.
 template <class D, class V, class I>
-HWY_INLINE void light_tails(D d, V light_and_gain, V facing, I kind, BeamLight<D>& t) {
+HWY_INLINE void light_tails(D d, V light_and_gain, V facing, I kind, float r, BeamLight<D>& t) {
     using namespace physical;
     const hn::RebindToSigned<D> di;
-    const auto fresh = hn::Ne(kind, t.before);
-    const auto met = [&](PackedKind which) HWY_ATTR {
-        const auto same = hn::Eq(kind, hn::Set(di, static_cast<std::int32_t>(which) << 16));
-        return hn::RebindMask(d, hn::And(fresh, same));
+    const auto is = [&](I what, PackedKind which) HWY_ATTR {
+        return hn::Eq(what, hn::Set(di, static_cast<std::int32_t>(which) << 16));
     };
-    const auto to_bone = met(kPackedBone), to_gas = met(kPackedGas);
+    const auto to_bone =
+        hn::RebindMask(d, hn::AndNot(is(t.before, kPackedBone), is(kind, kPackedBone)));
+    const auto to_gas = hn::RebindMask(
+        d, hn::AndNot(is(t.before_that, kPackedGas),
+                      hn::And(is(t.before, kPackedGas), is(kind, kPackedGas))));
     const auto raise = [&](V tail, V to) HWY_ATTR { return hn::Max(tail, to); };
     const auto face = hn::Mul(hn::Mul(light_and_gain, facing),
                               hn::Set(d, static_cast<float>(kBoneTail * kMaxReflection)));
@@ -66,6 +87,16 @@ HWY_INLINE void light_tails(D d, V light_and_gain, V facing, I kind, BeamLight<D
     t.bone_slow = hn::IfThenElse(to_bone, raise(t.bone_slow, slow), t.bone_slow);
     t.bone_floor = hn::IfThenElse(to_bone, raise(t.bone_floor, floor), t.bone_floor);
     t.gas = hn::IfThenElse(to_gas, raise(t.gas, ring), t.gas);
+    // Only a surface that was seen to face the beam is a mirror.
+    const auto mirror = hn::IfThenElseZero(
+        hn::Lt(facing, hn::Set(d, 1.0f)),
+        hn::Mul(hn::Mul(light_and_gain, facing),
+                hn::Set(d, static_cast<float>(kReverb * kReverbLoss))));
+    const auto brighter = hn::And(to_gas, hn::Gt(mirror, t.reverb));
+    const auto depth = hn::Set(d, r);
+    t.reverb = hn::IfThenElse(brighter, mirror, t.reverb);
+    t.period = hn::IfThenElse(brighter, depth, t.period);
+    t.next = hn::IfThenElse(brighter, hn::Add(depth, depth), t.next);
 }
 
 // kTails: the stretch holds bone or gas, or follows some.
@@ -93,9 +124,10 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
             const auto kind = hn::And(hn::Load(di, c.look.row(row)), kind_bits);
             fade_tails(d, b, t);
             const auto facing = c.surfaces ? hn::Load(d, c.facing.row(row)) : hn::Set(d, 1.0f);
-            light_tails(d, hn::Mul(t.light, hn::Set(d, b.gain[k])), facing, kind, t);
+            light_tails(d, hn::Mul(t.light, hn::Set(d, b.gain[k])), facing, kind, b.r[k], t);
+            t.before_that = t.before;
             t.before = kind;
-            hn::StoreU(tail_power(d, b, t), d, b.tail + out);
+            hn::StoreU(tail_power(d, b, k, t), d, b.tail + out);
         }
         auto left = uniform;
         if (!c.one_label) left = hn::GatherIndex(d, dim, hn::Load(di, c.label.row(row)));
@@ -105,7 +137,8 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
         }
         t.light = hn::Mul(t.light, left);
     }
-    if constexpr (!kTails) t.before = hn::And(hn::Load(di, c.look.row(c.rows - 1)), kind_bits);
+    if constexpr (!kTails)
+        t.before_that = t.before = hn::And(hn::Load(di, c.look.row(c.rows - 1)), kind_bits);
 }
 
 // kHard: the scene holds bone or gas at all.
@@ -133,7 +166,7 @@ HWY_INLINE void dark_rows(D d, const PhysicalBlock& b, int beam, int first, Beam
         hn::StoreU(hn::Zero(d), d, b.light + out);
         if (t.tail_from > k) continue;
         fade_tails(d, b, t);
-        hn::StoreU(tail_power(d, b, t), d, b.tail + out);
+        hn::StoreU(tail_power(d, b, k, t), d, b.tail + out);
     }
 }
 

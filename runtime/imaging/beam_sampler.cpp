@@ -38,6 +38,10 @@ void sample_beams_as(PhysicalBlock& b) {
                            zero,
                            zero,
                            zero,
+                           zero,
+                           zero,
+                           zero,
+                           hn::Zero(di),
                            hn::Zero(di),
                            b.samples};
         for (int k = 0; k < b.samples; k += kChunkRows) {

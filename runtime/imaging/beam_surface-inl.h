@@ -142,7 +142,9 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
             const auto code = hn::And(pair, hn::Set(di, 0xFFF));
             const auto per_sigma = hn::Mul(
                 hn::ConvertTo(d, hn::And(hn::ShiftRight<12>(pair), byte)), hn::Set(d, 1.0f / 32));
-            const auto u = hn::Mul(distance, per_sigma);
+            const auto split =
+                hn::Mul(hn::ConvertTo(d, hn::ShiftRight<24>(pair)), hn::Set(d, 1.0f / 128));
+            const auto u = hn::Mul(hn::Sub(hn::Abs(distance), split), per_sigma);
             const auto exponent =
                 hn::Add(hn::Add(hn::Mul(hn::ConvertTo(d, hn::Sub(code, hn::Set(di, 2048))),
                                         hn::Set(d, 1.0f / 128)),

@@ -124,9 +124,14 @@ FineStructure make_fine_structure(const CaseBundle& bundle) {
             const Axis own = longest_axis(moments[l]);
             if (own.elongation > 1.6) along = own.direction;
         }
-        const Vector3 a =
+        Vector3 a =
             normalized(cross(along, std::abs(along.x) < 0.7 ? Vector3{1, 0, 0} : Vector3{0, 1, 0}));
         const Vector3 b = cross(along, a);
+        if (kind[l] == 0) {  // strands run into their sheet at an angle
+            const Vector3 straight = along;
+            along = std::cos(kPennationRad) * straight + std::sin(kPennationRad) * a;
+            a = std::cos(kPennationRad) * a - std::sin(kPennationRad) * straight;
+        }
         const double across_mm = kind[l] == 0 ? kFibreAcrossMm : kSeptaMm;
         const double along_mm = kind[l] == 0 ? kFibreAlongMm : kSeptaMm;
         const std::array<Vector3, 3> rows{(voxel / along_mm) * along, (voxel / across_mm) * a,
@@ -139,7 +144,7 @@ FineStructure make_fine_structure(const CaseBundle& bundle) {
     }
 
     const std::vector<float> a = smooth_periodic_noise(kFineEdge, 2, 21),
-                             b = smooth_periodic_noise(kFineEdge, 3, 22),
+                             b = smooth_periodic_noise(kFineEdge, 5, 22),
                              c = smooth_periodic_noise(kFineEdge, 5, 23);
     std::vector<double> db(cube);
     // Fibres: sparse bright strands on dark ground.
@@ -150,8 +155,8 @@ FineStructure make_fine_structure(const CaseBundle& bundle) {
     store(db, f.cubes.data());
     // Septa: thin sheets where a smooth field crosses zero, torn here and there.
     for (std::size_t i = 0; i < cube; ++i) {
-        const double off = static_cast<double>(b[i]) / 0.16;
-        db[i] = -2 + 13 * std::exp(-off * off) *
+        const double off = static_cast<double>(b[i]) / 0.11;
+        db[i] = -4 + 18 * std::exp(-off * off) *
                          std::clamp(0.45 + 0.7 * static_cast<double>(c[i]), 0.0, 1.3);
     }
     store(db, f.cubes.data() + cube);

@@ -155,6 +155,7 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f,
     const auto decay = [&](double mm) { return static_cast<float>(std::exp(-g.step_mm / mm)); };
     base.decay = {decay(kBoneTailMm), decay(kBoneTailSlowMm), decay(kBoneFloorMm),
                   decay(kGasTailMm)};
+    base.reverb_mm = static_cast<float>(kReverbWidth * tables_.axial_mm);
     base.structure = f.effects.structure && scene_.has_echo;
     base.speckled = f.effects.speckle;
     base.interfaces = f.effects.interfaces;

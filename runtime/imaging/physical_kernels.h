@@ -23,7 +23,7 @@ inline constexpr int kLookFine = 1 << 19;
 
 // A pair's echo in one word: log2 of the amplitude (bits 0-11, 1/128, + 2048; 0: none), one over
 // the thickness (12-19, 1/32 per mm), hard (20), refracts (21), own label pulses (22), second label
-// pulses (23).
+// pulses (23), split into two layers (24-30, 1/128 mm).
 inline constexpr int kPairHard = 1 << 20, kPairRefracts = 1 << 21, kPairOwnPulse = 1 << 22,
                      kPairSecondPulse = 1 << 23;
 
@@ -77,6 +77,7 @@ struct PhysicalBlock {
     struct {
         float bone = 0, bone_slow = 0, bone_floor = 0, gas = 0;
     } decay;  // of the tails, a sample
+    float reverb_mm = 0.5f;  // half the width of a line
     float voxel_mm = 1, rough_per_voxel = 2, step_mm = 0.3f;
     bool structure = true, speckled = true, interfaces = true, edge_shadow = true,
          attenuation = true;

@@ -47,10 +47,10 @@ inline constexpr double kRoughnessMm = 0.28;
 inline constexpr int kRoughEdge = 32;  // 128 kB: it stays in the second cache
 inline constexpr double kRoughVoxelMm = 0.7;
 
-// Interfaces: amplitude 60 R^0.85 with R at most 0.22; share of specular and diffuse by angle.
+// Interfaces: amplitude 60 R^0.85 with R at most 0.115; share of specular and diffuse by angle.
 inline constexpr double kInterfaceGain = 60;
 inline constexpr double kInterfacePower = 0.85;
-inline constexpr double kMaxReflection = 0.22;
+inline constexpr double kMaxReflection = 0.115;
 
 // Refraction at fluid: a beam that grazes within kEdgeCos of the tangent loses energy along the
 // wall.
@@ -59,11 +59,17 @@ inline constexpr double kEdgeLossLog2PerMm = 0.55;
 inline constexpr double kEdgeReachMm = 1.0;
 
 // Tails behind bone and gas.
-inline constexpr double kBoneTail = 4, kBoneTailMm = 0.6, kBoneTailSlow = 0.1,
+inline constexpr double kBoneTail = 7.7, kBoneTailMm = 0.6, kBoneTailSlow = 0.1,
                         kBoneTailSlowMm = 4.5;
 // What side lobes and reverberation leave in a bone's shadow: 15 to 22 grey in living bone.
 inline constexpr double kBoneFloor = 0.075, kBoneFloorMm = 90;
-inline constexpr double kGasTail = 2.4, kGasTailMm = 22;
+inline constexpr double kGasTail = 1.4, kGasTailMm = 18;
+// A smooth face of gas and the probe's throw the pulse to and fro: lines at multiples of its depth
+// (A-lines), each this much of the one before; half a line is this many times the pulse wide.
+inline constexpr double kReverb = 9, kReverbLoss = 0.42, kReverbWidth = 1.4;
+// In fluid the pulse steepens, and its harmonics are lost: attenuation on top of the tissue's own.
+// Without, a full bladder would whiten all that lies behind.
+inline constexpr double kFluidSteepening = 0.22;
 
 // Haze: side lobes and reverberation, this far below the mean envelope nearby.
 inline constexpr double kHazeDb = -24;
@@ -99,6 +105,7 @@ inline constexpr double kTipGlintMm = 1.0;
 // offsets in quarter dB; a label's frame gives the cube's coordinates.
 inline constexpr int kFineEdge = 64;
 inline constexpr double kFibreAlongMm = 1.6, kFibreAcrossMm = 0.16;  // a cube's voxel
+inline constexpr double kPennationRad = 0.2;
 inline constexpr double kSeptaMm = 0.45;
 
 // Targets of an exercise are balls in the anatomy; their surface is as rough as any.
@@ -122,6 +129,7 @@ struct Tables {
     std::vector<Row> rows;  // # samples
     int axial_reach = 0;
     std::array<float, 2 * kMaxAxial + 1> axial{};  // centre at kMaxAxial; unit power
+    double axial_mm = 0.58;                        // full width at half height
     double scatter_mm = 0.3;                       // spacing of scatterers
     double frequency_mhz = 3.5;
 };

@@ -152,8 +152,8 @@ BeamSamples reference_beams(const PhysicalScene& s,
         const Vector3 sideways = f.volume_from_probe.rotation * Vector3{1, 0, 0};
         const double gap = static_cast<double>(gaps[static_cast<std::size_t>(l)]);
         double log2_light = 0, needle_light = 0, bone = 0, bone_slow = 0, bone_floor = 0, gas = 0,
-               needle_tail = 0;
-        TissueKind before = TissueKind::soft;
+               needle_tail = 0, reverb = 0, period = 0, next = 0;
+        TissueKind before = TissueKind::soft, before_that = TissueKind::soft;
         for (int k = 0; k < samples; ++k) {
             const Row& row = tables.rows[static_cast<std::size_t>(k)];
             bone *= std::exp(-g.step_mm / kBoneTailMm);
@@ -230,7 +230,8 @@ BeamSamples reference_beams(const PhysicalScene& s,
                 facing = pair.hard ? 0.25 * cosine + 0.75 * std::pow(cosine, 6)
                                    : 0.08 * cosine + 0.92 * std::pow(cosine, 10);
                 if (on.interfaces && pair.amplitude > 0) {
-                    const double u = place.distance_mm / pair.sigma_mm;
+                    const double u =
+                        (std::abs(place.distance_mm) - pair.split_mm) / pair.sigma_mm;
                     const double i = pair.amplitude * facing * std::exp2(place.rough.log2_glint) *
                                      std::exp(-0.5 * u * u) * row.interface_scale;
                     re += i * place.rough.re;
@@ -271,8 +272,18 @@ BeamSamples reference_beams(const PhysicalScene& s,
                                                     facing * here * row.gain);
                 bone_floor = std::max(bone_floor, kBoneFloor * std::min(here * row.gain, 1.0));
             }
-            if (look.kind == TissueKind::gas && before != TissueKind::gas)
+            if (look.kind == TissueKind::gas && before == TissueKind::gas &&
+                before_that != TissueKind::gas) {
                 gas = std::max(gas, kGasTail * here * row.gain);
+                const double mirror =
+                    facing < 1 ? kReverb * kReverbLoss * facing * here * row.gain : 0;
+                if (mirror > reverb) {
+                    reverb = mirror;
+                    period = row.r_mm;
+                    next = 2 * row.r_mm;
+                }
+            }
+            before_that = before;
             before = look.kind;
 
             if (on.needle && f.needle != nullptr) {
@@ -303,7 +314,15 @@ BeamSamples reference_beams(const PhysicalScene& s,
             double power = 0;
             if (on.bone_tail)
                 power += bone * bone + bone_slow * bone_slow + bone_floor * bone_floor;
-            if (on.gas_ring_down) power += gas * gas;
+            if (on.gas_ring_down) {
+                const double off = (row.r_mm - next) / (kReverbWidth * tables.axial_mm);
+                const double line = reverb * std::max(1 - off * off, 0.0);
+                power += gas * gas + line * line;
+                if (off > 1) {
+                    next += period;
+                    reverb *= kReverbLoss;
+                }
+            }
             tail[at(k, l)] = power + needle_tail * needle_tail;
             log2_light -= loss;
         }

@@ -44,11 +44,13 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
     // Between muscles, and between muscle and fat, lies a sheet of connective tissue that the label
     // volume does not show.
     if (is_muscle(a) && is_muscle(b) && la.name != lb.name) {
-        reflection = std::max(reflection, 0.045);
-        e.sigma_mm = 0.20;
+        reflection = std::max(reflection, 0.04);
+        e.sigma_mm = 0.128;
+        e.split_mm = 0.25;
     } else if ((is_muscle(a) && is_fat(b)) || (is_fat(a) && is_muscle(b))) {
-        reflection = std::max(reflection, 0.09);
-        e.sigma_mm = 0.24;
+        reflection = std::max(reflection, 0.05);
+        e.sigma_mm = 0.128;
+        e.split_mm = 0.375;
     }
     if (reflection > 1e-4) {
         e.amplitude =
@@ -141,6 +143,9 @@ Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
         ball.fluid = look.kind == TissueKind::fluid;
         s.looks.push_back(look);
         s.targets.push_back(ball);
+    }
+    for (LabelLook& look : s.looks) {
+        if (look.kind == TissueKind::fluid) look.attenuation += kFluidSteepening;
     }
     s.pairs.resize(count * count);
     for (std::size_t a = 0; a < count; ++a) {

@@ -18,6 +18,7 @@ namespace sonocase::runtime {
 struct PairEcho {
     double amplitude = 0;   // 60 R^0.85; 0: none
     double sigma_mm = 0.2;  // of the reflecting layer
+    double split_mm = 0;    // of two layers, to either side of the surface; 0: one
     bool hard = false;      // bone or gas on one side
     bool refracts = false;  // fluid on one side
     int pulse = 0;          // +1: the first label swells with the pulse, -1: the second
