@@ -63,9 +63,9 @@ HWY_INLINE hn::Vec<D> tail_power(D d, const PhysicalBlock& b, int k, BeamLight<D
 }
 
 // A face of bone or gas lights its tails: of gas from the second sample on, as one alone is a
-// neighbour's that a random look-up brought.
+// neighbour's that a random look-up brought. above_mm: depth of the sample above.
 template <class D, class V, class I>
-HWY_INLINE void light_tails(D d, V light_and_gain, V facing, I kind, float r, BeamLight<D>& t) {
+HWY_INLINE void light_tails(D d, V light_and_gain, V facing, I kind, float above_mm, BeamLight<D>& t) {
     using namespace physical;
     const hn::RebindToSigned<D> di;
     const auto is = [&](I what, PackedKind which) HWY_ATTR {
@@ -93,7 +93,7 @@ HWY_INLINE void light_tails(D d, V light_and_gain, V facing, I kind, float r, Be
         hn::Mul(hn::Mul(light_and_gain, facing),
                 hn::Set(d, static_cast<float>(kReverb * kReverbLoss))));
     const auto brighter = hn::And(to_gas, hn::Gt(mirror, t.reverb));
-    const auto depth = hn::Set(d, r);
+    const auto depth = hn::Set(d, above_mm);
     t.reverb = hn::IfThenElse(brighter, mirror, t.reverb);
     t.period = hn::IfThenElse(brighter, depth, t.period);
     t.next = hn::IfThenElse(brighter, hn::Add(depth, depth), t.next);
@@ -124,7 +124,8 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
             const auto kind = hn::And(hn::Load(di, c.look.row(row)), kind_bits);
             fade_tails(d, b, t);
             const auto facing = c.surfaces ? hn::Load(d, c.facing.row(row)) : hn::Set(d, 1.0f);
-            light_tails(d, hn::Mul(t.light, hn::Set(d, b.gain[k])), facing, kind, b.r[k], t);
+            light_tails(d, hn::Mul(t.light, hn::Set(d, b.gain[k])), facing, kind,
+                        b.r[k] - b.step_mm, t);
             t.before_that = t.before;
             t.before = kind;
             hn::StoreU(tail_power(d, b, k, t), d, b.tail + out);

@@ -279,8 +279,8 @@ BeamSamples reference_beams(const PhysicalScene& s,
                     facing < 1 ? kReverb * kReverbLoss * facing * here * row.gain : 0;
                 if (mirror > reverb) {
                     reverb = mirror;
-                    period = row.r_mm;
-                    next = 2 * row.r_mm;
+                    period = row.r_mm - g.step_mm;
+                    next = 2 * period;
                 }
             }
             before_that = before;

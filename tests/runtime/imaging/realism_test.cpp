@@ -282,6 +282,68 @@ TEST(Realism, FasciaStandsOutAndAVesselIsDark) {
     EXPECT_LT(lumen / m, 35);
 }
 
+// Mean grey of some beams over a stretch of depth.
+double grey_of(const Bench& b, double from_mm, double to_mm, int first_line, int end_line) {
+    double sum = 0;
+    int n = 0;
+    for (int k = b.row_of(from_mm); k < b.row_of(to_mm); ++k) {
+        for (int l = first_line; l < end_line; ++l, ++n) sum += b.renderer->shade(k, l);
+    }
+    return sum / n;
+}
+
+TEST(Realism, BehindFluidTissueIsBrighterButNotWhite) {
+    PhantomOptions o;
+    o.ribs = o.gas = o.kidney = false;
+    Bench b(Phantom(o).bundle(), phantom_exercise());
+    b.run();
+    // The cyst of 24 mm whose middle lies 105 mm down its beam.
+    double line = 0, sample = 0;
+    ASSERT_TRUE(b.geometry.locate({-40, 100}, line, sample));
+    const double far_wall_mm = (sample + 0.5) * b.geometry.step_mm + 12;
+    const int middle = static_cast<int>(line);
+    const double inside = grey_of(b, far_wall_mm - 16, far_wall_mm - 8, middle - 3, middle + 4),
+                 behind = grey_of(b, far_wall_mm + 5, far_wall_mm + 13, middle - 3, middle + 4),
+                 beside = grey_of(b, far_wall_mm + 5, far_wall_mm + 13, middle + 22, middle + 30);
+    std::printf("cyst %.0f grey, behind %.0f, beside %.0f\n", inside, behind, beside);
+    EXPECT_LT(inside, 35);
+    EXPECT_GT(behind - beside, 10);  // 2 to 8 dB behind 24 mm: 10 to 35 grey
+    EXPECT_LT(behind - beside, 35);
+}
+
+TEST(Realism, GasThrowsLinesAtMultiplesOfItsDepth) {
+    Bench b(phantom(), phantom_exercise());
+    b.frame.volume_from_probe.translation = {48, 0, 0};  // its face 36 mm under the middle
+    // Few beams meet the face squarely, and a draw of clutter is wider than they: mean of draws.
+    constexpr std::uint32_t kDraws = 12;
+    std::vector<double> grey(512, 0.0);
+    for (std::uint32_t seed = 1; seed <= kDraws; ++seed) {
+        b.frame.seed = seed;
+        b.run();
+        for (int k = 0; k < 512; ++k) {
+            for (int l = 94; l < 98; ++l)
+                grey[static_cast<std::size_t>(k)] += b.renderer->shade(k, l) / (4.0 * kDraws);
+        }
+    }
+    const auto mean = [&](double from_mm, double to_mm) {
+        const auto first = grey.begin() + b.row_of(from_mm), last = grey.begin() + b.row_of(to_mm);
+        return std::accumulate(first, last, 0.0) / static_cast<double>(last - first);
+    };
+    for (const int n : {2, 3}) {
+        // Roughness shifts a face by up to a millimetre, and its lines by as much again and again.
+        const double depth_mm = 36.0 * n, reach_mm = n;
+        const double on = *std::max_element(grey.begin() + b.row_of(depth_mm - reach_mm),
+                                            grey.begin() + b.row_of(depth_mm + reach_mm)),
+                     off = 0.5 * (mean(depth_mm - 9, depth_mm - 6) +
+                                  mean(depth_mm + 6, depth_mm + 9));
+        std::printf("line at %.0f mm: %.0f over %.0f\n", depth_mm, on, off);
+        EXPECT_GT(on, off + 10);
+    }
+    std::printf("dirty shadow %.0f grey, %.0f at twice the depth\n", mean(40, 46), mean(86, 96));
+    EXPECT_GT(mean(40, 46), 50);  // dirty, and fading
+    EXPECT_GT(mean(40, 46), mean(86, 96) + 30);
+}
+
 TEST(Realism, SpeckleFollowsTheTissue) {
     Bench b(homogeneous(), phantom_linear_exercise());
     const double pitch = b.geometry.line_step;
