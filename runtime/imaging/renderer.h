@@ -78,6 +78,9 @@ class Renderer {
     static Result<Renderer> create(const CaseBundle& bundle,
                                    const Exercise& exercise,
                                    const RenderOptions& options);
+    static Result<Renderer> create(CaseBundle&& bundle,
+                                   const Exercise& exercise,
+                                   const RenderOptions& options) = delete;  // it would not outlive
     ~Renderer();
     Renderer(Renderer&&) noexcept;
     Renderer& operator=(Renderer&&) noexcept;

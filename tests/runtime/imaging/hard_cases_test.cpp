@@ -156,8 +156,8 @@ TEST(HardCases, ABundleOfOneLabel) {
     for (const ImageModel model : kModels) {
         expect_agreement(filled_with(Phantom::liver), model, needle_input(), "liver");
         // Nothing but outside: the probe touches nothing.
-        auto renderer =
-            Renderer::create(filled_with(Phantom::outside), phantom_exercise(), options_of(model));
+        const CaseBundle outside = filled_with(Phantom::outside);
+        auto renderer = Renderer::create(outside, phantom_exercise(), options_of(model));
         ASSERT_TRUE(renderer.has_value());
         std::vector<std::uint8_t> pixels(128 * 128);
         const FrameStatus status = renderer->render({}, pixels);
