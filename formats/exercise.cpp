@@ -277,6 +277,25 @@ void read_pass_mark(Table table, std::vector<Exercise::PassMark>& marks) {
     marks.push_back(std::move(mark));
 }
 
+// Lines of a file are as long as its author's screen: a single break is a space, an empty line parts
+// paragraphs.
+std::string flowed(const std::string& lines) {
+    std::string text;
+    std::istringstream in(lines);
+    bool parted = false;
+    for (std::string line; std::getline(in, line);) {
+        const std::size_t first = line.find_first_not_of(" \t\r");
+        if (first == std::string::npos) {
+            parted = !text.empty();
+            continue;
+        }
+        if (!text.empty()) text += parted ? "\n" : " ";
+        text += line.substr(first, line.find_last_not_of(" \t\r") + 1 - first);
+        parted = false;
+    }
+    return text;
+}
+
 Exercise read_exercise(Table root) {
     Exercise e;
     root.text("name", e.name);
@@ -285,6 +304,7 @@ Exercise read_exercise(Table root) {
     e.title = e.name;
     root.text("title", e.title);
     root.text("description", e.description);
+    e.description = flowed(e.description);
     root.text("kind", e.kind, {"biopsy", "drainage", "nephrostomy", "vascular", "scan"});
     root.whole("difficulty", e.difficulty, 1, 5);
     root.text("model", e.model, {"physical", "paper"});

@@ -164,5 +164,12 @@ TEST(Exercise, NeedleDiameterFollowsTheGauge) {
     EXPECT_DOUBLE_EQ(needle_diameter_mm({.gauge = 99}), 0.185);
 }
 
+TEST(Exercise, DescriptionsFlowWhateverTheLengthOfTheirLines) {
+    const auto exercise = parse_exercise(
+        "name = \"x\"\ndescription = \"\"\"\nFind the lesion\nand stop in it.  \n\n  Then wait.\n\"\"\"\n", "x.toml");
+    ASSERT_TRUE(exercise);
+    EXPECT_EQ(exercise->description, "Find the lesion and stop in it.\nThen wait.");
+}
+
 }  // namespace
 }  // namespace sonocase
