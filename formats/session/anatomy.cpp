@@ -177,4 +177,18 @@ double MeshAnatomy::exit_distance(Point3 from, Vector3 direction, double reach) 
     return nearest;
 }
 
+double insertion_depth_mm(
+    const Anatomy& anatomy, Point3 tip, Vector3 direction, double needle_length_mm, Point3* skin) {
+    if (anatomy.inside(tip)) {
+        const double depth = anatomy.exit_distance(tip, -direction, needle_length_mm);
+        if (skin) *skin = tip - depth * direction;
+        return depth;
+    }
+    constexpr double kReachMm = 10;
+    double ahead = 0;
+    while (ahead < kReachMm && !anatomy.inside(tip + ahead * direction)) ahead += 0.5;
+    if (skin) *skin = tip + ahead * direction;
+    return -ahead;
+}
+
 }  // namespace sonocase

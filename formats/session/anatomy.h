@@ -71,4 +71,12 @@ class MeshAnatomy final : public Anatomy {
     std::vector<std::vector<std::uint32_t>> triangles_of_column_;
 };
 
+// Distance of the tip along the needle to the skin: > 0 inside, <= 0 outside (how far ahead the
+// skin is, at most 10). skin: where the shaft passes it.
+double insertion_depth_mm(const Anatomy& anatomy,
+                          Point3 tip,
+                          Vector3 direction,
+                          double needle_length_mm,
+                          Point3* skin = nullptr);
+
 }  // namespace sonocase

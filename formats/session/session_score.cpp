@@ -1,15 +1,14 @@
 #include "formats/session/session_score.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <sstream>
-#include <thread>
 
 #include "formats/session/image_region.h"
 #include "formats/session/metric_table.h"
+#include "formats/session/needle_readings.h"
 #include "formats/session/session_monitor.h"
 #include "formats/session/target_tree.h"
 
@@ -23,19 +22,6 @@ Point3 origin_of(const Rigid& t) {
     return {t.translation.x, t.translation.y, t.translation.z};
 }
 
-// What is looked up for one reading of the needle. Readings do not depend on each other here, so
-// that threads may share them out.
-struct Reading {
-    bool inside = false, ahead = false, behind = false, touches = false;
-    bool no_go = false;
-    double depth_mm = 0;  // > 0 inside
-    Point3 skin;
-    bool seen = false;       // the probe is tracked in the same sample
-    double plane_mm = kNan;  // signed distance of the tip to the scan plane
-    bool tip_in_view = false;
-    double in_beam_mm = 0;
-};
-
 class Scorer {
   public:
     Scorer(const Session& session,
@@ -43,22 +29,21 @@ class Scorer {
            const Anatomy* anatomy,
            const std::vector<Label>& labels,
            const ScoreOptions& options)
-        : session_(session), exercise_(exercise), anatomy_(anatomy), options_(options) {
-        no_go_.resize(256, false);
-        for (std::size_t i = 0; i < labels.size() && i < no_go_.size(); ++i) {
-            for (const std::string& name : exercise.no_go)
-                no_go_[i] = no_go_[i] || labels[i].name == name;
+        : session_(session),
+          exercise_(exercise),
+          anatomy_(anatomy),
+          labels_(labels),
+          options_(options) {
+        for (const Label& label : labels) {
+            has_no_go_ = has_no_go_ ||
+                         std::count(exercise.no_go.begin(), exercise.no_go.end(), label.name) > 0;
         }
-        has_no_go_ = std::find(no_go_.begin(), no_go_.end(), true) != no_go_.end();
-        const double slab = exercise.needle.slab_mm > 0 ? exercise.needle.slab_mm
-                                                        : needle_diameter_mm(exercise.needle);
-        half_slab_mm_ = 0.5 * std::max(slab, exercise.probe.elevation_mm);
     }
 
     SessionScore score() {
         probe_ = track_of(session_, Tool::probe);
         needle_ = track_of(session_, Tool::drawn_needle);
-        look_up();
+        readings_ = look_up_readings(session_, needle_, exercise_, anatomy_, labels_, options_);
         session_metrics();
         motion("needle_", motion_metrics(needle_.points, options_.motion), !needle_.points.empty());
         motion("probe_", motion_metrics(probe_.points, options_.motion), !probe_.points.empty());
@@ -86,65 +71,6 @@ class Scorer {
         return anatomy_ ? anatomy_->moved(centre, time_s) : centre;
     }
     double target_shift_mm() const { return anatomy_ ? anatomy_->greatest_shift_mm() : 0; }
-
-    Reading look_up_one(const TrackPoint& point) const {
-        Reading r;
-        const Point3 tip = origin_of(point.pose);
-        const Vector3 direction = point.pose.rotation.column(2);
-        const double length = exercise_.needle.length_mm;
-        if (anatomy_) {
-            r.inside = anatomy_->inside(tip);
-            r.ahead = anatomy_->inside(tip + options_.puncture_mm * direction);
-            r.behind = anatomy_->inside(tip - options_.puncture_mm * direction);
-            r.touches = r.inside || anatomy_->inside(tip + options_.contact_mm * direction);
-            r.depth_mm = insertion_depth_mm(*anatomy_, tip, direction, length, &r.skin);
-            if (has_no_go_ && r.inside) {
-                for (double s = 0; s <= r.depth_mm && !r.no_go; s += options_.shaft_step_mm) {
-                    const int label =
-                        anatomy_->label(anatomy_->at_rest(tip - s * direction, point.time_s));
-                    r.no_go = no_go_[static_cast<std::size_t>(label)];
-                }
-            }
-        }
-        const SessionSample& sample = session_.samples[point.sample];
-        if (sample.probe_ok && is_finite(sample.mannequin_from_probe)) {
-            r.seen = true;
-            const Rigid probe_from_mannequin = inverse(sample.mannequin_from_probe);
-            const Point3 t = probe_from_mannequin * tip;
-            r.plane_mm = t.y;
-            r.tip_in_view = std::abs(t.y) <= half_slab_mm_ && in_image(exercise_.probe, t.x, t.z);
-            if (r.depth_mm > 0) {
-                const Point3 skin = probe_from_mannequin * (tip - r.depth_mm * direction);
-                r.in_beam_mm = length_in_image(exercise_.probe, t, skin, half_slab_mm_);
-            }
-        }
-        return r;
-    }
-
-    void look_up() {
-        readings_.resize(needle_.points.size());
-        constexpr std::size_t kBlock = 1024;
-        const std::size_t blocks = (readings_.size() + kBlock - 1) / kBlock;
-        std::atomic<std::size_t> next{0};
-        const auto work = [&] {
-            for (std::size_t b = next++; b < blocks; b = next++) {
-                const std::size_t end = std::min(readings_.size(), (b + 1) * kBlock);
-                for (std::size_t i = b * kBlock; i < end; ++i)
-                    readings_[i] = look_up_one(needle_.points[i]);
-            }
-        };
-#if !defined(__EMSCRIPTEN__) || defined(__EMSCRIPTEN_PTHREADS__)
-        const unsigned machine = std::min(16u, std::max(1u, std::thread::hardware_concurrency()));
-        const std::size_t wanted =
-            options_.threads > 0 ? static_cast<std::size_t>(options_.threads) : machine;
-        std::vector<std::thread> helpers;
-        for (std::size_t t = 1; t < std::min(wanted, blocks); ++t) helpers.emplace_back(work);
-        work();
-        for (std::thread& helper : helpers) helper.join();
-#else
-        work();
-#endif
-    }
 
     void session_metrics() {
         double first = INFINITY, last = -INFINITY;
@@ -191,7 +117,7 @@ class Scorer {
         bool punctured = false;
         const double length = exercise_.needle.length_mm;
         for (std::size_t i = 0; i < readings_.size(); ++i) {
-            const Reading& r = readings_[i];
+            const NeedleReading& r = readings_[i];
             deepest = std::max(deepest, r.depth_mm);
             if (!punctured && r.inside && r.ahead && r.behind) {
                 ++punctures;
@@ -203,7 +129,7 @@ class Scorer {
             path += distance(tip(i), tip(i - 1));
             time_in += step_s(i);
             if (r.no_go) no_go_s += step_s(i);
-            const Reading& before = readings_[i - 1];
+            const NeedleReading& before = readings_[i - 1];
             if (!before.inside) continue;
             // The shaft swept the quadrilateral between its two inserted parts: two triangles.
             const Point3 end = tip(i) - std::min(r.depth_mm, length) * direction(i);
@@ -217,9 +143,9 @@ class Scorer {
         set("tissue_damage_mm2", damage);
         set("tissue_punctures", punctures);
         set("deepest_mm", deepest);
-        set("skin_contacts", contacts([](const Reading& r) { return r.touches; }));
+        set("skin_contacts", contacts([](const NeedleReading& r) { return r.touches; }));
         if (has_no_go_ || exercise_.no_go.empty()) {
-            set("no_go_contacts", contacts([](const Reading& r) { return r.no_go; }));
+            set("no_go_contacts", contacts([](const NeedleReading& r) { return r.no_go; }));
             set("no_go_time_s", no_go_s);
         } else {
             out_.warnings.push_back("The body has none of the structures to be spared.");
@@ -243,7 +169,7 @@ class Scorer {
         if (!anatomy_) return;
         InsertionDetector detector(options_.insertion);
         for (std::size_t i = 0; i < readings_.size(); ++i) {
-            const Reading& r = readings_[i];
+            const NeedleReading& r = readings_[i];
             const InsertionChange change =
                 detector.update(time(i), r.depth_mm, direction(i), r.skin);
             if (change == InsertionChange::entered) {
@@ -341,7 +267,7 @@ class Scorer {
                angle = 0;
         double advance = 0, advance_in_view = 0;
         for (std::size_t i = 1; i < readings_.size(); ++i) {
-            const Reading& r = readings_[i];
+            const NeedleReading& r = readings_[i];
             if (!r.inside || !r.seen) continue;
             const double dt = step_s(i);
             in_beam += dt * r.in_beam_mm;
@@ -421,7 +347,7 @@ class Scorer {
     void curves() {
         SessionCurves& c = out_.curves;
         for (std::size_t i = 0; i < readings_.size(); ++i) {
-            const Reading& r = readings_[i];
+            const NeedleReading& r = readings_[i];
             c.time_s.push_back(time(i));
             c.depth_mm.push_back(anatomy_ ? std::max(r.depth_mm, 0.0) : kNan);
             c.plane_distance_mm.push_back(r.plane_mm);
@@ -457,32 +383,17 @@ class Scorer {
     const Session& session_;
     const Exercise& exercise_;
     const Anatomy* anatomy_;
+    const std::vector<Label>& labels_;
     const ScoreOptions& options_;
-    std::vector<bool> no_go_;
     bool has_no_go_ = false;
-    double half_slab_mm_ = 0;
     ToolTrack probe_, needle_;
-    std::vector<Reading> readings_;
+    std::vector<NeedleReading> readings_;
     std::vector<std::size_t> deepest_;
     std::map<std::string, double> values_;
     SessionScore out_;
 };
 
 }  // namespace
-
-double insertion_depth_mm(
-    const Anatomy& anatomy, Point3 tip, Vector3 direction, double needle_length_mm, Point3* skin) {
-    if (anatomy.inside(tip)) {
-        const double depth = anatomy.exit_distance(tip, -direction, needle_length_mm);
-        if (skin) *skin = tip - depth * direction;
-        return depth;
-    }
-    constexpr double kReachMm = 10;
-    double ahead = 0;
-    while (ahead < kReachMm && !anatomy.inside(tip + ahead * direction)) ahead += 0.5;
-    if (skin) *skin = tip + ahead * direction;
-    return -ahead;
-}
 
 BreathingMotion breathing_shown(const Exercise& exercise,
                                 bool physical_model,

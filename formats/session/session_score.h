@@ -89,12 +89,4 @@ BreathingMotion breathing_shown(const Exercise& exercise, const SessionHeader& h
 // [...], "targets": [...], "warnings": [...]}.
 std::string score_json(const SessionScore& score, const Exercise& exercise);
 
-// Distance of the tip along the needle to the skin: > 0 inside, <= 0 outside (how far ahead the
-// skin is, at most 10). skin: where the shaft passes it.
-double insertion_depth_mm(const Anatomy& anatomy,
-                          Point3 tip,
-                          Vector3 direction,
-                          double needle_length_mm,
-                          Point3* skin = nullptr);
-
 }  // namespace sonocase

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "formats/session/session_score.h"
+#include "formats/session/anatomy.h"
 
 namespace sonocase::runtime {
 namespace {
