@@ -39,8 +39,7 @@ template <class D>
 HWY_INLINE hn::Vec<D> reverb_power(D d, const PhysicalBlock& b, float r, BeamLight<D>& t) {
     const auto off = hn::Mul(hn::Sub(hn::Set(d, r), t.next), hn::Set(d, 1 / b.reverb_mm));
     const auto one = hn::Set(d, 1.0f);
-    const auto pulse =
-        hn::Mul(t.reverb, hn::Max(hn::Sub(one, hn::Mul(off, off)), hn::Zero(d)));
+    const auto pulse = hn::Mul(t.reverb, hn::Max(hn::Sub(one, hn::Mul(off, off)), hn::Zero(d)));
     const auto past = hn::Gt(off, one);
     t.next = hn::Add(t.next, hn::IfThenElseZero(past, t.period));
     t.reverb = hn::IfThenElse(
@@ -65,7 +64,8 @@ HWY_INLINE hn::Vec<D> tail_power(D d, const PhysicalBlock& b, int k, BeamLight<D
 // A face of bone or gas lights its tails: of gas from the second sample on, as one alone is a
 // neighbour's that a random look-up brought. above_mm: depth of the sample above.
 template <class D, class V, class I>
-HWY_INLINE void light_tails(D d, V light_and_gain, V facing, I kind, float above_mm, BeamLight<D>& t) {
+HWY_INLINE void light_tails(
+    D d, V light_and_gain, V facing, I kind, float above_mm, BeamLight<D>& t) {
     using namespace physical;
     const hn::RebindToSigned<D> di;
     const auto is = [&](I what, PackedKind which) HWY_ATTR {
@@ -73,9 +73,9 @@ HWY_INLINE void light_tails(D d, V light_and_gain, V facing, I kind, float above
     };
     const auto to_bone =
         hn::RebindMask(d, hn::AndNot(is(t.before, kPackedBone), is(kind, kPackedBone)));
-    const auto to_gas = hn::RebindMask(
-        d, hn::AndNot(is(t.before_that, kPackedGas),
-                      hn::And(is(t.before, kPackedGas), is(kind, kPackedGas))));
+    const auto to_gas =
+        hn::RebindMask(d, hn::AndNot(is(t.before_that, kPackedGas),
+                                     hn::And(is(t.before, kPackedGas), is(kind, kPackedGas))));
     const auto raise = [&](V tail, V to) HWY_ATTR { return hn::Max(tail, to); };
     const auto face = hn::Mul(hn::Mul(light_and_gain, facing),
                               hn::Set(d, static_cast<float>(kBoneTail * kMaxReflection)));
@@ -88,10 +88,10 @@ HWY_INLINE void light_tails(D d, V light_and_gain, V facing, I kind, float above
     t.bone_floor = hn::IfThenElse(to_bone, raise(t.bone_floor, floor), t.bone_floor);
     t.gas = hn::IfThenElse(to_gas, raise(t.gas, ring), t.gas);
     // Only a surface that was seen to face the beam is a mirror.
-    const auto mirror = hn::IfThenElseZero(
-        hn::Lt(facing, hn::Set(d, 1.0f)),
-        hn::Mul(hn::Mul(light_and_gain, facing),
-                hn::Set(d, static_cast<float>(kReverb * kReverbLoss))));
+    const auto mirror =
+        hn::IfThenElseZero(hn::Lt(facing, hn::Set(d, 1.0f)),
+                           hn::Mul(hn::Mul(light_and_gain, facing),
+                                   hn::Set(d, static_cast<float>(kReverb * kReverbLoss))));
     const auto brighter = hn::And(to_gas, hn::Gt(mirror, t.reverb));
     const auto depth = hn::Set(d, above_mm);
     t.reverb = hn::IfThenElse(brighter, mirror, t.reverb);

@@ -22,7 +22,7 @@ struct EffectEntry {
     const char* name;
     Pass pass;
     double weight;          // of the pass's time, relative
-    double gathers, bytes;  // scattered reads, and bytes moved, a sample where it shows
+    double gathers, bytes;  // scattered reads, and bytes from beyond the first cache, a sample
     bool PaperEffects::*paper = nullptr;  // switch; null: always on
     bool PhysicalEffects::*physical = nullptr;
 };

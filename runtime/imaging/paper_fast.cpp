@@ -97,7 +97,8 @@ bool PaperFast::place_block(const Rigid& volume_from_probe, int first_line) {
     bool inside = true;
     for (int l = first_line; l < first_line + kPaperBlock; ++l) {
         const auto& [o, d] = g.beams[static_cast<std::size_t>(std::min(l, g.scanlines - 1))];
-        const Point3 first = volume_from_probe * Point3{o.x + first_r * d.x, 0, o.z + first_r * d.z};
+        const Point3 first =
+            volume_from_probe * Point3{o.x + first_r * d.x, 0, o.z + first_r * d.z};
         const Point3 last = volume_from_probe * Point3{o.x + last_r * d.x, 0, o.z + last_r * d.z};
         const Point3 a = scene_.grid.voxel_from_point(first),
                      b = scene_.grid.voxel_from_point(last);

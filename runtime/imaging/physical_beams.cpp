@@ -20,8 +20,8 @@ void PhysicalFast::find_contact(const PhysicalFrame& f) {
     });
     passes_.beams_in_contact = smooth_gaps(lines, raw_gaps_, gaps_);
     if (!f.effects.contact) std::fill(gaps_.begin(), gaps_.end(), 0.0f);
-    passes_.gap_met = std::any_of(gaps_.begin(), gaps_.begin() + lines,
-                                  [](float gap) { return gap != 0.0f; });
+    passes_.gap_met =
+        std::any_of(gaps_.begin(), gaps_.begin() + lines, [](float gap) { return gap != 0.0f; });
 }
 
 void PhysicalFast::place_beams(const PhysicalFrame& f, const BreathingField* breathing, int first) {

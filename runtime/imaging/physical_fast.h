@@ -75,11 +75,11 @@ class PhysicalFast {
     std::vector<float> planes_;  // holds the four below, samples x stride each
     std::int32_t* echoes_ = nullptr;
     float *light_ = nullptr, *tail_ = nullptr, *power_ = nullptr;
-    std::vector<std::int32_t> tail_from_;        // per block
-    std::vector<float> work_, ring_;             // per thread
-    std::vector<int> next_row_;  // per thread: what its ring can go on with
-    std::vector<float> envelope_, haze_;  // per thread: sum of a row of cells; # cells x stride
-    std::vector<std::uint8_t> shade_;            // per thread: two rows
+    std::vector<std::int32_t> tail_from_;  // per block
+    std::vector<float> work_, ring_;       // per thread
+    std::vector<int> next_row_;            // per thread: what its ring can go on with
+    std::vector<float> envelope_, haze_;   // per thread: sum of a row of cells; # cells x stride
+    std::vector<std::uint8_t> shade_;      // per thread: two rows
     std::vector<std::uint16_t> pairs_;
     PhysicalPasses passes_;
 };

@@ -78,8 +78,8 @@ inline std::uint32_t noise_start(std::uint32_t seed, NoiseUse use, std::uint32_t
 inline constexpr int kPersistedFrames = 4;
 inline constexpr std::array<double, kPersistedFrames> kPersistence{0.40, 0.30, 0.20, 0.10};
 
-// Gap between probe face and skin on the beams [first, last), mm; negative: no skin within reach, so
-// that the beam sees air. raw: # scanlines.
+// Gap between probe face and skin on the beams [first, last), mm; negative: no skin within reach,
+// so that the beam sees air. raw: # scanlines.
 void find_gaps(const PhysicalScene& scene,
                const ScanGeometry& geometry,
                const PhysicalFrame& frame,

@@ -17,8 +17,7 @@ constexpr std::uint64_t range_of(std::uint64_t first, std::uint64_t last) {
 
 }  // namespace
 
-WorkerPool::WorkerPool(int threads)
-    : shares_(static_cast<std::size_t>(threads)), inside_{kClosed} {
+WorkerPool::WorkerPool(int threads) : shares_(static_cast<std::size_t>(threads)), inside_{kClosed} {
     if (static_cast<unsigned>(threads) <= std::thread::hardware_concurrency()) spins_ = kSpins;
     for (int part = 1; part < threads; ++part) workers_.emplace_back([this, part] { work(part); });
 }

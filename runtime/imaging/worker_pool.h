@@ -27,7 +27,8 @@ class WorkerPool {
     // waited for. Allocates nothing; one caller at a time; functions must not throw.
     template <class F>
     void for_each(int items, F&& function) {
-        run(items,
+        run(
+            items,
             [](void* f, int part, int item) {
                 (*static_cast<std::remove_reference_t<F>*>(f))(part, item);
             },

@@ -3,8 +3,8 @@
 //   Accuracy/LINESxSAMPLES   time: a frame of model `physical`; error_grey: root mean square
 //                            difference of the picture to one of 384 x 1024, both smoothed over
 //                            grain (4 mm), since speckle of another sampling is another draw;
-//                            lost_detail_grey: what the picture lost of the finer one's detail, as the
-//                            fall of its deviation from its own smoothed self
+//                            lost_detail_grey: what the picture lost of the finer one's detail, as
+//                            the fall of its deviation from its own smoothed self
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -108,9 +108,11 @@ void accuracy(benchmark::State& state, int lines, int samples) {
         for (const int samples : {512, 448, 384, 256}) {
             const std::string name =
                 "Accuracy/" + std::to_string(lines) + "x" + std::to_string(samples);
-            benchmark::RegisterBenchmark(name.c_str(), [lines, samples](benchmark::State& s) {
-                accuracy(s, lines, samples);
-            })->Unit(benchmark::kMillisecond)->Iterations(61 * 12);
+            benchmark::RegisterBenchmark(
+                name.c_str(),
+                [lines, samples](benchmark::State& s) { accuracy(s, lines, samples); })
+                ->Unit(benchmark::kMillisecond)
+                ->Iterations(61 * 12);
         }
     }
     return true;

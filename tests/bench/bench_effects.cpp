@@ -121,7 +121,8 @@ struct PhysicalRig {
     const Exercise exercise = bench_exercise();
     const runtime::ScanGeometry geometry =
         runtime::make_scan_geometry(exercise.probe, kPhysicalLines, kSamples, kPixels, kPixels);
-    const runtime::physical::Tables tables = runtime::physical::make_tables(exercise.probe, geometry);
+    const runtime::physical::Tables tables =
+        runtime::physical::make_tables(exercise.probe, geometry);
     const runtime::PhysicalNoise noise = runtime::make_physical_noise(1, kPhysicalLines + 128);
     const runtime::NeedleShape shaft = needle_of(exercise);
     const std::vector<float> gain = std::vector<float>(kSamples, 0.0f);
@@ -230,12 +231,12 @@ const CaseBundle& plain_bundle() {
 // Effects that a scene may not call for.
 bool optional_effect(const runtime::EffectEntry& e) {
     using Y = PhysicalEffects;
-    for (const auto which :
-         {&Y::breathing, &Y::pulsation, &Y::boundaries, &Y::structure, &Y::fine_structure,
-          &Y::targets, &Y::interfaces, &Y::edge_shadow, &Y::bone_tail, &Y::gas_ring_down,
-          &Y::needle})
+    for (const auto which : {&Y::breathing, &Y::pulsation, &Y::boundaries, &Y::structure,
+                             &Y::fine_structure, &Y::targets, &Y::interfaces, &Y::edge_shadow,
+                             &Y::bone_tail, &Y::gas_ring_down, &Y::needle})
         if (e.physical == which) return true;
-    return e.paper != nullptr && (e.paper == &PaperEffects::shadow || e.paper == &PaperEffects::needle);
+    return e.paper != nullptr &&
+           (e.paper == &PaperEffects::shadow || e.paper == &PaperEffects::needle);
 }
 
 void report_off(benchmark::State& state, const Cost& cost) {

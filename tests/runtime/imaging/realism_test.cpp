@@ -334,8 +334,8 @@ TEST(Realism, GasThrowsLinesAtMultiplesOfItsDepth) {
         const double depth_mm = 36.0 * n, reach_mm = n;
         const double on = *std::max_element(grey.begin() + b.row_of(depth_mm - reach_mm),
                                             grey.begin() + b.row_of(depth_mm + reach_mm)),
-                     off = 0.5 * (mean(depth_mm - 9, depth_mm - 6) +
-                                  mean(depth_mm + 6, depth_mm + 9));
+                     off = 0.5 *
+                           (mean(depth_mm - 9, depth_mm - 6) + mean(depth_mm + 6, depth_mm + 9));
         std::printf("line at %.0f mm: %.0f over %.0f\n", depth_mm, on, off);
         EXPECT_GT(on, off + 10);
     }

@@ -15,7 +15,8 @@ TEST(WorkerPool, DoesEveryItemOnceForAnyNumberOfThreads) {
             // Plain integers: that a caller sees them afterwards is part of the promise.
             std::vector<int> done(static_cast<std::size_t>(items), 0);
             for (int round = 0; round < 50; ++round)
-                pool.for_each(items, [&](int, int item) { ++done[static_cast<std::size_t>(item)]; });
+                pool.for_each(items,
+                              [&](int, int item) { ++done[static_cast<std::size_t>(item)]; });
             EXPECT_EQ(done, std::vector<int>(done.size(), 50)) << threads << " threads";
         }
     }
