@@ -61,6 +61,11 @@ void find_gaps(const PhysicalScene& scene,
                int first,
                int last,
                std::span<float> raw) {
+    // Of a voxel coordinate within 1e5 and a step: cheaper than a call of floor().
+    const auto nearest = [](double v) {
+        constexpr int kShift = 1 << 18;
+        return static_cast<int>(v + (kShift + 0.5)) - kShift;
+    };
     for (int l = first; l < last; ++l) {
         float& gap = raw[static_cast<std::size_t>(l)];
         gap = -1;
@@ -71,9 +76,7 @@ void find_gaps(const PhysicalScene& scene,
         if (!(std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5 && std::abs(p.z) < 1e5)) continue;
         for (int step = 0; step * physical::kGapStepMm <= physical::kMaxGapMm; ++step) {
             const Point3 q = p + static_cast<double>(step) * v;
-            const int label = label_at(scene, static_cast<int>(std::floor(q.x + 0.5)),
-                                       static_cast<int>(std::floor(q.y + 0.5)),
-                                       static_cast<int>(std::floor(q.z + 0.5)));
+            const int label = label_at(scene, nearest(q.x), nearest(q.y), nearest(q.z));
             if (label == 0) continue;
             gap = static_cast<float>(step * physical::kGapStepMm);
             break;
