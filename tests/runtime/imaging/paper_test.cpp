@@ -228,7 +228,8 @@ TEST(Renderer, RefusesWhatCannotBeScanned) {
     o = paper_options();
     o.effects = {"shadows"};
     EXPECT_FALSE(Renderer::create(phantom(), phantom_exercise(), o).has_value());
-    EXPECT_FALSE(Renderer::create(CaseBundle{}, phantom_exercise(), paper_options()).has_value());
+    const CaseBundle empty;
+    EXPECT_FALSE(Renderer::create(empty, phantom_exercise(), paper_options()).has_value());
 }
 
 }  // namespace
