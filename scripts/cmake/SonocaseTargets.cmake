@@ -25,6 +25,11 @@ if(SONOCASE_SANITIZE)
                       -fno-sanitize-recover=undefined)
   add_link_options(-fsanitize=${SONOCASE_SANITIZE})
 endif()
+# Gives a program scripts/cmake/keep_modules.c, which says what for.
+function(sonocase_keep_modules program)
+  target_sources(${program} PRIVATE "${CMAKE_SOURCE_DIR}/scripts/cmake/keep_modules.c")
+  target_link_options(${program} PRIVATE -Wl,--export-dynamic-symbol=dlclose)
+endfunction()
 
 # sonocase_library(NAME FOLDER): one of the three libraries. Its headers are reached as
 # "<folder>/..." through a directory that holds a link to that folder alone, so that a target sees
@@ -46,14 +51,9 @@ function(sonocase_test name)
                         GTest::gtest_main)
   add_test(NAME ${name} COMMAND ${name})
   if(SONOCASE_SANITIZE MATCHES "address")
-    # Drivers that paint are unloaded before leaks are counted, and what they keep cannot be told
-    # from a leak of ours then; scripts/player-soak looks for those.
-    set(leaks 1)
-    if(name MATCHES "window_test|review_test")
-      set(leaks 0)
-    endif()
+    sonocase_keep_modules(${name})
     set_tests_properties(${name} PROPERTIES ENVIRONMENT
-      "ASAN_OPTIONS=detect_leaks=${leaks};LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/leaks-of-libraries.txt:print_suppressions=0")
+      "LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/leaks-of-libraries.txt:print_suppressions=0")
   endif()
 endfunction()
 
@@ -84,6 +84,9 @@ function(sonocase_build_facts program)
   target_sources(${program} PRIVATE "${CMAKE_BINARY_DIR}/facts/${program}.cpp")
   target_include_directories(${program} PRIVATE "${CMAKE_BINARY_DIR}/facts")
   add_dependencies(${program} sonocase_commit)
+  if(SONOCASE_SANITIZE MATCHES "address")
+    sonocase_keep_modules(${program})
+  endif()
 endfunction()
 
 # sonocase_header_version(VARIABLE HEADER MACRO...): numbers that a header defines, joined by dots, of a library
