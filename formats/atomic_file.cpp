@@ -145,6 +145,10 @@ Result<std::vector<std::uint8_t>> read_file(const std::string& path) {
     return read_whole<std::vector<std::uint8_t>>(path);
 }
 
+Result<RawVector<std::uint8_t>> read_large_file(const std::string& path) {
+    return read_whole<RawVector<std::uint8_t>>(path);
+}
+
 Result<std::string> read_text_file(const std::string& path) {
     return read_whole<std::string>(path);
 }

@@ -10,11 +10,13 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/raw_vector.h"
 #include "formats/result.h"
 
 namespace sonocase {
 
 Result<std::vector<std::uint8_t>> read_file(const std::string& path);
+Result<RawVector<std::uint8_t>> read_large_file(const std::string& path);  // not cleared first
 Result<std::string> read_text_file(const std::string& path);
 
 // Writes a temporary name in the same folder, flushes it to the disk and renames it over `path`;

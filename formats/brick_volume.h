@@ -1,7 +1,6 @@
 // A volume kept in bricks of 4 x 4 x 4 voxels. A brick whose voxels are all alike costs only its
 // table entry, so that the air round a torso and the inside of an organ are nearly free.
 //
-//
 // table    one entry a brick, x fastest. Bit 31 clear: number of the brick in `pool`, whose 64 values
 //          start at 64 * entry, x fastest inside the brick. Bit 31 set: the brick is uniform and the
 //          other bits are an index into `uniform`.
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "formats/geometry.h"
+#include "formats/raw_vector.h"
 
 namespace sonocase {
 
@@ -30,10 +30,10 @@ inline Int3 brick_count(Int3 size) {
 
 template <class T>  // std::uint8_t (labels), std::int8_t (echo offsets), std::uint32_t (boundaries)
 struct BrickVolume {
-    Int3 size{0, 0, 0};                // voxels
-    std::vector<std::uint32_t> table;  // # product of brick_count(size)
-    std::vector<T> uniform;            // distinct values of uniform bricks
-    std::vector<T> pool;               // 64 values a stored brick
+    Int3 size{0, 0, 0};              // voxels
+    RawVector<std::uint32_t> table;  // # product of brick_count(size)
+    std::vector<T> uniform;          // distinct values of uniform bricks
+    RawVector<T> pool;               // 64 values a stored brick
 
     T at(int i, int j, int k) const {
         const Int3 n = brick_count(size);

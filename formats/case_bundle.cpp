@@ -1,10 +1,12 @@
 #include "formats/case_bundle.h"
 
 #include <new>
+#include <optional>
 
 #include "formats/atomic_file.h"
 #include "formats/detail/bundle_parts.h"
 #include "formats/detail/packed_volumes.h"
+#include "formats/detail/run_jobs.h"
 
 namespace sonocase {
 namespace {
@@ -86,6 +88,20 @@ void read_manifest_into(CaseBundle& bundle, JsonObject& manifest) {
     }
 }
 
+Status read_surfaces_into(CaseBundle& bundle, const ChunkReader& reader, int threads) {
+    auto patient = detail::read_surface(reader, "skin.pat", threads);
+    if (!patient) return patient.error();
+    bundle.patient_skin = std::move(*patient);
+    auto mannequin = detail::read_surface(reader, "skin.man", threads);
+    if (!mannequin) return mannequin.error();
+    bundle.mannequin_skin = std::move(*mannequin);
+    if (!reader.has("preview")) return Done{};
+    auto preview = reader.read("preview", kMaxPreviewBytes, threads);
+    if (!preview) return preview.error();
+    bundle.preview_png = std::move(*preview);
+    return Done{};
+}
+
 Result<CaseBundle> read_checked(std::span<const std::uint8_t> bytes,
                                 const std::string& where,
                                 int threads) {
@@ -98,12 +114,22 @@ Result<CaseBundle> read_checked(std::span<const std::uint8_t> bytes,
     JsonObject manifest(*json, "", fault);
     read_manifest_into(bundle, manifest);
     if (fault.error) return *fault.error;
-    auto volumes =
-        detail::read_volumes(*reader, manifest, bundle.grid.size, bundle.labels.size(), threads);
-    if (!volumes) return volumes.error();
-    bundle.label_bricks = std::move(volumes->labels);
-    bundle.boundary = std::move(volumes->boundary);
-    bundle.echo_offset = std::move(volumes->echo_offset);
+    // Surfaces and preview meanwhile.
+    std::optional<Result<detail::VoxelVolumes>> volumes;
+    Status surfaces = Done{};
+    detail::run_jobs(2, threads, [&](std::size_t job) {
+        if (job == 1) {
+            surfaces = read_surfaces_into(bundle, *reader, threads);
+        } else {
+            volumes = detail::read_volumes(*reader, manifest, bundle.grid.size,
+                                           bundle.labels.size(), threads);
+        }
+    });
+    if (!*volumes) return volumes->error();
+    bundle.label_bricks = std::move((*volumes)->labels);
+    bundle.boundary = std::move((*volumes)->boundary);
+    bundle.echo_offset = std::move((*volumes)->echo_offset);
+    bundle.blocks = std::move((*volumes)->blocks);
     auto textures = detail::read_textures(*reader, manifest, threads);
     if (!textures) return textures.error();
     bundle.textures = std::move(*textures);
@@ -111,18 +137,12 @@ Result<CaseBundle> read_checked(std::span<const std::uint8_t> bytes,
     if (!speckle) return speckle.error();
     bundle.speckle = std::move(*speckle);
     if (fault.error) return *fault.error;
-    auto patient = detail::read_surface(*reader, "skin.pat", threads);
-    if (!patient) return patient.error();
-    bundle.patient_skin = std::move(*patient);
-    auto mannequin = detail::read_surface(*reader, "skin.man", threads);
-    if (!mannequin) return mannequin.error();
-    bundle.mannequin_skin = std::move(*mannequin);
-    if (reader->has("preview")) {
-        auto preview = reader->read("preview", kMaxPreviewBytes, threads);
-        if (!preview) return preview.error();
-        bundle.preview_png = std::move(*preview);
-    }
+    if (!surfaces) return surfaces.error();
     return bundle;
+}
+
+Error no_memory(const std::string& where) {
+    return {"needs more memory than there is", where, "use a case with larger voxels"};
 }
 
 }  // namespace
@@ -143,9 +163,14 @@ Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,
                                const std::string& where,
                                int threads) {
     try {
-        return read_checked(bytes, where, threads);
+        auto bundle = read_checked(bytes, where, threads);
+        if (!bundle || !bundle->blocks) return bundle;
+        bundle->blocks->need_all(threads);
+        if (Status whole = bundle->blocks->status(); !whole) return whole.error();
+        bundle->blocks.reset();
+        return bundle;
     } catch (const std::bad_alloc&) {
-        return Error{"needs more memory than there is", where, "use a case with larger voxels"};
+        return no_memory(where);
     }
 }
 
@@ -164,9 +189,25 @@ std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle) {
 }
 
 Result<CaseBundle> load_bundle(const std::string& path) {
-    const auto bytes = read_file(path);
+    const auto bytes = read_large_file(path);
     if (!bytes) return bytes.error();
     return read_bundle(*bytes, path);
+}
+
+Result<CaseBundle> open_bundle(const std::string& path) {
+    auto bytes = read_large_file(path);
+    if (!bytes) return bytes.error();
+    try {
+        auto bundle = read_checked(*bytes, path, 0);
+        // What the blocks refer to stays where it is while the vector moves.
+        if (bundle && bundle->blocks) {
+            bundle->blocks->keep(std::move(*bytes));
+            bundle->blocks->use_small_pages();
+        }
+        return bundle;
+    } catch (const std::bad_alloc&) {
+        return no_memory(path);
+    }
 }
 
 Status save_bundle(const CaseBundle& bundle, const std::string& path) {

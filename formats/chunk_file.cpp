@@ -101,12 +101,18 @@ void ChunkWriter::add_view(std::string type, bool required, std::span<const std:
     chunks_.push_back({std::move(type), required, {}, bytes});
 }
 
+void ChunkWriter::add_packed(std::string type, bool required, std::vector<std::uint8_t> bytes) {
+    add(std::move(type), required, std::move(bytes));
+    chunks_.back().packed = true;
+}
+
 std::vector<std::uint8_t> ChunkWriter::write(int threads) const {
     const std::size_t table_bytes = kEntryBytes * chunks_.size();
     std::vector<std::uint8_t> out(kHeaderBytes + table_bytes);
     for (std::size_t i = 0; i < chunks_.size(); ++i) {
         const Chunk& chunk = chunks_[i];
-        const std::vector<std::uint8_t> packed = compressed(chunk.view, threads);
+        const std::vector<std::uint8_t> packed =
+            chunk.packed ? std::vector<std::uint8_t>() : compressed(chunk.view, threads);
         const std::span<const std::uint8_t> stored =
             packed.empty() ? chunk.view : std::span(packed);
         const std::size_t offset = aligned(out.size());
@@ -272,14 +278,26 @@ Result<std::vector<std::uint8_t>> ChunkReader::read(std::string_view type,
     return read_array<std::uint8_t>(type, raw_bytes(type), threads);
 }
 
+Status ChunkReader::check_sum(const Entry& entry) const {
+    if (XXH3_64bits(bytes_.data() + entry.offset, entry.stored) == entry.checksum) return Done{};
+    return fault("chunk '" + entry.type + "' checksum does not match",
+                 "the file is damaged; copy it again or make it again");
+}
+
+Result<std::span<const std::uint8_t>> ChunkReader::packed(std::string_view type) const {
+    const Entry* entry = find(type);
+    if (!entry) return fault("chunk '" + std::string(type) + "' is missing", "make the file again");
+    if (entry->compressed)
+        return fault("chunk '" + entry->type + "' is packed twice", "make the file again");
+    if (Status sum = check_sum(*entry); !sum) return sum.error();
+    return bytes_.subspan(entry->offset, entry->stored);
+}
+
 Status ChunkReader::unpack(std::string_view type, std::span<std::uint8_t> to, int threads) const {
     const Entry& entry = *find(type);
     const auto stored = bytes_.subspan(entry.offset, entry.stored);
     const std::string name = "chunk '" + std::string(type) + "'";
-    if (XXH3_64bits(stored.data(), stored.size()) != entry.checksum) {
-        return fault(name + " checksum does not match",
-                     "the file is damaged; copy it again or make it again");
-    }
+    if (Status sum = check_sum(entry); !sum) return sum;
     if (!entry.compressed) {
         if (!to.empty()) std::memcpy(to.data(), stored.data(), to.size());
         return Done{};

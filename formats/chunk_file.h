@@ -31,8 +31,10 @@ class ChunkWriter {
     void add(std::string type, bool required, std::vector<std::uint8_t> bytes);
     // Borrows: the bytes must stay until write() returns.
     void add_view(std::string type, bool required, std::span<const std::uint8_t> bytes);
-    template <class T>
-    void add_array(std::string type, bool required, const std::vector<T>& values) {
+    // Bytes that are packed already, and that readers take as they lie.
+    void add_packed(std::string type, bool required, std::vector<std::uint8_t> bytes);
+    template <class T, class A>
+    void add_array(std::string type, bool required, const std::vector<T, A>& values) {
         static_assert(std::is_trivially_copyable_v<T>);
         add_view(std::move(type), required,
                  {reinterpret_cast<const std::uint8_t*>(values.data()), values.size() * sizeof(T)});
@@ -47,6 +49,7 @@ class ChunkWriter {
         bool required;
         std::vector<std::uint8_t> owned;
         std::span<const std::uint8_t> view;
+        bool packed = false;
     };
     std::string kind_;
     std::vector<Chunk> chunks_;
@@ -68,13 +71,13 @@ class ChunkReader {
     Result<std::vector<std::uint8_t>> read(std::string_view type,
                                            std::size_t max_bytes,
                                            int threads = 0) const;
+    // The bytes of a chunk of add_packed() as they lie in the file, their checksum checked.
+    Result<std::span<const std::uint8_t>> packed(std::string_view type) const;
     // count: how many values the chunk must hold exactly.
-    template <class T>
-    Result<std::vector<T>> read_array(std::string_view type,
-                                      std::size_t count,
-                                      int threads = 0) const {
+    template <class T, class Values = std::vector<T>>
+    Result<Values> read_array(std::string_view type, std::size_t count, int threads = 0) const {
         static_assert(std::is_trivially_copyable_v<T>);
-        std::vector<T> values;
+        Values values;
         if (Status size = check_size(type, count, sizeof(T)); !size) return size.error();
         if (Status room = reserve([&] { values.resize(count); }, type); !room) return room.error();
         const std::span<std::uint8_t> to(reinterpret_cast<std::uint8_t*>(values.data()),
@@ -97,6 +100,7 @@ class ChunkReader {
     };
     const Entry* find(std::string_view type) const;
     Status check_size(std::string_view type, std::size_t count, std::size_t bytes_each) const;
+    Status check_sum(const Entry& entry) const;
     Status unpack(std::string_view type, std::span<std::uint8_t> to, int threads) const;
     template <class Allocate>
     Status reserve(Allocate allocate, std::string_view type) const {

@@ -50,6 +50,7 @@ Status fill_labels(LabelFile& file, const ChunkReader& reader, JsonObject& manif
     const Int3 size = file.volume.grid.size;
     auto volumes = detail::read_volumes(reader, manifest, size, file.volume.labels.size(), 0);
     if (!volumes) return volumes.error();
+    if (Status whole = detail::unpack_all(&*volumes, 0); !whole) return whole;
     file.volume.voxels = dense_from_bricks(volumes->labels);
     file.boundary = std::move(volumes->boundary);
     file.echo_offset = std::move(volumes->echo_offset);

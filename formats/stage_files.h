@@ -11,6 +11,7 @@
 #include "formats/solid_texture.h"
 #include "formats/stage_report.h"
 #include "formats/surface.h"
+#include "formats/surface_patch.h"
 #include "formats/tissue.h"
 
 namespace sonocase {
@@ -19,7 +20,7 @@ namespace sonocase {
 struct LabelFile {
     std::string frame;  // "ct" or "mannequin"
     LabelVolume volume;
-    BrickVolume<std::uint32_t> boundary;   // formats/boundary_record.h; may be empty
+    BoundaryBricks boundary;               // formats/boundary_record.h; may be empty
     BrickVolume<std::int8_t> echo_offset;  // quarter dB; may be empty
     std::vector<StageReport> reports;
 };

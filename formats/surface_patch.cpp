@@ -1,103 +1,95 @@
 #include "formats/surface_patch.h"
 
 #include <algorithm>
-#include <climits>
 #include <cmath>
-#include <numeric>
 
 #include "formats/boundary_record.h"
 
 namespace sonocase {
 namespace {
 
-// q in 1/512 voxel at the 64 voxels, and 512 times its change a half voxel along each axis.
-struct PatchValues {
-    std::array<std::int32_t, kBrickVoxels> q, x, y, z;
+// The loops over a brick's voxels, for the widest registers that the machine has; they are whole
+// numbers but for the direction's division and rounding, which are one operation each everywhere.
+#if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define SONOCASE_WIDEST __attribute__((target_clones("avx2", "default")))
+#else
+#define SONOCASE_WIDEST
+#endif
+
+using Voxels = std::array<std::int32_t, kBrickVoxels>;
+
+// Twice the voxels' places from the brick's centre.
+struct Places {
+    Voxels x, y, z;
 };
-
-void evaluate_distance(const SurfacePatch& patch, std::int32_t* q) {
-    const auto& c = patch.c;
-    for (int k = 0; k < kBrickEdge; ++k) {
-        const int mz = 2 * k - 3;  // voxels lie at odd halves of a voxel from the brick's centre
-        for (int j = 0; j < kBrickEdge; ++j) {
-            const int my = 2 * j - 3;
-            const int base = 16 * c[0] + 4 * (c[2] * my + c[3] * mz) + c[5] * my * my +
-                             c[6] * mz * mz + c[9] * my * mz;
-            const int slope = 4 * c[1] + c[7] * my + c[8] * mz;
-            for (int i = 0; i < kBrickEdge; ++i) {
-                const int mx = 2 * i - 3;
-                *q++ = base + mx * (slope + c[4] * mx);
-            }
-        }
+constexpr Places places_of_voxels() {
+    Places out{};
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+        out.x[v] = 2 * static_cast<std::int32_t>(v % 4) - 3;
+        out.y[v] = 2 * static_cast<std::int32_t>(v / 4 % 4) - 3;
+        out.z[v] = 2 * static_cast<std::int32_t>(v / 16) - 3;
     }
+    return out;
 }
+alignas(64) constexpr Places kPlaces = places_of_voxels();
 
-void evaluate(const SurfacePatch& patch, PatchValues* out) {
-    const auto& c = patch.c;
-    evaluate_distance(patch, out->q.data());
-    std::size_t v = 0;
-    for (int k = 0; k < kBrickEdge; ++k) {
-        const int mz = 2 * k - 3;
-        for (int j = 0; j < kBrickEdge; ++j) {
-            const int my = 2 * j - 3;
-            const int x = 4 * c[1] + c[7] * my + c[8] * mz;
-            const int y = 4 * c[2] + 2 * c[5] * my + c[9] * mz;
-            const int z = 4 * c[3] + 2 * c[6] * mz + c[9] * my;
-            for (int i = 0; i < kBrickEdge; ++i, ++v) {
-                const int mx = 2 * i - 3;
-                out->x[v] = x + 2 * c[4] * mx;
-                out->y[v] = y + c[7] * mx;
-                out->z[v] = z + c[8] * mx;
-            }
-        }
-    }
+// q in 1/512 voxel.
+inline std::int32_t distance_at(const std::array<std::int16_t, kPatchCoefficients>& c, std::size_t v) {
+    const std::int32_t x = kPlaces.x[v], y = kPlaces.y[v], z = kPlaces.z[v];
+    return 16 * c[0] + x * (4 * c[1] + c[4] * x + c[7] * y + c[8] * z) +
+           y * (4 * c[2] + c[5] * y + c[9] * z) + z * (4 * c[3] + c[6] * z);
 }
 
 // Steps of 1/48 voxel from 1/512 voxel, rounded; not negative.
-std::int32_t steps_of(std::int32_t q) {
+inline std::int32_t steps_of(std::int32_t q) {
     return (q * 3 + 16) >> 5;
 }
 
-std::int32_t rounded(float v) {  // |v| <= 128
+inline std::int32_t rounded(float v) {  // |v| <= 128
     return static_cast<std::int32_t>(v + 256.5f) - 256;
 }
 
 // Distance and direction packed as boundary_record.h has them, without the second label.
-std::uint32_t packed_plane(std::int32_t steps, std::int32_t x, std::int32_t y, std::int32_t z) {
+inline std::uint32_t packed_plane(std::int32_t steps, std::int32_t x, std::int32_t y, std::int32_t z) {
     const float fx = static_cast<float>(x), fy = static_cast<float>(y), fz = static_cast<float>(z);
     const float sum = std::abs(fx) + std::abs(fy) + std::abs(fz);
     const float scale = 127.0f / std::max(sum, 1.0f);
     const float u = fx * scale, v = fy * scale;
-    const float folded_u = fx < 0 ? std::abs(v) - 127.0f : 127.0f - std::abs(v);
-    const float folded_v = fy < 0 ? std::abs(u) - 127.0f : 127.0f - std::abs(u);
+    const float fold_u = 127.0f - std::abs(v), fold_v = 127.0f - std::abs(u);
+    const float folded_u = fx < 0 ? -fold_u : fold_u, folded_v = fy < 0 ? -fold_v : fold_v;
     const std::int32_t a = rounded(fz < 0 ? folded_u : u), b = rounded(fz < 0 ? folded_v : v);
     return static_cast<std::uint32_t>(steps) << 8 | (static_cast<std::uint32_t>(a) & 0xFFu) << 16 |
            (static_cast<std::uint32_t>(b) & 0xFFu) << 24;
 }
 
-// What a patch says of voxel v.
-std::uint32_t record_at(const SurfacePatch& patch,
-                        const PatchValues& value,
-                        std::size_t v,
-                        std::uint32_t label,
-                        int reach_steps) {
-    const std::uint32_t low = patch.low, high = patch.high;
-    const bool in_low = label == low, in_high = label == high;
-    const std::int32_t side = in_low ? 1 : -1;
-    const std::int32_t steps = steps_of(std::max(side * value.q[v], 0));
-    if (!(in_low || in_high) || steps > reach_steps) return kNoBoundary;
-    return packed_plane(steps, side * value.x[v], side * value.y[v], side * value.z[v]) |
-           (in_low ? high : low);
+SONOCASE_WIDEST void sides(const SurfacePatch& patch, std::uint8_t* labels) {
+    Voxels q;
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) q[v] = distance_at(patch.c, v);
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) labels[v] = q[v] >= 0 ? patch.low : patch.high;
 }
 
-void records_from_one(const SurfacePatch& patch,
-                      const std::uint8_t* labels,
-                      int reach_steps,
-                      std::uint32_t* records) {
-    PatchValues value;
-    evaluate(patch, &value);
-    for (std::size_t v = 0; v < kBrickVoxels; ++v)
-        records[v] = record_at(patch, value, v, labels[v], reach_steps);
+SONOCASE_WIDEST void records_from_one(const SurfacePatch& patch,
+                                      const std::uint8_t* labels,
+                                      int reach_steps,
+                                      std::uint32_t* records) {
+    const auto& c = patch.c;
+    const std::int32_t low = patch.low, high = patch.high;
+    Voxels label;
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) label[v] = labels[v];
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+        const std::int32_t x = kPlaces.x[v], y = kPlaces.y[v], z = kPlaces.z[v];
+        const std::int32_t side = label[v] == low ? 1 : -1;
+        const std::int32_t steps = steps_of(std::max(side * distance_at(c, v), 0));
+        // 512 times q's change a half voxel along each axis.
+        const std::int32_t gx = 4 * c[1] + 2 * c[4] * x + c[7] * y + c[8] * z,
+                           gy = 4 * c[2] + c[7] * x + 2 * c[5] * y + c[9] * z,
+                           gz = 4 * c[3] + c[8] * x + c[9] * y + 2 * c[6] * z;
+        const std::uint32_t plane = packed_plane(steps, side * gx, side * gy, side * gz) |
+                                    static_cast<std::uint32_t>(label[v] == low ? high : low);
+        const bool none = (label[v] != low && label[v] != high) || steps > reach_steps;
+        records[v] = none ? kNoBoundary : plane;
+    }
 }
 
 // Of two patches' records the nearer, the earlier at equal distance.
@@ -161,9 +153,7 @@ struct Fit {
 }  // namespace
 
 void labels_from_patch(const SurfacePatch& patch, std::uint8_t* labels) {
-    std::array<std::int32_t, kBrickVoxels> q;
-    evaluate_distance(patch, q.data());
-    for (std::size_t v = 0; v < kBrickVoxels; ++v) labels[v] = q[v] >= 0 ? patch.low : patch.high;
+    sides(patch, labels);
 }
 
 void records_from_patches(std::span<const SurfacePatch> patches,
@@ -235,77 +225,6 @@ std::vector<SurfacePatch> fit_patches(const BrickLabels& labels, const BrickReco
         out.push_back(patch);
     }
     return out;
-}
-
-std::vector<SurfacePatch> find_patches(const BrickLabels& labels,
-                                       const BrickRecords& records,
-                                       int reach_steps) {
-    std::vector<SurfacePatch> patches = fit_patches(labels, records);
-    if (patches.empty()) return {};
-    const bool by_side =
-        patches.size() == 1 && std::all_of(labels.begin(), labels.end(), [&](std::uint8_t l) {
-            return l == patches[0].low || l == patches[0].high;
-        });
-    std::vector<PatchValues> values(patches.size());
-    for (std::size_t k = 0; k < patches.size(); ++k) evaluate(patches[k], &values[k]);
-    // 0 where all is right, else about the squared steps between made and wanted; `enough` or more
-    // stands for itself. Voxels that were wrong last time come first: most tries leave them so.
-    std::array<std::uint8_t, kBrickVoxels> order;
-    std::iota(order.begin(), order.end(), std::uint8_t{0});
-    const auto wrong = [&](int enough) {
-        int count = 0;
-        std::size_t front = 0;
-        for (std::size_t n = 0; n < kBrickVoxels && count < enough; ++n) {
-            const std::size_t v = order[n];
-            const int before = count;
-            std::uint32_t made = kNoBoundary;
-            for (std::size_t k = 0; k < patches.size(); ++k)
-                made = nearer_of(made, record_at(patches[k], values[k], v, labels[v], reach_steps));
-            if (by_side)
-                count += (values[0].q[v] >= 0 ? patches[0].low : patches[0].high) != labels[v];
-            if (made != records[v]) {
-                const bool both = made != kNoBoundary && records[v] != kNoBoundary;
-                for (int shift = 8; both && shift < 32; shift += 8) {
-                    const int d = static_cast<std::int8_t>(made >> shift) -
-                                  static_cast<std::int8_t>(records[v] >> shift);
-                    count += d * d;
-                }
-                count += both ? 1 : 10;
-            }
-            if (count > before) std::swap(order[n], order[front++]);
-        }
-        return count;
-    };
-    constexpr int kSteps = 8;
-    int least = wrong(INT_MAX);
-    for (int step = 0; least > 0 && step < kSteps; ++step) {
-        std::int16_t* best = nullptr;
-        std::int16_t best_value = 0;
-        std::size_t best_patch = 0;
-        for (std::size_t k = 0; k < patches.size(); ++k) {
-            for (std::int16_t& c : patches[k].c) {
-                const std::int16_t was = c;
-                for (const int change : {-1, 1}) {
-                    c = static_cast<std::int16_t>(was + change);
-                    evaluate(patches[k], &values[k]);
-                    const int count = wrong(least);
-                    if (count < least) {
-                        least = count;
-                        best = &c;
-                        best_value = c;
-                        best_patch = k;
-                    }
-                }
-                c = was;
-            }
-            evaluate(patches[k], &values[k]);
-        }
-        if (best == nullptr) return {};
-        *best = best_value;
-        evaluate(patches[best_patch], &values[best_patch]);
-    }
-    if (least > 0) return {};
-    return patches;
 }
 
 }  // namespace sonocase

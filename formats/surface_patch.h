@@ -22,8 +22,8 @@ inline constexpr int kPatchCoefficients = 10;  // 1, x, y, z, xx, yy, zz, xy, xz
 inline constexpr int kMaxPatches = 6;          // of one brick
 
 struct SurfacePatch {
-    std::uint8_t low = 0, high = 0;  // labels, low < high
-    std::array<std::int16_t, kPatchCoefficients> c{};
+    std::uint8_t low, high;  // labels, low < high
+    std::array<std::int16_t, kPatchCoefficients> c;
     friend bool operator==(const SurfacePatch&, const SurfacePatch&) = default;
 };
 
@@ -49,11 +49,26 @@ SurfacePatch continued(const SurfacePatch& patch, int axis);
 // a patch.
 std::vector<SurfacePatch> fit_patches(const BrickLabels& labels, const BrickRecords& records);
 
-// Patches that give the records back exactly (and the labels, where the one patch can); empty: none
-// found. Rounding leaves a fit of what a patch made a step off in a coefficient or two: they are
-// searched for from there, one step at a time. Cost: 3 us, 50 us where there are none.
-std::vector<SurfacePatch> find_patches(const BrickLabels& labels,
-                                       const BrickRecords& records,
-                                       int reach_steps);
+// The patches of a volume's stored bricks, by their numbers in its pool.
+struct BrickPatches {
+    std::vector<std::uint32_t> first;  // # stored bricks, into `patches`; empty: none known
+    std::vector<std::uint8_t> count;   // # stored bricks
+    RawVector<SurfacePatch> patches;
+
+    std::span<const SurfacePatch> of(std::size_t stored_brick) const {
+        if (stored_brick >= first.size()) return {};
+        return {patches.data() + first[stored_brick], count[stored_brick]};
+    }
+};
+
+// Boundary records, and the patches that most of them were made from. Patches are a hint to whoever
+// packs the volume: the records alone say where the boundaries are.
+struct BoundaryBricks : BrickVolume<std::uint32_t> {
+    BrickPatches patches;
+
+    BoundaryBricks() = default;
+    BoundaryBricks(BrickVolume<std::uint32_t> records)
+        : BrickVolume<std::uint32_t>(std::move(records)) {}
+};
 
 }  // namespace sonocase

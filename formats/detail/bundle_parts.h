@@ -21,17 +21,7 @@ inline constexpr std::size_t kMaxSurfaceItems = std::size_t{1} << 27;
 void add_manifest(ChunkWriter& writer, const Json& manifest);
 Result<Json> read_manifest(const ChunkReader& reader);
 
-// A brick volume is three chunks: NAME.t, NAME.u and NAME.p, NAME being at most six characters.
-template <class T>
-void add_bricks(ChunkWriter& writer,
-                const std::string& name,
-                bool required,
-                const BrickVolume<T>& bricks) {
-    writer.add_array(name + ".t", required, bricks.table);
-    writer.add_array(name + ".u", required, bricks.uniform);
-    writer.add_array(name + ".p", required, bricks.pool);
-}
-
+// The first layout: a brick volume is three chunks, NAME.t, NAME.u and NAME.p.
 // size: from the manifest. Every table entry is checked, so that at() stays inside.
 template <class T>
 Result<BrickVolume<T>> read_bricks(const ChunkReader& reader,
@@ -43,7 +33,7 @@ Result<BrickVolume<T>> read_bricks(const ChunkReader& reader,
     const Int3 n = brick_count(size);
     const std::size_t count = static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) *
                               static_cast<std::size_t>(n.z);
-    auto table = reader.read_array<std::uint32_t>(name + ".t", count, threads);
+    auto table = reader.read_array<std::uint32_t, RawVector<std::uint32_t>>(name + ".t", count, threads);
     if (!table) return table.error();
     const std::size_t uniform_count = reader.raw_bytes(name + ".u") / sizeof(T);
     const std::size_t pool_count = reader.raw_bytes(name + ".p") / sizeof(T);
@@ -55,7 +45,7 @@ Result<BrickVolume<T>> read_bricks(const ChunkReader& reader,
     }
     auto uniform = reader.read_array<T>(name + ".u", uniform_count, threads);
     if (!uniform) return uniform.error();
-    auto pool = reader.read_array<T>(name + ".p", pool_count, threads);
+    auto pool = reader.read_array<T, RawVector<T>>(name + ".p", pool_count, threads);
     if (!pool) return pool.error();
     const std::size_t stored = pool_count / kBrickVoxels;
     bool inside = true;

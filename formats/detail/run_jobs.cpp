@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <exception>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -9,8 +11,16 @@ namespace sonocase::detail {
 
 void run_jobs(std::size_t count, int threads, const std::function<void(std::size_t)>& job) {
     std::atomic<std::size_t> next{0};
+    std::exception_ptr thrown;  // the first; only memory can run out
+    std::mutex mutex;
     const auto work = [&] {
-        for (std::size_t i = next++; i < count; i = next++) job(i);
+        try {
+            for (std::size_t i = next++; i < count; i = next++) job(i);
+        } catch (...) {
+            const std::scoped_lock lock(mutex);
+            if (!thrown) thrown = std::current_exception();
+            next = count;
+        }
     };
 #if !defined(__EMSCRIPTEN__) || defined(__EMSCRIPTEN_PTHREADS__)
     if (threads <= 0) threads = static_cast<int>(std::min(8u, std::thread::hardware_concurrency()));
@@ -29,6 +39,7 @@ void run_jobs(std::size_t count, int threads, const std::function<void(std::size
     (void)threads;
     work();
 #endif
+    if (thrown) std::rethrow_exception(thrown);
 }
 
 }  // namespace sonocase::detail

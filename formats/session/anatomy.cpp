@@ -48,6 +48,7 @@ int CaseAnatomy::label(Point3 p) const {
               k = static_cast<int>(v.z + 0.5);
     const int own = bundle_->label_bricks.at(i, j, k);
     if (bundle_->boundary.table.empty()) return own;
+    if (bundle_->blocks) bundle_->blocks->need_voxel(i, j, k);
     const std::uint32_t packed = bundle_->boundary.at(i, j, k);
     if (packed == kNoBoundary) return own;
     const BoundaryRecord record = unpack_boundary(packed);

@@ -110,11 +110,13 @@ Result<EchoOffsets> EchoCodec::decode(const Bytes& bytes, const std::string& whe
     auto size = reader->read_array<std::int32_t>("size", 3);
     if (!size) return size.error();
     result.offset.size = {(*size)[0], (*size)[1], (*size)[2]};
-    auto table = reader->read_array<std::uint32_t>("table", reader->raw_bytes("table") / 4);
+    auto table = reader->read_array<std::uint32_t, RawVector<std::uint32_t>>(
+        "table", reader->raw_bytes("table") / 4);
     if (!table) return table.error();
     auto uniform = reader->read_array<std::int8_t>("uniform", reader->raw_bytes("uniform"));
     if (!uniform) return uniform.error();
-    auto pool = reader->read_array<std::int8_t>("pool", reader->raw_bytes("pool"));
+    auto pool =
+        reader->read_array<std::int8_t, RawVector<std::int8_t>>("pool", reader->raw_bytes("pool"));
     if (!pool) return pool.error();
     result.offset.table = std::move(*table);
     result.offset.uniform = std::move(*uniform);

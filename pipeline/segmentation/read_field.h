@@ -5,8 +5,8 @@
 #include <functional>
 #include <vector>
 
-#include "formats/brick_volume.h"
 #include "formats/label_volume.h"
+#include "formats/surface_patch.h"
 #include "pipeline/progress.h"
 #include "pipeline/registration/inverse_map.h"
 #include "pipeline/segmentation/label_field.h"
@@ -30,7 +30,7 @@ struct FieldReadOptions {
 
 struct FieldRead {
     LabelVolume volume;
-    BrickVolume<std::uint32_t> boundary;
+    BoundaryBricks boundary;
     PreimageCounts counts;
     std::vector<int> rescued;  // labels too small for the grid, kept as one voxel
     std::vector<int> lost;     // labels whose place lies outside the grid

@@ -18,11 +18,11 @@
 #include <string>
 #include <vector>
 
-#include "formats/brick_volume.h"
 #include "formats/label_volume.h"
 #include "formats/registration.h"
 #include "formats/result.h"
 #include "formats/stage_report.h"
+#include "formats/surface_patch.h"
 #include "pipeline/progress.h"
 #include "pipeline/segmentation/label_changes.h"
 #include "pipeline/segmentation/level_set_smoothing.h"
@@ -49,7 +49,7 @@ struct ResampleOptions {
 };
 
 // Raised whenever the same input and options give other bytes than before.
-inline constexpr int kResampleVersion = 4;
+inline constexpr int kResampleVersion = 5;
 
 struct ResampleSeconds {  // method shape; wall clock
     double distances = 0, volumes = 0, voxels = 0;
@@ -57,7 +57,7 @@ struct ResampleSeconds {  // method shape; wall clock
 
 struct ResampleResult {
     LabelVolume volume;                   // `mannequin`, direction the identity
-    BrickVolume<std::uint32_t> boundary;  // formats/boundary_record.h; empty: none made
+    BoundaryBricks boundary;  // formats/boundary_record.h; empty: none made
     std::vector<LabelChange> changes;     // against the CT's volumes times det J
     StageReport report;
     ResampleSeconds seconds;  // not in the report: its measures are part of the stage's bytes

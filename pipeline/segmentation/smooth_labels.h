@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "formats/brick_volume.h"
 #include "formats/label_volume.h"
 #include "formats/result.h"
 #include "formats/stage_report.h"
+#include "formats/surface_patch.h"
 #include "pipeline/progress.h"
 #include "pipeline/segmentation/label_changes.h"
 #include "pipeline/segmentation/level_set_smoothing.h"
@@ -34,7 +34,7 @@ struct SmoothOptions {
 
 struct SmoothResult {
     LabelVolume volume;                   // on the grid of the input
-    BrickVolume<std::uint32_t> boundary;  // formats/boundary_record.h; empty: none made
+    BoundaryBricks boundary;  // formats/boundary_record.h; empty: none made
     std::vector<LabelChange> changes;
     StageReport report;
 };

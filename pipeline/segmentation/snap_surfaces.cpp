@@ -1,6 +1,7 @@
 #include "pipeline/segmentation/snap_surfaces.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -12,11 +13,12 @@ namespace sonocase::pipeline {
 namespace {
 
 struct Change {
-    std::size_t bricks = 0, snapped = 0, labels = 0, records = 0;
+    std::size_t bricks = 0, snapped = 0, missed = 0, labels = 0, records = 0;
     double distance_sum = 0, normal_sum = 0;  // squares
     void operator+=(const Change& o) {
         bricks += o.bricks;
         snapped += o.snapped;
+        missed += o.missed;
         labels += o.labels;
         records += o.records;
         distance_sum += o.distance_sum;
@@ -39,9 +41,19 @@ BoundaryRecord seen_from(std::uint8_t side, std::uint8_t own, std::uint32_t pack
     return r;
 }
 
+// What patches make of a brick.
+struct Attempt {
+    std::vector<SurfacePatch> patches;
+    Brick made;
+    std::array<bool, kBrickVoxels> hit{};  // the voxel's record may be replaced
+    bool labels_hit = true;                // and so may all its labels
+    std::size_t missed = 0;
+    Change change;
+};
+
 class Snapper {
   public:
-    // Only what is found again from the records can be kept short: nearly all is at once.
+    // Fitted again to what the last fit hit: nearly all is gained at once.
     static constexpr int kTurns = 3;
 
     explicit Snapper(const SnapOptions& options)
@@ -49,63 +61,86 @@ class Snapper {
           reach_(static_cast<int>(std::lround(options.band_vx * kBoundaryStepsPerVoxel))),
           cosine_(std::cos(options.normal_deg / 57.29577951308232)) {}
 
-    // True and `brick` replaced where patches say nearly the same.
-    bool operator()(Brick* brick, Change* change) const {
-        std::vector<SurfacePatch> patches = fit_patches(brick->labels, brick->records);
-        for (int turn = 0; turn < kTurns && !patches.empty(); ++turn) {
-            Brick out;
-            apply(*brick, patches, &out);
-            Change made;
-            if (!close(*brick, out, &made)) return false;
-            if (!find_patches(out.labels, out.records, reach_).empty()) {
-                *brick = out;
-                *change += made;
-                return true;
-            }
-            patches = fit_patches(out.labels, out.records);
+    // The patches that the brick now follows, where it does; empty: it is as it was.
+    std::vector<SurfacePatch> operator()(Brick* brick, Change* change) const {
+        Attempt best;
+        best.missed = kBrickVoxels + 1;
+        BrickRecords hits = brick->records;
+        for (int turn = 0; turn < kTurns && best.missed > 0; ++turn) {
+            std::vector<SurfacePatch> patches = fit_patches(brick->labels, hits);
+            if (patches.empty()) break;
+            Attempt now = attempt(*brick, std::move(patches));
+            for (std::size_t v = 0; v < kBrickVoxels; ++v)
+                hits[v] = now.hit[v] ? brick->records[v] : kNoBoundary;
+            if (now.missed < best.missed) best = std::move(now);
         }
-        return false;
+        if (best.change.records == 0) return {};
+        for (std::size_t v = 0; v < kBrickVoxels; ++v)
+            if (best.hit[v]) brick->records[v] = best.made.records[v];
+        brick->labels = best.made.labels;
+        best.change.missed = best.missed;
+        best.change.snapped = best.missed == 0;
+        *change += best.change;
+        return best.patches;
     }
 
   private:
-    void apply(const Brick& from, const std::vector<SurfacePatch>& patches, Brick* out) const {
-        const auto parted = [&](std::uint8_t l) {
-            return l == patches[0].low || l == patches[0].high;
-        };
-        out->labels = from.labels;
-        if (patches.size() == 1 && std::all_of(from.labels.begin(), from.labels.end(), parted))
-            labels_from_patch(patches[0], out->labels.data());
-        records_from_patches(patches, out->labels.data(), reach_, out->records.data());
+    // With the sides of the one patch for labels where all may be.
+    Attempt attempt(const Brick& brick, std::vector<SurfacePatch> patches) const {
+        Attempt out;
+        out.patches = std::move(patches);
+        const SurfacePatch& one = out.patches.front();
+        const auto parted = [&](std::uint8_t l) { return l == one.low || l == one.high; };
+        out.made.labels = brick.labels;
+        if (out.patches.size() == 1 &&
+            std::all_of(brick.labels.begin(), brick.labels.end(), parted)) {
+            labels_from_patch(one, out.made.labels.data());
+            compare(brick, &out);
+            if (out.labels_hit) return out;
+            out.made.labels = brick.labels;
+        }
+        compare(brick, &out);
+        return out;
     }
 
-    bool close(const Brick& a, const Brick& b, Change* change) const {
-        const double near_rim = options_.band_vx - options_.distance_vx;
+    void compare(const Brick& before, Attempt* out) const {
+        records_from_patches(out->patches, out->made.labels.data(), reach_,
+                             out->made.records.data());
+        out->change = {};
+        out->missed = 0;
+        out->labels_hit = true;
         for (std::size_t v = 0; v < kBrickVoxels; ++v) {
-            const bool was = a.records[v] != kNoBoundary, is = b.records[v] != kNoBoundary;
-            if (!was || !is) {
-                if (a.labels[v] != b.labels[v]) return false;
-                // A record may come or go at the rim of the band alone.
-                if (was && unpack_boundary(a.records[v]).distance_vx < near_rim) return false;
-                if (is && unpack_boundary(b.records[v]).distance_vx < near_rim) return false;
-                continue;
-            }
-            const BoundaryRecord old = seen_from(a.labels[v], a.labels[v], a.records[v]);
-            if (a.labels[v] != b.labels[v] && old.second_label != b.labels[v]) return false;
-            const BoundaryRecord now = seen_from(a.labels[v], b.labels[v], b.records[v]);
-            const double moved = now.distance_vx - old.distance_vx;
-            if (std::abs(moved) > options_.distance_vx) return false;
-            if (a.labels[v] == b.labels[v] && now.second_label != old.second_label) continue;
-            const double cosine = dot(now.normal, old.normal);
-            if (cosine < cosine_) return false;
+            out->hit[v] = close(before, out->made, v, &out->change);
+            out->missed += !out->hit[v];
+            if (before.labels[v] == out->made.labels[v]) continue;
             // The last voxel of a label in its brick stays.
-            if (a.labels[v] != b.labels[v] &&
-                std::find(b.labels.begin(), b.labels.end(), a.labels[v]) == b.labels.end())
-                return false;
-            change->labels += a.labels[v] != b.labels[v];
-            change->records += 1;
-            change->distance_sum += moved * moved;
-            change->normal_sum += 2 * (1 - std::min(cosine, 1.0));  // angle squared, rad
+            const bool stays = std::find(out->made.labels.begin(), out->made.labels.end(),
+                                         before.labels[v]) != out->made.labels.end();
+            out->labels_hit = out->labels_hit && out->hit[v] && stays;
+            out->change.labels += 1;
         }
+    }
+
+    bool close(const Brick& a, const Brick& b, std::size_t v, Change* change) const {
+        const double near_rim = options_.band_vx - options_.distance_vx;
+        const bool was = a.records[v] != kNoBoundary, is = b.records[v] != kNoBoundary;
+        if (!was || !is) {
+            if (a.labels[v] != b.labels[v]) return false;
+            // A record may come or go at the rim of the band alone.
+            if (was) return unpack_boundary(a.records[v]).distance_vx >= near_rim;
+            return !is || unpack_boundary(b.records[v]).distance_vx >= near_rim;
+        }
+        const BoundaryRecord old = seen_from(a.labels[v], a.labels[v], a.records[v]);
+        if (a.labels[v] != b.labels[v] && old.second_label != b.labels[v]) return false;
+        const BoundaryRecord now = seen_from(a.labels[v], b.labels[v], b.records[v]);
+        const double moved = now.distance_vx - old.distance_vx;
+        if (std::abs(moved) > options_.distance_vx) return false;
+        if (a.labels[v] == b.labels[v] && now.second_label != old.second_label) return true;
+        const double cosine = dot(now.normal, old.normal);
+        if (cosine < cosine_) return false;
+        change->records += 1;
+        change->distance_sum += moved * moved;
+        change->normal_sum += 2 * (1 - std::min(cosine, 1.0));  // angle squared, rad
         return true;
     }
 
@@ -114,10 +149,34 @@ class Snapper {
     double cosine_;
 };
 
+// What one layer of bricks finds.
+struct Found {
+    Change change;
+    std::vector<std::uint32_t> entry;         // stored bricks that follow patches
+    std::vector<std::uint8_t> count;          // and how many each
+    std::vector<SurfacePatch> patches;
+};
+
+BrickPatches by_stored_brick(const std::vector<Found>& layers, std::size_t stored) {
+    BrickPatches out;
+    out.first.assign(stored, 0);
+    out.count.assign(stored, 0);
+    for (const Found& layer : layers) {
+        auto first = static_cast<std::uint32_t>(out.patches.size());
+        for (std::size_t n = 0; n < layer.entry.size(); ++n) {
+            out.first[layer.entry[n]] = first;
+            out.count[layer.entry[n]] = layer.count[n];
+            first += layer.count[n];
+        }
+        out.patches.insert(out.patches.end(), layer.patches.begin(), layer.patches.end());
+    }
+    return out;
+}
+
 }  // namespace
 
 SnapReport snap_surfaces(LabelVolume* volume,
-                         BrickVolume<std::uint32_t>* boundary,
+                         BoundaryBricks* boundary,
                          const SnapOptions& options) {
     const Grid& g = volume->grid;
     const Int3 bricks = brick_count(g.size);
@@ -127,10 +186,10 @@ SnapReport snap_surfaces(LabelVolume* volume,
             std::max(options.distance_vx, std::min(0.2, options.distance_vx / g.spacing_mm.x));
     }
     const Snapper snap(allowed);
-    std::vector<Change> changes(static_cast<std::size_t>(bricks.z));
-    parallel_for(changes.size(), 1, [&](std::size_t begin, std::size_t end) {
+    std::vector<Found> layers(static_cast<std::size_t>(bricks.z));
+    parallel_for(layers.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t bz = begin; bz < end; ++bz) {
-            Change& change = changes[bz];
+            Found& found = layers[bz];
             const int k = static_cast<int>(bz) * kBrickEdge;
             for (int by = 0; by < bricks.y; ++by) {
                 for (int bx = 0; bx < bricks.x; ++bx) {
@@ -140,7 +199,7 @@ SnapReport snap_surfaces(LabelVolume* volume,
                             (static_cast<std::size_t>(by) + static_cast<std::size_t>(bricks.y) * bz);
                     const std::uint32_t entry = boundary->table[b];
                     if (entry & kUniformBrick) continue;
-                    ++change.bricks;
+                    ++found.change.bricks;
                     const int i = bx * kBrickEdge, j = by * kBrickEdge;
                     // The last bricks repeat what is inside; no quadric does.
                     if (i + kBrickEdge > g.size.x || j + kBrickEdge > g.size.y ||
@@ -154,8 +213,11 @@ SnapReport snap_surfaces(LabelVolume* volume,
                         std::copy_n(volume->voxels.data() + g.index(i, j + r % 4, k + r / 4), 4,
                                     brick.labels.begin() + 4 * r);
                     }
-                    if (!snap(&brick, &change)) continue;
-                    ++change.snapped;
+                    const std::vector<SurfacePatch> patches = snap(&brick, &found.change);
+                    if (patches.empty()) continue;
+                    found.entry.push_back(entry);
+                    found.count.push_back(static_cast<std::uint8_t>(patches.size()));
+                    found.patches.insert(found.patches.end(), patches.begin(), patches.end());
                     std::copy_n(brick.records.begin(), kBrickVoxels, records);
                     for (int r = 0; r < 16; ++r) {
                         std::copy_n(brick.labels.begin() + 4 * r, 4,
@@ -166,10 +228,12 @@ SnapReport snap_surfaces(LabelVolume* volume,
         }
     });
     Change sum;
-    for (const Change& change : changes) sum += change;
+    for (const Found& layer : layers) sum += layer.change;
+    boundary->patches = by_stored_brick(layers, boundary->pool.size() / kBrickVoxels);
     SnapReport report;
     report.bricks = sum.bricks;
     report.snapped = sum.snapped;
+    report.missed = sum.missed;
     report.labels = sum.labels;
     const double n = static_cast<double>(std::max<std::size_t>(sum.records, 1));
     report.distance_rms_vx = std::sqrt(sum.distance_sum / n);
@@ -180,6 +244,7 @@ SnapReport snap_surfaces(LabelVolume* volume,
 void add_measures(const SnapReport& snapped, StageReport* report) {
     report->measures.push_back({"record_bricks", static_cast<double>(snapped.bricks)});
     report->measures.push_back({"snapped_bricks", static_cast<double>(snapped.snapped)});
+    report->measures.push_back({"snap_missed", static_cast<double>(snapped.missed)});
     report->measures.push_back({"snap_labels", static_cast<double>(snapped.labels)});
     report->measures.push_back({"snap_rms_vx", snapped.distance_rms_vx});
     report->measures.push_back({"snap_rms_deg", snapped.normal_rms_deg});

@@ -1,14 +1,14 @@
 // Brings the surfaces inside bricks onto quadrics (formats/surface_patch.h) wherever one says the
 // same to within a few hundredths of a voxel, so that a bundle can keep coefficients instead of 64
-// labels and records. Bricks where none does (edges, thin structures, noise) are left as they are.
+// labels and records. Voxels that no quadric hits (edges, thin structures, noise) stay as they are.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
-#include "formats/brick_volume.h"
 #include "formats/label_volume.h"
 #include "formats/stage_report.h"
+#include "formats/surface_patch.h"
 
 namespace sonocase::pipeline {
 
@@ -21,19 +21,20 @@ struct SnapOptions {
 
 struct SnapReport {
     std::size_t bricks = 0;        // that hold records
-    std::size_t snapped = 0;       // of them
+    std::size_t snapped = 0;       // of them, in all their voxels
+    std::size_t missed = 0;        // records of the others that stay as they were
     std::size_t labels = 0;        // voxels that changed sides: closer than distance_vx to a surface
-    double distance_rms_vx = 0;    // change, over the records of snapped bricks
+    double distance_rms_vx = 0;    // change, over the records that did
     double normal_rms_deg = 0;
 };
 
-// boundary: of the volume's size, as read_field makes it. Same bytes for any number of threads.
-// Cost: 5 us a brick with records.
+// boundary: of the volume's size, as read_field makes it; its patches are set. Same bytes for any
+// number of threads. Cost: 5 us a brick with records.
 SnapReport snap_surfaces(LabelVolume* volume,
-                         BrickVolume<std::uint32_t>* boundary,
+                         BoundaryBricks* boundary,
                          const SnapOptions& options = {});
 
-// record_bricks, snapped_bricks, snap_labels, snap_rms_vx, snap_rms_deg
+// record_bricks, snapped_bricks, snap_missed, snap_labels, snap_rms_vx, snap_rms_deg
 void add_measures(const SnapReport& snapped, StageReport* report);
 
 }  // namespace sonocase::pipeline

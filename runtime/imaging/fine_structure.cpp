@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/imaging/in_halves.h"
 #include "runtime/imaging/paper_scene.h"
 #include "runtime/imaging/periodic_noise.h"
 #include "runtime/imaging/physical_model.h"
@@ -18,11 +19,17 @@ struct Moments {
     std::array<double, 6> square{};  // xx yy zz xy xz yz
 };
 
-void add(Moments& m, Vector3 p, double weight) {
-    m.count += weight;
-    m.sum = m.sum + weight * p;
+void add(Moments& m, Vector3 p) {
+    m.count += 1;
+    m.sum = m.sum + p;
     const std::array<double, 6> s{p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.x * p.z, p.y * p.z};
-    for (std::size_t i = 0; i < 6; ++i) m.square[i] += weight * s[i];
+    for (std::size_t i = 0; i < 6; ++i) m.square[i] += s[i];
+}
+
+void add(Moments& m, const Moments& part) {
+    m.count += part.count;
+    m.sum = m.sum + part.sum;
+    for (std::size_t i = 0; i < 6; ++i) m.square[i] += part.square[i];
 }
 
 struct Axis {
@@ -73,12 +80,39 @@ void store(const std::vector<double>& db, std::int8_t* out) {
     }
 }
 
+std::vector<std::int8_t> make_cubes() {
+    const std::size_t cube = static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge;
+    std::vector<std::int8_t> cubes(2 * cube + kGatherSlack);
+    const std::vector<float> a = smooth_periodic_noise(kFineEdge, 2, 21),
+                             b = smooth_periodic_noise(kFineEdge, 5, 22),
+                             c = smooth_periodic_noise(kFineEdge, 5, 23);
+    std::vector<double> db(cube);
+    // Fibres: sparse bright strands on dark ground.
+    for (std::size_t i = 0; i < cube; ++i) {
+        const double strand = static_cast<double>(a[i]) + 0.3 * static_cast<double>(c[i]);
+        db[i] = -5 + 13 * std::clamp(strand - 0.35, 0.0, 1.9);
+    }
+    store(db, cubes.data());
+    // Septa: thin sheets where a smooth field crosses zero, torn here and there.
+    for (std::size_t i = 0; i < cube; ++i) {
+        const double off = static_cast<double>(b[i]) / 0.11;
+        db[i] = -4 + 18 * std::exp(-off * off) *
+                         std::clamp(0.45 + 0.7 * static_cast<double>(c[i]), 0.0, 1.3);
+    }
+    store(db, cubes.data() + cube);
+    return cubes;
+}
+
 }  // namespace
+
+const std::vector<std::int8_t>& fine_cubes() {
+    static const std::vector<std::int8_t> cubes = make_cubes();
+    return cubes;
+}
 
 FineStructure make_fine_structure(const CaseBundle& bundle) {
     FineStructure f;
-    const std::size_t cube = static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge;
-    f.cubes.resize(2 * cube + kGatherSlack);
+    f.cubes = fine_cubes();
     f.frames.resize(bundle.labels.size());
     const std::vector<int> tissue_of = tissue_of_label(bundle);
     std::vector<int> kind(bundle.labels.size(), -1);
@@ -94,24 +128,30 @@ FineStructure make_fine_structure(const CaseBundle& bundle) {
     if (!any) return f;
 
     // One voxel of a brick speaks for it.
-    std::vector<Moments> moments(bundle.labels.size());
-    Moments all_spine;
     const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
     const Int3 n = brick_count(labels.size);
-    std::size_t index = 0;
-    for (int k = 0; k < n.z; ++k) {
-        for (int j = 0; j < n.y; ++j) {
-            for (int i = 0; i < n.x; ++i, ++index) {
-                const std::uint32_t entry = labels.table[index];
-                const std::size_t label =
-                    entry & kUniformBrick
-                        ? labels.uniform[entry & ~kUniformBrick]
-                        : labels.pool[static_cast<std::size_t>(entry) * kBrickVoxels + 42];
-                if (kind[label] != 0 && !spine[label]) continue;
-                const Vector3 p{4.0 * i, 4.0 * j, 4.0 * k};
-                add(spine[label] ? all_spine : moments[label], p, 1);
-            }
+    std::vector<std::vector<Moments>> parts(2, std::vector<Moments>(bundle.labels.size()));
+    in_halves(static_cast<std::size_t>(n.z), [&](std::size_t half, std::size_t begin, std::size_t end) {
+        std::vector<Moments>& moments = parts[half];
+        const auto row = static_cast<std::size_t>(n.x), layer = row * static_cast<std::size_t>(n.y);
+        for (std::size_t index = begin * layer; index < end * layer; ++index) {
+            const std::uint32_t entry = labels.table[index];
+            const std::size_t label =
+                entry & kUniformBrick
+                    ? labels.uniform[entry & ~kUniformBrick]
+                    : labels.pool[static_cast<std::size_t>(entry) * kBrickVoxels + 42];
+            if (kind[label] != 0 && !spine[label]) continue;
+            add(moments[label], {4.0 * static_cast<double>(index % row),
+                                 4.0 * static_cast<double>(index % layer / row),
+                                 4.0 * static_cast<double>(index / layer)});
         }
+    });
+    // Sums of whole numbers: the same however they are parted.
+    std::vector<Moments> moments(bundle.labels.size());
+    Moments all_spine;
+    for (const std::vector<Moments>& part : parts) {
+        for (std::size_t l = 0; l < part.size(); ++l)
+            add(spine[l] ? all_spine : moments[l], part[l]);
     }
     const Vector3 up = longest_axis(all_spine).direction;
     const double voxel = bundle.grid.spacing_mm.x;
@@ -142,24 +182,6 @@ FineStructure make_fine_structure(const CaseBundle& bundle) {
                     static_cast<float>(rows[static_cast<std::size_t>(r)][c]);
         }
     }
-
-    const std::vector<float> a = smooth_periodic_noise(kFineEdge, 2, 21),
-                             b = smooth_periodic_noise(kFineEdge, 5, 22),
-                             c = smooth_periodic_noise(kFineEdge, 5, 23);
-    std::vector<double> db(cube);
-    // Fibres: sparse bright strands on dark ground.
-    for (std::size_t i = 0; i < cube; ++i) {
-        const double strand = static_cast<double>(a[i]) + 0.3 * static_cast<double>(c[i]);
-        db[i] = -5 + 13 * std::clamp(strand - 0.35, 0.0, 1.9);
-    }
-    store(db, f.cubes.data());
-    // Septa: thin sheets where a smooth field crosses zero, torn here and there.
-    for (std::size_t i = 0; i < cube; ++i) {
-        const double off = static_cast<double>(b[i]) / 0.11;
-        db[i] = -4 + 18 * std::exp(-off * off) *
-                         std::clamp(0.45 + 0.7 * static_cast<double>(c[i]), 0.0, 1.3);
-    }
-    store(db, f.cubes.data() + cube);
     return f;
 }
 

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "formats/case_bundle.h"
@@ -19,12 +20,15 @@ struct FineFrame {
 };
 
 struct FineStructure {
-    std::vector<std::int8_t>
-        cubes;  // two of kFineEdge^3, quarter dB, and slack for four-byte look-ups
+    std::span<const std::int8_t> cubes;  // fine_cubes()
     std::vector<FineFrame> frames;  // # labels
 };
 
-// Cost: one pass over the brick table, and 0.5 M values.
+// Two of kFineEdge^3, quarter dB, and slack for four-byte look-ups. They depend on nothing: made once,
+// by whoever asks first. Cost: 0.5 M values.
+const std::vector<std::int8_t>& fine_cubes();
+
+// Cost: one pass over the brick table.
 FineStructure make_fine_structure(const CaseBundle& bundle);
 
 }  // namespace sonocase::runtime

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "formats/case_bundle.h"
@@ -51,15 +52,13 @@ struct PhysicalScene {
     // Four words a brick: label entry, echo entry, boundary entry, unused. A uniform label entry is
     // kUniformBrick | label; a uniform echo entry kUniformBrick | (offset & 0xFF); a boundary entry
     // is kUniformBrick where the brick holds no interface.
-    std::vector<std::uint32_t> table;
+    RawVector<std::uint32_t> table;
     std::vector<LabelLook> looks;  // # labels
     std::vector<PairEcho> pairs;   // # labels^2, [own * # labels + second]
     bool has_boundary = false, has_echo = false;
     bool has_hard = true;  // some label is bone or gas: what plans for scenes without go by
 
-    // Boundary roughness and glint, kRoughEdge^3: byte 0 roughness (/ 32), byte 1 log2 of the glint
-    // (/ 32), bytes 2 and 3 cosine and sine of its phase (/ 127); all signed.
-    std::vector<std::uint32_t> rough;
+    std::span<const std::uint32_t> rough;  // rough_surfaces()
     std::vector<std::int8_t> speckle;  // pairs, edge 2^kSpeckleLog2
     FineStructure fine;
 
@@ -67,6 +66,11 @@ struct PhysicalScene {
 
     int labels() const { return static_cast<int>(bundle->labels.size()); }
 };
+
+// Boundary roughness and glint, kRoughEdge^3: byte 0 roughness (/ 32), byte 1 log2 of the glint
+// (/ 32), bytes 2 and 3 cosine and sine of its phase (/ 127); all signed. It depends on nothing: made
+// once, by whoever asks first.
+const std::vector<std::uint32_t>& rough_surfaces();
 
 // targets: of the exercise; those that only mark a place leave no trace in the tissue.
 Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,

@@ -9,6 +9,7 @@
 #include "runtime/imaging/governor.h"
 #include "runtime/imaging/paper_fast.h"
 #include "runtime/imaging/physical_fast.h"
+#include "runtime/imaging/scan_reach.h"
 #include "runtime/imaging/simd_target.h"
 
 namespace sonocase::runtime {
@@ -62,6 +63,7 @@ struct Renderer::Impl {
         physical::Tables tables;
         std::unique_ptr<PaperFast> paper;
         std::unique_ptr<PhysicalFast> physical;
+        ScanReach reach;
     };
     std::vector<std::unique_ptr<Level>> levels;  // finest first; one without a frame budget
     Governor governor;
@@ -123,6 +125,7 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
     choose_simd_target();
     auto impl = std::make_unique<Impl>(bundle, exercise, options);
     Impl& m = *impl;
+    if (bundle.blocks && options.kind == RendererKind::reference) bundle.blocks->need_all(0);
     Result<EffectChoice> effects = choose_effects(options.model, options.effects);
     if (!effects) return effects.error();
     m.effects = *effects;
@@ -157,6 +160,8 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
         } else if (options.kind == RendererKind::fast) {
             level->physical = std::make_unique<PhysicalFast>(m.physical_scene, level->geometry,
                                                              level->tables, m.noise, m.workers);
+            level->reach =
+                make_scan_reach(level->geometry, level->tables, m.physical_scene.voxel_mm);
         }
         m.levels.push_back(std::move(level));
         if (!governed) break;
@@ -267,6 +272,10 @@ FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
             return e.physical != nullptr && !(effects.physical.*e.physical) ? "switched off" : "";
         });
         return FrameStatus::rendered;
+    }
+    if (bundle.blocks) {
+        unpack_reach(*bundle.blocks, at.reach, bundle.grid, frame.volume_from_probe,
+                     norm(frame.motion.breathing_mm));
     }
     physical->render(frame, breathing, input.settings.flip_left_right, effects.keep_all, pixels);
     const PhysicalPasses& p = physical->passes();

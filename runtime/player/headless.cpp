@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "formats/atomic_file.h"
+#include "runtime/imaging/physical_scene.h"
 #include "runtime/player/contact_sheet.h"
 #include "runtime/player/frame_stats.h"
 #include "runtime/player/open_case.h"
@@ -97,7 +98,16 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     if (arguments.bundle.empty()) {
         return Error{"no bundle given", "", "sonoplay BUNDLE --headless needs one"};
     }
+    // What no bundle has a say in, while it is read.
+    std::thread tables([] {
+        try {
+            (void)rough_surfaces();
+            (void)fine_cubes();
+        } catch (const std::bad_alloc&) {  // whoever needs them will say so
+        }
+    });
     Result<std::unique_ptr<OpenCase>> opened = open_case(arguments.bundle);
+    tables.join();
     if (!opened) return opened.error();
     const OpenCase& open = **opened;
     for (const std::string& warning : open.warnings) {
@@ -214,6 +224,8 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
         const double before_s = steady_seconds();
         engine->frame(now_s, settings, pixels);
         const double after_s = steady_seconds();
+        if (open.bundle.blocks && open.bundle.blocks->damaged())
+            return open.bundle.blocks->status();
         stats.add((after_s - before_s) * 1e3, engine->renderer().costs());
         if (tracker.is_device()) pose_to_pixel.add((context.clock() - reading.time_s) * 1e3);
         if (session) session->observe(engine->last(), pixels, !tracker.is_device());

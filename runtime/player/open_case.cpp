@@ -26,7 +26,7 @@ Exercise free_scan(const CaseBundle& bundle) {
 }
 
 Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
-    Result<CaseBundle> bundle = load_bundle(path);
+    Result<CaseBundle> bundle = open_bundle(path);
     if (!bundle) return bundle.error();
     auto open = std::make_unique<OpenCase>();
     open->path = path;

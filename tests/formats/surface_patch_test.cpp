@@ -100,32 +100,6 @@ TEST(SurfacePatch, BallsOfEightVoxelsDo) {
     }
 }
 
-TEST(SurfacePatch, WhatAPatchMakesIsFoundAgain) {
-    const std::uint64_t seed = 23;
-    SCOPED_TRACE(seed);
-    Random random(seed);
-    int found = 0;
-    for (int n = 0; n < 200; ++n) {
-        const Point3 centre = Point3{} + random.uniform(7, 13) * random.direction();
-        const Brick brick = brick_of([&](Point3 p) { return 10 - norm(p - centre); },
-                                     [&](Point3 p) { return normalized(centre - p); });
-        const auto patches = fit_patches(brick.labels, brick.records);
-        if (patches.empty()) continue;
-        Brick back;
-        labels_from_patch(patches[0], back.labels.data());
-        records_from_patches(patches, back.labels.data(), kReach, back.records.data());
-        const auto again = find_patches(back.labels, back.records, kReach);
-        if (again.empty()) continue;
-        Brick twice;
-        labels_from_patch(again[0], twice.labels.data());
-        records_from_patches(again, twice.labels.data(), kReach, twice.records.data());
-        EXPECT_EQ(twice.labels, back.labels);
-        EXPECT_EQ(twice.records, back.records);
-        ++found;
-    }
-    EXPECT_GT(found, 190);  // of 200
-}
-
 TEST(SurfacePatch, ContinuedIsTheSameSurfaceInTheNextBrick) {
     const std::uint64_t seed = 24;
     SCOPED_TRACE(seed);

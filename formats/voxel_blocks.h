@@ -1,0 +1,75 @@
+// The part of a bundle's volumes that is unpacked as it is needed: boundary records and echo offsets,
+// in blocks of bricks. Labels and all tables are there from the start; what the pools of the two hold
+// in a block counts only once the block was asked for.
+//
+// Asking neither allocates nor throws, so that a frame may do it; any thread may. A block costs about
+// 0.1 ms the first time. A file whose bytes are whole but make no sense in some block shows when that
+// block is asked for: it then holds no surfaces and offsets of 0, and status() says so.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+
+#include "formats/geometry.h"
+#include "formats/raw_vector.h"
+#include "formats/result.h"
+
+namespace sonocase {
+
+namespace detail {
+struct BlockParts;
+class BlockWork;
+}
+
+class VoxelBlocks {
+  public:
+    explicit VoxelBlocks(std::unique_ptr<detail::BlockParts> parts);
+    ~VoxelBlocks();
+
+    // Unpacks every block for which wanted(lower, upper) is true: its first and last voxel.
+    template <class Wanted>
+    void need(const Wanted& wanted) noexcept {
+        if (whole()) return;
+        for (std::size_t block = 0; block < count_; ++block) {
+            if (there(block)) continue;
+            const Corners voxels = corners(block);
+            if (wanted(voxels.lower, voxels.upper)) unpack(block);
+        }
+    }
+    void need_voxel(int i, int j, int k) noexcept;
+    void need_all(int threads);  // 0: as many as the machine has
+
+    bool whole() const noexcept { return left_.load(std::memory_order_acquire) == 0; }
+    bool damaged() const noexcept { return damaged_.load(std::memory_order_relaxed); }
+    Status status() const;
+
+    // Keeps the system from finding a page of 2 MB for a block of a tenth of it, where the pools are
+    // large enough for such pages. Before anything is asked for.
+    void use_small_pages() noexcept;
+
+    // The bytes that the blocks are read from, for a bundle that outlives them elsewhere.
+    void keep(RawVector<std::uint8_t> file) { file_ = std::move(file); }
+
+  private:
+    struct Corners {
+        Int3 lower, upper;
+    };
+    bool there(std::size_t block) const noexcept {
+        return there_[block].load(std::memory_order_acquire);
+    }
+    Corners corners(std::size_t block) const noexcept;
+    void unpack(std::size_t block) noexcept;
+
+    std::unique_ptr<detail::BlockParts> parts_;
+    std::unique_ptr<detail::BlockWork> work_;  // under mutex_
+    RawVector<std::uint8_t> file_;
+    std::size_t count_ = 0;
+    std::unique_ptr<std::atomic<bool>[]> there_;
+    std::atomic<std::size_t> left_{0};
+    std::atomic<bool> damaged_{false};
+    std::mutex mutex_;
+};
+
+}  // namespace sonocase
