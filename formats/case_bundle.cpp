@@ -88,7 +88,21 @@ void read_manifest_into(CaseBundle& bundle, JsonObject& manifest) {
     }
 }
 
-Status read_surfaces_into(CaseBundle& bundle, const ChunkReader& reader, int threads) {
+// What is small, by one thread.
+Status read_others_into(CaseBundle& bundle,
+                        const ChunkReader& reader,
+                        const Json& json,
+                        const std::string& where) {
+    constexpr int threads = 1;
+    JsonFault fault{where + ": manifest", {}};
+    JsonObject manifest(json, "", fault);
+    auto textures = detail::read_textures(reader, manifest, threads);
+    if (!textures) return textures.error();
+    bundle.textures = std::move(*textures);
+    auto speckle = detail::read_speckle(reader, manifest, threads);
+    if (!speckle) return speckle.error();
+    bundle.speckle = std::move(*speckle);
+    if (fault.error) return *fault.error;
     auto patient = detail::read_surface(reader, "skin.pat", threads);
     if (!patient) return patient.error();
     bundle.patient_skin = std::move(*patient);
@@ -114,12 +128,12 @@ Result<CaseBundle> read_checked(std::span<const std::uint8_t> bytes,
     JsonObject manifest(*json, "", fault);
     read_manifest_into(bundle, manifest);
     if (fault.error) return *fault.error;
-    // Surfaces and preview meanwhile.
+    // Textures, surfaces and preview meanwhile.
     std::optional<Result<detail::VoxelVolumes>> volumes;
-    Status surfaces = Done{};
+    Status others = Done{};
     detail::run_jobs(2, threads, [&](std::size_t job) {
         if (job == 1) {
-            surfaces = read_surfaces_into(bundle, *reader, threads);
+            others = read_others_into(bundle, *reader, *json, where);
         } else {
             volumes = detail::read_volumes(*reader, manifest, bundle.grid.size,
                                            bundle.labels.size(), threads);
@@ -130,14 +144,8 @@ Result<CaseBundle> read_checked(std::span<const std::uint8_t> bytes,
     bundle.boundary = std::move((*volumes)->boundary);
     bundle.echo_offset = std::move((*volumes)->echo_offset);
     bundle.blocks = std::move((*volumes)->blocks);
-    auto textures = detail::read_textures(*reader, manifest, threads);
-    if (!textures) return textures.error();
-    bundle.textures = std::move(*textures);
-    auto speckle = detail::read_speckle(*reader, manifest, threads);
-    if (!speckle) return speckle.error();
-    bundle.speckle = std::move(*speckle);
     if (fault.error) return *fault.error;
-    if (!surfaces) return surfaces.error();
+    if (!others) return others.error();
     return bundle;
 }
 

@@ -188,7 +188,9 @@ SurfacePatch continued(const SurfacePatch& patch, int axis) {
     return out;
 }
 
-std::vector<SurfacePatch> fit_patches(const BrickLabels& labels, const BrickRecords& records) {
+std::vector<SurfacePatch> fit_patches(const BrickLabels& labels,
+                                      const BrickRecords& records,
+                                      int step) {
     std::array<std::uint16_t, kBrickVoxels> pair;  // low << 8 | high; 0: no record
     std::vector<std::uint16_t> pairs;
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
@@ -218,9 +220,10 @@ std::vector<SurfacePatch> fit_patches(const BrickLabels& labels, const BrickReco
         double c[kPatchCoefficients];
         fit.solve(c);
         for (int i = 0; i < kPatchCoefficients; ++i) {
-            const double unit = i == 0 ? 32 : i < 4 ? 64 : 128;
+            const double unit = (i == 0 ? 32.0 : i < 4 ? 64.0 : 128.0) / step;
+            const double most = 32767 / step;
             patch.c[static_cast<std::size_t>(i)] =
-                static_cast<std::int16_t>(std::lround(std::clamp(unit * c[i], -32767.0, 32767.0)));
+                static_cast<std::int16_t>(step * std::lround(std::clamp(unit * c[i], -most, most)));
         }
         out.push_back(patch);
     }

@@ -45,15 +45,18 @@ void records_from_patches(std::span<const SurfacePatch> patches,
 SurfacePatch continued(const SurfacePatch& patch, int axis);
 
 // Least squares through the records' distances and normals, one patch for each pair of labels that
-// they part, in the order of the pairs. Empty: no records, or more than kMaxPatches pairs. Cost: 2 us
-// a patch.
-std::vector<SurfacePatch> fit_patches(const BrickLabels& labels, const BrickRecords& records);
+// they part, in the order of the pairs; coefficients are multiples of `step`. Empty: no records, or
+// more than kMaxPatches pairs. Cost: 2 us a patch.
+std::vector<SurfacePatch> fit_patches(const BrickLabels& labels,
+                                      const BrickRecords& records,
+                                      int step = 1);
 
 // The patches of a volume's stored bricks, by their numbers in its pool.
 struct BrickPatches {
     std::vector<std::uint32_t> first;  // # stored bricks, into `patches`; empty: none known
     std::vector<std::uint8_t> count;   // # stored bricks
     RawVector<SurfacePatch> patches;
+    int step = 1;  // all coefficients are multiples of it, 1 to 16
 
     std::span<const SurfacePatch> of(std::size_t stored_brick) const {
         if (stored_brick >= first.size()) return {};

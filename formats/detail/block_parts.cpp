@@ -116,24 +116,24 @@ bool BlockWork::offsets(const BlockParts& parts, std::size_t block) noexcept {
         const std::uint32_t entry = parts.echo.table[brick];
         if ((entry & kUniformBrick) || !good) return;
         const bool in_cells = parts.in_cells[entry] != 0;
-        const int edge = in_cells ? 2 : kBrickEdge;
-        good = end - from >= edge * edge * edge;
+        good = end - from >= (in_cells ? 8 : kBrickVoxels);
         if (!good) return;
         std::array<std::int8_t, kBrickVoxels> left, front, cells;
         if (has_left) spread(parts.echo, brick - 1, left.data());
         if (has_front)
             spread(parts.echo, brick - static_cast<std::size_t>(parts.grid.bricks.x), front.data());
-        const OffsetGuess guess(edge, has_left ? left.data() : nullptr,
-                                has_front ? front.data() : nullptr);
+        const std::int8_t* at_left = has_left ? left.data() : nullptr;
+        const std::int8_t* in_front = has_front ? front.data() : nullptr;
         std::int8_t* to = parts.echo.pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels;
         std::int8_t* values = in_cells ? cells.data() : to;
-        for (int k = 0, v = 0; k < edge; ++k) {
-            for (int j = 0; j < edge; ++j) {
-                for (int i = 0; i < edge; ++i, ++v)
-                    values[v] = static_cast<std::int8_t>(*from++ + guess(values, i, j, k));
-            }
+        const auto told = [&](int v, std::uint8_t guess) {
+            return values[v] = static_cast<std::int8_t>(*from++ + guess);
+        };
+        if (!in_cells) {
+            walk_offsets<kBrickEdge>(at_left, in_front, told);
+            return;
         }
-        if (!in_cells) return;
+        walk_offsets<2>(at_left, in_front, told);
         for (std::size_t v = 0; v < kBrickVoxels; ++v)
             to[v] = cells[v % 4 / 2 + 2 * (v / 4 % 4 / 2) + 4 * (v / 32)];
     });

@@ -1,10 +1,8 @@
-// A guess at an echo offset by its neighbours in the brick, to the left of it and in front of it.
-// A brick is `edge` values an edge here: 4 voxels, or 2 cells of 2 x 2 x 2 alike voxels. Across the
-// brick's left and front faces only bricks of the same block count. For the .cpp files of formats/.
+// How echo offsets of a brick are told: each by its difference from a guess by its neighbours to the
+// left, in front and below. For the .cpp files of formats/.
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -12,41 +10,37 @@
 
 namespace sonocase::detail {
 
-class OffsetGuess {
-  public:
-    // left, front: the 64 values of those bricks, or null at the border.
-    OffsetGuess(int edge, const std::int8_t* left, const std::int8_t* front) : edge_(edge) {
-        const int step = kBrickEdge / edge;
-        for (int k = 0; k < edge; ++k) {
-            for (int j = 0; j < edge; ++j) {
-                const auto face = static_cast<std::size_t>(step * (kBrickEdge * j + 16 * k));
-                left_[at(j, k)] = left ? left[face + kBrickEdge - 1] : 0;
-                front_[at(j, k)] =
-                    front ? front[static_cast<std::size_t>(step * (j + 16 * k)) + 12] : 0;
+// A brick is Edge values an edge here: 4 voxels, or 2 cells of 2 x 2 x 2 alike voxels. left, front:
+// the 64 values of the bricks there, or null at the border of the block. value(v, guess) hands over
+// the value of number v, an std::int8_t, x fastest.
+template <int Edge, class Value>
+void walk_offsets(const std::int8_t* left, const std::int8_t* front, Value value) {
+    constexpr int kStep = kBrickEdge / Edge, kRow = Edge + 1;
+    // A plane of the brick with the faces of its neighbours round it, and the plane below.
+    int planes[2][kRow * kRow] = {};
+    int v = 0;
+    for (int k = 0; k < Edge; ++k) {
+        int* plane = planes[k & 1];
+        const int* below = planes[~k & 1];
+        const int base = kStep * 16 * k;
+        for (int n = 0; n < Edge; ++n) {
+            plane[kRow * (n + 1)] = left ? left[base + kStep * kBrickEdge * n + kBrickEdge - 1] : 0;
+            plane[n + 1] = front ? front[base + kStep * n + kBrickEdge * (kBrickEdge - 1)] : 0;
+        }
+        plane[0] = (plane[kRow] + plane[1]) / 2;
+        for (int j = 1; j <= Edge; ++j) {
+            for (int i = 1; i <= Edge; ++i, ++v) {
+                const int at = i + kRow * j;
+                const int a = plane[at - 1], b = plane[at - kRow], ab = plane[at - kRow - 1];
+                // Of three values the middle one: a, b, and the plane through them.
+                const int flat = std::max(std::min(a, b), std::min(std::max(a, b), a + b - ab));
+                const int guess = k == 0 ? flat : (flat + below[at]) >> 1;
+                // Values of one label are whole dB apart.
+                plane[at] =
+                    value(v, static_cast<std::uint8_t>(a + 4 * ((guess - a + 2) >> 2)));
             }
         }
     }
-    // values: of the brick, edge^3, those before (i, j, k) known.
-    std::uint8_t operator()(const std::int8_t* values, int i, int j, int k) const {
-        const auto value = [&](int x, int y, int z) -> int {
-            return values[static_cast<std::size_t>(x + edge_ * (y + edge_ * z))];
-        };
-        const int a = i > 0 ? value(i - 1, j, k) : left_[at(j, k)];
-        const int b = j > 0 ? value(i, j - 1, k) : front_[at(i, k)];
-        const int ab = i > 0   ? (j > 0 ? value(i - 1, j - 1, k) : front_[at(i - 1, k)])
-                       : j > 0 ? left_[at(j - 1, k)]
-                               : (a + b) / 2;
-        // Of three values the middle one: a, b, and the plane through them.
-        const int plane = std::max(std::min(a, b), std::min(std::max(a, b), a + b - ab));
-        const int guess = k == 0 ? plane : (plane + value(i, j, k - 1)) >> 1;
-        // Values of one label are whole dB apart.
-        return static_cast<std::uint8_t>(a + 4 * ((guess - a + 2) >> 2));
-    }
-
-  private:
-    static std::size_t at(int u, int v) { return static_cast<std::size_t>(u + kBrickEdge * v); }
-    int edge_;
-    std::array<std::int8_t, 16> left_{}, front_{};
-};
+}
 
 }  // namespace sonocase::detail

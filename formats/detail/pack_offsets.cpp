@@ -58,14 +58,18 @@ void add_values(const BlockGrid& grid,
         if (has_left) brick_values(volume, brick - 1, left.data());
         if (has_front)
             brick_values(volume, brick - static_cast<std::size_t>(grid.bricks.x), front.data());
-        const bool in_cells = cells_of(values, &cells);
-        const int edge = in_cells ? 2 : kBrickEdge;
-        const std::int8_t* from = in_cells ? cells.data() : values.data();
-        const OffsetGuess guess(edge, has_left ? left.data() : nullptr,
-                                has_front ? front.data() : nullptr);
-        for (int v = 0; v < edge * edge * edge; ++v) {
-            out->push_back(static_cast<std::uint8_t>(
-                from[v] - guess(from, v % edge, v / edge % edge, v / edge / edge)));
+        const std::int8_t* at_left = has_left ? left.data() : nullptr;
+        const std::int8_t* in_front = has_front ? front.data() : nullptr;
+        const auto told = [&](const std::int8_t* from) {
+            return [out, from](int v, std::uint8_t guess) {
+                out->push_back(static_cast<std::uint8_t>(from[v] - guess));
+                return from[v];
+            };
+        };
+        if (cells_of(values, &cells)) {
+            walk_offsets<2>(at_left, in_front, told(cells.data()));
+        } else {
+            walk_offsets<kBrickEdge>(at_left, in_front, told(values.data()));
         }
     });
 }

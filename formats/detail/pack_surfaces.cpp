@@ -18,6 +18,16 @@ struct Streams {  // of one layer of bricks
     std::vector<std::uint32_t> first_patch;  // # bricks of the layer
 };
 
+// A patch in units of `step`, as it is told; and back.
+SurfacePatch in_steps(SurfacePatch patch, int step) {
+    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c / step);
+    return patch;
+}
+SurfacePatch in_units(SurfacePatch patch, int step) {
+    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c * step);
+    return patch;
+}
+
 std::vector<SurfacePatch> patches_for(const BoundaryBricks& boundary,
                                       std::size_t brick,
                                       const BrickLabels& label,
@@ -28,7 +38,7 @@ std::vector<SurfacePatch> patches_for(const BoundaryBricks& boundary,
         if (!known.empty() && known.size() <= static_cast<std::size_t>(kMaxPatches))
             return {known.begin(), known.end()};
     }
-    return fit_patches(label, record);
+    return fit_patches(label, record, boundary.patches.step);
 }
 
 Streams packed_layer(const BrickVolume<std::uint8_t>& labels,
@@ -39,6 +49,7 @@ Streams packed_layer(const BrickVolume<std::uint8_t>& labels,
     const Int3 bricks = brick_count(labels.size);
     const std::size_t count = layer_bricks(bricks);
     PatchRows rows(static_cast<std::size_t>(bricks.x), count);
+    std::vector<SurfacePatch> told;
     std::uint8_t before = 0;
     for (std::size_t b = 0; b < count; ++b) {
         const std::size_t brick = static_cast<std::size_t>(layer) * count + b;
@@ -57,6 +68,8 @@ Streams packed_layer(const BrickVolume<std::uint8_t>& labels,
         std::vector<SurfacePatch> patches;
         if (!none) {
             patches = patches_for(boundary, brick, label, record);
+            const int step = boundary.patches.step;
+            for (SurfacePatch& patch : patches) patch = in_units(in_steps(patch, step), step);
             BrickRecords guess;
             records_from_patches(patches, label.data(), reach_steps, guess.data());
             if (guess != record) kind = kCorrected;
@@ -78,14 +91,15 @@ Streams packed_layer(const BrickVolume<std::uint8_t>& labels,
         for (const SurfacePatch& patch : patches) {
             out.pair.push_back(patch.low);
             out.pair.push_back(patch.high);
-            const auto near = rows.guess(out.patches.data(), b, patch);
-            for (std::size_t i = 0; i < kPatchCoefficients; ++i) {
-                out.coefficient[i].push_back(
-                    folded(static_cast<std::int16_t>(patch.c[i] - near[i])));
-            }
+            const auto near = rows.guess(told.data(), b, patch);
+            const SurfacePatch own = in_steps(patch, boundary.patches.step);
+            for (std::size_t i = 0; i < kPatchCoefficients; ++i)
+                out.coefficient[i].push_back(folded(static_cast<std::int16_t>(own.c[i] - near[i])));
         }
+        for (const SurfacePatch& patch : patches)
+            told.push_back(in_steps(patch, boundary.patches.step));
         append(out.patches, patches);
-        rows.close(b, out.patches.size());
+        rows.close(b, told.size());
     }
     return out;
 }

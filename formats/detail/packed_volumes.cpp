@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kLeastBlock = 8, kLargestBlock = 32;  // bricks an edge
 constexpr std::size_t kMostBlocks = 4096;
+constexpr int kMostPatchStep = 16;
 
 // Blocks small enough that a frame needs few, large enough that each packs well.
 BlockGrid block_grid(Int3 size) {
@@ -49,6 +50,7 @@ void add_volumes(ChunkWriter& writer,
     manifest["echo_offset"] = !echo_offset.table.empty();
     manifest["boundary"] = !boundary.table.empty();
     manifest["record_reach"] = reach_steps;
+    manifest["patch_step"] = boundary.patches.step;
     manifest["block_bricks"] = grid.edge;
     add_manifest(writer, manifest);
     add_surfaces(writer, grid, labels, boundary, reach_steps);
@@ -64,14 +66,20 @@ Result<VoxelVolumes> read_volumes(const ChunkReader& reader,
     const bool with_records = manifest.flag_or("boundary", false);
     if (!reader.has("vox.kind"))
         return read_first_layout(reader, with_records, with_offsets, size, palette, threads);
+    if (reader.has("vox.rec")) {
+        return reader.fault("is of a layout that was in use for a few days only",
+                            "make the file again");
+    }
     auto parts = std::make_unique<BlockParts>();
     parts->reach_steps = static_cast<int>(manifest.integer("record_reach", 0, 127));
     parts->grid.bricks = brick_count(size);
     parts->grid.edge = static_cast<int>(manifest.integer("block_bricks", 1, kLargestBlock));
+    const auto step = static_cast<int>(manifest.integer_or("patch_step", 1, 1, kMostPatchStep));
     if (!manifest.ok()) return VoxelVolumes{};
     parts->palette = palette;
     parts->where = reader.where();
     VoxelVolumes out;
+    out.boundary.patches.step = step;
     out.labels.size = size;
     if (with_records) out.boundary.size = size;
     if (Status s = read_surfaces(reader, with_records, threads, parts.get(), &out); !s)

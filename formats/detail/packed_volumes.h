@@ -41,7 +41,7 @@ Status unpack_all(VoxelVolumes* volumes, int threads);
 // The chunks that either layout may hold; for ChunkReader::open.
 #define SONOCASE_VOLUME_CHUNKS                                                                  \
     "lab.t", "lab.u", "lab.p", "echo.t", "echo.u", "echo.p", "bnd.t", "bnd.u", "bnd.p",          \
-        "vox.kind", "vox.one", "vox.mix", "vox.pair", "vox.low", "vox.high", "vox.fix",          \
+        "vox.kind", "vox.one", "vox.mix", "vox.pair", "vox.low", "vox.high", "vox.fix", "vox.rec",          \
         "ofs.kind", "ofs.one", "ofs.val"
 
 }  // namespace sonocase::detail

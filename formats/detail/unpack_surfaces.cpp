@@ -56,6 +56,12 @@ SurfacePatch told_patch(const Packed& in,
     return patch;
 }
 
+// Told in units of `step`.
+SurfacePatch in_units(SurfacePatch patch, int step) {
+    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c * step);
+    return patch;
+}
+
 void unpack_layer(const Packed& in,
                   Starts at,
                   std::size_t patches,
@@ -66,6 +72,7 @@ void unpack_layer(const Packed& in,
                   VoxelVolumes* out) {
     const Int3 bricks = brick_count(out->labels.size);
     const std::size_t count = layer_bricks(bricks), first_patch = at.patch;
+    const int step = out->boundary.patches.step;
     SurfacePatch* const own = out->boundary.patches.patches.data() + first_patch;
     PatchRows rows(static_cast<std::size_t>(bricks.x), count);
     std::uint8_t before = 0;
@@ -84,7 +91,7 @@ void unpack_layer(const Packed& in,
             if (labels_as == kMixedLabels) {
                 std::memcpy(to, in.mix.data() + at.mix * kBrickVoxels, kBrickVoxels);
             } else {
-                labels_from_patch(own[at.patch - first_patch], to);
+                labels_from_patch(in_units(own[at.patch - first_patch], step), to);
             }
             out->labels.table[brick] = static_cast<std::uint32_t>(at.label_pool);
         }
@@ -99,6 +106,7 @@ void unpack_layer(const Packed& in,
         }
         at.add(kind, 1);
     }
+    for (std::size_t p = 0; p < at.patch - first_patch; ++p) own[p] = in_units(own[p], step);
 }
 
 bool below(const Bytes& values, std::size_t limit) {

@@ -53,6 +53,17 @@ void check_exercise(const Exercise& exercise,
             warnings->push_back(exercise.name + ": no-go label '" + name + "' is not in this case");
 }
 
+// To 1/4096 mm, and normals to as many digits: more than any use of a skin can tell, and what is left
+// of each number packs to half.
+Surface rounded(Surface surface) {
+    const auto round = [](auto& v) {
+        for (int axis = 0; axis < 3; ++axis) v[axis] = std::round(4096 * v[axis]) / 4096;
+    };
+    for (Point3& p : surface.points) round(p);
+    for (Vector3& n : surface.normals) round(n);
+    return surface;
+}
+
 }  // namespace
 
 Surface mapped_surface(const Surface& surface, const Registration& registration) {
@@ -98,7 +109,7 @@ Result<PackResult> pack_case(const PackInput& input) {
     bundle.textures = input.textures.textures;
     bundle.speckle = input.textures.speckle;
     if (input.ct_skin != nullptr && input.registration != nullptr)
-        bundle.patient_skin = mapped_surface(*input.ct_skin, *input.registration);
+        bundle.patient_skin = rounded(mapped_surface(*input.ct_skin, *input.registration));
     bundle.mannequin_skin = input.mannequin;
     bundle.preview_png = png_of(preview_picture(volume));
 

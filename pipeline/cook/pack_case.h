@@ -30,7 +30,7 @@ struct PackResult {
     StageReport report;  // stage "pack": voxels, labels, bytes of each part
 };
 
-inline constexpr int kPackVersion = 1;
+inline constexpr int kPackVersion = 2;
 
 // Error: a label names a tissue that is not there. Targets of exercises that lie outside the body
 // or outside the label that they name, and no-go labels that the case lacks, are warnings.

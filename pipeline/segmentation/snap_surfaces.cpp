@@ -67,7 +67,7 @@ class Snapper {
         best.missed = kBrickVoxels + 1;
         BrickRecords hits = brick->records;
         for (int turn = 0; turn < kTurns && best.missed > 0; ++turn) {
-            std::vector<SurfacePatch> patches = fit_patches(brick->labels, hits);
+            std::vector<SurfacePatch> patches = fit_patches(brick->labels, hits, options_.patch_step);
             if (patches.empty()) break;
             Attempt now = attempt(*brick, std::move(patches));
             for (std::size_t v = 0; v < kBrickVoxels; ++v)
@@ -184,6 +184,8 @@ SnapReport snap_surfaces(LabelVolume* volume,
     if (g.spacing_mm.x < 1) {
         allowed.distance_vx =
             std::max(options.distance_vx, std::min(0.2, options.distance_vx / g.spacing_mm.x));
+        // What rounding twice as coarse moves is less than half of that.
+        if (g.spacing_mm.x <= 0.6) allowed.patch_step = 2 * options.patch_step;
     }
     const Snapper snap(allowed);
     std::vector<Found> layers(static_cast<std::size_t>(bricks.z));
@@ -230,6 +232,7 @@ SnapReport snap_surfaces(LabelVolume* volume,
     Change sum;
     for (const Found& layer : layers) sum += layer.change;
     boundary->patches = by_stored_brick(layers, boundary->pool.size() / kBrickVoxels);
+    boundary->patches.step = allowed.patch_step;
     SnapReport report;
     report.bricks = sum.bricks;
     report.snapped = sum.snapped;

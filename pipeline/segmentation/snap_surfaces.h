@@ -17,6 +17,7 @@ struct SnapOptions {
     double distance_vx = 0.07;  // the most that a record's distance may change, voxels; where voxels
                                 // are smaller than 1 mm as many mm, up to 0.2 voxels
     double normal_deg = 5;      // and its normal
+    int patch_step = 1;         // of the quadrics' coefficients; twice as much below 0.6 mm
 };
 
 struct SnapReport {

@@ -141,9 +141,9 @@ FineStructure make_fine_structure(const CaseBundle& bundle) {
                     ? labels.uniform[entry & ~kUniformBrick]
                     : labels.pool[static_cast<std::size_t>(entry) * kBrickVoxels + 42];
             if (kind[label] != 0 && !spine[label]) continue;
-            add(moments[label], {4.0 * static_cast<double>(index % row),
-                                 4.0 * static_cast<double>(index % layer / row),
-                                 4.0 * static_cast<double>(index / layer)});
+            add(moments[label], Vector3{4.0 * static_cast<double>(index % row),
+                                        4.0 * static_cast<double>(index % layer / row),
+                                        4.0 * static_cast<double>(index / layer)});
         }
     });
     // Sums of whole numbers: the same however they are parted.

@@ -7,6 +7,7 @@
 
 #include "runtime/imaging/effects.h"
 #include "runtime/imaging/governor.h"
+#include "runtime/imaging/in_halves.h"
 #include "runtime/imaging/paper_fast.h"
 #include "runtime/imaging/physical_fast.h"
 #include "runtime/imaging/scan_reach.h"
@@ -137,10 +138,16 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
         if (!scene) return scene.error();
         m.paper_scene = std::move(*scene);
     } else {
-        Result<PhysicalScene> scene = make_physical_scene(bundle, exercise.targets);
-        if (!scene) return scene.error();
-        m.physical_scene = std::move(*scene);
-        m.noise = make_physical_noise(options.seed, lines + 128);
+        std::optional<Result<PhysicalScene>> scene;
+        in_halves(2, [&](std::size_t half, std::size_t, std::size_t) {
+            if (half == 0) {
+                m.noise = make_physical_noise(options.seed, lines + 128);
+            } else {
+                scene = make_physical_scene(bundle, exercise.targets);
+            }
+        });
+        if (!*scene) return scene->error();
+        m.physical_scene = std::move(**scene);
         if (exercise.breathing.amplitude_mm != 0) m.breathing = BreathingField(bundle);
     }
     const bool governed = options.frame_budget_ms > 0 && options.kind == RendererKind::fast;
@@ -160,8 +167,7 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
         } else if (options.kind == RendererKind::fast) {
             level->physical = std::make_unique<PhysicalFast>(m.physical_scene, level->geometry,
                                                              level->tables, m.noise, m.workers);
-            level->reach =
-                make_scan_reach(level->geometry, level->tables, m.physical_scene.voxel_mm);
+            level->reach = ScanReach(level->geometry, level->tables, m.physical_scene.voxel_mm);
         }
         m.levels.push_back(std::move(level));
         if (!governed) break;
@@ -274,8 +280,8 @@ FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
         return FrameStatus::rendered;
     }
     if (bundle.blocks) {
-        unpack_reach(*bundle.blocks, at.reach, bundle.grid, frame.volume_from_probe,
-                     norm(frame.motion.breathing_mm));
+        at.reach.unpack(*bundle.blocks, bundle.grid, frame.volume_from_probe,
+                        norm(frame.motion.breathing_mm));
     }
     physical->render(frame, breathing, input.settings.flip_left_right, effects.keep_all, pixels);
     const PhysicalPasses& p = physical->passes();

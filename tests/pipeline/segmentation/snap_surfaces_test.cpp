@@ -89,13 +89,13 @@ TEST(SnapSurfaces, MostBricksAreKeptShortAndComeBackExactly) {
     const auto back = read_label_file(small, "snapped");
     ASSERT_TRUE(back) << back.error().message();
     EXPECT_EQ(back->volume.voxels, snapped.volume.voxels);
-    EXPECT_EQ(back->boundary.table, snapped.boundary.table);
-    EXPECT_EQ(back->boundary.pool, snapped.boundary.pool);
+    EXPECT_EQ(dense_from_bricks<std::uint32_t>(back->boundary),
+              dense_from_bricks<std::uint32_t>(snapped.boundary));
 }
 
 TEST(SnapSurfaces, SameBytesForOneAndTwoThreads) {
     LabelVolume volume[2];
-    BrickVolume<std::uint32_t> boundary[2];
+    BoundaryBricks boundary[2];
     const ResampleResult plain = torso(0);
     for (const int threads : {1, 2}) {
         const ThreadLimit limit(threads);
@@ -105,6 +105,7 @@ TEST(SnapSurfaces, SameBytesForOneAndTwoThreads) {
     }
     EXPECT_EQ(volume[0].voxels, volume[1].voxels);
     EXPECT_EQ(boundary[0].pool, boundary[1].pool);
+    EXPECT_EQ(boundary[0].patches.patches, boundary[1].patches.patches);
 }
 
 }  // namespace

@@ -1,0 +1,81 @@
+// A bundle that is unpacked as frames need it shows what a bundle that is all there shows, wherever
+// the probe is, whatever moves.
+#include "formats/case_bundle.h"
+
+#include <gtest/gtest.h>
+
+#include "imaging_support.h"
+#include "support/temporary_folder.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using sonocase::testing::TemporaryFolder;
+
+// What was not unpacked is not there: its records turn everything into label 1 beyond a plane.
+CaseBundle opened(const std::string& path) {
+    auto bundle = open_bundle(path);
+    EXPECT_TRUE(bundle.has_value());
+    EXPECT_TRUE(bundle->blocks);
+    std::fill(bundle->boundary.pool.begin(), bundle->boundary.pool.end(), 0x40408101u);
+    std::fill(bundle->echo_offset.pool.begin(), bundle->echo_offset.pool.end(), std::int8_t{99});
+    return std::move(*bundle);
+}
+
+TEST(OpenBundle, FramesAreThoseOfTheWholeBundle) {
+    const TemporaryFolder folder;
+    const std::string path = folder / "phantom.sonocase";
+    ASSERT_TRUE(save_bundle(phantom(), path));
+    const std::uint64_t seed = 41;
+    SCOPED_TRACE(seed);
+    Random random(seed);
+    RenderOptions options;
+    options.width_px = options.height_px = 160;
+    std::size_t frames_with_blocks_left = 0;
+    for (const ProbeShape shape :
+         {ProbeShape::linear, ProbeShape::curvilinear, ProbeShape::phased}) {
+        Exercise exercise = phantom_exercise();
+        exercise.probe.shape = shape;
+        exercise.probe.depth_mm = 80;
+        exercise.probe.elevation_mm = shape == ProbeShape::phased ? 6 : 3;
+        exercise.breathing.amplitude_mm = 12;
+        exercise.breathing.direction = {0, 0.6, 0.8};
+        const CaseBundle whole = *load_bundle(path);
+        EXPECT_FALSE(whole.blocks);
+        auto expected = Renderer::create(whole, exercise, options);
+        ASSERT_TRUE(expected);
+        for (int n = 0; n < 8; ++n) {
+            const CaseBundle parts = opened(path);
+            auto renderer = Renderer::create(parts, exercise, options);
+            ASSERT_TRUE(renderer);
+            for (int frame = 0; frame < 3; ++frame) {
+                FrameInput input;
+                input.mannequin_from_probe = random_pose(random);
+                input.time_s = random.uniform(0, 8);
+                std::vector<std::uint8_t> a(160 * 160), b(160 * 160);
+                EXPECT_EQ(expected->render(input, a), renderer->render(input, b));
+                EXPECT_EQ(a, b) << "probe " << static_cast<int>(shape) << " pose " << n << " frame "
+                                << frame;
+                frames_with_blocks_left += !parts.blocks->whole();
+            }
+        }
+    }
+    EXPECT_GT(frames_with_blocks_left, 36u);  // of 72: it was not all unpacked at once
+}
+
+TEST(OpenBundle, TheSlowRendererHasAllOfIt) {
+    const TemporaryFolder folder;
+    const std::string path = folder / "phantom.sonocase";
+    ASSERT_TRUE(save_bundle(phantom(), path));
+    const CaseBundle parts = opened(path);
+    RenderOptions options;
+    options.kind = RendererKind::reference;
+    options.scanlines = 16;
+    options.samples = 64;
+    options.width_px = options.height_px = 32;
+    ASSERT_TRUE(Renderer::create(parts, phantom_exercise(), options));
+    EXPECT_TRUE(parts.blocks->whole());
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
