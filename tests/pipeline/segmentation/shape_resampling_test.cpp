@@ -234,7 +234,7 @@ TEST(ShapeResampling, SameBytesForOneAndTwoThreads) {
     Random random(9);
     const Registration registration = registration_of(random.rigid(30), ct.grid);
     std::vector<std::uint8_t> labels[2];
-    std::vector<std::uint32_t> records[2];
+    RawVector<std::uint32_t> records[2];
     for (const int threads : {1, 2}) {
         const ThreadLimit limit(threads);
         const auto result = resample_labels({ct, registration});
