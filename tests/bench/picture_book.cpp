@@ -1,8 +1,8 @@
 // Draws the pictures of docs/effects.md and docs/realism.md from a bundle of scenarios/real-torso:
 //   sonocase_pictures BUNDLE FOLDER
-// writes FOLDER/effects/MODEL-EFFECT.png, the effect on the left and without it on the right, and
-// FOLDER/realism.png. Views are named by anatomy, so that another cooking of the case shows the
-// same.
+// writes FOLDER/effects/MODEL-EFFECT.png, the effect on the left and without it on the right,
+// FOLDER/realism.png and FOLDER/readme.png. Views are named by anatomy, so that another cooking of
+// the case shows the same.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -211,18 +211,20 @@ bool effect_pictures(const Body& body, const std::string& folder) {
     return true;
 }
 
-bool realism_picture(const Body& body, const std::string& path) {
+// Four views a row, the first `physical` rows in that model.
+bool sheet_of(const Body& body,
+              const std::vector<std::vector<const char*>>& rows,
+              std::size_t physical,
+              const std::string& path) {
     constexpr int kWidth = 440, kHeight = 400, kGap = 6;
-    const std::vector<std::vector<const char*>> rows{{"liver", "kidney", "aorta", "gas"},
-                                                     {"bladder", "rib", "muscle", "vessel"},
-                                                     {"kidney", "aorta", "bladder", "muscle"}};
-    Picture sheet(4 * kWidth + 3 * kGap, 3 * kHeight + 2 * kGap, 40);
+    const int height = static_cast<int>(rows.size()) * (kHeight + kGap) - kGap;
+    Picture sheet(4 * (kWidth + kGap) - kGap, height, 40);
     for (std::size_t row = 0; row < rows.size(); ++row) {
         for (std::size_t i = 0; i < rows[row].size(); ++i) {
             Shot shot;
             shot.view = rows[row][i];
-            sheet.put(draw(body, shot, row == 2 ? ImageModel::paper : ImageModel::physical,
-                           {"auto"}, kWidth, kHeight),
+            const auto model = row < physical ? ImageModel::physical : ImageModel::paper;
+            sheet.put(draw(body, shot, model, {"auto"}, kWidth, kHeight),
                       static_cast<int>(i) * (kWidth + kGap),
                       static_cast<int>(row) * (kHeight + kGap));
         }
@@ -245,8 +247,11 @@ int run(const std::string& path, const std::string& folder) {
             return 1;
         }
     }
+    const std::vector<const char*> fan{"liver", "kidney", "aorta", "gas"},
+        linear{"bladder", "rib", "muscle", "vessel"}, paper{"kidney", "aorta", "bladder", "muscle"};
     return effect_pictures(body, folder + "/effects") &&
-                   realism_picture(body, folder + "/realism.png")
+                   sheet_of(body, {fan, linear, paper}, 2, folder + "/realism.png") &&
+                   sheet_of(body, {fan, linear}, 2, folder + "/readme.png")
                ? 0
                : 1;
 }
