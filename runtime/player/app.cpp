@@ -92,6 +92,7 @@ bool open_bundle(App& app, const std::string& path, const std::string& exercise)
     }
     close_bundle(app);
     app.open = std::move(*opened);
+    app.damage_told = false;
     for (const std::string& warning : app.open->warnings)
         notify(app, Notice::Kind::warning, warning);
     app.skin = std::make_unique<Skin>(app.open->bundle);
@@ -437,6 +438,12 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
         const double between_s = now_s - last_shown_s;
         if (between_s > 0) app.ui_rate += 0.08 * (1 / between_s - app.ui_rate);
         last_shown_s = now_s;
+
+        const VoxelBlocks* blocks = app.open ? app.open->bundle.blocks.get() : nullptr;
+        if (blocks && blocks->damaged() && !app.damage_told) {
+            notify(app, Notice::Kind::error, blocks->status().error().message());
+            app.damage_told = true;
+        }
 
         std::string shot;
         bool quit = false;

@@ -48,6 +48,7 @@ struct App {
 
     // The open case. The scan thread's engine points into it: closed first.
     std::unique_ptr<OpenCase> open;
+    bool damage_told = false;  // of `open`: VoxelBlocks::damaged()
     std::unique_ptr<Skin> skin;
     int exercise = 0;
     std::string model;  // "paper", "physical"
