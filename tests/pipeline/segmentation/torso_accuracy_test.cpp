@@ -134,16 +134,21 @@ const Cooked& thick() {
     return cooked;
 }
 
-// What is asked of organs is 0.15 mm and 8 degrees. The limits are what is reached: 0.18, 0.15 and
-// 0.21 mm and 10 to 12 degrees, with or without the move onto quadrics. Percentiles over a hundred
-// records swing by half, so there are more.
+// What is asked of organs is 0.15 mm and 8 degrees. The limits are what is reached and little more,
+// with or without the move onto quadrics. Percentiles over a hundred records swing by half, so
+// there are more.
 TEST(TorsoAccuracy, BoundaryPlanesOfOrgans) {
-    for (const char* name : {"liver", "kidney_right", "gallbladder"}) {
-        const PlaneErrors errors =
-            plane_errors(fine(), fine().label(name), std::string(name) == "liver" ? 60 : 8);
-        ASSERT_GT(errors.distance_mm.size(), 400u) << name;
-        EXPECT_LT(percentile(errors.distance_mm, 0.95), 0.22) << name;
-        EXPECT_LT(percentile(errors.normal_deg, 0.95), 13) << name;
+    const struct {
+        const char* name;
+        std::size_t stride;
+        double distance_mm, normal_deg;
+    } organs[] = {
+        {"liver", 60, 0.19, 11}, {"kidney_right", 8, 0.16, 12.5}, {"gallbladder", 8, 0.22, 12}};
+    for (const auto& organ : organs) {
+        const PlaneErrors errors = plane_errors(fine(), fine().label(organ.name), organ.stride);
+        ASSERT_GT(errors.distance_mm.size(), 400u) << organ.name;
+        EXPECT_LT(percentile(errors.distance_mm, 0.95), organ.distance_mm) << organ.name;
+        EXPECT_LT(percentile(errors.normal_deg, 0.95), organ.normal_deg) << organ.name;
     }
 }
 

@@ -41,8 +41,8 @@ TEST(PaperModel, BeamSpaceAgreesWithTheLiteralRendererEffectByEffect) {
         EXPECT_LT(d.mean, row.mean) << row.effects.front();
         EXPECT_LT(std::abs(d.bias), row.bias) << row.effects.front();
         if (row.effects.front() == "auto") {
-            write_pgm("paper_fast.pgm", a, 256, 256);
-            write_pgm("paper_reference.pgm", b, 256, 256);
+            write_pgm(::testing::TempDir() + "paper_fast.pgm", a, 256, 256);
+            write_pgm(::testing::TempDir() + "paper_reference.pgm", b, 256, 256);
         }
     }
 }

@@ -183,9 +183,10 @@ TEST(PhysicalModel, PicturesForTheEye) {
     Exercise curved = phantom_exercise(), linear = phantom_linear_exercise();
     RenderOptions o = physical_options();
     o.width_px = o.height_px = 512;
-    write_pgm("physical_curved.pgm", draw(curved, o, needle_input()), 512, 512);
+    write_pgm(::testing::TempDir() + "physical_curved.pgm", draw(curved, o, needle_input()), 512,
+              512);
     FrameInput input;
-    write_pgm("physical_linear.pgm", draw(linear, o, input), 512, 512);
+    write_pgm(::testing::TempDir() + "physical_linear.pgm", draw(linear, o, input), 512, 512);
     const auto pixels = draw(curved, o, input);
     EXPECT_GT(*std::max_element(pixels.begin(), pixels.end()), 200);
 }
