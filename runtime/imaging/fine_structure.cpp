@@ -69,35 +69,42 @@ Axis longest_axis(const Moments& m) {
     return {first, l2 > 1e-9 ? std::sqrt(l1 / l2) : 10.0};
 }
 
-// Mean power 1, as quarter dB.
-void store(const std::vector<double>& db, std::int8_t* out) {
+// Mean power 1, as quarter dB. Powers are looked up: in steps of 1/64 dB, from kLeast on.
+void store(const RawVector<float>& db, std::int8_t* out) {
+    constexpr float kLeast = -8, kMost = 24, kSteps = 64;
+    std::vector<std::uint32_t> met(static_cast<std::size_t>((kMost - kLeast) * kSteps) + 1);
+    for (const float v : db)
+        ++met[static_cast<std::size_t>((std::clamp(v, kLeast, kMost) - kLeast) * kSteps + 0.5f)];
     double power = 0;
-    for (const double v : db) power += std::pow(10.0, v / 10);
-    const double mean = 10 * std::log10(power / static_cast<double>(db.size()));
+    for (std::size_t i = 0; i < met.size(); ++i)
+        power += met[i] * std::pow(10.0, (kLeast + static_cast<double>(i) / kSteps) / 10);
+    const auto mean = static_cast<float>(10 * std::log10(power / static_cast<double>(db.size())));
     for (std::size_t i = 0; i < db.size(); ++i) {
-        out[i] =
-            static_cast<std::int8_t>(std::lround(std::clamp(4 * (db[i] - mean), -127.0, 127.0)));
+        constexpr float kAbove = 127.5f;  // what is cast is above 0: rounded, not cut
+        const float quarters = std::clamp(4 * (db[i] - mean), -127.0f, 127.0f);
+        out[i] = static_cast<std::int8_t>(static_cast<int>(quarters + kAbove) - 127);
     }
 }
 
 std::vector<std::int8_t> make_cubes() {
     const std::size_t cube = static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge;
     std::vector<std::int8_t> cubes(2 * cube + kGatherSlack);
-    const std::vector<float> a = smooth_periodic_noise(kFineEdge, 2, 21),
-                             b = smooth_periodic_noise(kFineEdge, 5, 22),
-                             c = smooth_periodic_noise(kFineEdge, 5, 23);
-    std::vector<double> db(cube);
+    const RawVector<float> a = smooth_periodic_noise(kFineEdge, 2, 21),
+                           b = smooth_periodic_noise(kFineEdge, 5, 22),
+                           c = smooth_periodic_noise(kFineEdge, 5, 23);
+    RawVector<float> db(cube);
     // Fibres: sparse bright strands on dark ground.
-    for (std::size_t i = 0; i < cube; ++i) {
-        const double strand = static_cast<double>(a[i]) + 0.3 * static_cast<double>(c[i]);
-        db[i] = -5 + 13 * std::clamp(strand - 0.35, 0.0, 1.9);
-    }
+    for (std::size_t i = 0; i < cube; ++i)
+        db[i] = -5 + 13 * std::clamp(a[i] + 0.3f * c[i] - 0.35f, 0.0f, 1.9f);
     store(db, cubes.data());
     // Septa: thin sheets where a smooth field crosses zero, torn here and there.
     for (std::size_t i = 0; i < cube; ++i) {
-        const double off = static_cast<double>(b[i]) / 0.11;
-        db[i] = -4 + 18 * std::exp(-off * off) *
-                         std::clamp(0.45 + 0.7 * static_cast<double>(c[i]), 0.0, 1.3);
+        constexpr float kNothing = 20;  // e to the minus of it
+        const float off = b[i] / 0.11f, square = off * off;
+        db[i] = -4;
+        if (square < kNothing)
+            db[i] += 18 * static_cast<float>(std::exp(-static_cast<double>(square))) *
+                     std::clamp(0.45f + 0.7f * c[i], 0.0f, 1.3f);
     }
     store(db, cubes.data() + cube);
     return cubes;

@@ -1,18 +1,32 @@
 #include "runtime/imaging/periodic_noise.h"
 
 #include <cmath>
+#include <vector>
 
 #include "runtime/imaging/noise.h"
 
 namespace sonocase::runtime {
 namespace {
 
-// Running sums along one axis; rows of `stride` neighbours go together.
-void box(const std::vector<float>& in,
-         std::vector<float>& out,
-         std::size_t n,
-         std::size_t stride,
-         std::size_t reach) {
+// Sums of 2 * reach + 1 neighbours along rows of n.
+void box_along_rows(const RawVector<float>& in, RawVector<float>& out, std::size_t n, std::size_t reach) {
+    std::vector<float> row(n + 2 * reach);
+    for (std::size_t base = 0; base < in.size(); base += n) {
+        for (std::size_t i = 0; i < row.size(); ++i) row[i] = in[base + (n - reach + i) % n];
+        float* to = out.data() + base;
+        for (std::size_t i = 0; i < n; ++i) to[i] = row[i];
+        for (std::size_t k = 1; k <= 2 * reach; ++k) {
+            for (std::size_t i = 0; i < n; ++i) to[i] += row[i + k];
+        }
+    }
+}
+
+// The same across them: running sums of `stride` neighbours at once.
+void box_across(const RawVector<float>& in,
+                RawVector<float>& out,
+                std::size_t n,
+                std::size_t stride,
+                std::size_t reach) {
     for (std::size_t base = 0; base < in.size(); base += n * stride) {
         for (std::size_t j = 0; j < n; ++j) {
             float* to = out.data() + base + j * stride;
@@ -34,19 +48,19 @@ void box(const std::vector<float>& in,
 
 }  // namespace
 
-std::vector<float> smooth_periodic_noise(int edge, int reach, std::uint32_t seed) {
-    const auto n = static_cast<std::size_t>(edge);
-    std::vector<float> a(n * n * n), b(a.size());
+RawVector<float> smooth_periodic_noise(int edge, int reach, std::uint32_t seed) {
+    const auto n = static_cast<std::size_t>(edge), width = static_cast<std::size_t>(reach);
+    RawVector<float> a(n * n * n), b(a.size());
     for (std::size_t i = 0; i < a.size(); ++i) {
         a[i] = static_cast<float>(hash32(seed + static_cast<std::uint32_t>(i) * 2654435761u) >> 8) *
                    0x1p-24f -
                0.5f;
     }
     for (int pass = 0; pass < 2; ++pass) {
-        for (const std::size_t stride : {std::size_t{1}, n, n * n}) {
-            box(a, b, n, stride, static_cast<std::size_t>(reach));
-            std::swap(a, b);
-        }
+        box_along_rows(a, b, n, width);
+        box_across(b, a, n, n, width);
+        box_across(a, b, n, n * n, width);
+        std::swap(a, b);
     }
     double sum = 0, square = 0;
     for (const float v : a) {

@@ -2,13 +2,13 @@
 // structure.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <vector>
+
+#include "formats/raw_vector.h"
 
 namespace sonocase::runtime {
 
 // edge^3 values, x fastest; white noise after two box filters of 2 * reach + 1 voxels in each axis.
-std::vector<float> smooth_periodic_noise(int edge, int reach, std::uint32_t seed);
+RawVector<float> smooth_periodic_noise(int edge, int reach, std::uint32_t seed);
 
 }  // namespace sonocase::runtime
