@@ -46,16 +46,20 @@ Status read_offsets(const ChunkReader& reader,
     parts->in_cells.resize(places.total());
     run_jobs(layers, threads, [&](std::size_t k) {
         std::size_t next_one = first_one[k];
-        std::uint8_t before = 0;
-        for (std::size_t b = k * layer; b < (k + 1) * layer; ++b) {
-            const unsigned v = (*kind)[b];
-            if (v == kOneOffset) before = (*one)[next_one++];
-            if (v <= kOneOffset) {
-                out->table[b] = kUniformBrick | order.index()[before];
-            } else {
-                const std::uint32_t place = places.next(k, b - k * layer);
-                parts->in_cells[place] = v == kCells;
-                out->table[b] = place;
+        std::uint32_t before = kUniformBrick | order.index()[0];
+        std::size_t b = k * layer;
+        for (int j = 0; j < parts->grid.bricks.y; ++j) {
+            PoolOrder::Row row = places.row(k, j);
+            for (int i = 0; i < parts->grid.bricks.x; ++i, ++b) {
+                const unsigned v = (*kind)[b];
+                if (v == kOneOffset) before = kUniformBrick | order.index()[(*one)[next_one++]];
+                if (v <= kOneOffset) {
+                    out->table[b] = before;
+                } else {
+                    const std::uint32_t place = row.next(i);
+                    parts->in_cells[place] = v == kCells;
+                    out->table[b] = place;
+                }
             }
         }
     });

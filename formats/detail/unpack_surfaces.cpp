@@ -76,9 +76,21 @@ void unpack_layer(const Packed& in,
     SurfacePatch* const own = out->boundary.patches.patches.data() + first_patch;
     PatchRows rows(static_cast<std::size_t>(bricks.x), count);
     std::uint8_t before = 0;
-    for (std::size_t b = 0; b < count; ++b) {
+    const auto width = static_cast<std::size_t>(bricks.x);
+    PoolOrder::Row row = places->row(layer, 0);
+    for (std::size_t b = 0, i = 0, j = 0; b < count; ++b, ++i) {
+        if (i == width) {
+            i = 0;
+            row = places->row(layer, static_cast<int>(++j));
+        }
         const std::size_t brick = layer * count + b;
         const unsigned kind = in.kind[brick], labels_as = label_kind(kind);
+        if (kind == 0) {  // air and the inside of organs: most bricks
+            out->labels.table[brick] = kUniformBrick | uniform_of_label[before];
+            if (!out->boundary.table.empty()) out->boundary.table[brick] = kUniformBrick;
+            rows.close(b, at.patch - first_patch);
+            continue;
+        }
         const std::size_t end = at.patch + patch_count(kind);
         for (std::size_t p = at.patch; p < end; ++p)
             own[p - first_patch] = told_patch(in, p, patches, rows, own, b);
@@ -96,7 +108,7 @@ void unpack_layer(const Packed& in,
             out->labels.table[brick] = static_cast<std::uint32_t>(at.label_pool);
         }
         if (has_records(kind)) {
-            const std::uint32_t place = places->next(layer, b);
+            const std::uint32_t place = row.next(static_cast<int>(i));
             out->boundary.table[brick] = place;
             out->boundary.patches.first[place] = static_cast<std::uint32_t>(at.patch);
             out->boundary.patches.count[place] = static_cast<std::uint8_t>(patch_count(kind));
