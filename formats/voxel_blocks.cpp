@@ -12,28 +12,21 @@ namespace sonocase {
 VoxelBlocks::VoxelBlocks(std::unique_ptr<detail::BlockParts> parts)
     : parts_(std::move(parts)),
       work_(std::make_unique<detail::BlockWork>(*parts_)),
+      blocks_(parts_->grid.blocks()),
+      edge_(kBrickEdge * parts_->grid.edge),
       count_(parts_->grid.count()),
       there_(std::make_unique<std::atomic<bool>[]>(count_)),
       left_(count_) {}
 
 VoxelBlocks::~VoxelBlocks() = default;
 
-VoxelBlocks::Corners VoxelBlocks::corners(std::size_t block) const noexcept {
-    const Int3 f = parts_->grid.first_brick(block);
-    const int edge = kBrickEdge * parts_->grid.edge;
-    const Int3 lower{kBrickEdge * f.x, kBrickEdge * f.y, kBrickEdge * f.z};
-    return {lower, {lower.x + edge - 1, lower.y + edge - 1, lower.z + edge - 1}};
-}
-
 void VoxelBlocks::need_voxel(int i, int j, int k) noexcept {
     if (whole()) return;
-    const int edge = kBrickEdge * parts_->grid.edge;
-    const Int3 n = parts_->grid.blocks();
     const std::size_t block =
-        static_cast<std::size_t>(i / edge) +
-        static_cast<std::size_t>(n.x) *
-            (static_cast<std::size_t>(j / edge) +
-             static_cast<std::size_t>(n.y) * static_cast<std::size_t>(k / edge));
+        static_cast<std::size_t>(i / edge_) +
+        static_cast<std::size_t>(blocks_.x) *
+            (static_cast<std::size_t>(j / edge_) +
+             static_cast<std::size_t>(blocks_.y) * static_cast<std::size_t>(k / edge_));
     if (!there(block)) unpack(block);
 }
 
@@ -74,6 +67,10 @@ void VoxelBlocks::use_small_pages() noexcept {
     advise(parts_->boundary.pool);
     advise(parts_->echo.pool);
 #endif
+}
+
+std::size_t VoxelBlocks::pool_bytes() const noexcept {
+    return parts_->boundary.pool.size_bytes() + parts_->echo.pool.size_bytes();
 }
 
 Status VoxelBlocks::status() const {

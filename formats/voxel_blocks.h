@@ -32,16 +32,24 @@ class VoxelBlocks {
     template <class Wanted>
     void need(const Wanted& wanted) noexcept {
         if (whole()) return;
-        for (std::size_t block = 0; block < count_; ++block) {
-            if (there(block)) continue;
-            const Corners voxels = corners(block);
-            if (wanted(voxels.lower, voxels.upper)) unpack(block);
+        std::size_t block = 0;
+        for (int z = 0; z < blocks_.z; ++z) {
+            for (int y = 0; y < blocks_.y; ++y) {
+                for (int x = 0; x < blocks_.x; ++x, ++block) {
+                    if (there(block)) continue;
+                    const Int3 lower{x * edge_, y * edge_, z * edge_};
+                    if (wanted(lower,
+                               Int3{lower.x + edge_ - 1, lower.y + edge_ - 1, lower.z + edge_ - 1}))
+                        unpack(block);
+                }
+            }
         }
     }
     void need_voxel(int i, int j, int k) noexcept;
     void need_all(int threads);  // 0: as many as the machine has
 
     bool whole() const noexcept { return left_.load(std::memory_order_acquire) == 0; }
+    std::size_t pool_bytes() const noexcept;  // of all blocks, unpacked
     bool damaged() const noexcept { return damaged_.load(std::memory_order_relaxed); }
     Status status() const;
 
@@ -53,18 +61,16 @@ class VoxelBlocks {
     void keep(RawVector<std::uint8_t> file) { file_ = std::move(file); }
 
   private:
-    struct Corners {
-        Int3 lower, upper;
-    };
     bool there(std::size_t block) const noexcept {
         return there_[block].load(std::memory_order_acquire);
     }
-    Corners corners(std::size_t block) const noexcept;
     void unpack(std::size_t block) noexcept;
 
     std::unique_ptr<detail::BlockParts> parts_;
     std::unique_ptr<detail::BlockWork> work_;  // under mutex_
     RawVector<std::uint8_t> file_;
+    Int3 blocks_{0, 0, 0};
+    int edge_ = 0;  // of a block, voxels
     std::size_t count_ = 0;
     std::unique_ptr<std::atomic<bool>[]> there_;
     std::atomic<std::size_t> left_{0};

@@ -45,7 +45,9 @@ HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
                jz = hn::Mul(beam(kBeam + 2), jitter);
     const auto shift = hn::Set(d, kRoundingShift);
     const auto bits = hn::Set(di, kRoundingBits), three = hn::Set(di, 3);
-    const auto bx = hn::Set(di, b.bricks_x), bxy = hn::Set(di, b.bricks_xy);
+    const auto bx = hn::Set(di, b.blocks_x), bxy = hn::Set(di, b.blocks_xy);
+    const int edge_log2 = b.block_log2;  // of a block of bricks
+    const auto in_block = hn::Set(di, (1 << edge_log2) - 1);
     const auto sx = hn::Set(du, static_cast<std::uint32_t>(b.size.x)),
                sy = hn::Set(du, static_cast<std::uint32_t>(b.size.y)),
                sz = hn::Set(du, static_cast<std::uint32_t>(b.size.z));
@@ -79,9 +81,16 @@ HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
         const auto inside = hn::RebindMask(
             di, hn::And(hn::Lt(hn::BitCast(du, i), sx),
                         hn::And(hn::Lt(hn::BitCast(du, j), sy), hn::Lt(hn::BitCast(du, l), sz))));
+        const auto bi = hn::ShiftRight<2>(i), bj = hn::ShiftRight<2>(j), bl = hn::ShiftRight<2>(l);
+        const auto along = [&](auto p) HWY_ATTR { return hn::ShiftRightSame(p, edge_log2); };
+        const auto block =
+            hn::Add(along(bi), hn::Add(hn::Mul(along(bj), bx), hn::Mul(along(bl), bxy)));
+        // Base of the block, then the layer's, the row's and the brick's place in it.
+        const auto shifted = [&](auto base, auto place)
+                                 HWY_ATTR { return hn::Or(hn::ShiftLeftSame(base, edge_log2), place); };
         const auto number =
-            hn::Add(hn::ShiftRight<2>(i),
-                    hn::Add(hn::Mul(hn::ShiftRight<2>(j), bx), hn::Mul(hn::ShiftRight<2>(l), bxy)));
+            shifted(shifted(shifted(block, hn::And(bl, in_block)), hn::And(bj, in_block)),
+                    hn::And(bi, in_block));
         const auto brick = hn::ShiftLeft<2>(hn::IfThenElseZero(inside, number));
         hn::Store(px, d, c.x.row(row));
         hn::Store(py, d, c.y.row(row));

@@ -112,10 +112,10 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f,
     base.elevation_start = elevation_start_.data();
     base.lookup_start = lookup_start_.data();
     const CaseBundle& bundle = *scene_.bundle;
-    base.table = reinterpret_cast<const std::int32_t*>(scene_.table.data());
+    base.table = reinterpret_cast<const std::int32_t*>(scene_.words.data());
     base.labels = reinterpret_cast<const std::int32_t*>(bundle.label_bricks.pool.data());
     base.echo = reinterpret_cast<const std::int32_t*>(bundle.echo_offset.pool.data());
-    base.boundary = f.effects.boundaries && scene_.has_boundary
+    base.boundary = f.effects.boundaries && scene_.words.has_boundary()
                         ? reinterpret_cast<const std::int32_t*>(bundle.boundary.pool.data())
                         : nullptr;
     base.looks = looks_.data();
@@ -143,8 +143,10 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f,
     base.targets = near_targets_.data();
     base.target_count = static_cast<int>(near_targets_.size());
     base.size = scene_.grid.size;
-    base.bricks_x = scene_.bricks.x;
-    base.bricks_xy = scene_.bricks.x * scene_.bricks.y;
+    const Int3 table_blocks = scene_.words.blocks();
+    base.blocks_x = table_blocks.x;
+    base.blocks_xy = table_blocks.x * table_blocks.y;
+    base.block_log2 = scene_.words.edge_log2();
     base.label_count = scene_.labels();
     base.voxel_mm = static_cast<float>(scene_.voxel_mm);
     base.rough_per_voxel = static_cast<float>(scene_.voxel_mm / kRoughVoxelMm);
@@ -156,7 +158,7 @@ void PhysicalFast::sample_beams(const PhysicalFrame& f,
     base.decay = {decay(kBoneTailMm), decay(kBoneTailSlowMm), decay(kBoneFloorMm),
                   decay(kGasTailMm)};
     base.reverb_mm = static_cast<float>(kReverbWidth * tables_.axial_mm);
-    base.structure = f.effects.structure && scene_.has_echo;
+    base.structure = f.effects.structure && scene_.words.has_echo();
     base.speckled = f.effects.speckle;
     base.interfaces = f.effects.interfaces;
     base.edge_shadow = f.effects.edge_shadow;

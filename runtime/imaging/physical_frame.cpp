@@ -44,15 +44,7 @@ PhysicalNoise make_physical_noise(std::uint32_t seed, int overhang) {
 
 int label_at(const PhysicalScene& s, int i, int j, int k) {
     if (!s.grid.contains(i, j, k)) return 0;
-    const std::uint32_t entry =
-        s.table[4 * (static_cast<std::size_t>(i / 4) +
-                     static_cast<std::size_t>(s.bricks.x) *
-                         (static_cast<std::size_t>(j / 4) +
-                          static_cast<std::size_t>(s.bricks.y) * static_cast<std::size_t>(k / 4)))];
-    if (entry & kUniformBrick) return static_cast<int>(entry & 0xFF);
-    return s.bundle->label_bricks
-        .pool[static_cast<std::size_t>(entry & ~kBoundaryFlag) * kBrickVoxels +
-              static_cast<std::size_t>((i & 3) + 4 * (j & 3) + 16 * (k & 3))];
+    return s.bundle->label_bricks.at(i, j, k);
 }
 
 void find_gaps(const PhysicalScene& scene,

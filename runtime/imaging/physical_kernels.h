@@ -71,7 +71,8 @@ struct PhysicalBlock {
     const PhysicalTarget* targets = nullptr;
     int target_count = 0;
     Int3 size;
-    int bricks_x = 0, bricks_xy = 0, label_count = 0;
+    int blocks_x = 0, blocks_xy = 0, block_log2 = 3;  // of the table: BrickWords
+    int label_count = 0;
     const float *dim = nullptr, *dim_off = nullptr;  // per look: light that one sample leaves
     float dead_light = 0;
     struct {

@@ -14,39 +14,10 @@ int nearest(double x) {
     return static_cast<int>(std::nearbyint(std::clamp(x, -1e6, 1e6)));
 }
 
-template <class T>
-T pool_value(const PhysicalScene& s,
-             int word,
-             const BrickVolume<T>& volume,
-             int i,
-             int j,
-             int k,
-             T uniform) {
-    const std::size_t brick =
-        static_cast<std::size_t>(i / 4) +
-        static_cast<std::size_t>(s.bricks.x) *
-            (static_cast<std::size_t>(j / 4) +
-             static_cast<std::size_t>(s.bricks.y) * static_cast<std::size_t>(k / 4));
-    const std::uint32_t entry = s.table[4 * brick + static_cast<std::size_t>(word)];
-    if (entry & kUniformBrick) return uniform;
-    return volume.pool[static_cast<std::size_t>(entry) * kBrickVoxels +
-                       static_cast<std::size_t>((i & 3) + 4 * (j & 3) + 16 * (k & 3))];
-}
-
 double echo_offset_db(const PhysicalScene& s, Point3 v) {
     const int i = nearest(v.x), j = nearest(v.y), k = nearest(v.z);
-    if (!s.has_echo || !s.grid.contains(i, j, k)) return 0;
-    const std::size_t brick =
-        static_cast<std::size_t>(i / 4) +
-        static_cast<std::size_t>(s.bricks.x) *
-            (static_cast<std::size_t>(j / 4) +
-             static_cast<std::size_t>(s.bricks.y) * static_cast<std::size_t>(k / 4));
-    const std::uint32_t entry = s.table[4 * brick + 1];
-    if (entry & kUniformBrick) return static_cast<std::int8_t>(entry & 0xFF) / 4.0;
-    return s.bundle->echo_offset
-               .pool[static_cast<std::size_t>(entry) * kBrickVoxels +
-                     static_cast<std::size_t>((i & 3) + 4 * (j & 3) + 16 * (k & 3))] /
-           4.0;
+    if (!s.words.has_echo() || !s.grid.contains(i, j, k)) return 0;
+    return s.bundle->echo_offset.at(i, j, k) / 4.0;
 }
 
 double fine_offset_db(const PhysicalScene& s, int label, Point3 v) {
@@ -97,8 +68,8 @@ Place place_at(const PhysicalScene& s, const PhysicalFrame& f, Point3 v, Point3 
     Place p;
     const int i = nearest(near.x), j = nearest(near.y), k = nearest(near.z);
     p.own = p.label = label_at(s, i, j, k);
-    if (!f.effects.boundaries || !s.has_boundary || !s.grid.contains(i, j, k)) return p;
-    const std::uint32_t bits = pool_value(s, 2, s.bundle->boundary, i, j, k, kNoBoundary);
+    if (!f.effects.boundaries || !s.words.has_boundary() || !s.grid.contains(i, j, k)) return p;
+    const std::uint32_t bits = s.bundle->boundary.at(i, j, k);
     if (bits == kNoBoundary || static_cast<int>(bits & 0xFF) >= s.labels()) return p;
     const BoundaryRecord r = unpack_boundary(bits);
     if (std::abs(r.distance_vx) > kSurfaceReachVx) return p;

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/boundary_record.h"
-#include "runtime/imaging/in_halves.h"
 #include "runtime/imaging/periodic_noise.h"
 #include "runtime/imaging/physical_model.h"
 
@@ -66,36 +64,10 @@ std::uint32_t signed_byte(double v) {
            0xFFu;
 }
 
-void merge_entries(const CaseBundle& bundle, std::size_t b, PhysicalScene* s) {
-    std::uint32_t* words = s->table.data() + 4 * b;
-    const std::uint32_t label = bundle.label_bricks.table[b];
-    words[0] = label & kUniformBrick
-                   ? kUniformBrick | bundle.label_bricks.uniform[label & ~kUniformBrick]
-                   : label;
-    words[1] = kUniformBrick;
-    words[2] = kUniformBrick;
-    words[3] = 0;
-    if (s->has_echo) {
-        const std::uint32_t e = bundle.echo_offset.table[b];
-        words[1] = e & kUniformBrick
-                       ? kUniformBrick | static_cast<std::uint8_t>(
-                                             bundle.echo_offset.uniform[e & ~kUniformBrick])
-                       : e;
-    }
-    if (s->has_boundary) {
-        const std::uint32_t e = bundle.boundary.table[b];
-        // A uniform record would be the same plane in 64 voxels: no surface does that.
-        if (!(e & kUniformBrick)) {
-            words[2] = e;
-            words[0] |= kBoundaryFlag;
-        }
-    }
-}
-
 std::vector<std::uint32_t> make_rough_surfaces() {
-    const std::vector<float> rough = smooth_periodic_noise(kRoughEdge, 2, 11),
-                             glint = smooth_periodic_noise(kRoughEdge, 2, 12),
-                             phase = smooth_periodic_noise(kRoughEdge, 2, 13);
+    const RawVector<float> rough = smooth_periodic_noise(kRoughEdge, 2, 11),
+                           glint = smooth_periodic_noise(kRoughEdge, 2, 12),
+                           phase = smooth_periodic_noise(kRoughEdge, 2, 13);
     std::vector<std::uint32_t> out(rough.size());
     for (std::size_t i = 0; i < rough.size(); ++i) {
         const double p = 0.9 * static_cast<double>(phase[i]);
@@ -118,7 +90,6 @@ Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
     PhysicalScene s;
     s.bundle = &bundle;
     s.grid = bundle.grid;
-    s.bricks = brick_count(bundle.label_bricks.size);
     s.voxel_mm = bundle.grid.spacing_mm.x;
     if (bundle.labels.empty() || bundle.label_bricks.table.empty()) {
         return Error{"the bundle holds no label volume", "", "build the case again"};
@@ -202,16 +173,8 @@ Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
         }
     }
 
-    const auto same = [&](const auto& volume) {
-        return volume.table.size() == bundle.label_bricks.table.size();
-    };
-    s.has_echo = same(bundle.echo_offset);
-    s.has_boundary = same(bundle.boundary);
-    s.table.resize(4 * bundle.label_bricks.table.size());
-    in_halves(bundle.label_bricks.table.size(),
-              [&](std::size_t, std::size_t begin, std::size_t end) {
-                  for (std::size_t b = begin; b < end; ++b) merge_entries(bundle, b, &s);
-              });
+    s.words = BrickWords(bundle);
+    if (!bundle.blocks) s.words.need_all();
     s.rough = rough_surfaces();
     s.fine = make_fine_structure(bundle);
     return s;

@@ -1,6 +1,5 @@
 // What model `physical` needs of a bundle, laid out for the frame loop. Voxel pools are used where
-// they lie in the bundle; only the brick tables are merged, so that one cache line answers for a
-// brick.
+// they lie in the bundle.
 #pragma once
 
 #include <array>
@@ -11,6 +10,7 @@
 #include "formats/case_bundle.h"
 #include "formats/exercise.h"
 #include "formats/result.h"
+#include "runtime/imaging/brick_words.h"
 #include "runtime/imaging/fine_structure.h"
 
 namespace sonocase::runtime {
@@ -31,9 +31,6 @@ struct LabelLook {
     TissueKind kind = TissueKind::outside;
 };
 
-inline constexpr std::uint32_t kBoundaryFlag =
-    0x40000000u;  // in a brick's label word: it holds surfaces
-
 // A ball of the exercise, put into the anatomy.
 struct TargetBall {
     Point3 centre_vx;  // voxel coordinates
@@ -46,16 +43,12 @@ struct TargetBall {
 struct PhysicalScene {
     const CaseBundle* bundle = nullptr;
     Grid grid;
-    Int3 bricks{0, 0, 0};
     double voxel_mm = 1;
 
-    // Four words a brick: label entry, echo entry, boundary entry, unused. A uniform label entry is
-    // kUniformBrick | label; a uniform echo entry kUniformBrick | (offset & 0xFF); a boundary entry
-    // is kUniformBrick where the brick holds no interface.
-    RawVector<std::uint32_t> table;
+    // All filled in where all of the bundle is there; else to be asked for what a frame reads.
+    BrickWords words;
     std::vector<LabelLook> looks;  // # labels
     std::vector<PairEcho> pairs;   // # labels^2, [own * # labels + second]
-    bool has_boundary = false, has_echo = false;
     bool has_hard = true;  // some label is bone or gas: what plans for scenes without go by
 
     std::span<const std::uint32_t> rough;  // rough_surfaces()

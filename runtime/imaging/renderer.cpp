@@ -10,6 +10,7 @@
 #include "runtime/imaging/in_halves.h"
 #include "runtime/imaging/paper_fast.h"
 #include "runtime/imaging/physical_fast.h"
+#include "runtime/imaging/read_ahead.h"
 #include "runtime/imaging/scan_reach.h"
 #include "runtime/imaging/simd_target.h"
 
@@ -82,6 +83,7 @@ struct Renderer::Impl {
     PhysicalScene physical_scene;
     PhysicalNoise noise;
     BreathingField breathing;
+    std::optional<ReadAhead> ahead;  // ends before what it looks at
 
     Impl(const CaseBundle& b, const Exercise& e, const RenderOptions& o)
         : bundle(b), exercise(e), options(o), workers(o.threads) {}
@@ -172,6 +174,8 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
         m.levels.push_back(std::move(level));
         if (!governed) break;
     }
+    if (options.read_ahead && bundle.blocks && m.levels.front()->physical)
+        m.ahead.emplace(*bundle.blocks, bundle.grid);
     for (const EffectEntry& e : effect_table(options.model))
         m.costs.push_back({e.name, 0, false, ""});
     return Renderer(std::move(impl));
@@ -280,10 +284,12 @@ FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
         return FrameStatus::rendered;
     }
     if (bundle.blocks) {
-        at.reach.unpack(*bundle.blocks, bundle.grid, frame.volume_from_probe,
-                        norm(frame.motion.breathing_mm));
+        const double shift_mm = norm(frame.motion.breathing_mm);
+        at.reach.need(*bundle.blocks, bundle.grid, frame.volume_from_probe, shift_mm);
+        at.reach.need(physical_scene.words, bundle.grid, frame.volume_from_probe, shift_mm);
     }
     physical->render(frame, breathing, input.settings.flip_left_right, effects.keep_all, pixels);
+    if (ahead) ahead->round(at.reach, frame.volume_from_probe);
     const PhysicalPasses& p = physical->passes();
     const std::array<double, 6> passes{p.contact_ms, p.beams_ms, p.needle_ms,
                                        p.filter_ms,  p.grey_ms,  p.convert_ms};
@@ -304,7 +310,7 @@ FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
         if (e.physical == &Y::fine_structure && !p.fine_met) return "no muscle or fat crossed";
         if (e.physical == &Y::targets && !p.target_met) return "no target near the slab";
         if (e.physical == &Y::contact && !p.gap_met) return "the probe touches everywhere";
-        if (e.physical == &Y::structure && !physical_scene.has_echo)
+        if (e.physical == &Y::structure && !physical_scene.words.has_echo())
             return "the bundle holds no structure";
         return "";
     });

@@ -42,6 +42,9 @@ struct RenderOptions {
     // Asked-for time of a frame; 0: none, full accuracy (recordings). See
     // runtime/imaging/governor.h.
     double frame_budget_ms = 0;
+    // A bundle that is unpacked as it is needed is unpacked round the scan plane by one more thread,
+    // so that the next frames find theirs. For a probe in somebody's hand; the same pixels.
+    bool read_ahead = false;
 };
 
 // A straight needle as drawn: after calibration and bend constraint.

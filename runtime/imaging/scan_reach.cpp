@@ -33,20 +33,18 @@ bool ScanReach::reaches(Point3 c, double radius_mm, double across_mm) const noex
     return std::abs(std::atan2(c.x, z)) < half_extent_ + std::asin(ball / range);
 }
 
-void ScanReach::unpack(VoxelBlocks& blocks,
-                       const Grid& grid,
-                       const Rigid& volume_from_probe,
-                       double shift_mm) const noexcept {
-    const Rigid probe_from_volume = inverse(volume_from_probe);
+bool ScanReach::reaches(const Grid& grid,
+                        Int3 lower,
+                        Int3 upper,
+                        const Rigid& probe_from_volume,
+                        double shift_mm) const noexcept {
+    const Point3 centre = grid.point_from_voxel(
+        {0.5 * (lower.x + upper.x), 0.5 * (lower.y + upper.y), 0.5 * (lower.z + upper.z)});
+    const double half_mm = 0.5 * (upper.x - lower.x + 1) * grid.spacing_mm.x;
     const Matrix3& turn = probe_from_volume.rotation;
     const double across = std::abs(turn(1, 0)) + std::abs(turn(1, 1)) + std::abs(turn(1, 2));
-    blocks.need([&](Int3 lower, Int3 upper) {
-        const Point3 centre = grid.point_from_voxel(
-            {0.5 * (lower.x + upper.x), 0.5 * (lower.y + upper.y), 0.5 * (lower.z + upper.z)});
-        const double half_mm = 0.5 * (upper.x - lower.x + 1) * grid.spacing_mm.x;
-        return reaches(probe_from_volume * centre, std::sqrt(3.0) * half_mm + shift_mm,
-                       across * half_mm + shift_mm);
-    });
+    return reaches(probe_from_volume * centre, std::sqrt(3.0) * half_mm + shift_mm,
+                   across * half_mm + shift_mm);
 }
 
 }  // namespace sonocase::runtime

@@ -40,6 +40,7 @@ void rebuild_engine(App& app, bool goes_on) {
     render.kind =
         app.arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
     render.threads = app.arguments.threads;
+    render.read_ahead = true;
     render.scanlines = app.arguments.scanlines;
     render.samples = app.arguments.samples;
     render.effects = app.arguments.effects.empty() ? app.current().effects : app.arguments.effects;

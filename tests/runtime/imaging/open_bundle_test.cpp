@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <thread>
+
 #include "imaging_support.h"
 #include "support/temporary_folder.h"
 
@@ -61,6 +63,48 @@ TEST(OpenBundle, FramesAreThoseOfTheWholeBundle) {
         }
     }
     EXPECT_GT(frames_with_blocks_left, 36u);  // of 72: it was not all unpacked at once
+}
+
+TEST(OpenBundle, ReadingAheadChangesNoPixel) {
+    const TemporaryFolder folder;
+    const std::string path = folder / "phantom.sonocase";
+    ASSERT_TRUE(save_bundle(phantom(), path));
+    const CaseBundle whole = *load_bundle(path), parts = opened(path);
+    RenderOptions options;
+    options.width_px = options.height_px = 160;
+    const Exercise exercise = phantom_exercise();
+    auto expected = Renderer::create(whole, exercise, options);
+    options.read_ahead = true;
+    auto renderer = Renderer::create(parts, exercise, options);
+    ASSERT_TRUE(expected);
+    ASSERT_TRUE(renderer);
+    Random random(43);
+    std::vector<std::uint8_t> a(160 * 160), b(160 * 160);
+    for (int frame = 0; frame < 40; ++frame) {
+        FrameInput input;
+        input.mannequin_from_probe = random_pose(random);
+        EXPECT_EQ(expected->render(input, a), renderer->render(input, b));
+        EXPECT_EQ(a, b) << "frame " << frame;
+    }
+}
+
+// The phantom ends within what is read round the plane: a probe at rest finds all of it in the end.
+TEST(OpenBundle, ReadsAheadRoundThePlane) {
+    const TemporaryFolder folder;
+    const std::string path = folder / "phantom.sonocase";
+    ASSERT_TRUE(save_bundle(phantom(), path));
+    RenderOptions options;
+    options.width_px = options.height_px = 32;
+    std::vector<std::uint8_t> pixels(32 * 32);
+    for (const bool ahead : {false, true}) {
+        const CaseBundle parts = opened(path);
+        options.read_ahead = ahead;
+        auto renderer = Renderer::create(parts, phantom_exercise(), options);
+        ASSERT_TRUE(renderer);
+        renderer->render({}, pixels);
+        while (ahead && !parts.blocks->whole()) std::this_thread::yield();
+        EXPECT_EQ(parts.blocks->whole(), ahead);
+    }
 }
 
 TEST(OpenBundle, TheSlowRendererHasAllOfIt) {
