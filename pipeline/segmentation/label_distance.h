@@ -1,18 +1,19 @@
-// Signed distance to every label of a map on any grid, made smooth, on nodes fine enough for both.
+// Signed distance to unions of labels of a map on any grid, made smooth, on nodes fine enough for
+// both.
 //
 // Thick slices are interpolated by shape: a distance field a slice, blended along the slice axis
 // with Catmull-Rom's cubic, outlines that move sideways blended along their shift (slice_groups.h).
-// Nearly cubic voxels are measured in 3-D. Then one separable smoothing by a kernel without second
-// moment, K = a G - (a - 1) G * G with a = 2 + 1 / (3 sigma^2): planes stay planes, and a sphere of
-// radius R moves by O(sigma^4 / R^3) instead of O(sigma^2 / R) (the 1/3 answers for the cubic
-// B-spline that the nodes are later read with). It is done at two widths: sigma where the map's own
-// voxels stay on their side of the surface (within a tolerance: steps and noise), detail where
-// they would not (thin structures, edges, vessels), with a smooth passage between them.
+// Nearly cubic voxels are measured in 3-D. Then separable smoothing by a kernel without second
+// moment (box_smoothing.h), at several widths: 1.76 sigma where that leaves the map's own voxels on
+// their side of the surface, which flattens the long steps of surfaces that lie nearly along the
+// grid; sigma where it would not; 0.59 sigma and then detail where that would not either (thin
+// structures, edges, vessels), with a smooth passage between them.
 #pragma once
 
 #include <vector>
 
 #include "formats/label_volume.h"
+#include "pipeline/segmentation/box_smoothing.h"
 #include "pipeline/segmentation/signed_distance.h"
 #include "pipeline/segmentation/slice_groups.h"
 
@@ -20,8 +21,9 @@ namespace sonocase::pipeline {
 
 struct LabelDistanceOptions {
     double sigma_vx = 1.7;       // smoothing, in-plane voxels of the map; 0: none
-    double detail_vx = 0.5;      // smoothing where sigma_vx would carry voxels across the surface
+    double detail_vx = 0.5;      // smoothing of what is too fine for any other width
     double tolerance_vx = 0.25;  // how far across they may come to lie; what is one voxel thick not
+    double wide_tolerance_vx = 0.15;  // for the widest
     double sigma_slices = 0;  // smoothing along thick slices, in slices; 0: as in the plane, in mm,
                               // but at most 0.3 slices of 3.5 pixels and more
     double thick_ratio =
@@ -40,12 +42,12 @@ class LabelDistance {
     const SliceGroups& groups() const { return groups_; }
     double limit_mm() const { return limit_mm_; }
 
-    // Smooth phi (negative inside, mm) of one label on `box` of the nodes; # box.count().
-    // Outside `box` the label is further than the limit. Thread-safe.
-    VoxelBox distance(std::uint8_t label, std::vector<float>* phi) const;
+    // Smooth phi (negative inside, mm) of a union of labels on `box` of the nodes; # box.count().
+    // Outside `box` it is further than the limit. Thread-safe.
+    VoxelBox distance(const LabelSet& labels, std::vector<float>* phi) const;
 
   private:
-    void shape_interpolated(std::uint8_t label, const VoxelBox& box, std::vector<float>* phi) const;
+    void shape_interpolated(const LabelSet& labels, const VoxelBox& box, std::vector<float>* phi) const;
     // own: the group is of the label of phi; else it is carved out of it.
     void blend_group(const SliceGroup& group,
                      bool own,
@@ -59,16 +61,36 @@ class LabelDistance {
     double limit_mm_ = 0;
     std::vector<VoxelBox> boxes_;
     SliceGroups groups_;
-    // Where the surface of `smooth` leaves voxels on the wrong side, `phi` is taken instead.
-    void keep_detail(std::uint8_t label,
-                     const VoxelBox& box,
-                     const std::vector<float>& smooth,
-                     std::vector<float>* phi) const;
 
-    struct Kernels {
-        std::vector<float> axis[3];
+    struct Level {
+        BoxKernels kernels, spread;
+        double tolerance_vx = 0;
     };
-    Kernels wide_, fine_, spread_;
+    bool thick(int axis) const { return axis == 2 && factor_ > 1; }
+    double nodes_per_vx(int axis) const;
+    double most_nodes(int axis) const;
+    void add_level(double sigma_vx, double tolerance_vx);
+    // Nodes of the map's own voxels that phi puts on the wrong side; indices in `box`.
+    std::vector<std::size_t> find_strays(const LabelSet& labels,
+                                         const VoxelBox& box,
+                                         const std::vector<float>& phi,
+                                         double tolerance_vx) const;
+    // phi, smoothed by `level`, is replaced by finer levels where it has strays.
+    void add_detail(const LabelSet& labels,
+                    const VoxelBox& box,
+                    const std::vector<float>& raw,
+                    std::size_t level,
+                    std::vector<float>* phi) const;
+    // phi on `box` becomes `fine` on `part` of it near the strays, with a smooth passage.
+    void blend(const VoxelBox& box,
+               const BoxKernels& spread,
+               const std::vector<std::size_t>& strays,
+               const VoxelBox& part,
+               const std::vector<float>& fine,
+               std::vector<float>* phi) const;
+
+    std::vector<Level> levels_;  // coarse to fine
+    Level wide_;                 // after levels_[0]
 };
 
 // The same voxels with the axis of the largest spacing last.

@@ -1,10 +1,13 @@
 // All labels of a map as one smooth partition of space, to be read at any point.
 //
-//     score_l(x) = phi_l(x) - price_l        label(x) = argmin_l score_l(x)
-// phi_l  smooth signed distance of label_distance.h, read with the cubic B-spline (C2)
+//     score_l(x) = sum_e phi_e(x) - price_l        label(x) = argmin_l score_l(x)
+// phi_e  smooth signed distance (label_distance.h) to the union of labels below an edge of the tree
+//        of label_tree.h, over the edges from its root to l; read with the cubic B-spline (C2)
 // price  one number a label, mm: shifts its surface outwards; label_prices.h picks them so that
 // each
 //        label keeps its volume
+// A label that the tree puts between others that touch (LabelTree::between) carries the phi of itself
+// alone as well.
 // No gap and no overlap is possible. Only blocks of 8^3 nodes that hold or touch two labels store
 // anything; elsewhere one byte a node names the label.
 // Between two labels f = score_second - score_first is zero on their surface, and f / |grad f| is
@@ -18,6 +21,7 @@
 #include "formats/label_volume.h"
 #include "pipeline/progress.h"
 #include "pipeline/segmentation/label_distance.h"
+#include "pipeline/segmentation/label_tree.h"
 
 namespace sonocase::pipeline {
 
@@ -30,7 +34,6 @@ inline constexpr int kFieldNodes = 11;  // with the spline's neighbours: one bel
 inline constexpr int kFieldRow = 12;    // floats a row, padded
 inline constexpr std::size_t kFieldValues =
     static_cast<std::size_t>(kFieldRow) * kFieldNodes * kFieldNodes;
-inline constexpr int kMaxCandidates = 24;  // labels that may compete in one block
 
 class LabelField {
   public:
@@ -50,7 +53,11 @@ class LabelField {
     struct Block {
         Int3 first;                        // node
         std::vector<std::uint8_t> labels;  // candidates; one: nothing is stored
-        std::size_t values = 0;            // into the pool, kFieldValues a candidate
+        std::vector<std::uint8_t> edges;   // that part candidates: the label at their lower end
+        std::vector<std::uint8_t> alone;   // labels that carry a phi of themselves alone
+        std::vector<std::uint16_t> terms;  // of each candidate in turn: places in the above two
+        std::vector<std::uint16_t> terms_end;  // # labels, in `terms`
+        std::size_t values = 0;            // into the pool, kFieldValues a phi
     };
     const std::vector<Block>& blocks() const { return blocks_; }
     const Block& block_of(int i, int j, int k) const {
@@ -70,10 +77,16 @@ class LabelField {
     };
     Position locate(float x, float y, float z) const;
 
-    // phi of each candidate at the position; # block->labels.
+    // Score of each candidate at the position; # block->labels.
     void scores(const Position& position, float* out) const;
-    // Gradient of phi of one candidate, per node, and its value.
-    std::array<float, 4> gradient(const Position& position, std::size_t candidate) const;
+    // Gradient of score_b - score_a, per node, and its value, for two candidates.
+    std::array<float, 4> difference(const Position& position, std::size_t a, std::size_t b) const;
+    // Near the surface between two labels their scores part by this much a mm.
+    float slope(const Block& block, std::uint8_t a, std::uint8_t b) const {
+        const bool alone = !block.alone.empty();
+        return static_cast<float>(tree_.steps_between(a, b) + (alone && tree_.between[a]) +
+                                  (alone && tree_.between[b]));
+    }
 
     // After the prices are set: per node, how far (mm, whole, at most 254) no other label can come
     // near. Lets most points be answered by one look-up.
@@ -86,8 +99,12 @@ class LabelField {
 
   private:
     void mark_candidates(const LabelDistance& distance);
+    void list_terms(Block* block) const;
+    std::array<float, 4> term_gradient(const Position& position, std::size_t term) const;
+    float block_score(const Block& block, std::size_t candidate, const float* values) const;
 
     LabelVolume source_;
+    LabelTree tree_;
     Grid nodes_;
     int factor_ = 1;
     Int3 block_count_;

@@ -104,7 +104,7 @@ LabelPriceReport set_label_prices(LabelField* field,
                                         static_cast<float>(block.first.y + j) + part(d, parts[1]),
                                         static_cast<float>(block.first.z + k) + part(c, parts[2]));
                                     field->scores(p, score.data());
-                                    Cell cell;
+                                    Cell cell{};
                                     for (std::size_t l = 0; l < p.block->labels.size(); ++l) {
                                         // Insert into the three best.
                                         float s = score[l];
@@ -123,7 +123,9 @@ LabelPriceReport set_label_prices(LabelField* field,
                                         }
                                     }
                                     if (cell.count < 2 ||
-                                        cell.phi[1] - cell.phi[0] > 2 * limit + 2 * cell_mm) {
+                                        cell.phi[1] - cell.phi[0] >
+                                            2 * limit + cell_mm * field->slope(block, cell.label[0],
+                                                                               cell.label[1])) {
                                         whole[cell.label[0]] += 1;
                                     } else {
                                         out.cells.push_back(cell);
@@ -205,14 +207,16 @@ LabelPriceReport set_label_prices(LabelField* field,
                                 m = cell.label[c];
                             }
                         }
-                        const float distance = 0.5f * (second - best);
+                        const float slope = field->slope(blocks[b], static_cast<std::uint8_t>(l),
+                                                         static_cast<std::uint8_t>(m));
+                        const float distance = (second - best) / slope;
                         const float part = std::min(1.0f, 0.5f + distance / cell_mm);
                         const double w = held[b].weight;
                         s[l] += w * part;
                         s[m] += w * (1 - part);
                         if (part < 1) {  // d volume / d price
-                            s[labels + l * labels + m] += 0.5 * w / cell_mm;
-                            s[labels + m * labels + l] += 0.5 * w / cell_mm;
+                            s[labels + l * labels + m] += w / (cell_mm * slope);
+                            s[labels + m * labels + l] += w / (cell_mm * slope);
                         }
                     }
                 }

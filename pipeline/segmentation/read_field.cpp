@@ -136,9 +136,12 @@ FieldRead read_field(const LabelField& field,
                             continue;
                         }
                         field.scores(at, score.data());
-                        const Contest c = contest(score.data(), at.block->labels.size());
+                        Contest c = contest(score.data(), at.block->labels.size());
                         to[i] = at.block->labels[c.first];
-                        if (!records || c.gap > 3 * band_mm) continue;
+                        if (!records || c.gap > 1.5 * band_mm *
+                                                    field.slope(*at.block, at.block->labels[c.first],
+                                                                at.block->labels[c.second]))
+                            continue;
                         const std::size_t brick = i / 4;
                         if (!has_slope[brick]) {
                             has_slope[brick] = true;
@@ -157,23 +160,23 @@ FieldRead read_field(const LabelField& field,
                         // the foot of the plane found, because f bends near thin structures.
                         const Matrix3& m = slope[brick];
                         const auto plane = [&](const LabelField::Position& p, Vector3* g) {
-                            const auto one = field.gradient(p, c.first);
-                            const auto two = field.gradient(p, c.second);
-                            const Vector3 n{two[0] - one[0], two[1] - one[1], two[2] - one[2]};
+                            const auto n = field.difference(p, c.first, c.second);
                             for (int b = 0; b < 3; ++b) {
-                                (*g)[b] = n.x * m(0, b) + n.y * m(1, b) + n.z * m(2, b);
+                                (*g)[b] = n[0] * m(0, b) + n[1] * m(1, b) + n[2] * m(2, b);
                             }
-                            return static_cast<double>(two[3]) - one[3];
+                            return static_cast<double>(n[3]);
                         };
-                        Vector3 g;
-                        const double f = plane(at, &g);
-                        const double steep = norm(g);
-                        // phi_2 - phi_1 rises by up to 2 mm a mm; much less means no surface here.
-                        if (!(steep > 0.2 * grid.spacing_mm.x)) continue;
-                        double d = f / steep;
-                        if (d > options.record_band_vx + 0.5) continue;
-                        Vector3 normal = g / steep;
-                        {
+                        double d = 0;
+                        Vector3 normal;
+                        const auto find_plane = [&] {
+                            Vector3 g;
+                            const double f = plane(at, &g);
+                            const double steep = norm(g);
+                            // The scores part by at least 1 mm a mm; much less means no surface here.
+                            if (!(steep > 0.2 * grid.spacing_mm.x)) return false;
+                            d = f / steep;
+                            if (d > options.record_band_vx + 0.5) return false;
+                            normal = g / steep;
                             const Vector3 back = m * (d * normal);
                             const auto foot = field.locate(v[0] - static_cast<float>(back.x),
                                                            v[1] - static_cast<float>(back.y),
@@ -188,8 +191,27 @@ FieldRead read_field(const LabelField& field,
                                     normal = g2 / steep2;
                                 }
                             }
+                            return d <= options.record_band_vx;
+                        };
+                        if (!find_plane()) continue;
+                        if (at.block->labels.size() > 2) {
+                            // Labels tie where they meet: the second is whoever lies beyond.
+                            const Vector3 back = m * ((d + 0.3) * normal);
+                            const auto beyond = field.locate(v[0] - static_cast<float>(back.x),
+                                                             v[1] - static_cast<float>(back.y),
+                                                             v[2] - static_cast<float>(back.z));
+                            field.scores(beyond, score.data());
+                            const auto& there = beyond.block->labels;
+                            const auto& here = at.block->labels;
+                            const auto w = std::find(
+                                here.begin(), here.end(),
+                                there[contest(score.data(), there.size()).first]);
+                            const auto other = static_cast<std::size_t>(w - here.begin());
+                            if (w != here.end() && other != c.first && other != c.second) {
+                                c.second = other;
+                                if (!find_plane()) continue;
+                            }
                         }
-                        if (d > options.record_band_vx) continue;
                         record[static_cast<std::size_t>(r) * nx + i] =
                             pack_boundary({at.block->labels[c.second], std::max(d, 0.0), normal});
                     }

@@ -88,7 +88,7 @@ VoxelBox grow(const VoxelBox& box, Int3 voxels, Int3 size) {
 }
 
 void signed_distance(const LabelVolume& volume,
-                     std::uint8_t label,
+                     const LabelSet& labels,
                      const VoxelBox& box,
                      double limit_mm,
                      std::array<bool, 3> axes,
@@ -113,6 +113,8 @@ void signed_distance(const LabelVolume& volume,
     phi->assign(count, 0.0f);
     std::vector<float> first(count), second(count);
     std::vector<std::uint8_t> mark(nx);
+    std::array<std::uint8_t, 256> member;
+    for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
     for (const bool outside :
          {false, true}) {  // distance to the label, then to what is not the label
         for (int k = 0; k < box.size.z; ++k) {
@@ -120,7 +122,7 @@ void signed_distance(const LabelVolume& volume,
                 const std::uint8_t* row =
                     volume.voxels.data() +
                     volume.grid.index(box.first.x, box.first.y + j, box.first.z + k);
-                for (std::size_t i = 0; i < nx; ++i) mark[i] = (row[i] == label) != outside;
+                for (std::size_t i = 0; i < nx; ++i) mark[i] = member[row[i]] != outside;
                 float* to = first.data() + box.index(0, j, k);
                 if (axes[0]) {
                     row_distances(mark.data(), box.size.x, static_cast<float>(h.x), limit_sq, to);
@@ -157,6 +159,15 @@ void signed_distance(const LabelVolume& volume,
             }
         }
     }
+}
+
+void signed_distance(const LabelVolume& volume,
+                     std::uint8_t label,
+                     const VoxelBox& box,
+                     double limit_mm,
+                     std::array<bool, 3> axes,
+                     std::vector<float>* phi) {
+    signed_distance(volume, one_label(label), box, limit_mm, axes, phi);
 }
 
 }  // namespace sonocase::pipeline

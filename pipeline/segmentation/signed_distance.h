@@ -1,4 +1,4 @@
-// Signed distance to one label of a label volume, in a box of voxels and up to a limit.
+// Signed distance to one label of a label volume, or to several as one, in a box of voxels and up to a limit.
 //
 // phi < 0 inside the label, > 0 outside, in mm. The surface is taken to run half-way between a
 // voxel of the label and its neighbour outside. Exact Euclidean distance between voxel centres less
@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <vector>
 
 #include "formats/label_volume.h"
@@ -39,7 +40,22 @@ std::vector<VoxelBox> label_boxes(const LabelVolume& volume);
 // `box` grown by `voxels` on each side and cut to the volume.
 VoxelBox grow(const VoxelBox& box, Int3 voxels, Int3 size);
 
+using LabelSet = std::bitset<256>;
+
+inline LabelSet one_label(std::uint8_t label) {
+    LabelSet set;
+    set.set(label);
+    return set;
+}
+
 // phi: # box.count(), x fastest. limit_mm > 0.
+void signed_distance(const LabelVolume& volume,
+                     const LabelSet& labels,
+                     const VoxelBox& box,
+                     double limit_mm,
+                     std::array<bool, 3> axes,
+                     std::vector<float>* phi);
+// Of one label.
 void signed_distance(const LabelVolume& volume,
                      std::uint8_t label,
                      const VoxelBox& box,
