@@ -259,7 +259,7 @@ void LabelField::scores(const Position& position, float* out) const {
     const Four wx = weights(position.t[0]), wy = weights(position.t[1]),
                wz = weights(position.t[2]);
     const float* values = pool_.data() + block.values + position.offset;
-    std::array<float, 256> edge;
+    std::array<float, 512> edge;  // each label may give an edge and one alone
     for (std::size_t e = 0; e < block.edges.size() + block.alone.size();
          ++e, values += kFieldValues) {
         Four total{};
@@ -317,7 +317,7 @@ void LabelField::find_sure_nodes() {
     node_label_.assign(nodes_.voxel_count(), 0);
     node_margin_.assign(nodes_.voxel_count(), 255);
     parallel_for(blocks_.size(), 16, [&](std::size_t begin, std::size_t end) {
-        std::vector<float> score(256), edge(256);
+        std::vector<float> score(256), edge(512);
         for (std::size_t b = begin; b < end; ++b) {
             const Block& block = blocks_[b];
             for (int k = 0; k < kFieldBlock && block.first.z + k < nodes_.size.z; ++k) {

@@ -1,9 +1,8 @@
 // From the patient to the mannequin: a label map on any grid in `ct`, through the inverse of the
 // fitted map, into cubic voxels in `mannequin`.
 //
-// shape    the labels become one smooth partition of space (label_field.h): thick slices
-// interpolated
-//          by shape, steps smoothed, every label at its own volume (label_prices.h). It is read at
+// shape    the labels become one smooth partition of space (label_field.h): thick slices are
+//          interpolated by shape, steps smoothed, every label at its own volume (label_prices.h). It is read at
 //          the preimage of each voxel, and near a surface a boundary record says where it runs
 //          inside the voxels.
 // nearest  the paper's: the label of the nearest CT voxel; no records.

@@ -3,10 +3,14 @@
 
 #include "pipeline/segmentation/label_tree.h"
 #include "pipeline/segmentation/signed_distance.h"
-#include "segmentation/shapes.h"
+#include "pipeline/segmentation/shapes.h"
 
 namespace sonocase::pipeline {
 namespace {
+
+using sonocase::testing::cubic_grid;
+using sonocase::testing::norm_of;
+using sonocase::testing::sample_labels;
 
 // Air, skin, fat and muscle as shells, two organs in the muscle that share a face; label 6 absent.
 LabelVolume body() {
