@@ -301,28 +301,36 @@ bool inside(const Solid& solid, Point3 p, double belly_mm) {
     return solid.within_depth < 0 || trunk(p, solid.within_depth, belly_mm) < 0;
 }
 
-// A solid this far off cannot be the nearest surface of what is asked; its box bounds the distance.
-constexpr double kReach = 60;
-
-double solid_distance(const Solid& solid, Point3 p) {
+// Beyond `reach` a bound stands for the distance: it has its sign and is at least reach.
+double solid_distance(const Solid& solid, Point3 p, double reach) {
     Vector3 gap;
     for (int a = 0; a < 3; ++a) {
         gap[a] = std::max({solid.box.lower[a] - p[a], p[a] - solid.box.upper[a], 0.0});
     }
-    if (norm(gap) > kReach) return norm(gap);
+    if (norm(gap) > reach) return norm(gap);
     const double belly_mm = AnalyticBody{}.belly_mm;
     const auto layer = [&](double depth) {
+        // A layer a millimetre deeper lies more than half a millimetre away.
+        if (trunk(p, depth + 2 * reach, belly_mm) < 0) return -reach;
+        if (trunk(p, depth - 2 * reach, belly_mm) > 0) return reach;
         return implicit_distance([&](Point3 x) { return trunk(x, depth, belly_mm); }, p);
     };
     double d;
     if (const auto* e = std::get_if<Ellipsoid>(&solid.shape)) {
-        d = implicit_distance([&](Point3 x) { return ellipsoid_value(*e, x); }, p);
+        // The ellipsoid through p is a scaled one; along its shortest axis they are closest.
+        const double least = (std::sqrt(ellipsoid_value(*e, p) + 1) - 1) *
+                             std::min({e->axes.x, e->axes.y, e->axes.z});
+        if (std::abs(least) > reach) {
+            d = least;
+        } else {
+            d = implicit_distance([&](Point3 x) { return ellipsoid_value(*e, x); }, p);
+        }
     } else if (const auto* tube = std::get_if<Tube>(&solid.shape)) {
         d = tube_distance(*tube, p);
     } else {
         return layer(std::get<Layer>(solid.shape).depth);
     }
-    return solid.within_depth < 0 ? d : std::max(d, layer(solid.within_depth));
+    return solid.within_depth < 0 || d > reach ? d : std::max(d, layer(solid.within_depth));
 }
 
 // Not std::normal_distribution: its sequence differs between standard libraries.
@@ -366,14 +374,14 @@ std::uint8_t analytic_torso_label(Point3 ct, const AnalyticBody& body) {
     return 0;
 }
 
-double analytic_torso_signed_distance(int label, Point3 ct) {
+double analytic_torso_signed_distance(int label, Point3 ct, double reach_mm) {
     // Region of a label: the union over its solids of (solid minus all later solids of other labels).
     const auto& solids = anatomy().solids;
     assert(label >= 0 && label < static_cast<int>(anatomy().labels.size()));
-    if (label == 0) return -solid_distance(solids.front(), ct);
+    if (label == 0) return -solid_distance(solids.front(), ct, reach_mm);
     double region = INFINITY, later = INFINITY;
     for (auto it = solids.rbegin(); it != solids.rend(); ++it) {
-        const double d = solid_distance(*it, ct);
+        const double d = solid_distance(*it, ct, reach_mm);
         if (it->label == label) {
             region = std::min(region, std::max(d, -later));
         } else {

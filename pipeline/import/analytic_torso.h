@@ -39,9 +39,10 @@ std::vector<Label> analytic_torso_labels();
 std::uint8_t analytic_torso_label(Point3 ct, const AnalyticBody& body = {});
 
 // Distance from a point to the surface of the region with palette index `label`, negative inside.
-// Sign exact; value exact to 1e-6 mm where the nearest surface point is on a smooth face within 30 mm,
-// and a lower bound near edges where two solids meet. With a scaled body: for unscaled bodies only.
-double analytic_torso_signed_distance(int label, Point3 ct);
+// Sign exact; value exact to 1e-6 mm where the nearest surface point is on a smooth face within
+// `reach_mm`, and a lower bound near edges where two solids meet. For unscaled bodies only. Cost: a
+// millisecond in the liver, a tenth of that with a reach of 3 mm.
+double analytic_torso_signed_distance(int label, Point3 ct, double reach_mm = 30);
 
 // Samples voxel centres. Same bytes for any number of threads.
 LabelVolume sample_analytic_torso(const Grid& grid, const AnalyticBody& body = {});

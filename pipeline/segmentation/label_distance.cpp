@@ -72,17 +72,16 @@ LabelDistance::LabelDistance(const LabelVolume& labels, const LabelDistanceOptio
     const double sigma = options_.sigma_vx;
     if (sigma <= 0) return;
     add_level(sigma, options_.tolerance_vx);
-    // Between thick slices what is thin is kept by its shape, and what is not by sigma.
-    const double middle = factor_ == 1 ? kMiddle * sigma : options_.detail_vx;
-    for (const double finer : {middle, options_.detail_vx}) {
-        if (finer < sigma && (levels_.size() == 1 || finer < middle))
+    for (const double finer : {kMiddle * sigma, options_.detail_vx}) {
+        if (finer < sigma && (levels_.size() == 1 || finer < kMiddle * sigma))
             add_level(finer, options_.tolerance_vx);
     }
     const double more = std::sqrt(kWide * kWide - 1) * sigma;
     for (int a = 0; a < 3; ++a) {
         if (nodes_.size[a] < 2) continue;
         const auto u = static_cast<std::size_t>(a);
-        const double taps = std::min(more * nodes_per_vx(a), most_nodes(a));
+        // Across slices far apart only their steps are left to flatten: at least a slice is needed.
+        const double taps = std::max(more * nodes_per_vx(a), thick(a) ? 1.0 * factor_ : 0.0);
         // What has been smoothed once is told by every second node.
         wide_.kernels.stride[u] = taps > 2.4 ? 2 : 1;
         wide_.kernels.taps[u] = smoothing_kernel(taps / wide_.kernels.stride[u]);

@@ -1,8 +1,9 @@
 // Signed distance to unions of labels of a map on any grid, made smooth, on nodes fine enough for
 // both.
 //
-// Thick slices are interpolated by shape: a distance field a slice, blended along the slice axis
-// with Catmull-Rom's cubic, outlines that move sideways blended along their shift (slice_groups.h).
+// Thick slices are interpolated by shape (slice_shapes.cpp): a distance field a slice, made a distance
+// in space by the lean of its surfaces, closed by balls where outlines end, blended along the slice axis
+// with Catmull-Rom's cubic; outlines that move sideways are blended along their shift (slice_groups.h).
 // Nearly cubic voxels are measured in 3-D. Then separable smoothing by a kernel without second
 // moment (box_smoothing.h), at several widths: 1.76 sigma where that leaves the map's own voxels on
 // their side of the surface, which flattens the long steps of surfaces that lie nearly along the
@@ -48,6 +49,14 @@ class LabelDistance {
 
   private:
     void shape_interpolated(const LabelSet& labels, const VoxelBox& box, std::vector<float>* phi) const;
+    void lean(const VoxelBox& slices,
+              const std::vector<std::uint8_t>& capped,
+              std::vector<float>* flat) const;
+    void cap(const SliceGroup& group,
+             bool own,
+             const VoxelBox& slices,
+             std::vector<float>* flat,
+             std::vector<std::uint8_t>* capped) const;
     // own: the group is of the label of phi; else it is carved out of it.
     void blend_group(const SliceGroup& group,
                      bool own,

@@ -205,15 +205,18 @@ SliceGroups find_slice_groups(const LabelVolume& volume) {
             if (!taken[i]) add(-1, loose_high[i]);
         }
     }
-    // On a paraboloid the area falls linearly to the pole.
+    // On a ball of radius R, z from its middle, an outline has the area pi (R^2 - z^2).
+    const double h = g.spacing_mm.z, disc = g.spacing_mm.x * g.spacing_mm.y / 3.14159265358979;
     for (auto& groups : out.of_label) {
         for (SliceGroup& group : groups) {
             if (group.lower >= 0 && group.upper >= 0) continue;
             const int own = group.lower >= 0 ? group.lower : group.upper;
             const auto o = static_cast<std::size_t>(own);
-            const double before = group.lower >= 0 ? area_below[o] : area_above[o];
-            const double ratio = before > 0 ? outline(own).area / before : 1;
-            if (ratio < 0.9) group.end = std::clamp(ratio / (1 - ratio), 0.2, 0.95);
+            const double last = disc * outline(own).area;
+            const double before = disc * (group.lower >= 0 ? area_below[o] : area_above[o]);
+            if (before <= last) continue;
+            const double z = 0.5 * ((before - last) / h + h);
+            group.end = std::clamp((std::sqrt(last + z * z) - z) / h, 0.1, 0.95);
         }
     }
     return out;

@@ -4,8 +4,8 @@
 // overlap: blending the slices' distance fields where they are makes a chain of discs of it.
 // Outlines (8-connected components of one label in one slice) are therefore paired, and a pair that
 // a shift and a turn bring together better than leaving it in place is blended along them.
-// An outline that simply ends is closed by a paraboloid: the areas of the last two slices say where
-// its pole is; half-way to the next slice where they do not shrink.
+// An outline that simply ends is closed by a ball: the areas of the last two slices say where its pole
+// is; half-way to the next slice where they do not shrink.
 #pragma once
 
 #include <vector>

@@ -45,7 +45,9 @@ OutlineField outline_field(const LabelVolume& labels,
                     field.window.first.x + i, field.window.first.y + j, o.slice)] == outline;
         }
     }
-    signed_distance(mask, 1, {{0, 0, 0}, mask.grid.size}, pad * labels.grid.spacing_mm.x,
+    const int depth = std::min(o.box.size.x, o.box.size.y) / 2 + 1;
+    signed_distance(mask, 1, {{0, 0, 0}, mask.grid.size},
+                    std::max(pad, depth) * std::max(labels.grid.spacing_mm.x, labels.grid.spacing_mm.y),
                     {true, true, false}, &field.phi);
     for (const float p : field.phi) field.deepest = std::max(field.deepest, -p);
     return field;
@@ -64,17 +66,14 @@ void LabelDistance::blend_group(const SliceGroup& group,
         if ((group.slice + 1) * factor_ <= low.z || group.slice * factor_ >= high.z) return;
         bool near = false;
         for (const int o : {group.lower, group.upper}) {
-            if (o < 0) continue;
             const VoxelBox& b = groups_.outlines[static_cast<std::size_t>(o)].box;
             near = near || (b.first.x < high.x && b.first.x + b.size.x > low.x &&
                             b.first.y < high.y && b.first.y + b.size.y > low.y);
         }
         if (!near) return;
     }
-    const OutlineField low =
-        group.lower >= 0 ? outline_field(labels_, groups_, group.lower, kPad) : OutlineField{};
-    const OutlineField high =
-        group.upper >= 0 ? outline_field(labels_, groups_, group.upper, kPad) : OutlineField{};
+    const OutlineField low = outline_field(labels_, groups_, group.lower, kPad);
+    const OutlineField high = outline_field(labels_, groups_, group.upper, kPad);
     for (int step = 1; step < factor_; ++step) {
         const double t = static_cast<double>(step) / factor_;
         const int k = group.slice * factor_ + step - box.first.z;
@@ -93,7 +92,7 @@ void LabelDistance::blend_group(const SliceGroup& group,
                         y};
         };
         const auto centre = [&](int outline) -> const Outline& {
-            return groups_.outlines[static_cast<std::size_t>(std::max(outline, 0))];
+            return groups_.outlines[static_cast<std::size_t>(outline)];
         };
         const Pose to_low = pose(centre(group.lower).x, centre(group.lower).y, -t);
         const Pose to_high = pose(centre(group.upper).x, centre(group.upper).y, 1 - t);
@@ -113,31 +112,104 @@ void LabelDistance::blend_group(const SliceGroup& group,
                 y1 = std::max(y1, static_cast<int>(std::ceil(y)));
             }
         };
-        if (group.lower >= 0) include(low, to_low);
-        if (group.upper >= 0) include(high, to_high);
+        include(low, to_low);
+        include(high, to_high);
         x0 = std::max(x0, box.first.x);
         y0 = std::max(y0, box.first.y);
         x1 = std::min(x1, box.first.x + box.size.x);
         y1 = std::min(y1, box.first.y + box.size.y);
         const float w = static_cast<float>(t);
-        // Share of its depth by which an outline that ends has shrunk here; past the pole it goes
-        // on.
-        const double beyond = (group.lower >= 0 ? t : 1 - t) / group.end;
-        const float shrink =
-            static_cast<float>(beyond < 1 ? 1 - std::sqrt(1 - beyond) : 0.5 + 0.5 * beyond);
         for (int y = y0; y < y1; ++y) {
             for (int x = x0; x < x1; ++x) {
-                float here = 0;
-                if (group.lower >= 0 && group.upper >= 0) {
-                    const float a = value(low, to_low, x, y), b = value(high, to_high, x, y);
-                    here = a + w * (b - a);
-                } else {
-                    const bool ends = group.lower >= 0;
-                    const OutlineField& own = ends ? low : high;
-                    here = value(own, ends ? to_low : to_high, x, y) + own.deepest * shrink;
-                }
+                const float a = value(low, to_low, x, y), b = value(high, to_high, x, y);
+                const float here = a + w * (b - a);
                 float& to = (*phi)[box.index(x - box.first.x, y - box.first.y, k)];
                 to = own_label ? std::min(to, here) : std::max(to, -here);
+            }
+        }
+    }
+}
+
+// The distance in space to a surface is shorter than that within a slice which it crosses obliquely: by
+// the cosine of its lean, which the slices on either side tell. They tell it by their distances in
+// space, so that it is found in two rounds.
+void LabelDistance::lean(const VoxelBox& slices,
+                         const std::vector<std::uint8_t>& capped,
+                         std::vector<float>* flat) const {
+    if (slices.size.z < 2) return;
+    constexpr int kRounds = 2;
+    constexpr float kLeast = 0.2f;  // of the cosine; slices say no more
+    const std::size_t plane =
+        static_cast<std::size_t>(slices.size.x) * static_cast<std::size_t>(slices.size.y);
+    const float h = static_cast<float>(labels_.grid.spacing_mm.z);
+    const std::vector<float> within = *flat;
+    std::vector<float> below(plane), here(plane);
+    for (int round = 0; round < kRounds; ++round) {
+        for (int k = 0; k < slices.size.z; ++k) {
+            const std::size_t at = static_cast<std::size_t>(k) * plane;
+            float* to = flat->data() + at;
+            const bool first = k == 0, last = k + 1 == slices.size.z;
+            std::copy(to, to + plane, here.begin());
+            const float* down = first ? here.data() : below.data();
+            const float* up = last ? here.data() : to + plane;
+            const float per = 1 / (h * static_cast<float>(2 - first - last));
+            for (std::size_t i = 0; i < plane; ++i) {
+                if (capped[at + i]) continue;
+                const float phi = within[at + i];
+                const float cosine =
+                    std::abs(phi) < 1e-6f ? 1 : std::clamp(here[i] / phi, kLeast, 1.0f);
+                const float slope = per * (up[i] - down[i]) / cosine;
+                to[i] = phi / std::sqrt(1 + slope * slope);
+            }
+            below.swap(here);
+        }
+    }
+}
+
+// An outline that ends: in it and in the next two slices, the distance to a ball through its rim and
+// the pole. Slices that hold nothing of it would say nothing of how far beyond they are.
+void LabelDistance::cap(const SliceGroup& group,
+                        bool own,
+                        const VoxelBox& slices,
+                        std::vector<float>* flat,
+                        std::vector<std::uint8_t>* capped) const {
+    const bool ends = group.lower >= 0;
+    const Outline& outline =
+        groups_.outlines[static_cast<std::size_t>(ends ? group.lower : group.upper)];
+    const double h = labels_.grid.spacing_mm.z;
+    const double pixel = std::min(labels_.grid.spacing_mm.x, labels_.grid.spacing_mm.y);
+    const int pad = std::clamp(std::min(outline.box.size.x, outline.box.size.y), 6,
+                               std::max(6, static_cast<int>(limit_mm_ / pixel)));
+    for (int a = 0; a < 2; ++a) {
+        const int low = outline.box.first[a] - pad - slices.first[a];
+        if (low >= slices.size[a] || low + outline.box.size[a] + 2 * pad <= 0) return;
+    }
+    if (outline.slice + 2 < slices.first.z || outline.slice - 2 >= slices.first.z + slices.size.z)
+        return;
+    const OutlineField field =
+        outline_field(labels_, groups_, ends ? group.lower : group.upper, pad);
+    const double height = group.end * h;
+    const double ball = 0.5 * (field.deepest * field.deepest / height + height);
+    for (int beyond = 0; beyond <= 2; ++beyond) {
+        const int k = outline.slice + (ends ? beyond : -beyond) - slices.first.z;
+        if (k < 0 || k >= slices.size.z) continue;
+        const double rise = beyond * h - height + ball;
+        for (int y = 0; y < field.window.size.y; ++y) {
+            for (int x = 0; x < field.window.size.x; ++x) {
+                const int i = field.window.first.x + x - slices.first.x,
+                          j = field.window.first.y + y - slices.first.y;
+                if (i < 0 || j < 0 || i >= slices.size.x || j >= slices.size.y) continue;
+                const float within = field.phi[field.window.index(x, y, 0)];
+                const double across = std::max(0.0f, within + field.deepest);
+                const float value = static_cast<float>(std::hypot(across, rise) - ball);
+                const std::size_t v = slices.index(i, j, k);
+                const float side = own ? 1.0f : -1.0f;
+                float& to = (*flat)[v];
+                // In it only where its rim is the surface: within a union it may be none.
+                const bool inside = beyond == 0 && within < 0 && side * to > within - 0.5 * pixel;
+                if (side * to <= value && !inside) continue;
+                to = side * value;
+                (*capped)[v] = 1;
             }
         }
     }
@@ -152,6 +224,16 @@ void LabelDistance::shape_interpolated(const LabelSet& labels,
     const VoxelBox in_slices{{box.first.x, box.first.y, first}, {box.size.x, box.size.y, slices}};
     std::vector<float> flat;
     signed_distance(labels_, labels, in_slices, limit_mm_, {true, true, false}, &flat);
+    std::vector<std::uint8_t> capped(flat.size(), 0);
+    for (const bool own : {false, true}) {
+        for (std::size_t l = 0; l < groups_.of_label.size(); ++l) {
+            if (labels[l] != own) continue;
+            for (const SliceGroup& group : groups_.of_label[l]) {
+                if (group.lower < 0 || group.upper < 0) cap(group, own, in_slices, &flat, &capped);
+            }
+        }
+    }
+    lean(in_slices, capped, &flat);
     phi->resize(box.count());
     const std::size_t plane =
         static_cast<std::size_t>(box.size.x) * static_cast<std::size_t>(box.size.y);
@@ -169,13 +251,12 @@ void LabelDistance::shape_interpolated(const LabelSet& labels,
             to[i] = wa * a[i] + wb * b[i] + wc * c[i] + wd * d[i];
     }
     // What another label's outline sweeps is its own and not this label's; then this label's own.
+    if (!options_.follow_shift) return;
     for (const bool own : {false, true}) {
         for (std::size_t l = 0; l < groups_.of_label.size(); ++l) {
             if (labels[l] != own) continue;
             for (const SliceGroup& group : groups_.of_label[l]) {
-                const bool moves = group.lower >= 0 && group.upper >= 0;
-                if (moves && !options_.follow_shift) continue;
-                blend_group(group, own, box, phi);
+                if (group.lower >= 0 && group.upper >= 0) blend_group(group, own, box, phi);
             }
         }
     }

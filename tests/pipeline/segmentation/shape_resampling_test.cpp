@@ -150,8 +150,8 @@ TEST(ShapeResampling, SlicesMayLieAlongAnyAxis) {
         for (std::size_t v = 0; v < truth.voxels.size(); ++v) {
             wrong += truth.voxels[v] != result->volume.voxels[v];
         }
-        // A shell of 0.25 mm: a sixteenth of the slice spacing.
-        EXPECT_LT(static_cast<double>(wrong), 0.25 * 4 * 3.1416 * 14 * 14);
+        // A shell of 0.13 mm: a thirtieth of the slice spacing.
+        EXPECT_LT(static_cast<double>(wrong), 0.13 * 4 * 3.1416 * 14 * 14);
     }
 }
 
