@@ -1,5 +1,6 @@
 #include "runtime/imaging/periodic_noise.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -8,16 +9,31 @@
 namespace sonocase::runtime {
 namespace {
 
-// Sums of 2 * reach + 1 neighbours along rows of n.
-void box_along_rows(const RawVector<float>& in, RawVector<float>& out, std::size_t n, std::size_t reach) {
+// Values are summed so many at a time, in vectors: numbers of values are multiples of it.
+constexpr std::size_t kAtOnce = 16;
+
+void add(const float* from, float* to, std::size_t n) {
+    for (std::size_t i = 0; i < n; i += kAtOnce) {
+        float sum[kAtOnce];
+        for (std::size_t k = 0; k < kAtOnce; ++k) sum[k] = to[i + k] + from[i + k];
+        for (std::size_t k = 0; k < kAtOnce; ++k) to[i + k] = sum[k];
+    }
+}
+
+// Sums of 2 * reach + 1 neighbours along rows of n > reach.
+void box_along_rows(const RawVector<float>& in,
+                    RawVector<float>& out,
+                    std::size_t n,
+                    std::size_t reach) {
     std::vector<float> row(n + 2 * reach);
     for (std::size_t base = 0; base < in.size(); base += n) {
-        for (std::size_t i = 0; i < row.size(); ++i) row[i] = in[base + (n - reach + i) % n];
+        const float* from = in.data() + base;
+        std::copy_n(from + n - reach, reach, row.data());
+        std::copy_n(from, n, row.data() + reach);
+        std::copy_n(from, reach, row.data() + reach + n);
         float* to = out.data() + base;
-        for (std::size_t i = 0; i < n; ++i) to[i] = row[i];
-        for (std::size_t k = 1; k <= 2 * reach; ++k) {
-            for (std::size_t i = 0; i < n; ++i) to[i] += row[i + k];
-        }
+        std::copy_n(row.data(), n, to);
+        for (std::size_t k = 1; k <= 2 * reach; ++k) add(row.data() + k, to, n);
     }
 }
 
@@ -32,16 +48,19 @@ void box_across(const RawVector<float>& in,
             float* to = out.data() + base + j * stride;
             if (j == 0) {
                 for (std::size_t i = 0; i < stride; ++i) to[i] = 0;
-                for (std::size_t k = 0; k <= 2 * reach; ++k) {
-                    const float* from = in.data() + base + (n - reach + k) % n * stride;
-                    for (std::size_t i = 0; i < stride; ++i) to[i] += from[i];
-                }
+                for (std::size_t k = 0; k <= 2 * reach; ++k)
+                    add(in.data() + base + (n - reach + k) % n * stride, to, stride);
                 continue;
             }
             const float* before = to - stride;
-            const float* add = in.data() + base + (j + reach) % n * stride;
-            const float* drop = in.data() + base + (j + n - reach - 1) % n * stride;
-            for (std::size_t i = 0; i < stride; ++i) to[i] = before[i] + (add[i] - drop[i]);
+            const float* come = in.data() + base + (j + reach) % n * stride;
+            const float* gone = in.data() + base + (j + n - reach - 1) % n * stride;
+            for (std::size_t i = 0; i < stride; i += kAtOnce) {
+                float sum[kAtOnce];
+                for (std::size_t k = 0; k < kAtOnce; ++k)
+                    sum[k] = before[i + k] + (come[i + k] - gone[i + k]);
+                for (std::size_t k = 0; k < kAtOnce; ++k) to[i + k] = sum[k];
+            }
         }
     }
 }

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "runtime/imaging/in_halves.h"
 
 namespace sonocase::runtime {
 
@@ -70,9 +73,13 @@ ScanGeometry make_scan_geometry(
     return g;
 }
 
-ScanConversionTable make_scan_conversion_table(const ScanGeometry& g, int stride) {
+namespace {
+
+// Rows [begin, end).
+ScanConversionTable conversion_of_rows(const ScanGeometry& g, int stride, int begin, int end) {
     ScanConversionTable table;
-    for (int row = 0; row < g.height_px; ++row) {
+    const auto parts = [](double part) { return std::min(static_cast<int>(part * 256 + 0.5), 255); };
+    for (int row = begin; row < end; ++row) {
         bool open = false;
         for (int column = 0; column < g.width_px; ++column) {
             double line = 0, sample = 0;
@@ -88,18 +95,36 @@ ScanConversionTable make_scan_conversion_table(const ScanGeometry& g, int stride
             table.runs.back().end = column + 1;
             line = std::clamp(line, 0.0, g.scanlines - 1.0);
             sample = std::clamp(sample, 0.0, g.samples - 1.0);
-            int l = static_cast<int>(line), k = static_cast<int>(sample);
-            int wl = static_cast<int>(std::lround((line - l) * 256)),
-                wk = static_cast<int>(std::lround((sample - k) * 256));
-            wl = std::min(wl, 255);  // a byte: at most 1/256 of the step between neighbours is lost
-            wk = std::min(wk, 255);
+            const int l = static_cast<int>(line), k = static_cast<int>(sample);
+            // A byte each: at most 1/256 of the step between neighbours is lost.
             table.offset.push_back(static_cast<std::uint32_t>(k) *
                                        static_cast<std::uint32_t>(stride) +
                                    static_cast<std::uint32_t>(l));
-            table.weight.push_back(static_cast<std::uint16_t>(wl | wk << 8));
+            table.weight.push_back(
+                static_cast<std::uint16_t>(parts(line - l) | parts(sample - k) << 8));
         }
     }
     return table;
+}
+
+}  // namespace
+
+ScanConversionTable make_scan_conversion_table(const ScanGeometry& g, int stride) {
+    ScanConversionTable halves[2];
+    in_halves(static_cast<std::size_t>(g.height_px),
+              [&](std::size_t half, std::size_t begin, std::size_t end) {
+                  halves[half] = conversion_of_rows(g, stride, static_cast<int>(begin),
+                                                    static_cast<int>(end));
+              });
+    ScanConversionTable& table = halves[0];
+    for (PixelRun& run : halves[1].runs) run.entry += static_cast<std::uint32_t>(table.offset.size());
+    const auto append = [](auto& to, const auto& from) {
+        to.insert(to.end(), from.begin(), from.end());
+    };
+    append(table.runs, halves[1].runs);
+    append(table.offset, halves[1].offset);
+    append(table.weight, halves[1].weight);
+    return std::move(table);
 }
 
 }  // namespace sonocase::runtime
