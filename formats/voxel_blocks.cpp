@@ -1,5 +1,8 @@
 #include "formats/voxel_blocks.h"
 
+#include <algorithm>
+#include <mutex>
+
 #ifdef __linux__
 #include <sys/mman.h>
 #endif
@@ -8,15 +11,33 @@
 #include "formats/detail/run_jobs.h"
 
 namespace sonocase {
+namespace {
+
+constexpr std::size_t kWorkers = 2;  // the frame's thread and one that reads ahead of it
+
+}  // namespace
+
+struct VoxelBlocks::Worker {
+    std::mutex mutex;
+    std::unique_ptr<detail::BlockWork> work;
+};
 
 VoxelBlocks::VoxelBlocks(std::unique_ptr<detail::BlockParts> parts)
     : parts_(std::move(parts)),
-      work_(std::make_unique<detail::BlockWork>(*parts_)),
+      workers_(std::make_unique<Worker[]>(kWorkers)),
       blocks_(parts_->grid.blocks()),
       edge_(kBrickEdge * parts_->grid.edge),
       count_(parts_->grid.count()),
-      there_(std::make_unique<std::atomic<bool>[]>(count_)),
-      left_(count_) {}
+      lower_(count_),
+      state_(std::make_unique<std::atomic<State>[]>(count_)),
+      left_(count_) {
+    for (std::size_t n = 0; n < kWorkers; ++n)
+        workers_[n].work = std::make_unique<detail::BlockWork>(*parts_);
+    for (std::size_t block = 0; block < count_; ++block) {
+        const Int3 brick = parts_->grid.first_brick(block);
+        lower_[block] = {kBrickEdge * brick.x, kBrickEdge * brick.y, kBrickEdge * brick.z};
+    }
+}
 
 VoxelBlocks::~VoxelBlocks() = default;
 
@@ -30,27 +51,46 @@ void VoxelBlocks::need_voxel(int i, int j, int k) noexcept {
     if (!there(block)) unpack(block);
 }
 
-void VoxelBlocks::unpack(std::size_t block) noexcept {
-    const std::scoped_lock lock(mutex_);
-    if (there(block)) return;
-    if (!work_->unpack(*parts_, block)) damaged_ = true;
-    there_[block].store(true, std::memory_order_release);
+bool VoxelBlocks::take(std::size_t block) noexcept {
+    State packed = kPacked;
+    return state_[block].compare_exchange_strong(packed, kBeingUnpacked);
+}
+
+void VoxelBlocks::finish(std::size_t block, bool makes_sense) noexcept {
+    if (!makes_sense) damaged_ = true;
+    state_[block].store(kThere, std::memory_order_release);
+    state_[block].notify_all();
     left_.fetch_sub(1, std::memory_order_release);
 }
 
+void VoxelBlocks::unpack(std::size_t block) noexcept {
+    if (!take(block)) {
+        state_[block].wait(kBeingUnpacked, std::memory_order_acquire);
+        return;
+    }
+    for (std::size_t n = 0;; n = (n + 1) % kWorkers) {
+        std::unique_lock lock(workers_[n].mutex, std::defer_lock);
+        if (n + 1 == kWorkers) {
+            lock.lock();
+        } else if (!lock.try_lock()) {
+            continue;
+        }
+        finish(block, workers_[n].work->unpack(*parts_, block));
+        return;
+    }
+}
+
 void VoxelBlocks::need_all(int threads) {
-    const std::scoped_lock lock(mutex_);
     // A row of blocks a job, so that few have to find memory to work in.
-    const auto row = static_cast<std::size_t>(std::max(parts_->grid.blocks().x, 1));
+    const auto row = static_cast<std::size_t>(std::max(blocks_.x, 1));
     detail::run_jobs((count_ + row - 1) / row, threads, [&](std::size_t job) {
         detail::BlockWork work(*parts_);
         for (std::size_t block = job * row; block < std::min((job + 1) * row, count_); ++block) {
-            if (there(block)) continue;
-            if (!work.unpack(*parts_, block)) damaged_ = true;
-            there_[block].store(true, std::memory_order_release);
-            left_.fetch_sub(1, std::memory_order_release);
+            if (take(block)) finish(block, work.unpack(*parts_, block));
         }
     });
+    for (std::size_t block = 0; block < count_; ++block)  // what other threads had begun
+        state_[block].wait(kBeingUnpacked, std::memory_order_acquire);
 }
 
 void VoxelBlocks::use_small_pages() noexcept {

@@ -10,7 +10,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
+#include <vector>
 
 #include "formats/geometry.h"
 #include "formats/raw_vector.h"
@@ -20,7 +20,6 @@ namespace sonocase {
 
 namespace detail {
 struct BlockParts;
-class BlockWork;
 }
 
 class VoxelBlocks {
@@ -28,26 +27,23 @@ class VoxelBlocks {
     explicit VoxelBlocks(std::unique_ptr<detail::BlockParts> parts);
     ~VoxelBlocks();
 
-    // Unpacks every block for which wanted(lower, upper) is true: its first and last voxel.
+    // Unpacks every block for which wanted(lower, upper) is true: its first and last voxel. Of two
+    // threads that want the same, one does well to begin from behind.
     template <class Wanted>
-    void need(const Wanted& wanted) noexcept {
+    void need(const Wanted& wanted, bool from_behind = false) noexcept {
         if (whole()) return;
-        std::size_t block = 0;
-        for (int z = 0; z < blocks_.z; ++z) {
-            for (int y = 0; y < blocks_.y; ++y) {
-                for (int x = 0; x < blocks_.x; ++x, ++block) {
-                    if (there(block)) continue;
-                    const Int3 lower{x * edge_, y * edge_, z * edge_};
-                    if (wanted(lower,
-                               Int3{lower.x + edge_ - 1, lower.y + edge_ - 1, lower.z + edge_ - 1}))
-                        unpack(block);
-                }
-            }
+        for (std::size_t n = 0; n < count_; ++n) {
+            const std::size_t block = from_behind ? count_ - 1 - n : n;
+            if (there(block)) continue;
+            const Int3 lower = lower_[block];
+            if (wanted(lower, Int3{lower.x + edge_ - 1, lower.y + edge_ - 1, lower.z + edge_ - 1}))
+                unpack(block);
         }
     }
     void need_voxel(int i, int j, int k) noexcept;
     void need_all(int threads);  // 0: as many as the machine has
 
+    int edge() const noexcept { return edge_; }  // of a block, voxels
     bool whole() const noexcept { return left_.load(std::memory_order_acquire) == 0; }
     std::size_t pool_bytes() const noexcept;  // of all blocks, unpacked
     bool damaged() const noexcept { return damaged_.load(std::memory_order_relaxed); }
@@ -61,21 +57,26 @@ class VoxelBlocks {
     void keep(RawVector<std::uint8_t> file) { file_ = std::move(file); }
 
   private:
+    enum State : std::uint8_t { kPacked, kBeingUnpacked, kThere };
+    struct Worker;
+
     bool there(std::size_t block) const noexcept {
-        return there_[block].load(std::memory_order_acquire);
+        return state_[block].load(std::memory_order_acquire) == kThere;
     }
+    bool take(std::size_t block) noexcept;  // to unpack it; false: another thread has
+    void finish(std::size_t block, bool makes_sense) noexcept;
     void unpack(std::size_t block) noexcept;
 
     std::unique_ptr<detail::BlockParts> parts_;
-    std::unique_ptr<detail::BlockWork> work_;  // under mutex_
+    std::unique_ptr<Worker[]> workers_;  // as many threads unpack at a time
     RawVector<std::uint8_t> file_;
     Int3 blocks_{0, 0, 0};
-    int edge_ = 0;  // of a block, voxels
+    int edge_ = 0;
     std::size_t count_ = 0;
-    std::unique_ptr<std::atomic<bool>[]> there_;
+    std::vector<Int3> lower_;  // first voxel of each block
+    std::unique_ptr<std::atomic<State>[]> state_;
     std::atomic<std::size_t> left_{0};
     std::atomic<bool> damaged_{false};
-    std::mutex mutex_;
 };
 
 }  // namespace sonocase

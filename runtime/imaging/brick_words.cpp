@@ -14,22 +14,19 @@ namespace {
 
 constexpr std::size_t kMostBlocks = 4096;  // a frame looks at each
 
-// Tables up to this go on large pages: a jumping probe reads from all over them. A larger one would
-// fill a page of 2 MB for each block of it that is needed.
-constexpr std::size_t kLargePagesBytes = std::size_t{64} << 20;
-
-std::uint32_t* cleared(std::size_t bytes) {
-    void* memory = std::calloc(bytes, 1);
-    if (memory == nullptr) throw std::bad_alloc();
+// Whether the system shall find pages of 2 MB for it. They serve a jumping probe, which reads from all
+// over the table; where few blocks are filled in they cost a start memory and time.
+void use_large_pages(void* memory, std::size_t bytes, bool large) {
 #ifdef __linux__
     constexpr std::size_t kPage = 4096;
     const std::size_t skip = (0 - reinterpret_cast<std::uintptr_t>(memory)) % kPage;
-    if (bytes >= std::size_t{4} << 20) {  // a system without such pages says no, nothing is lost
-        (void)madvise(static_cast<std::uint8_t*>(memory) + skip, (bytes - skip) / kPage * kPage,
-                      bytes <= kLargePagesBytes ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
-    }
+    if (bytes < skip + kPage) return;
+    // A system without such pages says no, and nothing is lost.
+    (void)madvise(static_cast<std::uint8_t*>(memory) + skip, (bytes - skip) / kPage * kPage,
+                  large ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
+#else
+    (void)memory, (void)bytes, (void)large;
 #endif
-    return static_cast<std::uint32_t*>(memory);
 }
 
 }  // namespace
@@ -53,10 +50,15 @@ BrickWords::BrickWords(const CaseBundle& bundle)
     has_echo_ = same(bundle.echo_offset);
     has_boundary_ = same(bundle.boundary);
     there_.assign(left_, 0);
-    words_.reset(cleared(sizeof(std::uint32_t) * kWords * (left_ << 3 * edge_log2_)));
+    bytes_ = sizeof(std::uint32_t) * kWords * (left_ << 3 * edge_log2_);
+    void* memory = std::calloc(bytes_, 1);  // pages that nobody writes to cost nothing
+    if (memory == nullptr) throw std::bad_alloc();
+    words_.reset(static_cast<std::uint32_t*>(memory));
+    use_large_pages(memory, bytes_, false);
 }
 
 void BrickWords::need_all() {
+    use_large_pages(words_.get(), bytes_, true);
     const std::size_t layer =
         static_cast<std::size_t>(blocks_.x) * static_cast<std::size_t>(blocks_.y);
     in_halves(static_cast<std::size_t>(blocks_.z),

@@ -28,7 +28,8 @@ class BrickWords {
     // uniform echo word kUniformBrick | (offset & 0xFF), a boundary word kUniformBrick where the brick
     // holds no interface. Bricks of a block that is not filled in, and beyond the volume, hold 0.
     const std::uint32_t* data() const { return words_.get(); }
-    int edge_log2() const { return edge_log2_; }
+    int edge_log2() const { return edge_log2_; }  // of a block, bricks
+    int edge() const { return kBrickEdge << edge_log2_; }  // voxels
     Int3 blocks() const { return blocks_; }
     bool has_echo() const { return has_echo_; }
     bool has_boundary() const { return has_boundary_; }
@@ -38,15 +39,14 @@ class BrickWords {
     template <class Wanted>
     void need(const Wanted& wanted) noexcept {
         if (left_ == 0) return;
-        const int edge = kBrickEdge << edge_log2_;
         std::size_t block = 0;
         for (int z = 0; z < blocks_.z; ++z) {
             for (int y = 0; y < blocks_.y; ++y) {
                 for (int x = 0; x < blocks_.x; ++x, ++block) {
                     if (there_[block]) continue;
-                    const Int3 lower{x * edge, y * edge, z * edge};
-                    if (wanted(lower, Int3{lower.x + edge - 1, lower.y + edge - 1,
-                                           lower.z + edge - 1})) {
+                    const Int3 lower{x * edge(), y * edge(), z * edge()};
+                    if (wanted(lower, Int3{lower.x + edge() - 1, lower.y + edge() - 1,
+                                           lower.z + edge() - 1})) {
                         fill({x, y, z}, block);
                         there_[block] = 1;
                         --left_;
@@ -68,6 +68,7 @@ class BrickWords {
     int edge_log2_ = 3;
     bool has_echo_ = false, has_boundary_ = false;
     std::unique_ptr<std::uint32_t[], Free> words_;
+    std::size_t bytes_ = 0;
     std::vector<std::uint8_t> there_;
     std::size_t left_ = 0;
 };

@@ -1,5 +1,5 @@
-// Unpacks the part of a bundle that lies round the scan plane on a thread of its own, so that the
-// frames of a probe that moves seldom have to.
+// Unpacks on a thread of its own what a frame reads, together with the frame itself, and then what
+// lies round the scan plane, so that the frames of a probe that moves seldom have to.
 #pragma once
 
 #include <atomic>
@@ -21,9 +21,9 @@ class ReadAhead {
     ReadAhead(const ReadAhead&) = delete;
     ReadAhead& operator=(const ReadAhead&) = delete;
 
-    // What a frame has just shown; one that is still being read round is left for it. reach must stay
-    // where it is. Neither allocates nor throws, and does not wait for what is read.
-    void round(const ScanReach& reach, const Rigid& volume_from_probe) noexcept;
+    // What a frame is about to ask for; the one before it is left for it. reach must stay where it is.
+    // Neither allocates nor throws, and does not wait for what is read.
+    void frame(const ScanReach& reach, const Rigid& volume_from_probe, double shift_mm) noexcept;
 
   private:
     void run() noexcept;
@@ -34,6 +34,7 @@ class ReadAhead {
     std::condition_variable wake_;
     const ScanReach* reach_ = nullptr;  // under mutex_, as the pose
     Rigid volume_from_probe_;
+    double shift_mm_ = 0;
     std::atomic<bool> news_{false}, stop_{false};
     std::thread thread_;
 };

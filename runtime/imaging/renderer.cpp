@@ -285,11 +285,11 @@ FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
     }
     if (bundle.blocks) {
         const double shift_mm = norm(frame.motion.breathing_mm);
+        if (ahead) ahead->frame(at.reach, frame.volume_from_probe, shift_mm);
         at.reach.need(*bundle.blocks, bundle.grid, frame.volume_from_probe, shift_mm);
         at.reach.need(physical_scene.words, bundle.grid, frame.volume_from_probe, shift_mm);
     }
     physical->render(frame, breathing, input.settings.flip_left_right, effects.keep_all, pixels);
-    if (ahead) ahead->round(at.reach, frame.volume_from_probe);
     const PhysicalPasses& p = physical->passes();
     const std::array<double, 6> passes{p.contact_ms, p.beams_ms, p.needle_ms,
                                        p.filter_ms,  p.grey_ms,  p.convert_ms};

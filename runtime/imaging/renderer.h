@@ -42,8 +42,8 @@ struct RenderOptions {
     // Asked-for time of a frame; 0: none, full accuracy (recordings). See
     // runtime/imaging/governor.h.
     double frame_budget_ms = 0;
-    // A bundle that is unpacked as it is needed is unpacked round the scan plane by one more thread,
-    // so that the next frames find theirs. For a probe in somebody's hand; the same pixels.
+    // A bundle that is unpacked as it is needed is so by one more thread, and round the scan plane
+    // too, so that the next frames find theirs. For a probe in somebody's hand; the same pixels.
     bool read_ahead = false;
 };
 

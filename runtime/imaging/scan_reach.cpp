@@ -22,29 +22,38 @@ ScanReach::ScanReach(const ScanGeometry& g, const physical::Tables& t, double vo
     thick_mm_ += rim;
 }
 
-bool ScanReach::reaches(Point3 c, double radius_mm, double across_mm) const noexcept {
-    if (std::abs(c.y) > thick_mm_ + across_mm) return false;
-    // thick_mm_ stands for the jitter in the plane too: it is more.
-    const double ball = radius_mm + thick_mm_;
-    if (!fan_) return std::abs(c.x) < half_extent_ + ball && c.z > -ball && c.z < deepest_mm_ + ball;
-    const double z = c.z + radius_mm_, range = std::hypot(c.x, z);
-    if (range > radius_mm_ + deepest_mm_ + radius_mm || range < radius_mm_ - ball) return false;
-    if (range <= ball) return true;
-    return std::abs(std::atan2(c.x, z)) < half_extent_ + std::asin(ball / range);
+ScanReach::View ScanReach::seen(const Grid& grid,
+                                int edge,
+                                const Rigid& volume_from_probe,
+                                double shift_mm) const {
+    const Rigid probe_from_volume = inverse(volume_from_probe);
+    const double middle = 0.5 * (edge - 1);
+    const auto at = [&](double i, double j, double k) {
+        return probe_from_volume * grid.point_from_voxel({middle + i, middle + j, middle + k});
+    };
+    View view;
+    view.first = at(0, 0, 0);
+    view.step[0] = at(1, 0, 0) - view.first;
+    view.step[1] = at(0, 1, 0) - view.first;
+    view.step[2] = at(0, 0, 1) - view.first;
+    const Vector3* s = view.step;
+    view.radius_mm = std::sqrt(3.0) * 0.5 * edge * norm(s[0]) + shift_mm;
+    view.across_mm =
+        0.5 * edge * (std::abs(s[0].y) + std::abs(s[1].y) + std::abs(s[2].y)) + shift_mm;
+    return view;
 }
 
-bool ScanReach::reaches(const Grid& grid,
-                        Int3 lower,
-                        Int3 upper,
-                        const Rigid& probe_from_volume,
-                        double shift_mm) const noexcept {
-    const Point3 centre = grid.point_from_voxel(
-        {0.5 * (lower.x + upper.x), 0.5 * (lower.y + upper.y), 0.5 * (lower.z + upper.z)});
-    const double half_mm = 0.5 * (upper.x - lower.x + 1) * grid.spacing_mm.x;
-    const Matrix3& turn = probe_from_volume.rotation;
-    const double across = std::abs(turn(1, 0)) + std::abs(turn(1, 1)) + std::abs(turn(1, 2));
-    return reaches(probe_from_volume * centre, std::sqrt(3.0) * half_mm + shift_mm,
-                   across * half_mm + shift_mm);
+bool ScanReach::reaches_along(const View& view, Int3 lower) const noexcept {
+    const Point3 c = view.first + (static_cast<double>(lower.x) * view.step[0] +
+                                   static_cast<double>(lower.y) * view.step[1] +
+                                   static_cast<double>(lower.z) * view.step[2]);
+    // thick_mm_ stands for the jitter in the plane too: it is more.
+    const double ball = view.radius_mm + thick_mm_;
+    if (!fan_) return std::abs(c.x) < half_extent_ + ball && c.z > -ball && c.z < deepest_mm_ + ball;
+    const double z = c.z + radius_mm_, range = std::hypot(c.x, z);
+    if (range > radius_mm_ + deepest_mm_ + view.radius_mm || range < radius_mm_ - ball) return false;
+    if (range <= ball) return true;
+    return std::abs(std::atan2(c.x, z)) < half_extent_ + std::asin(ball / range);
 }
 
 }  // namespace sonocase::runtime

@@ -2,7 +2,10 @@
 // as it is needed has it ready. A little more than is read, never less.
 #pragma once
 
+#include <cmath>
+
 #include "formats/grid.h"
+#include "formats/voxel_blocks.h"
 #include "runtime/imaging/physical_model.h"
 
 namespace sonocase::runtime {
@@ -19,30 +22,37 @@ class ScanReach {
               const Grid& grid,
               const Rigid& volume_from_probe,
               double shift_mm) const noexcept {
-        need(blocks, grid, volume_from_probe, shift_mm, [] { return false; });
+        const View view = seen(grid, blocks.edge(), volume_from_probe, shift_mm);
+        blocks.need([&](Int3 lower, Int3) { return reaches(view, lower); });
     }
-    // enough(): true ends it before a block.
-    template <class Blocks, class Enough>
-    void need(Blocks& blocks,
-              const Grid& grid,
-              const Rigid& volume_from_probe,
-              double shift_mm,
-              const Enough& enough) const noexcept {
-        const Rigid probe_from_volume = inverse(volume_from_probe);
-        blocks.need([&](Int3 lower, Int3 upper) {
-            return !enough() && reaches(grid, lower, upper, probe_from_volume, shift_mm);
-        });
+    // The same from the last block on, for a second thread. enough(): true ends it before a block.
+    template <class Enough>
+    void need_from_behind(VoxelBlocks& blocks,
+                          const Grid& grid,
+                          const Rigid& volume_from_probe,
+                          double shift_mm,
+                          const Enough& enough) const noexcept {
+        const View view = seen(grid, blocks.edge(), volume_from_probe, shift_mm);
+        blocks.need([&](Int3 lower, Int3) { return reaches(view, lower) && !enough(); }, true);
     }
 
   private:
-    bool reaches(const Grid& grid,
-                 Int3 lower,
-                 Int3 upper,
-                 const Rigid& probe_from_volume,
-                 double shift_mm) const noexcept;
-    // Whether what lies in a ball may be reached, across_mm of it across the plane; its centre is in
-    // the probe's frame.
-    bool reaches(Point3 centre, double radius_mm, double across_mm) const noexcept;
+    // Blocks as the probe sees them: a ball round the middle of each.
+    struct View {
+        Point3 first;     // middle of the block that begins at voxel (0, 0, 0), in the probe's frame
+        Vector3 step[3];  // of a voxel
+        double radius_mm = 0;
+        double across_mm = 0;  // of the block, across the plane
+    };
+    View seen(const Grid& grid, int edge, const Rigid& volume_from_probe, double shift_mm) const;
+    bool reaches(const View& view, Int3 lower) const noexcept {
+        // A frame asks for thousands of blocks: most lie beside the plane.
+        const double y = view.first.y + lower.x * view.step[0].y + lower.y * view.step[1].y +
+                         lower.z * view.step[2].y;
+        if (std::abs(y) > thick_mm_ + view.across_mm) return false;
+        return reaches_along(view, lower);
+    }
+    bool reaches_along(const View& view, Int3 lower) const noexcept;  // in the plane
 
     bool fan_ = false;
     double radius_mm_ = 0, half_extent_ = 0;  // of the face: ScanGeometry

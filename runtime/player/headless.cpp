@@ -132,6 +132,7 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     render.model = model == "paper" ? ImageModel::paper : ImageModel::physical;
     render.kind = arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
     render.threads = arguments.threads;
+    render.read_ahead = true;
     render.scanlines = arguments.scanlines;
     render.samples = arguments.samples;
     render.effects = arguments.effects.empty() ? exercise.effects : arguments.effects;
