@@ -160,11 +160,12 @@ LabelPriceReport set_label_prices(LabelField* field,
                 const double depth = rim ? 0.5 + 0.5 / field->factor() : 1;
                 for (int j = 0; j < g.size.y; ++j) {
                     const std::uint8_t* row = source.voxels.data() + g.index(0, j, k);
-                    for (int i = 0; i < g.size.x; i += 4) {
-                        const int stop = std::min(g.size.x, i + 4);
+                    // Weighed like the cells, a block at a time: what is asked for can be reached.
+                    for (int i = 0; i < g.size.x; i += kFieldBlock) {
+                        const int stop = std::min(g.size.x, i + kFieldBlock);
+                        const LabelField::Block& block = field->block_of(i, j, k * field->factor());
                         const double w =
-                            weight(g.point_from_voxel({0.5 * (i + stop - 1), static_cast<double>(j),
-                                                       static_cast<double>(k)}));
+                            held[static_cast<std::size_t>(&block - blocks.data())].weight / cell_mm3;
                         for (int r = i; r < stop; ++r) volume[row[r]] += w * share * depth;
                     }
                 }
@@ -238,12 +239,21 @@ LabelPriceReport set_label_prices(LabelField* field,
         }
         if (step == options.iterations || report.largest_miss < 1e-4) break;
         std::vector<double> right(labels, 0.0);
+        double all = 0, all_area = 0;
         for (std::size_t l = 0; l < labels; ++l) {
             double area = 0;
             for (std::size_t m = 0; m < labels; ++m) area -= matrix[l * labels + m];
             // A label without surface, or absent, has no say: its row reads price = 0 change.
             matrix[l * labels + l] += area > 0 ? area * 1.001 : 1;
-            if (report.target_mm3[l] > 0 && area > 0) right[l] = report.target_mm3[l] - volume[l];
+            if (report.target_mm3[l] <= 0 || area <= 0) continue;
+            right[l] = report.target_mm3[l] - volume[l];
+            all += right[l];
+            all_area += area;
+        }
+        // All prices as one change no volume: what all labels lack together is not to be had, and would
+        // drive all of them to the limit.
+        for (std::size_t l = 0; l < labels; ++l) {
+            if (right[l] != 0) right[l] -= all * (matrix[l * labels + l] / 1.001) / all_area;
         }
         solve(&matrix, &right, labels);
         const double stride = 0.3 * pixel;  // the linear model holds about this far

@@ -85,6 +85,15 @@ FieldRead read_field(const LabelField& field,
     const float sure_mm =
         static_cast<float>(1.5 * band_mm + 0.5 * norm(h) + 0.5 * std::max(h.x, h.y));
     const bool records = options.record_band_vx > 0;
+    // The map says nothing further out than half a voxel beyond its last ones.
+    float rim[3];
+    for (int a = 0; a < 3; ++a) rim[a] = 0.5f * static_cast<float>(a == 2 ? field.factor() : 1) + 1e-3f;
+    const auto beyond = [&](const float* v) {
+        bool out_of = false;
+        for (int a = 0; a < 3; ++a)
+            out_of = out_of || v[a] < -rim[a] || v[a] > static_cast<float>(nodes.size[a] - 1) + rim[a];
+        return out_of;
+    };
     std::vector<Strip> strips(strip_count);
     tell(progress, 0, "voxels");
     // In a few parts, so that progress can be told from the calling thread.
@@ -118,6 +127,10 @@ FieldRead read_field(const LabelField& field,
                         }
                         float v[3];
                         node_from_frame(x[i], y[i], z[i], v);
+                        if (beyond(v)) {
+                            ++strip.counts.outside;
+                            continue;
+                        }
                         std::size_t node = 0;
                         {
                             const auto near = [&](int a) {
@@ -197,11 +210,11 @@ FieldRead read_field(const LabelField& field,
                         if (at.block->labels.size() > 2) {
                             // Labels tie where they meet: the second is whoever lies beyond.
                             const Vector3 back = m * ((d + 0.3) * normal);
-                            const auto beyond = field.locate(v[0] - static_cast<float>(back.x),
+                            const auto past = field.locate(v[0] - static_cast<float>(back.x),
                                                              v[1] - static_cast<float>(back.y),
                                                              v[2] - static_cast<float>(back.z));
-                            field.scores(beyond, score.data());
-                            const auto& there = beyond.block->labels;
+                            field.scores(past, score.data());
+                            const auto& there = past.block->labels;
                             const auto& here = at.block->labels;
                             const auto w = std::find(
                                 here.begin(), here.end(),

@@ -85,7 +85,7 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
         }
     }
     result.report.stage = "smooth";
-    result.report.version = 4;
+    result.report.version = 5;
     result.report.measures = {{"sigma_vx", options.sigma_vx},
                               {"volume_steps", static_cast<double>(prices.iterations)},
                               {"volume_miss", prices.largest_miss}};

@@ -6,6 +6,8 @@
 
 #include "formats/boundary_record.h"
 #include "pipeline/parallel.h"
+#include "pipeline/segmentation/label_field.h"
+#include "pipeline/segmentation/label_prices.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/segmentation/shapes.h"
 #include "pipeline/segmentation/smooth_labels.h"
@@ -132,6 +134,42 @@ TEST(ShapeResampling, ObliqueVesselStaysOnePieceThroughThickSlices) {
         EXPECT_EQ(label, 1) << "the vessel is cut " << along << " mm along";
     }
     EXPECT_NEAR(result->changes.at(0).change(), 0, 0.05);
+}
+
+// Cells are weighed a block at a time. What all labels together seem to lack of a weight that varies
+// inside the blocks must not drive their prices to the limit, where none is kept.
+TEST(LabelPrices, KeepVolumesWhereTheWeightVaries) {
+    const LabelVolume ct = sample_labels(cubic_grid(48), 4, [](Point3 p) {
+        if (norm(p - Point3{-9, 4, 0}) < 5) return 2;
+        if (norm(p - Point3{9, 0, -6}) < 2) return 3;
+        return norm_of(p) < 19 ? 1 : 0;
+    });
+    LabelField field(ct, {});
+    const LabelPriceReport report = set_label_prices(
+        &field, [](Point3 p) { return 1 + 0.8 * std::cos(0.785398 * (p.x + 20)); });
+    EXPECT_LT(report.largest_miss, 0.01);
+    for (std::size_t l = 0; l < 4; ++l) {
+        EXPECT_NEAR(report.reached_mm3[l] / report.target_mm3[l], 1, 0.01) << l;
+        EXPECT_LT(std::abs(field.prices()[l]), 0.6) << l;  // the limit is 1.5
+    }
+}
+
+// A fit may be proven on a box larger than the map: what lies beyond the map's voxels is not known.
+TEST(ShapeResampling, NothingIsReadBeyondTheMap) {
+    for (const double slice_mm : {2.0, 5.0}) {
+        SCOPED_TRACE(slice_mm);
+        Grid grid = thick_grid(40, slice_mm);
+        const LabelVolume ct =
+            sample_labels(grid, 3, [](Point3 p) { return std::abs(p.x) < 12 ? 1 : 2; });
+        Registration registration = registration_of({{}, {0.4, 0.3, 0.2}}, grid);
+        for (int a = 0; a < 3; ++a) {
+            registration.ct_box.lower[a] -= 8;
+            registration.ct_box.upper[a] += 8;
+        }
+        const auto result = resample_labels({ct, registration});
+        ASSERT_TRUE(result);
+        for (const LabelChange& c : result->changes) EXPECT_NEAR(c.change(), 0, 0.01) << c.label;
+    }
 }
 
 TEST(ShapeResampling, SlicesMayLieAlongAnyAxis) {
