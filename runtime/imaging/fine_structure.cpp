@@ -179,8 +179,8 @@ FineStructure make_fine_structure(const CaseBundle& bundle) {
             along = std::cos(kPennationRad) * straight + std::sin(kPennationRad) * a;
             a = std::cos(kPennationRad) * a - std::sin(kPennationRad) * straight;
         }
-        const double across_mm = kind[l] == 0 ? kFibreAcrossMm : kSeptaMm;
-        const double along_mm = kind[l] == 0 ? kFibreAlongMm : kSeptaMm;
+        const double across_mm = kind[l] == 0 ? kFibreAcrossMm : kSeptaAcrossMm;
+        const double along_mm = kind[l] == 0 ? kFibreAlongMm : kSeptaAlongMm;
         const std::array<Vector3, 3> rows{(voxel / along_mm) * along, (voxel / across_mm) * a,
                                           (voxel / across_mm) * b};
         for (int r = 0; r < 3; ++r) {

@@ -1,7 +1,7 @@
 // Structure finer than a voxel: fibres of muscle and septa of fat, as two periodic cubes of echo
 // offset that each label looks up in its own frame. A muscle's fibres follow its long axis, found
 // from the voxels themselves; a muscle that wraps the body has them along the spine, which lies in
-// the sheet.
+// the sheet. Lobules of fat are flat: they are drawn out along the spine, which the skin follows.
 #pragma once
 
 #include <array>

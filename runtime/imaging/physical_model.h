@@ -106,7 +106,7 @@ inline constexpr double kTipGlintMm = 1.0;
 inline constexpr int kFineEdge = 64;
 inline constexpr double kFibreAlongMm = 1.6, kFibreAcrossMm = 0.16;  // a cube's voxel
 inline constexpr double kPennationRad = 0.2;
-inline constexpr double kSeptaMm = 0.45;
+inline constexpr double kSeptaAlongMm = 0.8, kSeptaAcrossMm = 0.4;
 
 // Targets of an exercise are balls in the anatomy; their surface is as rough as any.
 inline constexpr double kTargetReachMm = 2;
