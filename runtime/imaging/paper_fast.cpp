@@ -10,17 +10,13 @@
 #include "runtime/imaging/paper_kernels.h"
 #include "runtime/imaging/paper_model.h"
 #include "runtime/imaging/scan_convert.h"
+#include "runtime/imaging/stopwatch.h"
 
 namespace sonocase::runtime {
 namespace {
 
 // Slack behind every row and buffer: the widest vector there is, so that no kernel needs a tail.
 constexpr int kSlack = 64;
-
-double milliseconds_since(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-        .count();
-}
 
 // 16.16 fixed point; beyond its range the point is far outside any volume.
 std::int32_t fixed_voxel(double v) {

@@ -12,6 +12,7 @@
 #include "runtime/imaging/physical_fast.h"
 #include "runtime/imaging/read_ahead.h"
 #include "runtime/imaging/scan_reach.h"
+#include "runtime/imaging/stopwatch.h"
 #include "runtime/imaging/simd_target.h"
 
 namespace sonocase::runtime {
@@ -96,6 +97,20 @@ struct Renderer::Impl {
                                 const NeedleShape* needle,
                                 std::span<std::uint8_t> pixels);
     void flip(std::span<std::uint8_t> pixels) const;
+
+    // The slow renderer knows one pass. on(entry): the effect is not switched off.
+    template <class Draw, class On>
+    FrameStatus by_reference(const FrameInput& input,
+                             std::span<std::uint8_t> pixels,
+                             Draw&& draw,
+                             On&& on) {
+        const auto start = std::chrono::steady_clock::now();
+        draw();
+        if (input.settings.flip_left_right) flip(pixels);
+        const std::array<double, 6> passes{0, milliseconds_since(start), 0, 0, 0, 0};
+        set_costs(passes, [&](const EffectEntry& e) { return on(e) ? "" : "switched off"; });
+        return FrameStatus::rendered;
+    }
 
     // Shares the time of each pass among its effects that ran. `skipped` says why an effect did
     // not, or
@@ -225,17 +240,12 @@ FrameStatus Renderer::Impl::render_paper(const FrameInput& input,
     frame.row_gain = row_gain;
     frame.effects = effects.paper;
     if (options.kind == RendererKind::reference) {
-        const auto start = std::chrono::steady_clock::now();
-        render_paper_reference(paper_scene, geometry, paper->noise_tile(), frame, pixels);
-        if (input.settings.flip_left_right) flip(pixels);
-        const double ms =
-            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-                .count();
-        const std::array<double, 6> passes{0, ms, 0, 0, 0, 0};
-        set_costs(passes, [&](const EffectEntry& e) {
-            return e.paper != nullptr && !(effects.paper.*e.paper) ? "switched off" : "";
-        });
-        return FrameStatus::rendered;
+        return by_reference(
+            input, pixels,
+            [&] {
+                render_paper_reference(paper_scene, geometry, paper->noise_tile(), frame, pixels);
+            },
+            [&](const EffectEntry& e) { return e.paper == nullptr || effects.paper.*e.paper; });
     }
     paper->render(frame, input.settings.flip_left_right, effects.keep_all, pixels);
     const PaperPasses& p = paper->passes();
@@ -271,17 +281,14 @@ FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
                              std::isfinite(input.time_s) ? input.time_s : 0);
     frame.effects = effects.physical;
     if (options.kind == RendererKind::reference) {
-        const auto start = std::chrono::steady_clock::now();
-        render_physical_reference(physical_scene, geometry, tables, noise, frame, pixels);
-        if (input.settings.flip_left_right) flip(pixels);
-        const double ms =
-            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-                .count();
-        const std::array<double, 6> passes{0, ms, 0, 0, 0, 0};
-        set_costs(passes, [&](const EffectEntry& e) {
-            return e.physical != nullptr && !(effects.physical.*e.physical) ? "switched off" : "";
-        });
-        return FrameStatus::rendered;
+        return by_reference(
+            input, pixels,
+            [&] {
+                render_physical_reference(physical_scene, geometry, tables, noise, frame, pixels);
+            },
+            [&](const EffectEntry& e) {
+                return e.physical == nullptr || effects.physical.*e.physical;
+            });
     }
     if (bundle.blocks) {
         const double shift_mm = norm(frame.motion.breathing_mm);
@@ -341,9 +348,7 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
     const FrameStatus status = m.options.model == ImageModel::paper
                                    ? m.render_paper(input, shown, pixels)
                                    : m.render_physical(input, shown, pixels);
-    m.governor.frame_took(
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-            .count());
+    m.governor.frame_took(milliseconds_since(start));
     return status;
 }
 
