@@ -2,6 +2,8 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <set>
 
 #include "pipeline/import/label_map.h"
 #include "pipeline/segmentation/export_level_sets.h"
@@ -49,6 +51,29 @@ TEST(ExportSegNrrd, ReadsBackWithNamesColoursAndPlace) {
     // Four decimals of a colour in [0, 1] are exact to a step of 255.
     EXPECT_EQ(read.labels[2].colour, volume.labels[2].colour);
     EXPECT_EQ(read.voxels, volume.voxels);
+}
+
+// The header's lines as 3D Slicer documents them for .seg.nrrd, read as text by no library of ours.
+TEST(ExportSegNrrd, HeaderIsWhat3DSlicerReads) {
+    LabelVolume volume = torso_sized();
+    volume.labels[2].tissue = "liver";
+    const std::string path = scratch("header.seg.nrrd");
+    ASSERT_TRUE(export_seg_nrrd(volume, path));
+    std::ifstream file(path, std::ios::binary);
+    std::set<std::string> lines;
+    for (std::string line; std::getline(file, line) && !line.empty();) lines.insert(line);
+    for (const char* line :
+         {"dimension: 3", "sizes: 40 40 40", "kinds: domain domain domain",
+          "Segmentation_MasterRepresentation:=Binary labelmap",
+          "Segmentation_ContainedRepresentationNames:=Binary labelmap|",
+          "Segment0_Name:=other_fat", "Segment0_LabelValue:=1", "Segment0_Layer:=0",
+          "Segment1_ID:=liver", "Segment1_Name:=liver", "Segment1_LabelValue:=2",
+          "Segment1_Layer:=0", "Segment1_Color:=0.5882 0.2745 0.1882",
+          "Segment1_Tags:=sonocase.tissue:liver|"})
+        EXPECT_TRUE(lines.count(line)) << line;
+    EXPECT_FALSE(lines.count("Segment2_Name:=outside"));
+    // Ranges of voxels that hold the segment, inclusive: 50 mm in voxels of 8 mm about 19.5.
+    EXPECT_TRUE(lines.count("Segment1_Extent:=14 25 14 25 14 25"));
 }
 
 TEST(ExportLevelSets, WritesAndRefuses) {
