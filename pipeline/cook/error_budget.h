@@ -42,7 +42,7 @@ ErrorBudget error_budget(std::span<const StageReport> stages);
 // Mean displacement of surfaces through a map that is known, as a share of the map's own voxel (cube
 // root of its volume) and of the cooked voxel: measured on the analytic torso
 // (tests/pipeline/tradeoff/error_budget_test.cpp repeats it).
-inline constexpr double kSampledShare = 0.1;
+inline constexpr double kSampledShare = 0.085;
 inline constexpr double kCookedShare = 0.05;
 
 }  // namespace sonocase::pipeline

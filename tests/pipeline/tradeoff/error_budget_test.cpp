@@ -27,7 +27,7 @@ TEST(ErrorBudget, AddsWhatIsKnownAndNamesWhatIsNot) {
     EXPECT_DOUBLE_EQ(budget.entries[1].mm, 0.3);
     EXPECT_TRUE(std::isnan(budget.entries[2].mm));
     EXPECT_DOUBLE_EQ(budget.entries[3].mm, kCookedShare);
-    EXPECT_NEAR(budget.known_mm, std::sqrt(0.04 + 0.09 + 0.0025), 1e-12);
+    EXPECT_NEAR(budget.known_mm, std::sqrt(4 * kSampledShare * kSampledShare + 0.09 + 0.0025), 1e-12);
 }
 
 TEST(ErrorBudget, LeavesOutWhatWasNotReported) {
