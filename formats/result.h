@@ -17,10 +17,14 @@ struct Error {
     std::string where;     // file, offset, line or key; may be empty
     std::string expected;  // what was expected and what to do; may be empty
 
-    // One line for people: "where: what; expected".
+    // One line for people: "where: what; expected". What is quoted of a file may hold line breaks and
+    // escape sequences: blanks stand for them.
     std::string message() const {
         std::string line = where.empty() ? what : where + ": " + what;
         if (!expected.empty()) line += "; " + expected;
+        for (char& c : line) {
+            if (static_cast<unsigned char>(c) < 32 || c == 127) c = ' ';
+        }
         return line;
     }
 };

@@ -171,5 +171,14 @@ TEST(Exercise, DescriptionsFlowWhateverTheLengthOfTheirLines) {
     EXPECT_EQ(exercise->description, "Find the lesion and stop in it.\nThen wait.");
 }
 
+// What the text holds is quoted in the error: a line break or an escape sequence in it must not come
+// out of a terminal.
+TEST(Exercise, ErrorsAreOneLineWhateverTheTextHolds) {
+    const auto exercise = parse_exercise("[[sweeps]]\nsnap_to_skin = t\nname = \"tour\"", "x.toml");
+    ASSERT_FALSE(exercise);
+    for (const unsigned char c : exercise.error().message()) EXPECT_TRUE(c >= 32 && c != 127);
+    EXPECT_EQ((Error{"a\nb\x1b[2J", "c\td", "e\rf"}.message()), "c d: a b [2J; e f");
+}
+
 }  // namespace
 }  // namespace sonocase
