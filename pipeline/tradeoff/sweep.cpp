@@ -14,13 +14,12 @@ const Knob* find_knob(const Suite& suite, const std::string& key) {
     return nullptr;
 }
 
-std::vector<std::string> values_of(const Knob& knob, bool quick) {
+// Every step-th value, both ends and the standard one.
+std::vector<std::string> values_of(const Knob& knob, std::size_t step) {
     std::vector<std::string> values;
     for (std::size_t i = 0; i < knob.values.size(); ++i) {
-        // Quick keeps both ends, every second value and the standard one.
-        const bool keep =
-            i % 2 == 0 || i + 1 == knob.values.size() || knob.values[i] == knob.standard;
-        if (!quick || keep) values.push_back(knob.values[i]);
+        if (i % step == 0 || i + 1 == knob.values.size() || knob.values[i] == knob.standard)
+            values.push_back(knob.values[i]);
     }
     return values;
 }
@@ -89,7 +88,7 @@ std::vector<Trial> plan_sweep(const Suite& suite, const SweepOptions& options) {
         add(named.role, named.name, named.settings);
     }
     for (const Knob& knob : suite.knobs) {
-        for (const std::string& value : values_of(knob, options.quick)) {
+        for (const std::string& value : values_of(knob, options.quick ? knob.values.size() : 1)) {
             add(TrialRole::knob, knob.key, {{knob.key, value}});
         }
     }
@@ -97,8 +96,8 @@ std::vector<Trial> plan_sweep(const Suite& suite, const SweepOptions& options) {
         for (const auto& [first, second] : suite.pairs) {
             const Knob *a = find_knob(suite, first), *b = find_knob(suite, second);
             if (a == nullptr || b == nullptr) continue;
-            for (const std::string& va : values_of(*a, true)) {
-                for (const std::string& vb : values_of(*b, true)) {
+            for (const std::string& va : values_of(*a, 2)) {
+                for (const std::string& vb : values_of(*b, 2)) {
                     if (va == a->standard || vb == b->standard) continue;  // already a knob's trial
                     add(TrialRole::pair, first + " x " + second, {{first, va}, {second, vb}});
                 }

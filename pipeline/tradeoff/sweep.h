@@ -11,7 +11,7 @@ namespace sonocase::pipeline {
 
 struct SweepOptions {
     int repeats = 3;     // runs a setting; the median of the seconds is kept, >= 1
-    bool quick = false;  // every second value of each knob, no pairs
+    bool quick = false;  // both ends of each knob and its standard value, no pairs
     double limit_s = 0;  // leave the rest of a suite out after this long; 0: no limit
 };
 
