@@ -92,7 +92,7 @@ Suite smooth_suite() {
          "steps of the map's voxels",
          "its cost does not depend on it: too little leaves steps, too much rounds what is thin"},
         {"resample.volume_iterations",
-         {"0", "2", "4", "8", "16"},
+         {"0", "1", "2", "4", "8"},
          "8",
          "",
          "Newton steps that hold every label's volume",
