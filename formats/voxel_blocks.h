@@ -27,17 +27,15 @@ class VoxelBlocks {
     explicit VoxelBlocks(std::unique_ptr<detail::BlockParts> parts);
     ~VoxelBlocks();
 
-    // Unpacks every block for which wanted(lower, upper) is true: its first and last voxel. Of two
-    // threads that want the same, one does well to begin from behind.
+    // Unpacks every block for which wanted(lower) is true: its first voxel. Of two threads that want
+    // the same, one does well to begin from behind.
     template <class Wanted>
     void need(const Wanted& wanted, bool from_behind = false) noexcept {
         if (whole()) return;
         for (std::size_t n = 0; n < count_; ++n) {
             const std::size_t block = from_behind ? count_ - 1 - n : n;
             if (there(block)) continue;
-            const Int3 lower = lower_[block];
-            if (wanted(lower, Int3{lower.x + edge_ - 1, lower.y + edge_ - 1, lower.z + edge_ - 1}))
-                unpack(block);
+            if (wanted(lower_[block])) unpack(block);
         }
     }
     void need_voxel(int i, int j, int k) noexcept;

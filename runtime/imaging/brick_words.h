@@ -34,8 +34,8 @@ class BrickWords {
     bool has_echo() const { return has_echo_; }
     bool has_boundary() const { return has_boundary_; }
 
-    // Fills in every block for which wanted(lower, upper) is true: its first and last voxel. Neither
-    // allocates nor throws; one caller at a time.
+    // Fills in every block for which wanted(lower) is true: its first voxel. Neither allocates nor
+    // throws; one caller at a time.
     template <class Wanted>
     void need(const Wanted& wanted) noexcept {
         if (left_ == 0) return;
@@ -44,13 +44,10 @@ class BrickWords {
             for (int y = 0; y < blocks_.y; ++y) {
                 for (int x = 0; x < blocks_.x; ++x, ++block) {
                     if (there_[block]) continue;
-                    const Int3 lower{x * edge(), y * edge(), z * edge()};
-                    if (wanted(lower, Int3{lower.x + edge() - 1, lower.y + edge() - 1,
-                                           lower.z + edge() - 1})) {
-                        fill({x, y, z}, block);
-                        there_[block] = 1;
-                        --left_;
-                    }
+                    if (!wanted(Int3{x * edge(), y * edge(), z * edge()})) continue;
+                    fill({x, y, z}, block);
+                    there_[block] = 1;
+                    --left_;
                 }
             }
         }

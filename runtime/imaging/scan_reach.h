@@ -23,7 +23,7 @@ class ScanReach {
               const Rigid& volume_from_probe,
               double shift_mm) const noexcept {
         const View view = seen(grid, blocks.edge(), volume_from_probe, shift_mm);
-        blocks.need([&](Int3 lower, Int3) { return reaches(view, lower); });
+        blocks.need([&](Int3 lower) { return reaches(view, lower); });
     }
     // The same from the last block on, for a second thread. enough(): true ends it before a block.
     template <class Enough>
@@ -33,7 +33,7 @@ class ScanReach {
                           double shift_mm,
                           const Enough& enough) const noexcept {
         const View view = seen(grid, blocks.edge(), volume_from_probe, shift_mm);
-        blocks.need([&](Int3 lower, Int3) { return reaches(view, lower) && !enough(); }, true);
+        blocks.need([&](Int3 lower) { return reaches(view, lower) && !enough(); }, true);
     }
 
   private:

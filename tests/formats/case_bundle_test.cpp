@@ -241,7 +241,7 @@ TEST(CaseBundle, ABlockThatMakesNoSenseSaysSoAndHoldsNothing) {
         const auto opened = open_bundle(path);
         ASSERT_TRUE(opened) << opened.error().message();
         EXPECT_TRUE(opened->blocks->status());
-        opened->blocks->need([](Int3, Int3) { return true; });
+        opened->blocks->need([](Int3) { return true; });
         EXPECT_TRUE(opened->blocks->damaged());
         ASSERT_FALSE(opened->blocks->status());
         EXPECT_NE(opened->blocks->status().error().message().find(path), std::string::npos);
