@@ -1,8 +1,9 @@
-// A block of the analytic torso round its liver, cooked through its known warp, and how true its
-// surfaces are against the closed forms.
+// A block of the analytic torso cooked through its known warp, and how true its surfaces are against
+// the closed forms.
 #pragma once
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -18,25 +19,35 @@
 
 namespace sonocase::pipeline::testing {
 
-// Liver, gall bladder, kidney, colon and four vessels of 1.5 to 5 mm radius.
-inline LabelVolume sample_torso_block(Vector3 spacing_mm) {
+inline Grid grid_between(Point3 lower, Point3 upper, Vector3 spacing_mm) {
     Grid grid;
-    const Point3 lower{0, -45, 5}, upper{125, 75, 125};
     grid.spacing_mm = spacing_mm;
     grid.origin_mm = lower;
     for (int a = 0; a < 3; ++a)
         grid.size[a] = static_cast<int>((upper[a] - lower[a]) / spacing_mm[a]) + 1;
-    return sample_analytic_torso(grid);
+    return grid;
+}
+// Holds whole: liver, both kidneys, spleen, stomach, gall bladder, pancreas, and the four vessels of
+// 1.5 to 5 mm radius in the liver.
+inline Grid upper_abdomen(Vector3 spacing_mm) {
+    return grid_between({-142, -75, -62}, {142, 91, 143}, spacing_mm);
+}
+// Holds whole: liver with its vessels, gall bladder.
+inline Grid round_the_liver(Vector3 spacing_mm) {
+    return grid_between({-38, -75, -17}, {142, 91, 143}, spacing_mm);
 }
 
 class TorsoBlock {
   public:
-    explicit TorsoBlock(Vector3 spacing_mm, const ResampleOptions& options = {})
-        : ct_(sample_torso_block(spacing_mm)) {
+    explicit TorsoBlock(const Grid& ct, const ResampleOptions& options = {})
+        : ct_(sample_analytic_torso(ct)) {
         registration_.ct_box = ct_.grid.bounds();
+        inverse_map_.emplace(with_voxel_rim(registration_, ct_.grid));
         result_ = std::move(*resample_labels({ct_, registration_}, options));
     }
     const ResampleResult& result() const { return result_; }
+    const Registration& registration() const { return registration_; }
+    const Grid& ct_grid() const { return ct_.grid; }
 
     // Palette index; -1 for an unknown name.
     int label(const std::string& name) const {
@@ -53,18 +64,46 @@ class TorsoBlock {
         return NAN;
     }
 
+    // Preimage of a point; empty near the block's own faces, which are no anatomy.
+    std::optional<Point3> inner_ct_point(Point3 mannequin) const {
+        float x, y, z;
+        MapStatus status;
+        inverse_map_->invert_row(mannequin, {1, 0, 0}, 1, &x, &y, &z, &status);
+        if (status != MapStatus::ok) return {};
+        const Point3 ct{x, y, z};
+        const Box3 box = ct_.grid.bounds();
+        for (int a = 0; a < 3; ++a) {
+            if (ct[a] <= box.lower[a] + 6 || ct[a] >= box.upper[a] - 6) return {};
+        }
+        return ct;
+    }
+    // Of the true surface of `label`, in `mannequin`, into the label: normals go with the inverse
+    // transpose of the map.
+    Vector3 true_normal(int label, Point3 ct) const {
+        Vector3 slope;
+        for (int a = 0; a < 3; ++a) {
+            Vector3 step;
+            step[a] = 0.01;
+            slope[a] = analytic_torso_signed_distance(label, ct - step, 3) -
+                       analytic_torso_signed_distance(label, ct + step, 3);
+        }
+        return normalized(transpose(inverse(jacobian(registration_, ct))) * slope);
+    }
+
     struct PlaneError {
         double distance_mm;  // of the plane's foot from the true surface, in `ct`
         double normal_deg;
         int second_label;
         Point3 ct;
+        // A third label lies within a record's reach of the foot: the surface has an edge there, and
+        // beside an edge the nearest face may be another than the record's.
+        bool at_edge;
     };
     // Of every `stride`-th record that a voxel of `label` holds, in the middle of the block.
     std::vector<PlaneError> plane_errors(int label, std::size_t stride = 1) const {
         std::vector<PlaneError> errors;
         std::vector<Vector3> normals;
         const Grid& g = result_.volume.grid;
-        const InverseMap inverse_map(with_voxel_rim(registration_, ct_.grid));
         std::size_t met = 0;
         for (int k = 0; k < g.size.z; ++k) {
             for (int j = 0; j < g.size.y; ++j) {
@@ -77,40 +116,33 @@ class TorsoBlock {
                         g.point_from_voxel({static_cast<double>(i), static_cast<double>(j),
                                             static_cast<double>(k)}) -
                         record.distance_vx * g.spacing_mm.x * record.normal;
-                    const std::optional<Point3> ct = inner_ct_point(inverse_map, foot);
+                    const std::optional<Point3> ct = inner_ct_point(foot);
                     if (!ct) continue;
-                    errors.push_back({0, 0, record.second_label, *ct});
+                    errors.push_back({0, 0, record.second_label, *ct, false});
                     normals.push_back(record.normal);
                 }
             }
         }
         parallel_for(errors.size(), 16, [&](std::size_t begin, std::size_t end) {
-            const auto distance = [&](Point3 p) {
-                return analytic_torso_signed_distance(label, p, 3);
-            };
             for (std::size_t n = begin; n < end; ++n) {
-                const Point3 ct = errors[n].ct;
-                errors[n].distance_mm = std::abs(distance(ct));
-                // Into the label, through the map: normals go with the inverse transpose.
-                Vector3 slope;
-                for (int a = 0; a < 3; ++a) {
-                    Vector3 step;
-                    step[a] = 0.01;
-                    slope[a] = distance(ct - step) - distance(ct + step);
-                }
-                const Vector3 truth =
-                    normalized(transpose(inverse(jacobian(registration_, ct))) * slope);
-                errors[n].normal_deg =
-                    57.29577951 * std::acos(std::clamp(dot(truth, normals[n]), -1.0, 1.0));
+                PlaneError& e = errors[n];
+                e.distance_mm = std::abs(analytic_torso_signed_distance(label, e.ct, 3));
+                e.normal_deg = angle_deg(true_normal(label, e.ct), normals[n]);
+                e.at_edge = labels_within(2, e.ct) > 2;
             }
         });
         return errors;
     }
 
-    // Share of random points in voxels with a record that its plane puts on the right side.
-    double right_class(int points, std::uint64_t seed) const {
+    static double angle_deg(Vector3 a, Vector3 b) {
+        return 57.29577951 * std::acos(std::clamp(dot(a, b), -1.0, 1.0));
+    }
+
+    // Share of `points` random points within `reach_mm` (in `ct`) of a true surface whose label is
+    // right as a renderer reads it: of the voxel, or of either side of its plane if it has a record.
+    // With reach_mm 0: of points in voxels that have a record.
+    double right_class(int points, double reach_mm, std::uint64_t seed) const {
         const Grid& g = result_.volume.grid;
-        const InverseMap inverse_map(with_voxel_rim(registration_, ct_.grid));
         sonocase::testing::Random random(seed);
         int right = 0, count = 0;
         while (count < points) {
@@ -120,35 +152,39 @@ class TorsoBlock {
                       j = static_cast<int>(std::lround(v.y)),
                       k = static_cast<int>(std::lround(v.z));
             const std::uint32_t packed = result_.boundary.at(i, j, k);
-            if (packed == kNoBoundary) continue;
-            const std::optional<Point3> ct = inner_ct_point(inverse_map, g.point_from_voxel(v));
+            if (reach_mm == 0 && packed == kNoBoundary) continue;
+            const std::optional<Point3> ct = inner_ct_point(g.point_from_voxel(v));
             if (!ct) continue;
-            const BoundaryRecord r = unpack_boundary(packed);
-            const double d = r.distance_vx + dot(r.normal, Vector3{v.x - i, v.y - j, v.z - k});
-            const int own = result_.volume.voxels[g.index(i, j, k)];
-            right += (d >= 0 ? own : r.second_label) == analytic_torso_label(*ct);
+            const int truth = analytic_torso_label(*ct);
+            if (reach_mm > 0 &&
+                std::abs(analytic_torso_signed_distance(truth, *ct, reach_mm)) >= reach_mm)
+                continue;
+            int read = result_.volume.voxels[g.index(i, j, k)];
+            if (packed != kNoBoundary) {
+                const BoundaryRecord r = unpack_boundary(packed);
+                const double d = r.distance_vx + dot(r.normal, Vector3{v.x - i, v.y - j, v.z - k});
+                if (d < 0) read = r.second_label;
+            }
+            right += read == truth;
             ++count;
         }
         return static_cast<double>(right) / count;
     }
 
   private:
-    // Empty near the block's own faces, which are no anatomy.
-    std::optional<Point3> inner_ct_point(const InverseMap& inverse_map, Point3 p) const {
-        float x, y, z;
-        MapStatus status;
-        inverse_map.invert_row(p, {1, 0, 0}, 1, &x, &y, &z, &status);
-        if (status != MapStatus::ok) return {};
-        const Point3 ct{x, y, z};
-        const Box3 box = ct_.grid.bounds();
-        for (int a = 0; a < 3; ++a) {
-            if (ct[a] <= box.lower[a] + 6 || ct[a] >= box.upper[a] - 6) return {};
+    // Labels at the corners, edges and faces of a cube about the point.
+    static int labels_within(double half_edge_mm, Point3 ct) {
+        std::bitset<256> present;
+        for (int q = 0; q < 27; ++q) {
+            const Vector3 step{q % 3 - 1.0, q / 3 % 3 - 1.0, q / 9 - 1.0};
+            present.set(analytic_torso_label(ct + half_edge_mm * step));
         }
-        return ct;
+        return static_cast<int>(present.count());
     }
 
     LabelVolume ct_;
     Registration registration_ = analytic_torso_truth();
+    std::optional<InverseMap> inverse_map_;
     ResampleResult result_;
 };
 
