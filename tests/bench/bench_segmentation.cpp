@@ -17,10 +17,8 @@
 #include "peer_itk.h"
 #include "pipeline/import/analytic_torso.h"
 #include "pipeline/import/label_map.h"
-#include "pipeline/parallel.h"
-#include "pipeline/registration/inverse_map.h"
-#include "pipeline/segmentation/cooked_grid.h"
 #include "pipeline/segmentation/resample_labels.h"
+#include "support/label_score.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -38,58 +36,15 @@ const Torso& torso() {
     return instance;
 }
 
-// -1 where the voxel comes from outside the CT.
-std::vector<int> truth_on(const Grid& grid) {
-    const InverseMap inverse_map(with_voxel_rim(torso().registration, torso().ct.grid));
-    std::vector<int> truth(grid.voxel_count(), -1);
-    const auto slices = static_cast<std::size_t>(grid.size.z);
-    parallel_for(slices, 1, [&](std::size_t begin, std::size_t end) {
-        const auto nx = static_cast<std::size_t>(grid.size.x);
-        std::vector<float> x(nx), y(nx), z(nx);
-        std::vector<MapStatus> status(nx);
-        for (std::size_t k = begin; k < end; ++k) {
-            for (int j = 0; j < grid.size.y; ++j) {
-                const Point3 start =
-                    grid.point_from_voxel({0, static_cast<double>(j), static_cast<double>(k)});
-                inverse_map.invert_row(start, {grid.spacing_mm.x, 0, 0}, grid.size.x, x.data(),
-                                       y.data(), z.data(), status.data());
-                for (std::size_t i = 0; i < nx; ++i) {
-                    if (status[i] != MapStatus::ok) continue;
-                    truth[grid.index(static_cast<int>(i), j, static_cast<int>(k))] =
-                        analytic_torso_label({x[i], y[i], z[i]});
-                }
-            }
-        }
-    });
-    return truth;
-}
-
 void score(const LabelVolume& volume, benchmark::State& state) {
-    const std::vector<int> truth = truth_on(volume.grid);
-    const std::size_t labels = volume.labels.size();
-    std::vector<double> ours(labels), theirs(labels), both(labels);
-    double wrong = 0, count = 0;
-    for (std::size_t v = 0; v < truth.size(); ++v) {
-        if (truth[v] < 0) continue;
-        const auto a = static_cast<std::size_t>(volume.voxels[v]);
-        const auto b = static_cast<std::size_t>(truth[v]);
-        ours[a] += 1;
-        theirs[b] += 1;
-        (a == b ? both[a] : wrong) += 1;
-        count += 1;
-    }
-    double dice = 0, change = 0, lost = 0, present = 0;
-    for (std::size_t l = 1; l < labels; ++l) {
-        if (theirs[l] == 0) continue;
-        dice += 2 * both[l] / (ours[l] + theirs[l]);
-        change += std::abs(ours[l] / theirs[l] - 1);
-        lost += ours[l] == 0;
-        present += 1;
-    }
-    state.counters["dice"] = dice / present;
-    state.counters["wrong_percent"] = 100 * wrong / count;
-    state.counters["volume_percent"] = 100 * change / present;
-    state.counters["lost"] = lost;
+    const auto truth =
+        testing::truth_on(volume.grid, torso().registration, torso().ct.grid,
+                          [](Point3 p) { return analytic_torso_label(p); });
+    const testing::LabelScore score = testing::score_labels(volume, truth);
+    state.counters["dice"] = score.dice;
+    state.counters["wrong_percent"] = 100 * score.wrong;
+    state.counters["volume_percent"] = 100 * score.volume_change;
+    state.counters["lost"] = score.lost;
 }
 
 void resample_torso(benchmark::State& state, ResampleOptions options) {

@@ -1,5 +1,5 @@
-// A block of the analytic torso cooked through its known warp, and how true its surfaces are against
-// the closed forms.
+// A block of the analytic torso cooked through its known warp, and how true its surfaces are
+// against the closed forms.
 #pragma once
 
 #include <algorithm>
@@ -27,8 +27,8 @@ inline Grid grid_between(Point3 lower, Point3 upper, Vector3 spacing_mm) {
         grid.size[a] = static_cast<int>((upper[a] - lower[a]) / spacing_mm[a]) + 1;
     return grid;
 }
-// Holds whole: liver, both kidneys, spleen, stomach, gall bladder, pancreas, and the four vessels of
-// 1.5 to 5 mm radius in the liver.
+// Holds whole: liver, both kidneys, spleen, stomach, gall bladder, pancreas, and the four vessels
+// of 1.5 to 5 mm radius in the liver.
 inline Grid upper_abdomen(Vector3 spacing_mm) {
     return grid_between({-142, -75, -62}, {142, 91, 143}, spacing_mm);
 }
@@ -95,8 +95,8 @@ class TorsoBlock {
         double normal_deg;
         int second_label;
         Point3 ct;
-        // A third label lies within a record's reach of the foot: the surface has an edge there, and
-        // beside an edge the nearest face may be another than the record's.
+        // A third label lies within a record's reach of the foot: the surface has an edge there,
+        // and beside an edge the nearest face may be another than the record's.
         bool at_edge;
     };
     // Of every `stride`-th record that a voxel of `label` holds, in the middle of the block.
@@ -139,8 +139,8 @@ class TorsoBlock {
     }
 
     // Share of `points` random points within `reach_mm` (in `ct`) of a true surface whose label is
-    // right as a renderer reads it: of the voxel, or of either side of its plane if it has a record.
-    // With reach_mm 0: of points in voxels that have a record.
+    // right as a renderer reads it: of the voxel, or of either side of its plane if it has a
+    // record. With reach_mm 0: of points in voxels that have a record.
     double right_class(int points, double reach_mm, std::uint64_t seed) const {
         const Grid& g = result_.volume.grid;
         sonocase::testing::Random random(seed);

@@ -1,0 +1,113 @@
+// How true labels are on two bodies known in closed form, through the same warp into voxels of 1
+// mm.
+//
+//   plain_body/...   the plain body from slices 1, 3 and 5 mm apart, pixels of 1 mm; 5 mm apart
+//   also
+//                    across the body and in a grid that lies oblique to it. dice, wrong_percent,
+//                    wrong_of_nearest (share of nearest neighbour's wrong voxels), volume_percent,
+//                    lost
+//   planes/...       boundary records of the analytic torso's organs: 95th percentiles of the
+//   distance
+//                    (um) and of the normal (hundredths of a degree); class_... percent of random
+//                    points near a surface whose label is right: in voxels with a record, within 3
+//                    and 4 mm
+#include <benchmark/benchmark.h>
+
+#include <string>
+
+#include "pipeline/import/analytic_torso.h"
+#include "pipeline/segmentation/resample_labels.h"
+#include "support/label_score.h"
+#include "support/plain_body.h"
+#include "support/torso_block.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using testing::LabelScore;
+using testing::plain_body;
+using testing::PlainBody;
+
+void resample_plain_body(benchmark::State& state, const std::string& method, const Grid& ct_grid) {
+    const LabelVolume ct = plain_body().sample(ct_grid);
+    Registration registration = analytic_torso_truth();
+    registration.ct_box = ct_grid.bounds();
+    ResampleOptions options;
+    options.method = method;
+    Result<ResampleResult> result = Error{};
+    for (auto _ : state) result = resample_labels({ct, registration}, options);
+    const auto truth =
+        testing::truth_on(result->volume.grid, registration, ct_grid, [&](Point3 p) -> std::uint8_t {
+            const Point3 v = ct_grid.voxel_from_point(p);
+            for (int a = 0; a < 3; ++a) {
+                // The box of an oblique grid has corners that the grid has not.
+                if (v[a] < -0.5 || v[a] > ct_grid.size[a] - 0.5) return testing::kNoTruth;
+            }
+            return plain_body().label(p);
+        });
+    const LabelScore score = testing::score_labels(result->volume, truth);
+    state.counters["dice"] = score.dice;
+    state.counters["wrong_percent"] = 100 * score.wrong;
+    state.counters["volume_percent"] = 100 * score.volume_change;
+    state.counters["lost"] = score.lost;
+    if (method == "nearest") return;
+    options.method = "nearest";
+    const auto nearest = resample_labels({ct, registration}, options);
+    state.counters["wrong_of_nearest"] = score.wrong / testing::score_labels(nearest->volume, truth).wrong;
+}
+
+void planes(benchmark::State& state, double slice_mm) {
+    for (auto _ : state) {
+        const testing::TorsoBlock torso(analytic_torso_grid({1, 1, slice_mm}));
+        std::vector<double> all_mm, all_deg;
+        for (const char* organ : {"liver", "kidney_left", "kidney_right", "gallbladder", "spleen",
+                                  "stomach", "pancreas", "small_bowel", "colon"}) {
+            std::vector<double> mm, deg;
+            for (const auto& e : torso.plane_errors(torso.label(organ), 8)) {
+                mm.push_back(e.distance_mm);
+                deg.push_back(e.normal_deg);
+            }
+            all_mm.insert(all_mm.end(), mm.begin(), mm.end());
+            all_deg.insert(all_deg.end(), deg.begin(), deg.end());
+            state.counters[std::string(organ) + "_mm"] = testing::percentile(mm, 0.95);
+            state.counters[std::string(organ) + "_deg"] = testing::percentile(deg, 0.95);
+        }
+        state.counters["organs_mm"] = testing::percentile(all_mm, 0.95);
+        state.counters["organs_deg"] = testing::percentile(all_deg, 0.95);
+        state.counters["class_records"] = 100 * torso.right_class(100000, 0, 31);
+        state.counters["class_3mm"] = 100 * torso.right_class(100000, 3, 31);
+        state.counters["class_4mm"] = 100 * torso.right_class(100000, 4, 31);
+    }
+}
+
+template <class Run>
+void add_run(const std::string& name, const Run& run) {
+    benchmark::RegisterBenchmark(("Segmentation/" + name).c_str(), run)
+        ->Unit(benchmark::kMillisecond)
+        ->MeasureProcessCPUTime()
+        ->UseRealTime()
+        ->Iterations(1);
+}
+
+[[maybe_unused]] const bool registered = [] {
+    for (const std::string method : {"nearest", "shape"}) {
+        const auto add = [&](const std::string& name, const Grid& grid) {
+            add_run("plain_body/" + method + "/" + name,
+                    [=](benchmark::State& state) { resample_plain_body(state, method, grid); });
+        };
+        for (const int slice_mm : {1, 3, 5})
+            add(std::to_string(slice_mm) + "mm", PlainBody::grid({1, 1, 1.0 * slice_mm}));
+        add("5mm_sagittal",
+            PlainBody::grid({1, 1, 5}, Matrix3::from_columns({0, 1, 0}, {0, 0, 1}, {1, 0, 0})));
+        add("5mm_oblique",
+            PlainBody::grid({1, 1, 5}, rotation_about(normalized({0.3, 1, 0.5}), 0.4)));
+    }
+    for (const int slice_mm : {1, 5}) {
+        add_run("planes/" + std::to_string(slice_mm) + "mm",
+                [=](benchmark::State& state) { planes(state, slice_mm); });
+    }
+    return true;
+}();
+
+}  // namespace
+}  // namespace sonocase::pipeline

@@ -1,0 +1,42 @@
+// A second known body, so that what is asked of labels does not hold for one anatomy alone.
+#include <gtest/gtest.h>
+
+#include "pipeline/import/analytic_torso.h"
+#include "pipeline/segmentation/resample_labels.h"
+#include "support/label_score.h"
+#include "support/plain_body.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using testing::plain_body;
+using testing::PlainBody;
+
+// Voxels of 2 mm are an eighth of the points of 1 mm, read from the same partition of space: the
+// shares are those of 1 mm to a hundredth of themselves.
+TEST(PlainBody, SlicesOfFiveMillimetresKeepEveryLabel) {
+    const Grid grid = PlainBody::grid({1, 1, 5});
+    const LabelVolume ct = plain_body().sample(grid);
+    ASSERT_EQ(ct.labels.size(), 26u);
+    Registration registration = analytic_torso_truth();
+    registration.ct_box = grid.bounds();
+    ResampleOptions options;
+    options.voxel_mm = 2;
+    const auto shape = resample_labels({ct, registration}, options);
+    options.method = "nearest";
+    const auto nearest = resample_labels({ct, registration}, options);
+    ASSERT_TRUE(shape && nearest);
+    const auto truth = testing::truth_on(shape->volume.grid, registration, grid,
+                                         [](Point3 p) { return plain_body().label(p); });
+    const testing::LabelScore ours = testing::score_labels(shape->volume, truth);
+    const testing::LabelScore theirs = testing::score_labels(nearest->volume, truth);
+    ASSERT_EQ(ours.labels, 25);
+    // As asked for; reached are 0.950 and 1.1 %, and 0.326 of nearest neighbour's 1.46 %.
+    EXPECT_GT(ours.dice, 0.93);
+    EXPECT_EQ(ours.lost, 0);
+    EXPECT_LT(ours.volume_change, 0.02);
+    EXPECT_LT(ours.wrong, 0.4 * theirs.wrong);
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
