@@ -9,8 +9,9 @@
 
 namespace sonocase::pipeline {
 
-// Slicer's header fields: one segment a label, in one layer, with its own extent. Labels without a
-// colour get one each.
+// Slicer's header fields: one segment a label, all in one layer and with its extent. Labels without
+// a colour get one each.
+// Source: 3D Slicer, developer guide, "Segmentation labelmap file format (.seg.nrrd)".
 std::map<std::string, std::string> seg_nrrd_fields(const LabelVolume& volume);
 
 // One 8-bit layer, gzip inside; a label's value is its palette index. The volume's frame is written

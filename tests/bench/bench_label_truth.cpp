@@ -1,16 +1,11 @@
-// How true labels are on two bodies known in closed form, through the same warp into voxels of 1
-// mm.
+// How true labels are on two bodies known in closed form, through the same warp into voxels of 1 mm.
 //
-//   plain_body/...   the plain body from slices 1, 3 and 5 mm apart, pixels of 1 mm; 5 mm apart
-//   also
-//                    across the body and in a grid that lies oblique to it. dice, wrong_percent,
-//                    wrong_of_nearest (share of nearest neighbour's wrong voxels), volume_percent,
-//                    lost
-//   planes/...       boundary records of the analytic torso's organs: 95th percentiles of the
-//   distance
-//                    (um) and of the normal (hundredths of a degree); class_... percent of random
-//                    points near a surface whose label is right: in voxels with a record, within 3
-//                    and 4 mm
+//   plain_body/...  the plain body from slices 1, 3 and 5 mm apart with pixels of 1 mm; those of 5 mm
+//                   also across the body, and in a grid that lies oblique to it. wrong_of_nearest is
+//                   the share of nearest neighbour's wrong voxels
+//   planes/...      boundary records of the whole analytic torso: 95th percentiles of the distance
+//                   (mm) and of the normal (deg) by organ; class_...: percent of random points whose
+//                   label is right, in voxels that have a record and within 3 and 4 mm of a surface
 #include <benchmark/benchmark.h>
 
 #include <string>

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -35,6 +36,7 @@ LabelVolume torso_sized() {
     return volume;
 }
 
+// Read by ITK, which shares no code with the writer.
 TEST(ExportSegNrrd, ReadsBackWithNamesColoursAndPlace) {
     const LabelVolume volume = torso_sized();
     const std::string path = scratch("labels.seg.nrrd");
@@ -53,6 +55,41 @@ TEST(ExportSegNrrd, ReadsBackWithNamesColoursAndPlace) {
     EXPECT_EQ(read.voxels, volume.voxels);
 }
 
+// Whatever order of axes the reader brings, every voxel has its label at its place in the room.
+TEST(ExportSegNrrd, ObliqueGridsKeepTheirPlace) {
+    LabelVolume volume = torso_sized();
+    volume.grid.direction = rotation_about(normalized({0.3, 1, 0.5}), 0.3) *
+                            Matrix3::from_columns({0, -1, 0}, {1, 0, 0}, {0, 0, 1});
+    volume.grid.spacing_mm = {7, 8, 9};
+    volume.grid.origin_mm = {40, -90, 130};
+    // Nothing about it is symmetric.
+    for (std::size_t v = 0; v < volume.voxels.size() / 3; ++v)
+        if (volume.voxels[v] == 2) volume.voxels[v] = 1;
+    const std::string path = scratch("oblique.seg.nrrd");
+    ASSERT_TRUE(export_seg_nrrd(volume, path));
+    const auto back = import_label_map(path);
+    ASSERT_TRUE(back) << back.error().message();
+    const LabelVolume& read = back->labels;
+    ASSERT_EQ(read.voxels.size(), volume.voxels.size());
+    const Grid& g = read.grid;
+    std::size_t wrong = 0;
+    for (int k = 0; k < g.size.z; ++k) {
+        for (int j = 0; j < g.size.y; ++j) {
+            for (int i = 0; i < g.size.x; ++i) {
+                const Point3 v = volume.grid.voxel_from_point(
+                    g.point_from_voxel({1.0 * i, 1.0 * j, 1.0 * k}));
+                const int x = static_cast<int>(std::lround(v.x)),
+                          y = static_cast<int>(std::lround(v.y)),
+                          z = static_cast<int>(std::lround(v.z));
+                ASSERT_TRUE(volume.grid.contains(x, y, z));
+                ASSERT_LT(norm(v - Point3{1.0 * x, 1.0 * y, 1.0 * z}), 1e-6);
+                wrong += read.voxels[g.index(i, j, k)] != volume.voxels[volume.grid.index(x, y, z)];
+            }
+        }
+    }
+    EXPECT_EQ(wrong, 0u);
+}
+
 // The header's lines as 3D Slicer documents them for .seg.nrrd, read as text by no library of ours.
 TEST(ExportSegNrrd, HeaderIsWhat3DSlicerReads) {
     LabelVolume volume = torso_sized();
@@ -65,6 +102,8 @@ TEST(ExportSegNrrd, HeaderIsWhat3DSlicerReads) {
     for (const char* line :
          {"dimension: 3", "sizes: 40 40 40", "kinds: domain domain domain",
           "Segmentation_MasterRepresentation:=Binary labelmap",
+          "Segmentation_SourceRepresentation:=Binary labelmap",
+          "Segmentation_ReferenceImageExtentOffset:=0 0 0",
           "Segmentation_ContainedRepresentationNames:=Binary labelmap|",
           "Segment0_Name:=other_fat", "Segment0_LabelValue:=1", "Segment0_Layer:=0",
           "Segment1_ID:=liver", "Segment1_Name:=liver", "Segment1_LabelValue:=2",
@@ -72,8 +111,9 @@ TEST(ExportSegNrrd, HeaderIsWhat3DSlicerReads) {
           "Segment1_Tags:=sonocase.tissue:liver|"})
         EXPECT_TRUE(lines.count(line)) << line;
     EXPECT_FALSE(lines.count("Segment2_Name:=outside"));
-    // Ranges of voxels that hold the segment, inclusive: 50 mm in voxels of 8 mm about 19.5.
-    EXPECT_TRUE(lines.count("Segment1_Extent:=14 25 14 25 14 25"));
+    // Inclusive, and of the whole layer for each segment: Slicer cuts a layer to its first one's.
+    EXPECT_TRUE(lines.count("Segment0_Extent:=0 39 0 39 0 39"));
+    EXPECT_TRUE(lines.count("Segment1_Extent:=0 39 0 39 0 39"));
 }
 
 TEST(ExportLevelSets, WritesAndRefuses) {
