@@ -56,7 +56,7 @@ float curvature(const float* p, const Stencil& s, float h) {
     const float top = dxx * (dy * dy + dz * dz) + dyy * (dx * dx + dz * dz) +
                       dzz * (dx * dx + dy * dy) -
                       2 * (dxy * dx * dy + dxz * dx * dz + dyz * dy * dz);
-    const float kappa = top / (g2 * std::sqrt(g2));
+    const float kappa = top / (h * g2 * std::sqrt(g2));  // differences are over voxels, not mm
     // A stencil resolves no curvature above about 1/h in each direction.
     return std::clamp(kappa, -2.0f / h, 2.0f / h);
 }

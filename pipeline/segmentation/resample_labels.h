@@ -48,7 +48,7 @@ struct ResampleOptions {
 };
 
 // Raised whenever the same input and options give other bytes than before.
-inline constexpr int kResampleVersion = 7;
+inline constexpr int kResampleVersion = 8;
 
 struct ResampleSeconds {  // method shape; wall clock
     double distances = 0, volumes = 0, voxels = 0;
