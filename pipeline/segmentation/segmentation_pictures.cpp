@@ -10,23 +10,12 @@
 #include "pipeline/cook/preview_picture.h"
 #include "formats/atomic_file.h"
 #include "pipeline/registration/inverse_map.h"
+#include "pipeline/segmentation/label_colour.h"
 
 namespace sonocase::pipeline {
 namespace {
 
 using Colour = std::array<std::uint8_t, 3>;
-
-Colour colour_of(const std::vector<Label>& labels, int label) {
-    if (label <= 0) return {18, 18, 18};
-    const Colour own = labels[static_cast<std::size_t>(label)].colour;
-    if (own != Colour{0, 0, 0}) return own;
-    Colour out;
-    for (unsigned c = 0; c < 3; ++c) {
-        out[c] =
-            static_cast<std::uint8_t>(70 + (static_cast<unsigned>(label) * (53 + 38 * c)) % 170);
-    }
-    return out;
-}
 
 int nearest_label(const LabelVolume& volume, Point3 voxel) {
     const int i = static_cast<int>(std::lround(voxel.x)),
@@ -41,7 +30,8 @@ struct Plane {
 };
 constexpr Plane kPlanes[] = {{"xy", 0, 1, 2}, {"xz", 0, 2, 1}, {"yz", 1, 2, 0}};
 
-// The middle of a cube of 8 voxels that holds the most labels: where it is hardest.
+// The middle of a cube of 8 voxels that holds the most labels, and nothing of the outside (which
+// is all round the body and at its cut ends): where it is hardest.
 Point3 busiest_place(const LabelVolume& volume) {
     const Int3 n = volume.grid.size;
     constexpr int kEdge = 8;
@@ -55,7 +45,7 @@ Point3 busiest_place(const LabelVolume& volume) {
                     present.set(volume.voxels[volume.grid.index(
                         i + q % kEdge, j + q / kEdge % kEdge, k + q / kEdge / kEdge)]);
                 }
-                if (present.count() > most) {
+                if (!present[0] && present.count() > most) {
                     most = present.count();
                     place = {i + 0.5 * kEdge, j + 0.5 * kEdge, k + 0.5 * kEdge};
                 }
@@ -84,6 +74,20 @@ int label_with_boundary(const LabelVolume& volume,
     return d >= 0 ? own : record.second_label;
 }
 
+bool label_is_within(const LabelVolume& volume, int label, double reach_vx, Point3 voxel) {
+    const int n = static_cast<int>(std::ceil(reach_vx));
+    for (int k = -n; k <= n; ++k) {
+        for (int j = -n; j <= n; ++j) {
+            for (int i = -n; i <= n; ++i) {
+                const Vector3 step{1.0 * i, 1.0 * j, 1.0 * k};
+                if (norm(step) <= reach_vx && nearest_label(volume, voxel + step) == label)
+                    return true;
+            }
+        }
+    }
+    return false;
+}
+
 Status write_segmentation_pictures(const SegmentationPictureInput& input,
                                    const std::string& folder) {
     const Grid& g = input.after.grid;
@@ -98,6 +102,16 @@ Status write_segmentation_pictures(const SegmentationPictureInput& input,
         }
         return nearest_label(input.before, input.before.grid.voxel_from_point(p));
     };
+    // In voxels of `after`: steps of the map lie half a diagonal to either side of a smooth surface,
+    // and so do its own.
+    const double reach_vx =
+        0.5 * (norm(input.before.grid.spacing_mm) + norm(g.spacing_mm)) / g.spacing_mm.x;
+    const auto changed_colour = [&](int before_label, int after_label, Point3 v) {
+        const Colour c = colour_of(input.after.labels, after_label);
+        const auto grey = static_cast<std::uint8_t>(20 + (c[0] + 2 * c[1] + c[2]) / 10);
+        if (before_label == after_label) return Colour{grey, grey, grey};
+        return label_is_within(input.after, before_label, reach_vx, v) ? Colour{150, 130, 60} : Colour{255, 40, 40};
+    };
     const Point3 middle{0.5 * (g.size.x - 1), 0.5 * (g.size.y - 1), 0.5 * (g.size.z - 1)};
     const Point3 busy = busiest_place(input.after);
     for (const Plane& plane : kPlanes) {
@@ -109,9 +123,9 @@ Status write_segmentation_pictures(const SegmentationPictureInput& input,
             const double step = std::max(wide, high) / 480;  // voxels a pixel
             const int width = std::max(1, static_cast<int>(wide / step));
             const int height = std::max(1, static_cast<int>(high / step));
-            constexpr int kGap = 6;
+            constexpr int kGap = 6, kPanels = 4;
             Picture picture;
-            picture.width_px = 3 * width + 2 * kGap;
+            picture.width_px = kPanels * width + (kPanels - 1) * kGap;
             picture.height_px = height;
             picture.rgb.assign(
                 3 * static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(height),
@@ -124,9 +138,10 @@ Status write_segmentation_pictures(const SegmentationPictureInput& input,
                     const int labels[3] = {
                         before(v), nearest_label(input.after, v),
                         label_with_boundary(input.after, input.boundary, v.x, v.y, v.z)};
-                    for (int panel = 0; panel < 3; ++panel) {
+                    for (int panel = 0; panel < kPanels; ++panel) {
                         const auto& palette = panel == 0 ? input.before.labels : input.after.labels;
-                        const Colour colour = colour_of(palette, labels[panel]);
+                        const Colour colour = panel < 3 ? colour_of(palette, labels[panel])
+                                                        : changed_colour(labels[0], labels[2], v);
                         const std::size_t at =
                             3 * (static_cast<std::size_t>(y) *
                                      static_cast<std::size_t>(picture.width_px) +

@@ -1,4 +1,4 @@
-// Before and after in three planes: what resampling and smoothing did, for people.
+// Before, after and what changed in three planes: what resampling and smoothing did, for people.
 #pragma once
 
 #include <cstdint>
@@ -25,9 +25,14 @@ int label_with_boundary(const LabelVolume& volume,
                         double y,
                         double z);
 
+// Whether a voxel of `label` (outside beyond the volume) lies within so many voxels of a point.
+bool label_is_within(const LabelVolume& volume, int label, double reach_vx, Point3 voxel);
+
 // Writes whole-xy.png, whole-xz.png, whole-yz.png (axes of `after`, through the middle of the body)
-// and close-up-xy.png and so on (40 mm about the place with the most labels): left before, middle
-// after as voxels, right after with boundary planes. Makes the folder.
+// and close-up-xy.png and so on (40 mm about the place with the most labels). Four panels from
+// left: before; after as voxels; after with boundary planes; and on grey what changed: ochre where
+// a label gave way to another beside it, as when steps are taken out, red where the label that was
+// there is further off than half a voxel of either volume. Makes the folder.
 Status write_segmentation_pictures(const SegmentationPictureInput& input,
                                    const std::string& folder);
 

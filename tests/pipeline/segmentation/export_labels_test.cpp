@@ -131,6 +131,16 @@ TEST(ExportLevelSets, WritesAndRefuses) {
     EXPECT_FALSE(export_level_sets(thick, path));
 }
 
+// A ball of 50 mm in voxels of 8 mm, seen from its middle and from 20 mm outside of it.
+TEST(SegmentationPictures, ALabelIsMissedBeyondTheReachOfSteps) {
+    const LabelVolume volume = torso_sized();
+    EXPECT_TRUE(label_is_within(volume, 2, 0, {19.5, 19.5, 19.5}));
+    EXPECT_FALSE(label_is_within(volume, 1, 4, {19.5, 19.5, 19.5}));
+    EXPECT_FALSE(label_is_within(volume, 2, 2, {19.5 + 70 / 8.0, 19.5, 19.5}));
+    EXPECT_TRUE(label_is_within(volume, 2, 4, {19.5 + 70 / 8.0, 19.5, 19.5}));
+    EXPECT_TRUE(label_is_within(volume, 0, 1, {-3, 0, 0}));
+}
+
 TEST(SegmentationPictures, SixPicturesAreWritten) {
     const LabelVolume volume = torso_sized();
     const std::string folder = scratch("pictures");
