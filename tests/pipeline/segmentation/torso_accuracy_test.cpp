@@ -42,7 +42,8 @@ void expect_within(const Errors& errors, double distance_mm, double normal_deg) 
 
 // The right kidney and the pancreas do not reach what is asked: a fifth of their records lie within
 // 2 mm of an edge where a third label meets them, and an edge is drawn rounded over a voxel or two,
-// as one plane a voxel has to. Where two labels meet alone every organ is well within it.
+// as one plane a voxel has to. Where two labels meet alone every organ is well within it. (Of a
+// kidney cut in half by its block the limits were 0.15 mm and 12.3 degrees; it is whole now.)
 TEST(TorsoAccuracy, BoundaryPlanesOfOrgans) {
     const struct {
         const char* name;
@@ -80,7 +81,7 @@ TEST(TorsoAccuracy, BoundaryPlanesOfATubeOfTwoMillimetres) {
 TEST(TorsoAccuracy, ClassNearASurface) {
     const std::uint64_t seed = 31;
     SCOPED_TRACE(seed);
-    EXPECT_GT(fine().right_class(50000, 0, seed), 0.977);
+    EXPECT_GT(fine().right_class(50000, 0, seed), 0.979);
     EXPECT_GT(fine().right_class(20000, 3, seed), 0.988);
     EXPECT_GT(fine().right_class(20000, 4, seed), 0.99);
 }
@@ -98,13 +99,13 @@ TEST(TorsoAccuracy, ThickSlicesKeepNormalsAndVessels) {
     for (const auto& e : thick().plane_errors(thick().label("liver"), kStride)) errors.add(e);
     ASSERT_GT(errors.normal_deg.size(), 30000u);
     EXPECT_LT(rms(errors.normal_deg), 9);
-    EXPECT_GT(thick().right_class(50000, 0, 31), 0.935);
+    EXPECT_GT(thick().right_class(50000, 0, 31), 0.942);
     EXPECT_GT(thick().right_class(20000, 3, 31), 0.965);
     // The block cuts none of them but the portal vein's end.
     for (const char* name :
          {"portal_vein_and_splenic_vein", "hepatic_vein_3mm", "hepatic_vein_2mm"})
         EXPECT_NEAR(thick().change(name), 0, 0.05) << name;
-    EXPECT_GT(thick().change("hepatic_artery_1p5mm"), -0.3);
+    EXPECT_GT(thick().change("hepatic_artery_1p5mm"), -0.1);
 }
 
 // The slope of the liver's voxels (1 and 0) under a Gaussian, at its outermost voxels, in degrees
