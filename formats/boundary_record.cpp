@@ -8,8 +8,9 @@ namespace sonocase {
 namespace {
 
 std::uint32_t signed_byte(double value) {
-    const double r = std::clamp(std::round(value), -127.0, 127.0);
-    return static_cast<std::uint32_t>(static_cast<std::int32_t>(r)) & 0xFFu;
+    // To the nearest, halves away from zero.
+    const auto r = static_cast<std::int32_t>(std::min(std::abs(value), 127.0) + 0.5);
+    return static_cast<std::uint32_t>(value < 0 ? -r : r) & 0xFFu;
 }
 
 double from_signed_byte(std::uint32_t bits) {
@@ -33,15 +34,17 @@ std::uint32_t pack_boundary(const BoundaryRecord& record) {
 }
 
 BoundaryRecord unpack_boundary(std::uint32_t packed) {
-    double u = from_signed_byte(packed >> 16) / 127, v = from_signed_byte(packed >> 24) / 127;
-    const double z = 1 - std::abs(u) - std::abs(v);
+    double x = from_signed_byte(packed >> 16), y = from_signed_byte(packed >> 24);
+    const double z = 127 - std::abs(x) - std::abs(y);
     if (z < 0) {
-        const double u0 = u;
-        u = (1 - std::abs(v)) * (u0 < 0 ? -1 : 1);
-        v = (1 - std::abs(u0)) * (v < 0 ? -1 : 1);
+        const double x0 = x;
+        x = (127 - std::abs(y)) * (x0 < 0 ? -1 : 1);
+        y = (127 - std::abs(x0)) * (y < 0 ? -1 : 1);
     }
+    const double scale = 1 / std::sqrt(x * x + y * y + z * z);  // never 0: they add up to 127
     return {static_cast<std::uint8_t>(packed & 0xFFu),
-            from_signed_byte(packed >> 8) / kBoundaryStepsPerVoxel, normalized({u, v, z})};
+            from_signed_byte(packed >> 8) / kBoundaryStepsPerVoxel,
+            {scale * x, scale * y, scale * z}};
 }
 
 }  // namespace sonocase

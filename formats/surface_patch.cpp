@@ -99,28 +99,69 @@ std::uint32_t nearer_of(std::uint32_t record, std::uint32_t other) {
     return nearer ? other : record;
 }
 
-// The 10 monomials of q are fitted in voxels; the sums of the normal equations.
-struct Fit {
-    double matrix[kPatchCoefficients][kPatchCoefficients] = {};
-    double right[kPatchCoefficients] = {};
+// The 10 monomials of q are fitted in voxels. Of the normal equations' matrix only the lower half is
+// kept, row by row; what a voxel's record adds to it depends on the voxel's place alone, and is a
+// multiple of 1/16, so that sums of it are exact in any order.
+constexpr int kMatrix = kPatchCoefficients * (kPatchCoefficients + 1) / 2;
+constexpr int entry(int i, int j) {
+    return i * (i + 1) / 2 + j;
+}
 
-    void add(Vector3 u, double distance, Vector3 normal) {
-        const double row[kPatchCoefficients] = {1,         u.x,       u.y,       u.z,       u.x * u.x,
-                                                u.y * u.y, u.z * u.z, u.x * u.y, u.x * u.z, u.y * u.z};
+// Where each axis' derivative has its four terms, and what they are worth at u. That it should have
+// the length of 1 is what makes a distance of q, and the fit of few records firm.
+constexpr int kSlopeAt[3][4] = {{1, 4, 7, 8}, {2, 5, 7, 9}, {3, 6, 8, 9}};
+
+struct Terms {
+    double value[kPatchCoefficients];
+    double slope[3][4];
+    double matrix[kMatrix];
+};
+
+constexpr std::array<Terms, kBrickVoxels> terms_of_voxels() {
+    std::array<Terms, kBrickVoxels> out{};
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+        const double x = 0.5 * kPlaces.x[v], y = 0.5 * kPlaces.y[v], z = 0.5 * kPlaces.z[v];
+        Terms& t = out[v];
+        const double value[] = {1, x, y, z, x * x, y * y, z * z, x * y, x * z, y * z};
+        const double slope[3][4] = {{1, 2 * x, y, z}, {1, 2 * y, x, z}, {1, 2 * z, x, y}};
         for (int i = 0; i < kPatchCoefficients; ++i) {
-            for (int j = 0; j <= i; ++j) matrix[i][j] += row[i] * row[j];
-            right[i] += row[i] * distance;
+            t.value[i] = value[i];
+            for (int j = 0; j <= i; ++j) t.matrix[entry(i, j)] += value[i] * value[j];
         }
-        // Where each axis' derivative has its four terms, and what they are worth at u. That it
-        // should have the length of 1 is what makes a distance of q, and the fit of few records firm.
-        const int at[3][4] = {{1, 4, 7, 8}, {2, 5, 7, 9}, {3, 6, 8, 9}};
-        const double term[3][4] = {
-            {1, 2 * u.x, u.y, u.z}, {1, 2 * u.y, u.x, u.z}, {1, 2 * u.z, u.x, u.y}};
         for (int a = 0; a < 3; ++a) {
             for (int i = 0; i < 4; ++i) {
+                t.slope[a][i] = slope[a][i];
                 for (int j = 0; j <= i; ++j)
-                    matrix[at[a][i]][at[a][j]] += term[a][i] * term[a][j];
-                right[at[a][i]] += term[a][i] * normal[a];
+                    t.matrix[entry(kSlopeAt[a][i], kSlopeAt[a][j])] += slope[a][i] * slope[a][j];
+            }
+        }
+    }
+    return out;
+}
+alignas(64) constexpr std::array<Terms, kBrickVoxels> kTerms = terms_of_voxels();
+
+// What a patch is fitted to: records of some voxels, turned to its own side.
+struct Samples {
+    std::size_t count = 0;
+    std::array<std::uint8_t, kBrickVoxels> voxel;
+    std::array<std::array<double, 4>, kBrickVoxels> plane;  // distance, normal
+};
+
+struct Fit {
+    double matrix[kMatrix] = {};
+    double right[kPatchCoefficients] = {};
+
+    SONOCASE_WIDEST void add(const Samples& samples) {
+        for (std::size_t s = 0; s < samples.count; ++s) {
+            const Terms& t = kTerms[samples.voxel[s]];
+            for (int e = 0; e < kMatrix; ++e) matrix[e] += t.matrix[e];
+        }
+        for (std::size_t s = 0; s < samples.count; ++s) {
+            const Terms& t = kTerms[samples.voxel[s]];
+            const auto& plane = samples.plane[s];
+            for (int i = 0; i < kPatchCoefficients; ++i) right[i] += t.value[i] * plane[0];
+            for (int a = 0; a < 3; ++a) {
+                for (int i = 0; i < 4; ++i) right[kSlopeAt[a][i]] += t.slope[a][i] * plane[1 + a];
             }
         }
     }
@@ -131,7 +172,7 @@ struct Fit {
         double l[kPatchCoefficients][kPatchCoefficients];
         for (int i = 0; i < kPatchCoefficients; ++i) {
             for (int j = 0; j <= i; ++j) {
-                double sum = matrix[i][j];
+                double sum = matrix[entry(i, j)];
                 if (i == j) sum += i < 4 ? kAnything : kFlat;
                 for (int k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
                 l[i][j] = i == j ? std::sqrt(sum) : sum / l[j][j];
@@ -208,15 +249,17 @@ std::vector<SurfacePatch> fit_patches(const BrickLabels& labels,
         SurfacePatch patch;
         patch.low = static_cast<std::uint8_t>(wanted >> 8);
         patch.high = static_cast<std::uint8_t>(wanted & 0xFFu);
-        Fit fit;
+        Samples samples;
         for (std::size_t v = 0; v < kBrickVoxels; ++v) {
             if (pair[v] != wanted) continue;
-            const BoundaryRecord record = unpack_boundary(records[v]);
+            const BoundaryRecord r = unpack_boundary(records[v]);
             const double side = labels[v] == patch.low ? 1 : -1;
-            const Vector3 u{static_cast<double>(v % 4) - 1.5, static_cast<double>(v / 4 % 4) - 1.5,
-                            static_cast<double>(v / 16) - 1.5};
-            fit.add(u, side * record.distance_vx, side * record.normal);
+            samples.voxel[samples.count] = static_cast<std::uint8_t>(v);
+            samples.plane[samples.count++] = {side * r.distance_vx, side * r.normal.x,
+                                              side * r.normal.y, side * r.normal.z};
         }
+        Fit fit;
+        fit.add(samples);
         double c[kPatchCoefficients];
         fit.solve(c);
         for (int i = 0; i < kPatchCoefficients; ++i) {

@@ -10,13 +10,13 @@
 #include "pipeline/import/label_map.h"
 #include "pipeline/registration/register_surfaces.h"
 #include "pipeline/segmentation/resample_labels.h"
+#include "pipeline/segmentation/smooth_labels.h"
 
 namespace sonocase::pipeline {
 namespace {
 
 // Of stages whose headers name none. A change of what a stage computes raises its number, and with
 // it every key that the stage has a part in.
-constexpr int kSmoothVersion = 4;
 constexpr int kTextureVersion = 1;
 constexpr int kStructureVersion = 2;
 

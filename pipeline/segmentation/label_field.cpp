@@ -18,6 +18,10 @@ Four load(const float* p) {
     return v;
 }
 
+void store(Four v, float* p) {
+    __builtin_memcpy(p, &v, sizeof v);
+}
+
 // Weights of the cubic B-spline at fraction t, and their derivatives.
 Four weights(float t) {
     const float s = 1 - t;
@@ -52,6 +56,33 @@ std::pair<Int3, Int3> voxels_near(Int3 first, Int3 size, int factor) {
 constexpr std::size_t kRowStride = kFieldRow;
 constexpr std::size_t kPlaneStride = static_cast<std::size_t>(kFieldRow) * kFieldNodes;
 
+constexpr int kCorners = kFieldBlock + 1;  // of a block's cells, along an edge
+constexpr std::size_t kCornerCount = static_cast<std::size_t>(kCorners) * kCorners * kCorners;
+
+// The spline through a block's values, at its nodes: a weighted mean of three along each axis.
+void read_corners(const float* values, float* out) {
+    const auto mean = [](float a, float b, float c) { return (a + 4 * b + c) * (1.0f / 6); };
+    std::array<float, kFieldValues> rows, planes;
+    for (std::size_t k = 0; k < kFieldNodes; ++k) {
+        for (std::size_t v = 0; v < kCorners * kRowStride; ++v) {
+            const float* p = values + k * kPlaneStride + v;
+            rows[k * kPlaneStride + v] = mean(p[0], p[kRowStride], p[2 * kRowStride]);
+        }
+    }
+    for (std::size_t k = 0; k < kCorners; ++k) {
+        for (std::size_t v = 0; v < kCorners * kRowStride; ++v) {
+            const float* p = rows.data() + k * kPlaneStride + v;
+            planes[v] = mean(p[0], p[kPlaneStride], p[2 * kPlaneStride]);
+        }
+        for (std::size_t j = 0; j < kCorners; ++j) {
+            for (std::size_t i = 0; i < kCorners; ++i) {
+                const float* p = planes.data() + j * kRowStride + i;
+                out[i + kCorners * (j + kCorners * k)] = mean(p[0], p[1], p[2]);
+            }
+        }
+    }
+}
+
 }  // namespace
 
 LabelField::LabelField(const LabelVolume& labels,
@@ -73,7 +104,7 @@ LabelField::LabelField(const LabelVolume& labels,
     std::vector<std::vector<std::uint32_t>> blocks_of(2 * labels_count);
     parallel_for(blocks_.size(), 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t b = begin; b < end; ++b) {
-            if (blocks_[b].labels.size() > 1) list_terms(&blocks_[b]);
+            if (blocks_[b].labels.size() > 1) list_phis(&blocks_[b]);
         }
     });
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
@@ -131,7 +162,6 @@ LabelField::LabelField(const LabelVolume& labels,
             }
         }
     });
-    find_sure_nodes();
 }
 
 // Labels near a block, and those of which an outline is swept through it.
@@ -197,7 +227,7 @@ void LabelField::mark_candidates(const LabelDistance& distance) {
     });
 }
 
-void LabelField::list_terms(Block* block) const {
+void LabelField::list_phis(Block* block) const {
     LabelSet candidates;
     for (const std::uint8_t l : block->labels) candidates.set(l);
     for (std::size_t l = 0; l < tree_.parent.size(); ++l) {
@@ -209,158 +239,214 @@ void LabelField::list_terms(Block* block) const {
     for (const std::uint8_t l : block->labels) {
         if (block->labels.size() > 2 && tree_.between[l]) block->alone.push_back(l);
     }
-    for (const std::uint8_t l : block->labels) {
-        for (std::size_t e = 0; e < block->edges.size(); ++e) {
-            if (tree_.members[block->edges[e]][l])
-                block->terms.push_back(static_cast<std::uint16_t>(e));
-        }
-        for (std::size_t e = 0; e < block->alone.size(); ++e) {
-            if (block->alone[e] == l)
-                block->terms.push_back(static_cast<std::uint16_t>(block->edges.size() + e));
-        }
-        block->terms_end.push_back(static_cast<std::uint16_t>(block->terms.size()));
-    }
 }
 
-float LabelField::block_score(const Block& block,
-                              std::size_t candidate,
-                              const float* values) const {
-    float score = -prices_[block.labels[candidate]];
-    for (std::size_t t = candidate > 0 ? block.terms_end[candidate - 1] : 0;
-         t < block.terms_end[candidate]; ++t) {
-        score += values[block.terms[t]];
+// What the labels have in common is left out.
+LabelField::Contest LabelField::contest_of(const Block& block,
+                                           const std::vector<std::uint8_t>& labels) const {
+    Contest contest;
+    contest.labels = labels;
+    std::vector<std::vector<std::uint16_t>> of_label(labels.size());
+    const auto add = [&](std::size_t place, const auto& within) {
+        std::size_t count = 0;
+        for (const std::uint8_t l : labels) count += within(l);
+        if (count == 0 || count == labels.size()) return;
+        for (std::size_t i = 0; i < labels.size(); ++i) {
+            if (within(labels[i]))
+                of_label[i].push_back(static_cast<std::uint16_t>(contest.phis.size()));
+        }
+        contest.phis.push_back(static_cast<std::uint16_t>(place));
+    };
+    for (std::size_t e = 0; e < block.edges.size(); ++e)
+        add(e, [&](std::uint8_t l) { return tree_.members[block.edges[e]][l]; });
+    for (std::size_t e = 0; e < block.alone.size(); ++e)
+        add(block.edges.size() + e, [&](std::uint8_t l) { return l == block.alone[e]; });
+    for (const auto& terms : of_label) {
+        contest.terms.insert(contest.terms.end(), terms.begin(), terms.end());
+        contest.terms_end.push_back(static_cast<std::uint16_t>(contest.terms.size()));
     }
-    return score;
+    return contest;
+}
+
+void LabelField::sum_terms(const Contest& contest, const float* phis, float* out) const {
+    std::size_t t = 0;
+    for (std::size_t l = 0; l < contest.labels.size(); ++l) {
+        float score = -prices_[contest.labels[l]];
+        for (; t < contest.terms_end[l]; ++t) score += phis[contest.terms[t]];
+        out[l] = score;
+    }
 }
 
 LabelField::Position LabelField::locate(float x, float y, float z) const {
     Position p;
     const float v[3] = {x, y, z};
     std::size_t local[3];
-    for (int a = 0; a < 3; ++a) {
-        const float c = std::clamp(v[a], 0.0f, static_cast<float>(nodes_.size[a] - 1));
-        const int cell = static_cast<int>(c);
-        const auto u = static_cast<std::size_t>(a);
-        p.cell[u] = cell;
-        p.t[u] = c - static_cast<float>(cell);
-        local[u] = static_cast<std::size_t>(cell % kFieldBlock);
+    int cell[3];
+    for (std::size_t a = 0; a < 3; ++a) {
+        const int axis = static_cast<int>(a);
+        const float c = std::clamp(v[a], 0.0f, static_cast<float>(nodes_.size[axis] - 1));
+        cell[a] = static_cast<int>(c);
+        p.t[a] = c - static_cast<float>(cell[a]);
+        local[a] = static_cast<std::size_t>(cell[a] % kFieldBlock);
+        store(weights(p.t[a]), p.weights[a].data());
     }
-    p.block = &block_of(p.cell[0], p.cell[1], p.cell[2]);
+    p.block = &block_of(cell[0], cell[1], cell[2]);
+    const std::size_t at = local[0] + kFieldBlock * (local[1] + kFieldBlock * local[2]);
+    if (!p.block->contests.empty()) {
+        p.contest = &p.block->contests[p.block->contest_of_cell.empty()
+                                           ? 0
+                                           : p.block->contest_of_cell[at]];
+    }
     p.offset = local[0] + kRowStride * local[1] + kPlaneStride * local[2];
     return p;
 }
 
 void LabelField::scores(const Position& position, float* out) const {
-    const Block& block = *position.block;
-    if (block.labels.size() < 2) {
-        out[0] = -1e3f;
-        return;
-    }
-    const Four wx = weights(position.t[0]), wy = weights(position.t[1]),
-               wz = weights(position.t[2]);
-    const float* values = pool_.data() + block.values + position.offset;
-    std::array<float, 512> edge;  // each label may give an edge and one alone
-    for (std::size_t e = 0; e < block.edges.size() + block.alone.size();
-         ++e, values += kFieldValues) {
+    const Contest& contest = *position.contest;
+    const auto& [wx, wy, wz] = position.weights;
+    const float* values = pool_.data() + position.block->values + position.offset;
+    std::array<float, 512> phis;  // each label may give an edge and one alone
+    for (std::size_t e = 0; e < contest.phis.size(); ++e) {
+        const float* phi = values + contest.phis[e] * kFieldValues;
         Four total{};
         for (std::size_t k = 0; k < 4; ++k) {
-            const float* p = values + k * kPlaneStride;
+            const float* p = phi + k * kPlaneStride;
             const Four plane = wy[0] * load(p) + wy[1] * load(p + kRowStride) +
                                wy[2] * load(p + 2 * kRowStride) + wy[3] * load(p + 3 * kRowStride);
             total += wz[k] * plane;
         }
-        edge[e] = sum(total * wx);
+        phis[e] = sum(total * load(wx.data()));
     }
-    for (std::size_t c = 0; c < block.labels.size(); ++c)
-        out[c] = block_score(block, c, edge.data());
+    sum_terms(contest, phis.data(), out);
 }
 
 std::array<float, 4> LabelField::difference(const Position& position,
                                             std::size_t a,
                                             std::size_t b) const {
-    const Block& block = *position.block;
-    std::array<float, 4> out{0, 0, 0,
-                             prices_[block.labels[a]] - prices_[block.labels[b]]};
-    for (std::size_t e = 0; e < block.edges.size() + block.alone.size(); ++e) {
-        const auto within = [&](std::uint8_t label) {
-            return e < block.edges.size() ? tree_.members[block.edges[e]][label]
-                                          : block.alone[e - block.edges.size()] == label;
-        };
-        const bool in_a = within(block.labels[a]), in_b = within(block.labels[b]);
-        if (in_a == in_b) continue;
-        const auto one = term_gradient(position, e);
-        for (std::size_t i = 0; i < 4; ++i) out[i] += in_b ? one[i] : -one[i];
-    }
-    return out;
-}
-
-std::array<float, 4> LabelField::term_gradient(const Position& position, std::size_t term) const {
-    const Four wx = weights(position.t[0]), wy = weights(position.t[1]),
-               wz = weights(position.t[2]);
+    const Contest& contest = *position.contest;
+    const auto& [wx, wy, wz] = position.weights;
     const Four sx = slopes(position.t[0]), sy = slopes(position.t[1]), sz = slopes(position.t[2]);
-    const float* values =
-        pool_.data() + position.block->values + term * kFieldValues + position.offset;
+    const float* values = pool_.data() + position.block->values + position.offset;
     Four value{}, along_y{}, along_z{};
-    for (std::size_t k = 0; k < 4; ++k) {
-        const float* p = values + k * kPlaneStride;
-        const Four a = load(p), b = load(p + kRowStride), c = load(p + 2 * kRowStride),
-                   d = load(p + 3 * kRowStride);
-        const Four plane = wy[0] * a + wy[1] * b + wy[2] * c + wy[3] * d;
-        value += wz[k] * plane;
-        along_y += wz[k] * (sy[0] * a + sy[1] * b + sy[2] * c + sy[3] * d);
-        along_z += sz[k] * plane;
+    const auto add = [&](std::size_t term, float sign) {
+        const float* phi = values + contest.phis[term] * kFieldValues;
+        for (std::size_t k = 0; k < 4; ++k) {
+            const float* p = phi + k * kPlaneStride;
+            const Four q = load(p), r = load(p + kRowStride), s = load(p + 2 * kRowStride),
+                       t = load(p + 3 * kRowStride);
+            const Four plane = sign * (wy[0] * q + wy[1] * r + wy[2] * s + wy[3] * t);
+            value += wz[k] * plane;
+            along_y += (sign * wz[k]) * (sy[0] * q + sy[1] * r + sy[2] * s + sy[3] * t);
+            along_z += sz[k] * plane;
+        }
+    };
+    // Terms of the one and not of the other.
+    const auto begin = [&](std::size_t l) { return l > 0 ? contest.terms_end[l - 1] : 0u; };
+    std::size_t i = begin(a), j = begin(b);
+    const std::size_t i_end = contest.terms_end[a], j_end = contest.terms_end[b];
+    while (i < i_end || j < j_end) {
+        const std::size_t of_a = i < i_end ? contest.terms[i] : contest.phis.size();
+        const std::size_t of_b = j < j_end ? contest.terms[j] : contest.phis.size();
+        if (of_a != of_b) of_a < of_b ? add(of_a, -1) : add(of_b, 1);
+        i += of_a <= of_b;
+        j += of_b <= of_a;
     }
-    return {sum(value * sx), sum(along_y * wx), sum(along_z * wx), sum(value * wx)};
+    const Four w = load(wx.data());
+    return {sum(value * sx), sum(along_y * w), sum(along_z * w),
+            sum(value * w) + prices_[contest.labels[a]] - prices_[contest.labels[b]]};
 }
 
-void LabelField::find_sure_nodes() {
+void LabelField::find_contests(float reach_mm) {
     node_label_.assign(nodes_.voxel_count(), 0);
     node_margin_.assign(nodes_.voxel_count(), 255);
     parallel_for(blocks_.size(), 16, [&](std::size_t begin, std::size_t end) {
-        std::vector<float> score(256), edge(512);
-        for (std::size_t b = begin; b < end; ++b) {
-            const Block& block = blocks_[b];
-            for (int k = 0; k < kFieldBlock && block.first.z + k < nodes_.size.z; ++k) {
-                for (int j = 0; j < kFieldBlock && block.first.y + j < nodes_.size.y; ++j) {
-                    const std::size_t row =
-                        nodes_.index(block.first.x, block.first.y + j, block.first.z + k);
-                    const int width = std::min(kFieldBlock, nodes_.size.x - block.first.x);
-                    for (int i = 0; i < width; ++i) {
-                        const std::size_t node = row + static_cast<std::size_t>(i);
-                        if (block.labels.size() < 2) {
-                            node_label_[node] = block.labels[0];
-                            continue;
-                        }
-                        // The stored value stands for the spline's at the node: they differ by less
-                        // than the half voxel that the user of the margin adds.
-                        const float* p = pool_.data() + block.values +
-                                         static_cast<std::size_t>(k + 1) * kPlaneStride +
-                                         static_cast<std::size_t>(j + 1) * kRowStride +
-                                         static_cast<std::size_t>(i + 1);
-                        for (std::size_t e = 0; e < block.edges.size() + block.alone.size();
-                             ++e, p += kFieldValues)
-                            edge[e] = *p;
-                        std::size_t best = 0;
-                        for (std::size_t c = 0; c < block.labels.size(); ++c) {
-                            score[c] = block_score(block, c, edge.data());
-                            if (score[c] < score[best]) best = c;
-                        }
-                        const std::uint8_t own = block.labels[best];
-                        node_label_[node] = own;
-                        // Each phi changes by at most 1 mm a mm.
-                        float margin = 63;
-                        for (std::size_t c = 0; c < block.labels.size(); ++c) {
-                            if (c != best)
-                                margin = std::min(margin, (score[c] - score[best]) /
-                                                              slope(block, own, block.labels[c]));
-                        }
-                        node_margin_[node] =
-                            static_cast<std::uint8_t>(std::clamp(4 * margin, 0.0f, 254.0f));
-                    }
+        std::vector<float> at_corners;
+        for (std::size_t b = begin; b < end; ++b) find_contests(&blocks_[b], reach_mm, &at_corners);
+    });
+}
+
+void LabelField::find_contests(Block* block, float reach_mm, std::vector<float>* at_corners) {
+    // From any point of a cell to its nearest corner.
+    const float reach = reach_mm + 0.5f * static_cast<float>(norm(nodes_.spacing_mm));
+    const std::size_t count = block->labels.size();
+    using Near = std::uint64_t;  // candidates within reach of a surface
+    const bool told = count > 1 && count <= 64;
+    std::array<Near, kCornerCount> near{};
+    block->contest_of_cell.clear();
+    if (count > 1) {
+        block->contests = {contest_of(*block, block->labels)};
+        const std::size_t phis = block->contests[0].phis.size();
+        at_corners->resize(phis * kCornerCount);
+        for (std::size_t e = 0; e < phis; ++e) {
+            read_corners(pool_.data() + block->values + block->contests[0].phis[e] * kFieldValues,
+                         at_corners->data() + e * kCornerCount);
+        }
+    }
+    std::array<float, 256> score;
+    std::array<float, 512> phis;
+    for (int k = 0; k < kCorners; ++k) {
+        for (int j = 0; j < kCorners; ++j) {
+            for (int i = 0; i < kCorners; ++i) {
+                const Int3 at{block->first.x + i, block->first.y + j, block->first.z + k};
+                const bool own = i < kFieldBlock && j < kFieldBlock && k < kFieldBlock &&
+                                 nodes_.contains(at.x, at.y, at.z);
+                if (count < 2) {
+                    if (own) node_label_[nodes_.index(at.x, at.y, at.z)] = block->labels[0];
+                    continue;
                 }
+                const Contest& all = block->contests[0];
+                const auto corner = static_cast<std::size_t>(i + kCorners * (j + kCorners * k));
+                for (std::size_t e = 0; e < all.phis.size(); ++e)
+                    phis[e] = (*at_corners)[e * kCornerCount + corner];
+                sum_terms(all, phis.data(), score.data());
+                const auto best = static_cast<std::size_t>(
+                    std::min_element(score.begin(), score.begin() + count) - score.begin());
+                const std::uint8_t winner = block->labels[best];
+                // Each phi changes by at most 1 mm a mm.
+                float margin = 63;
+                Near here = Near{1} << (best & 63);
+                for (std::size_t c = 0; c < count; ++c) {
+                    if (c == best) continue;
+                    const float m = (score[c] - score[best]) / slope(*block, winner, block->labels[c]);
+                    margin = std::min(margin, m);
+                    if (m <= reach) here |= Near{1} << (c & 63);
+                }
+                near[corner] = here;
+                if (!own) continue;
+                const std::size_t node = nodes_.index(at.x, at.y, at.z);
+                node_label_[node] = winner;
+                node_margin_[node] = static_cast<std::uint8_t>(std::clamp(4 * margin, 0.0f, 254.0f));
             }
         }
-    });
+    }
+    if (!told) return;
+    std::vector<Near> sets{0};  // of contests; the first is never looked for
+    block->contest_of_cell.resize(kFieldBlock * kFieldBlock * kFieldBlock);
+    std::size_t cell = 0;
+    for (int k = 0; k < kFieldBlock; ++k) {
+        for (int j = 0; j < kFieldBlock; ++j) {
+            for (int i = 0; i < kFieldBlock; ++i, ++cell) {
+                Near set = 0;
+                for (int corner = 0; corner < 8; ++corner) {
+                    set |= near[static_cast<std::size_t>(
+                        i + (corner & 1) + kCorners * (j + (corner >> 1 & 1) +
+                                                       kCorners * (k + (corner >> 2))))];
+                }
+                auto found = std::find(sets.begin() + 1, sets.end(), set);
+                if (found == sets.end()) {
+                    if (sets.size() == 256) continue;  // too many to name: all candidates
+                    std::vector<std::uint8_t> labels;
+                    for (std::size_t c = 0; c < count; ++c) {
+                        if (set >> c & 1) labels.push_back(block->labels[c]);
+                    }
+                    block->contests.push_back(contest_of(*block, labels));
+                    sets.push_back(set);
+                    found = sets.end() - 1;
+                }
+                block->contest_of_cell[cell] = static_cast<std::uint8_t>(found - sets.begin());
+            }
+        }
+    }
 }
 
 }  // namespace sonocase::pipeline

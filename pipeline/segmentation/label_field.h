@@ -50,14 +50,21 @@ class LabelField {
     std::vector<float>& prices() { return prices_; }
     const std::vector<float>& prices() const { return prices_; }
 
+    // Labels among which the best two at a point are, and what parts them.
+    struct Contest {
+        std::vector<std::uint8_t> labels;
+        std::vector<std::uint16_t> phis;       // places in the block's values
+        std::vector<std::uint16_t> terms;      // of each label in turn: places in phis, ascending
+        std::vector<std::uint16_t> terms_end;  // # labels, in `terms`
+    };
     struct Block {
         Int3 first;                        // node
         std::vector<std::uint8_t> labels;  // candidates; one: nothing is stored
         std::vector<std::uint8_t> edges;   // that part candidates: the label at their lower end
         std::vector<std::uint8_t> alone;   // labels that carry a phi of themselves alone
-        std::vector<std::uint16_t> terms;  // of each candidate in turn: places in the above two
-        std::vector<std::uint16_t> terms_end;  // # labels, in `terms`
-        std::size_t values = 0;            // into the pool, kFieldValues a phi
+        std::size_t values = 0;            // into the pool, kFieldValues a phi: edges, then alone
+        std::vector<Contest> contests;     // the first: all candidates
+        std::vector<std::uint8_t> contest_of_cell;  // kFieldBlock^3; empty: the first
     };
     const std::vector<Block>& blocks() const { return blocks_; }
     const Block& block_of(int i, int j, int k) const {
@@ -71,15 +78,17 @@ class LabelField {
     // Where a point of node space (clamped to it) lies among the cells, with spline weights.
     struct Position {
         const Block* block = nullptr;
-        std::size_t offset = 0;  // of the first of 4 x 4 x 4 values inside a candidate's values
+        const Contest* contest = nullptr;
+        std::size_t offset = 0;  // of the first of 4 x 4 x 4 values inside a phi's values
+        std::array<std::array<float, 4>, 3> weights;
         std::array<float, 3> t;  // fraction of the cell
-        std::array<int, 3> cell;
     };
     Position locate(float x, float y, float z) const;
 
-    // Score of each candidate at the position; # block->labels.
+    // Score of each label of the position's contest, but for a summand that they have in common;
+    // # contest->labels.
     void scores(const Position& position, float* out) const;
-    // Gradient of score_b - score_a, per node, and its value, for two candidates.
+    // Gradient of score_b - score_a, per node, and its value, for two labels of the contest.
     std::array<float, 4> difference(const Position& position, std::size_t a, std::size_t b) const;
     // Near the surface between two labels their scores part by this much a mm.
     float slope(const Block& block, std::uint8_t a, std::uint8_t b) const {
@@ -88,9 +97,11 @@ class LabelField {
                                   (alone && tree_.between[b]));
     }
 
-    // After the prices are set: per node, how far (mm, whole, at most 254) no other label can come
-    // near. Lets most points be answered by one look-up.
-    void find_sure_nodes();
+    // With the prices as they are: how far (mm) from each node no other label can come near, which
+    // answers most points by one look-up; and in each cell the contest of those labels of which a
+    // surface may lie within reach_mm, with which most others are answered by two labels instead
+    // of by all of a block. Anew after prices change.
+    void find_contests(float reach_mm);
     // Label at the node and its margin.
     std::uint8_t node_label(std::size_t node) const { return node_label_[node]; }
     float node_margin_mm(std::size_t node) const {
@@ -99,9 +110,11 @@ class LabelField {
 
   private:
     void mark_candidates(const LabelDistance& distance);
-    void list_terms(Block* block) const;
-    std::array<float, 4> term_gradient(const Position& position, std::size_t term) const;
-    float block_score(const Block& block, std::size_t candidate, const float* values) const;
+    void list_phis(Block* block) const;
+    Contest contest_of(const Block& block, const std::vector<std::uint8_t>& labels) const;
+    void find_contests(Block* block, float reach_mm, std::vector<float>* at_corners);
+    // Scores of a contest's labels from the values of its phis.
+    void sum_terms(const Contest& contest, const float* phis, float* out) const;
 
     LabelVolume source_;
     LabelTree tree_;

@@ -40,17 +40,16 @@ void solve(std::vector<double>* matrix, std::vector<double>* right, std::size_t 
     }
 }
 
-}  // namespace
-
-LabelPriceReport set_label_prices(LabelField* field,
-                                  const std::function<double(Point3)>& weight,
-                                  const LabelPriceOptions& options) {
+LabelPriceReport prices_up_to(double most_vx,
+                              LabelField* field,
+                              const std::function<double(Point3)>& weight,
+                              const LabelPriceOptions& options) {
     const std::size_t labels = field->label_count();
     const Grid& nodes = field->nodes();
     const LabelVolume& source = field->source();
     const Vector3 h = nodes.spacing_mm;
     const float pixel = static_cast<float>(std::max(h.x, h.y));
-    const float limit = static_cast<float>(options.max_price_vx) * pixel;
+    const float limit = static_cast<float>(most_vx) * pixel;
     std::array<int, 3> parts;
     for (int a = 0; a < 3; ++a) {
         parts[static_cast<std::size_t>(a)] =
@@ -60,6 +59,8 @@ LabelPriceReport set_label_prices(LabelField* field,
     const float cell_mm = static_cast<float>(std::cbrt(cell_mm3));
 
     std::fill(field->prices().begin(), field->prices().end(), 0.0f);
+    // Prices may part two labels by twice the limit, and a cell is shared along a surface that near.
+    field->find_contests(2 * limit + 2 * cell_mm);
     const auto& blocks = field->blocks();
     std::vector<BlockCells> held(blocks.size());
     parallel_for(blocks.size(), 16, [&](std::size_t begin, std::size_t end) {
@@ -105,10 +106,10 @@ LabelPriceReport set_label_prices(LabelField* field,
                                         static_cast<float>(block.first.z + k) + part(c, parts[2]));
                                     field->scores(p, score.data());
                                     Cell cell{};
-                                    for (std::size_t l = 0; l < p.block->labels.size(); ++l) {
+                                    for (std::size_t l = 0; l < p.contest->labels.size(); ++l) {
                                         // Insert into the three best.
                                         float s = score[l];
-                                        std::uint8_t label = p.block->labels[l];
+                                        std::uint8_t label = p.contest->labels[l];
                                         for (std::uint8_t r = 0; r < 3; ++r) {
                                             if (r == cell.count) {
                                                 cell.phi[r] = s;
@@ -263,7 +264,24 @@ LabelPriceReport set_label_prices(LabelField* field,
             price[l] = std::clamp(price[l] + static_cast<float>(change), -limit, limit);
         }
     }
-    field->find_sure_nodes();
+    return report;
+}
+
+}  // namespace
+
+LabelPriceReport set_label_prices(LabelField* field,
+                                  const std::function<double(Point3)>& weight,
+                                  const LabelPriceOptions& options) {
+    // Most maps need half a voxel, and the nearer the limit the fewer cells it can reach.
+    const double enough_vx = std::min(0.7, options.max_price_vx);
+    LabelPriceReport report = prices_up_to(enough_vx, field, weight, options);
+    const Vector3 h = field->nodes().spacing_mm;
+    const double limit = enough_vx * std::max(h.x, h.y);
+    const auto& prices = field->prices();
+    const bool reached = std::any_of(prices.begin(), prices.end(),
+                                     [&](float p) { return std::abs(p) >= 0.999 * limit; });
+    if (reached && enough_vx < options.max_price_vx)
+        report = prices_up_to(options.max_price_vx, field, weight, options);
     return report;
 }
 

@@ -38,7 +38,8 @@ struct FieldRead {
 
 // The field's labels that have voxels in the source and none in the answer are put back as the one
 // voxel where they come nearest to winning. Same bytes for any number of threads.
-FieldRead read_field(const LabelField& field,
+// Sets the field's contests for the band of the records.
+FieldRead read_field(LabelField* field,
                      const Grid& grid,
                      const FieldMap& map,
                      const FieldReadOptions& options,

@@ -52,7 +52,7 @@ FieldRead through_field(const ResampleInput& input,
     };
     map.jacobian = [&](Point3 ct) { return inverse(jacobian(registration, ct)); };
     map.forward = [&](Point3 ct) { return mannequin_from_ct(registration, ct); };
-    FieldRead read = read_field(field, grid, map, {options.record_band_vx}, progress);
+    FieldRead read = read_field(&field, grid, map, {options.record_band_vx}, progress);
     StageReport* report = &result->report;
     if (options.snap_vx > 0 && !read.boundary.table.empty()) {
         const SnapReport snapped = snap_surfaces(

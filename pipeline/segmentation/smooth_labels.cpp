@@ -12,7 +12,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-FieldRead read_on_itself(const LabelField& field,
+FieldRead read_on_itself(LabelField* field,
                          const Grid& grid,
                          double band_vx,
                          const Progress& progress) {
@@ -66,7 +66,7 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
         prices = set_label_prices(&field, [](Point3) { return 1.0; },
                                   {.iterations = options.volume_iterations});
         last = i + 1 >= options.iterations;
-        FieldRead read = read_on_itself(field, volume.grid,
+        FieldRead read = read_on_itself(&field, volume.grid,
                                         last && cubic ? options.record_band_vx : 0, progress);
         result.volume.voxels = std::move(read.volume.voxels);
         result.boundary = std::move(read.boundary);
@@ -85,7 +85,7 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
         }
     }
     result.report.stage = "smooth";
-    result.report.version = 5;
+    result.report.version = kSmoothVersion;
     result.report.measures = {{"sigma_vx", options.sigma_vx},
                               {"volume_steps", static_cast<double>(prices.iterations)},
                               {"volume_miss", prices.largest_miss}};

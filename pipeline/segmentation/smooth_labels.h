@@ -32,6 +32,9 @@ struct SmoothOptions {
     LevelSetOptions level_set;
 };
 
+// Raised whenever the same input and options give other bytes than before.
+inline constexpr int kSmoothVersion = 6;
+
 struct SmoothResult {
     LabelVolume volume;                   // on the grid of the input
     BoundaryBricks boundary;  // formats/boundary_record.h; empty: none made
