@@ -170,23 +170,25 @@ struct Fit {
     void solve(double* c) {
         constexpr double kFlat = 0.1, kAnything = 1e-9;
         double l[kPatchCoefficients][kPatchCoefficients];
+        double part[kPatchCoefficients];  // 1 / l[i][i]
         for (int i = 0; i < kPatchCoefficients; ++i) {
             for (int j = 0; j <= i; ++j) {
                 double sum = matrix[entry(i, j)];
                 if (i == j) sum += i < 4 ? kAnything : kFlat;
                 for (int k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
-                l[i][j] = i == j ? std::sqrt(sum) : sum / l[j][j];
+                l[i][j] = i == j ? std::sqrt(sum) : sum * part[j];
             }
+            part[i] = 1 / l[i][i];
         }
         for (int i = 0; i < kPatchCoefficients; ++i) {
             double sum = right[i];
             for (int k = 0; k < i; ++k) sum -= l[i][k] * c[k];
-            c[i] = sum / l[i][i];
+            c[i] = sum * part[i];
         }
         for (int i = kPatchCoefficients; i-- > 0;) {
             double sum = c[i];
             for (int k = i + 1; k < kPatchCoefficients; ++k) sum -= l[k][i] * c[k];
-            c[i] = sum / l[i][i];
+            c[i] = sum * part[i];
         }
     }
 };

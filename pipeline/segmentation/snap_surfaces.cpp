@@ -70,9 +70,14 @@ class Snapper {
             std::vector<SurfacePatch> patches = fit_patches(brick->labels, hits, options_.patch_step);
             if (patches.empty()) break;
             Attempt now = attempt(*brick, std::move(patches));
-            for (std::size_t v = 0; v < kBrickVoxels; ++v)
-                hits[v] = now.hit[v] ? brick->records[v] : kNoBoundary;
+            bool others = false;
+            for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+                const std::uint32_t hit = now.hit[v] ? brick->records[v] : kNoBoundary;
+                others = others || hit != hits[v];
+                hits[v] = hit;
+            }
             if (now.missed < best.missed) best = std::move(now);
+            if (!others) break;
         }
         if (best.change.records == 0) return {};
         for (std::size_t v = 0; v < kBrickVoxels; ++v)
