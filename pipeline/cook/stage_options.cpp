@@ -76,6 +76,8 @@ const std::vector<OptionKey>& table() {
          [](Options& o) -> OptionSlot { return &o.resample.follow_shift; }},
         {"resample", "record_band_vx", 0, 2.6, "voxels", "reach of boundary records; 0: none",
          [](Options& o) -> OptionSlot { return &o.resample.record_band_vx; }},
+        {"resample", "block_vx", 4, 16, "nodes", "blocks of distances, 4, 8 or 16: time and memory",
+         [](Options& o) -> OptionSlot { return &o.resample.block_vx; }},
         {"resample", "snap_vx", 0, 0.5, "voxels", "most that surfaces move to be kept short; 0: none",
          [](Options& o) -> OptionSlot { return &o.resample.snap_vx; }},
         {"resample", "k0", 0.001, 100, "1/mm^2", "method paper: eq. (10)",

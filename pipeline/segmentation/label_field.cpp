@@ -1,6 +1,7 @@
 #include "pipeline/segmentation/label_field.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -42,45 +43,15 @@ float sum(Four v) {
 constexpr int kReach = 3;
 
 // First and last of those voxels.
-std::pair<Int3, Int3> voxels_near(Int3 first, Int3 size, int factor) {
+std::pair<Int3, Int3> voxels_near(Int3 first, int block, Int3 size, int factor) {
     Int3 low, high;
     for (int a = 0; a < 3; ++a) {
         const int f = a == 2 ? factor : 1;
         const int reach = a == 2 && f > 1 ? 1 : kReach;
         low[a] = std::max(0, (first[a] - 1) / f - reach);
-        high[a] = std::min(size[a] - 1, (first[a] + kFieldBlock + 1 + f - 1) / f + reach);
+        high[a] = std::min(size[a] - 1, (first[a] + block + 1 + f - 1) / f + reach);
     }
     return {low, high};
-}
-
-constexpr std::size_t kRowStride = kFieldRow;
-constexpr std::size_t kPlaneStride = static_cast<std::size_t>(kFieldRow) * kFieldNodes;
-
-constexpr int kCorners = kFieldBlock + 1;  // of a block's cells, along an edge
-constexpr std::size_t kCornerCount = static_cast<std::size_t>(kCorners) * kCorners * kCorners;
-
-// The spline through a block's values, at its nodes: a weighted mean of three along each axis.
-void read_corners(const float* values, float* out) {
-    const auto mean = [](float a, float b, float c) { return (a + 4 * b + c) * (1.0f / 6); };
-    std::array<float, kFieldValues> rows, planes;
-    for (std::size_t k = 0; k < kFieldNodes; ++k) {
-        for (std::size_t v = 0; v < kCorners * kRowStride; ++v) {
-            const float* p = values + k * kPlaneStride + v;
-            rows[k * kPlaneStride + v] = mean(p[0], p[kRowStride], p[2 * kRowStride]);
-        }
-    }
-    for (std::size_t k = 0; k < kCorners; ++k) {
-        for (std::size_t v = 0; v < kCorners * kRowStride; ++v) {
-            const float* p = rows.data() + k * kPlaneStride + v;
-            planes[v] = mean(p[0], p[kPlaneStride], p[2 * kPlaneStride]);
-        }
-        for (std::size_t j = 0; j < kCorners; ++j) {
-            for (std::size_t i = 0; i < kCorners; ++i) {
-                const float* p = planes.data() + j * kRowStride + i;
-                out[i + kCorners * (j + kCorners * k)] = mean(p[0], p[1], p[2]);
-            }
-        }
-    }
 }
 
 }  // namespace
@@ -95,7 +66,13 @@ LabelField::LabelField(const LabelVolume& labels,
     factor_ = distance.factor();
     tree_ = nest_labels(source_);
     prices_.assign(source_.labels.size(), 0.0f);
-    for (int a = 0; a < 3; ++a) block_count_[a] = (nodes_.size[a] + kFieldBlock - 1) / kFieldBlock;
+    assert(options.block == 4 || options.block == 8 || options.block == 16);
+    shift_ = options.block == 4 ? 2 : options.block == 8 ? 3 : 4;
+    const int edge = block_edge(), field_nodes = edge + 3;
+    row_ = static_cast<std::size_t>(edge + 4);  // padded
+    plane_ = row_ * static_cast<std::size_t>(field_nodes);
+    phi_ = plane_ * static_cast<std::size_t>(field_nodes);
+    for (int a = 0; a < 3; ++a) block_count_[a] = (nodes_.size[a] + edge - 1) >> shift_;
     mark_candidates(distance);
 
     std::size_t values = 0;
@@ -111,7 +88,7 @@ LabelField::LabelField(const LabelVolume& labels,
         Block& block = blocks_[b];
         if (block.labels.size() < 2) continue;
         block.values = values;
-        values += (block.edges.size() + block.alone.size()) * kFieldValues;
+        values += (block.edges.size() + block.alone.size()) * phi_;
         for (const std::uint8_t e : block.edges)
             blocks_of[e].push_back(static_cast<std::uint32_t>(b));
         for (const std::uint8_t l : block.alone)
@@ -140,23 +117,23 @@ LabelField::LabelField(const LabelVolume& labels,
                     static_cast<std::size_t>(std::find(terms.begin(), terms.end(), l) -
                                              terms.begin()) +
                     (alone ? block.edges.size() : 0);
-                float* to = pool_.data() + block.values + at * kFieldValues;
-                for (int k = 0; k < kFieldNodes; ++k) {
+                float* to = pool_.data() + block.values + at * phi_;
+                for (int k = 0; k < field_nodes; ++k) {
                     const int z =
                         std::clamp(block.first.z - 1 + k, 0, nodes_.size.z - 1) - box.first.z;
-                    for (int j = 0; j < kFieldNodes; ++j) {
+                    for (int j = 0; j < field_nodes; ++j) {
                         const int y =
                             std::clamp(block.first.y - 1 + j, 0, nodes_.size.y - 1) - box.first.y;
                         const bool in = z >= 0 && z < box.size.z && y >= 0 && y < box.size.y;
-                        float* row = to + static_cast<std::size_t>(k) * kPlaneStride +
-                                     static_cast<std::size_t>(j) * kRowStride;
-                        for (int i = 0; i < kFieldNodes; ++i) {
+                        float* row = to + static_cast<std::size_t>(k) * plane_ +
+                                     static_cast<std::size_t>(j) * row_;
+                        for (int i = 0; i < field_nodes; ++i) {
                             const int x = std::clamp(block.first.x - 1 + i, 0, nodes_.size.x - 1) -
                                           box.first.x;
                             row[i] =
                                 in && x >= 0 && x < box.size.x ? phi[box.index(x, y, z)] : beyond;
                         }
-                        row[kFieldNodes] = row[kFieldNodes - 1];
+                        row[field_nodes] = row[field_nodes - 1];
                     }
                 }
             }
@@ -167,6 +144,7 @@ LabelField::LabelField(const LabelVolume& labels,
 // Labels near a block, and those of which an outline is swept through it.
 void LabelField::mark_candidates(const LabelDistance& distance) {
     const Grid& g = source_.grid;
+    const int edge = block_edge();
     blocks_.resize(static_cast<std::size_t>(block_count_.x) *
                    static_cast<std::size_t>(block_count_.y) *
                    static_cast<std::size_t>(block_count_.z));
@@ -190,8 +168,8 @@ void LabelField::mark_candidates(const LabelDistance& distance) {
                 }
             }
             for (int a = 0; a < 3; ++a) {
-                low[a] = std::clamp((low[a] - kReach) / kFieldBlock, 0, block_count_[a] - 1);
-                high[a] = std::clamp((high[a] + kReach) / kFieldBlock, 0, block_count_[a] - 1);
+                low[a] = std::clamp((low[a] - kReach) / edge, 0, block_count_[a] - 1);
+                high[a] = std::clamp((high[a] + kReach) / edge, 0, block_count_[a] - 1);
             }
             for (int z = low.z; z <= high.z; ++z) {
                 for (int y = low.y; y <= high.y; ++y) {
@@ -208,8 +186,8 @@ void LabelField::mark_candidates(const LabelDistance& distance) {
             const int z = static_cast<int>(b / static_cast<std::size_t>(block_count_.x) /
                                            static_cast<std::size_t>(block_count_.y));
             Block& block = blocks_[b];
-            block.first = {x * kFieldBlock, y * kFieldBlock, z * kFieldBlock};
-            const auto [low, high] = voxels_near(block.first, g.size, factor_);
+            block.first = {x * edge, y * edge, z * edge};
+            const auto [low, high] = voxels_near(block.first, edge, g.size, factor_);
             LabelSet present = swept[b];
             for (int k = low.z; k <= high.z; ++k) {
                 for (int j = low.y; j <= high.y; ++j) {
@@ -235,7 +213,7 @@ void LabelField::list_phis(Block* block) const {
         if (below > 0 && below < block->labels.size())
             block->edges.push_back(static_cast<std::uint8_t>(l));
     }
-    // Where two labels are alone, either's distance is that of the edge.
+    // Where there are but two labels, either's own distance is that of the edge (see contest_of).
     for (const std::uint8_t l : block->labels) {
         if (block->labels.size() > 2 && tree_.between[l]) block->alone.push_back(l);
     }
@@ -261,6 +239,15 @@ LabelField::Contest LabelField::contest_of(const Block& block,
         add(e, [&](std::uint8_t l) { return tree_.members[block.edges[e]][l]; });
     for (std::size_t e = 0; e < block.alone.size(); ++e)
         add(block.edges.size() + e, [&](std::uint8_t l) { return l == block.alone[e]; });
+    if (block.labels.size() == 2 && labels.size() == 2) {
+        // A label's own distance counts here as elsewhere: else prices would move surfaces by other
+        // ways in other blocks. It is that of an edge below it, or what lacks to that of the other's.
+        for (std::size_t i = 0; i < 2; ++i) {
+            if (!tree_.between[labels[i]]) continue;
+            auto& terms = of_label[of_label[i].empty() ? 1 - i : i];
+            terms.insert(terms.begin(), terms.front());
+        }
+    }
     for (const auto& terms : of_label) {
         contest.terms.insert(contest.terms.end(), terms.begin(), terms.end());
         contest.terms_end.push_back(static_cast<std::uint16_t>(contest.terms.size()));
@@ -287,17 +274,17 @@ LabelField::Position LabelField::locate(float x, float y, float z) const {
         const float c = std::clamp(v[a], 0.0f, static_cast<float>(nodes_.size[axis] - 1));
         cell[a] = static_cast<int>(c);
         p.t[a] = c - static_cast<float>(cell[a]);
-        local[a] = static_cast<std::size_t>(cell[a] % kFieldBlock);
+        local[a] = static_cast<std::size_t>(cell[a] & (block_edge() - 1));
         store(weights(p.t[a]), p.weights[a].data());
     }
     p.block = &block_of(cell[0], cell[1], cell[2]);
-    const std::size_t at = local[0] + kFieldBlock * (local[1] + kFieldBlock * local[2]);
+    const std::size_t at = local[0] + ((local[1] + (local[2] << shift_)) << shift_);
     if (!p.block->contests.empty()) {
         p.contest = &p.block->contests[p.block->contest_of_cell.empty()
                                            ? 0
                                            : p.block->contest_of_cell[at]];
     }
-    p.offset = local[0] + kRowStride * local[1] + kPlaneStride * local[2];
+    p.offset = local[0] + row_ * local[1] + plane_ * local[2];
     return p;
 }
 
@@ -307,12 +294,12 @@ void LabelField::scores(const Position& position, float* out) const {
     const float* values = pool_.data() + position.block->values + position.offset;
     std::array<float, 512> phis;  // each label may give an edge and one alone
     for (std::size_t e = 0; e < contest.phis.size(); ++e) {
-        const float* phi = values + contest.phis[e] * kFieldValues;
+        const float* phi = values + contest.phis[e] * phi_;
         Four total{};
         for (std::size_t k = 0; k < 4; ++k) {
-            const float* p = phi + k * kPlaneStride;
-            const Four plane = wy[0] * load(p) + wy[1] * load(p + kRowStride) +
-                               wy[2] * load(p + 2 * kRowStride) + wy[3] * load(p + 3 * kRowStride);
+            const float* p = phi + k * plane_;
+            const Four plane = wy[0] * load(p) + wy[1] * load(p + row_) +
+                               wy[2] * load(p + 2 * row_) + wy[3] * load(p + 3 * row_);
             total += wz[k] * plane;
         }
         phis[e] = sum(total * load(wx.data()));
@@ -329,11 +316,11 @@ std::array<float, 4> LabelField::difference(const Position& position,
     const float* values = pool_.data() + position.block->values + position.offset;
     Four value{}, along_y{}, along_z{};
     const auto add = [&](std::size_t term, float sign) {
-        const float* phi = values + contest.phis[term] * kFieldValues;
+        const float* phi = values + contest.phis[term] * phi_;
         for (std::size_t k = 0; k < 4; ++k) {
-            const float* p = phi + k * kPlaneStride;
-            const Four q = load(p), r = load(p + kRowStride), s = load(p + 2 * kRowStride),
-                       t = load(p + 3 * kRowStride);
+            const float* p = phi + k * plane_;
+            const Four q = load(p), r = load(p + row_), s = load(p + 2 * row_),
+                       t = load(p + 3 * row_);
             const Four plane = sign * (wy[0] * q + wy[1] * r + wy[2] * s + wy[3] * t);
             value += wz[k] * plane;
             along_y += (sign * wz[k]) * (sy[0] * q + sy[1] * r + sy[2] * s + sy[3] * t);
@@ -356,6 +343,34 @@ std::array<float, 4> LabelField::difference(const Position& position,
             sum(value * w) + prices_[contest.labels[a]] - prices_[contest.labels[b]]};
 }
 
+// The spline through a block's values, at the corners of its cells: a weighted mean of three along
+// each axis.
+void LabelField::read_corners(const float* values, float* out) const {
+    const auto mean = [](float a, float b, float c) { return (a + 4 * b + c) * (1.0f / 6); };
+    const std::size_t corners = (std::size_t{1} << shift_) + 1;
+    constexpr std::size_t kLargest = 20 * 19;  // row_ * field_nodes
+    std::array<float, kLargest * 19> rows;
+    std::array<float, kLargest> planes;
+    for (std::size_t k = 0; k < corners + 2; ++k) {
+        for (std::size_t v = 0; v < corners * row_; ++v) {
+            const float* p = values + k * plane_ + v;
+            rows[k * plane_ + v] = mean(p[0], p[row_], p[2 * row_]);
+        }
+    }
+    for (std::size_t k = 0; k < corners; ++k) {
+        for (std::size_t v = 0; v < corners * row_; ++v) {
+            const float* p = rows.data() + k * plane_ + v;
+            planes[v] = mean(p[0], p[plane_], p[2 * plane_]);
+        }
+        for (std::size_t j = 0; j < corners; ++j) {
+            for (std::size_t i = 0; i < corners; ++i) {
+                const float* p = planes.data() + j * row_ + i;
+                *out++ = mean(p[0], p[1], p[2]);
+            }
+        }
+    }
+}
+
 void LabelField::find_contests(float reach_mm) {
     node_label_.assign(nodes_.voxel_count(), 0);
     node_margin_.assign(nodes_.voxel_count(), 255);
@@ -369,35 +384,37 @@ void LabelField::find_contests(Block* block, float reach_mm, std::vector<float>*
     // From any point of a cell to its nearest corner.
     const float reach = reach_mm + 0.5f * static_cast<float>(norm(nodes_.spacing_mm));
     const std::size_t count = block->labels.size();
+    const int edge = block_edge(), corners = edge + 1;
+    const auto corner_count = static_cast<std::size_t>(corners * corners * corners);
     using Near = std::uint64_t;  // candidates within reach of a surface
     const bool told = count > 1 && count <= 64;
-    std::array<Near, kCornerCount> near{};
+    std::vector<Near> near(count > 1 ? corner_count : 0);
     block->contest_of_cell.clear();
     if (count > 1) {
         block->contests = {contest_of(*block, block->labels)};
         const std::size_t phis = block->contests[0].phis.size();
-        at_corners->resize(phis * kCornerCount);
+        at_corners->resize(phis * corner_count);
         for (std::size_t e = 0; e < phis; ++e) {
-            read_corners(pool_.data() + block->values + block->contests[0].phis[e] * kFieldValues,
-                         at_corners->data() + e * kCornerCount);
+            read_corners(pool_.data() + block->values + block->contests[0].phis[e] * phi_,
+                         at_corners->data() + e * corner_count);
         }
     }
     std::array<float, 256> score;
     std::array<float, 512> phis;
-    for (int k = 0; k < kCorners; ++k) {
-        for (int j = 0; j < kCorners; ++j) {
-            for (int i = 0; i < kCorners; ++i) {
+    for (int k = 0; k < corners; ++k) {
+        for (int j = 0; j < corners; ++j) {
+            for (int i = 0; i < corners; ++i) {
                 const Int3 at{block->first.x + i, block->first.y + j, block->first.z + k};
-                const bool own = i < kFieldBlock && j < kFieldBlock && k < kFieldBlock &&
+                const bool own = i < edge && j < edge && k < edge &&
                                  nodes_.contains(at.x, at.y, at.z);
                 if (count < 2) {
                     if (own) node_label_[nodes_.index(at.x, at.y, at.z)] = block->labels[0];
                     continue;
                 }
                 const Contest& all = block->contests[0];
-                const auto corner = static_cast<std::size_t>(i + kCorners * (j + kCorners * k));
+                const auto corner = static_cast<std::size_t>(i + corners * (j + corners * k));
                 for (std::size_t e = 0; e < all.phis.size(); ++e)
-                    phis[e] = (*at_corners)[e * kCornerCount + corner];
+                    phis[e] = (*at_corners)[e * corner_count + corner];
                 sum_terms(all, phis.data(), score.data());
                 const auto best = static_cast<std::size_t>(
                     std::min_element(score.begin(), score.begin() + count) - score.begin());
@@ -407,7 +424,7 @@ void LabelField::find_contests(Block* block, float reach_mm, std::vector<float>*
                 Near here = Near{1} << (best & 63);
                 for (std::size_t c = 0; c < count; ++c) {
                     if (c == best) continue;
-                    const float m = (score[c] - score[best]) / slope(*block, winner, block->labels[c]);
+                    const float m = (score[c] - score[best]) / slope(winner, block->labels[c]);
                     margin = std::min(margin, m);
                     if (m <= reach) here |= Near{1} << (c & 63);
                 }
@@ -421,16 +438,16 @@ void LabelField::find_contests(Block* block, float reach_mm, std::vector<float>*
     }
     if (!told) return;
     std::vector<Near> sets{0};  // of contests; the first is never looked for
-    block->contest_of_cell.resize(kFieldBlock * kFieldBlock * kFieldBlock);
+    block->contest_of_cell.resize(edge * edge * edge);
     std::size_t cell = 0;
-    for (int k = 0; k < kFieldBlock; ++k) {
-        for (int j = 0; j < kFieldBlock; ++j) {
-            for (int i = 0; i < kFieldBlock; ++i, ++cell) {
+    for (int k = 0; k < edge; ++k) {
+        for (int j = 0; j < edge; ++j) {
+            for (int i = 0; i < edge; ++i, ++cell) {
                 Near set = 0;
                 for (int corner = 0; corner < 8; ++corner) {
                     set |= near[static_cast<std::size_t>(
-                        i + (corner & 1) + kCorners * (j + (corner >> 1 & 1) +
-                                                       kCorners * (k + (corner >> 2))))];
+                        i + (corner & 1) + corners * (j + (corner >> 1 & 1) +
+                                                       corners * (k + (corner >> 2))))];
                 }
                 auto found = std::find(sets.begin() + 1, sets.end(), set);
                 if (found == sets.end()) {

@@ -8,8 +8,8 @@
 //        label keeps its volume
 // A label that the tree puts between others that touch (LabelTree::between) carries the phi of itself
 // alone as well.
-// No gap and no overlap is possible. Only blocks of 8^3 nodes that hold or touch two labels store
-// anything; elsewhere one byte a node names the label.
+// No gap and no overlap is possible. Only blocks that hold or touch two labels store anything;
+// elsewhere one byte a node names the label.
 // Between two labels f = score_second - score_first is zero on their surface, and f / |grad f| is
 // the distance to it.
 #pragma once
@@ -27,13 +27,9 @@ namespace sonocase::pipeline {
 
 struct LabelFieldOptions {
     LabelDistanceOptions distance;
+    int block = 8;  // nodes an edge: 4, 8 or 16. Small ones repeat their rims, large ones hold distances
+                    // to labels that are far from most of their nodes.
 };
-
-inline constexpr int kFieldBlock = 8;   // nodes an edge
-inline constexpr int kFieldNodes = 11;  // with the spline's neighbours: one below, two above
-inline constexpr int kFieldRow = 12;    // floats a row, padded
-inline constexpr std::size_t kFieldValues =
-    static_cast<std::size_t>(kFieldRow) * kFieldNodes * kFieldNodes;
 
 class LabelField {
   public:
@@ -54,7 +50,8 @@ class LabelField {
     struct Contest {
         std::vector<std::uint8_t> labels;
         std::vector<std::uint16_t> phis;       // places in the block's values
-        std::vector<std::uint16_t> terms;      // of each label in turn: places in phis, ascending
+        std::vector<std::uint16_t> terms;      // of each label in turn: places in phis, ascending,
+                                               // some of them twice or three times
         std::vector<std::uint16_t> terms_end;  // # labels, in `terms`
     };
     struct Block {
@@ -62,17 +59,18 @@ class LabelField {
         std::vector<std::uint8_t> labels;  // candidates; one: nothing is stored
         std::vector<std::uint8_t> edges;   // that part candidates: the label at their lower end
         std::vector<std::uint8_t> alone;   // labels that carry a phi of themselves alone
-        std::size_t values = 0;            // into the pool, kFieldValues a phi: edges, then alone
+        std::size_t values = 0;            // into the pool, a phi after the other: edges, then alone
         std::vector<Contest> contests;     // the first: all candidates
-        std::vector<std::uint8_t> contest_of_cell;  // kFieldBlock^3; empty: the first
+        std::vector<std::uint8_t> contest_of_cell;  // block^3; empty: the first
     };
     const std::vector<Block>& blocks() const { return blocks_; }
+    int block_edge() const { return 1 << shift_; }  // nodes
     const Block& block_of(int i, int j, int k) const {
-        return blocks_[static_cast<std::size_t>(i / kFieldBlock) +
+        return blocks_[static_cast<std::size_t>(i >> shift_) +
                        static_cast<std::size_t>(block_count_.x) *
-                           (static_cast<std::size_t>(j / kFieldBlock) +
+                           (static_cast<std::size_t>(j >> shift_) +
                             static_cast<std::size_t>(block_count_.y) *
-                                static_cast<std::size_t>(k / kFieldBlock))];
+                                static_cast<std::size_t>(k >> shift_))];
     }
 
     // Where a point of node space (clamped to it) lies among the cells, with spline weights.
@@ -91,10 +89,8 @@ class LabelField {
     // Gradient of score_b - score_a, per node, and its value, for two labels of the contest.
     std::array<float, 4> difference(const Position& position, std::size_t a, std::size_t b) const;
     // Near the surface between two labels their scores part by this much a mm.
-    float slope(const Block& block, std::uint8_t a, std::uint8_t b) const {
-        const bool alone = !block.alone.empty();
-        return static_cast<float>(tree_.steps_between(a, b) + (alone && tree_.between[a]) +
-                                  (alone && tree_.between[b]));
+    float slope(std::uint8_t a, std::uint8_t b) const {
+        return static_cast<float>(tree_.steps_between(a, b) + tree_.between[a] + tree_.between[b]);
     }
 
     // With the prices as they are: how far (mm) from each node no other label can come near, which
@@ -111,6 +107,7 @@ class LabelField {
   private:
     void mark_candidates(const LabelDistance& distance);
     void list_phis(Block* block) const;
+    void read_corners(const float* values, float* out) const;
     Contest contest_of(const Block& block, const std::vector<std::uint8_t>& labels) const;
     void find_contests(Block* block, float reach_mm, std::vector<float>* at_corners);
     // Scores of a contest's labels from the values of its phis.
@@ -120,6 +117,9 @@ class LabelField {
     LabelTree tree_;
     Grid nodes_;
     int factor_ = 1;
+    int shift_ = 3;  // log2 of a block's edge
+    // A phi's values in a block: with the spline's neighbours, one node below and two above.
+    std::size_t row_ = 0, plane_ = 0, phi_ = 0;  // floats
     Int3 block_count_;
     std::vector<Block> blocks_;
     std::vector<float> pool_;

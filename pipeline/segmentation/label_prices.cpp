@@ -70,7 +70,7 @@ LabelPriceReport prices_up_to(double most_vx,
             BlockCells& out = held[b];
             Int3 count;
             for (int a = 0; a < 3; ++a) {
-                count[a] = std::min(kFieldBlock, nodes.size[a] - block.first[a]);
+                count[a] = std::min(field->block_edge(), nodes.size[a] - block.first[a]);
             }
             const Point3 middle = nodes.point_from_voxel({block.first.x + 0.5 * (count.x - 1),
                                                           block.first.y + 0.5 * (count.y - 1),
@@ -125,7 +125,7 @@ LabelPriceReport prices_up_to(double most_vx,
                                     }
                                     if (cell.count < 2 ||
                                         cell.phi[1] - cell.phi[0] >
-                                            2 * limit + cell_mm * field->slope(block, cell.label[0],
+                                            2 * limit + cell_mm * field->slope(cell.label[0],
                                                                                cell.label[1])) {
                                         whole[cell.label[0]] += 1;
                                     } else {
@@ -162,8 +162,8 @@ LabelPriceReport prices_up_to(double most_vx,
                 for (int j = 0; j < g.size.y; ++j) {
                     const std::uint8_t* row = source.voxels.data() + g.index(0, j, k);
                     // Weighed like the cells, a block at a time: what is asked for can be reached.
-                    for (int i = 0; i < g.size.x; i += kFieldBlock) {
-                        const int stop = std::min(g.size.x, i + kFieldBlock);
+                    for (int i = 0; i < g.size.x; i += field->block_edge()) {
+                        const int stop = std::min(g.size.x, i + field->block_edge());
                         const LabelField::Block& block = field->block_of(i, j, k * field->factor());
                         const double w =
                             held[static_cast<std::size_t>(&block - blocks.data())].weight / cell_mm3;
@@ -209,7 +209,7 @@ LabelPriceReport prices_up_to(double most_vx,
                                 m = cell.label[c];
                             }
                         }
-                        const float slope = field->slope(blocks[b], static_cast<std::uint8_t>(l),
+                        const float slope = field->slope(static_cast<std::uint8_t>(l),
                                                          static_cast<std::uint8_t>(m));
                         const float distance = (second - best) / slope;
                         const float part = std::min(1.0f, 0.5f + distance / cell_mm);

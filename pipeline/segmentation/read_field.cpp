@@ -115,15 +115,15 @@ void join_bricks(std::vector<Strip>* strips, const Grid& grid, BoundaryBricks* b
 std::optional<Int3> nearest_to_winning(const LabelField& field, std::uint8_t label) {
     float nearest = 1e30f;
     std::optional<Int3> place;
+    const int edge = field.block_edge();
     std::array<float, 256> score;
     for (const LabelField::Block& block : field.blocks()) {
         const auto at = std::find(block.labels.begin(), block.labels.end(), label);
         if (at == block.labels.end() || block.labels.size() < 2) continue;
         const auto own = static_cast<std::size_t>(at - block.labels.begin());
-        for (int q = 0; q < kFieldBlock * kFieldBlock * kFieldBlock; ++q) {
-            const Int3 node{block.first.x + q % kFieldBlock,
-                            block.first.y + q / kFieldBlock % kFieldBlock,
-                            block.first.z + q / kFieldBlock / kFieldBlock};
+        for (int q = 0; q < edge * edge * edge; ++q) {
+            const Int3 node{block.first.x + q % edge, block.first.y + q / edge % edge,
+                            block.first.z + q / edge / edge};
             if (!field.nodes().contains(node.x, node.y, node.z)) continue;
             LabelField::Position position =
                 field.locate(static_cast<float>(node.x), static_cast<float>(node.y),

@@ -35,6 +35,7 @@ FieldRead through_field(const ResampleInput& input,
                               .detail_vx = options.detail_vx,
                               .sigma_slices = options.sigma_slices,
                               .follow_shift = options.follow_shift};
+    field_options.block = options.block_vx;
     LabelField field(input.ct_labels, field_options, progress);
     lap(&result->seconds.distances);
     const Registration registration = with_voxel_rim(input.registration, input.ct_labels.grid);
@@ -77,6 +78,10 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
     if (!shape && !paper && options.method != "nearest") {
         return Error{"unknown method '" + options.method + "'", "resample",
                      "shape, nearest or paper"};
+    }
+    if (options.block_vx != 4 && options.block_vx != 8 && options.block_vx != 16) {
+        return Error{"blocks of " + std::to_string(options.block_vx) + " nodes", "resample.block_vx",
+                     "4, 8 or 16"};
     }
     const auto grid =
         cooked_grid(input.ct_labels, input.registration, {options.voxel_mm, options.margin_mm});

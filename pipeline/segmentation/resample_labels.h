@@ -44,6 +44,7 @@ struct ResampleOptions {
     bool follow_shift = true;      // shape: oblique vessels through thick slices
     double record_band_vx = 1.5;   // shape: boundary records up to this distance, [0, 2.6]; 0: none
     double snap_vx = 0.07;         // shape: surfaces may move so far to be kept short; 0: not at all
+    int block_vx = 8;              // shape: edge of the blocks distances are kept in, nodes: 4, 8, 16
     LevelSetOptions level_set;     // paper
 };
 
@@ -62,7 +63,8 @@ struct ResampleResult {
     ResampleSeconds seconds;  // not in the report: its measures are part of the stage's bytes
 };
 
-// Errors: no body in the map, voxel edge out of range, a grid of more than 2^31 voxels.
+// Errors: no body in the map, voxel edge out of range, a grid of more than 2^31 voxels, another method
+// or edge of blocks than those named.
 Result<ResampleResult> resample_labels(const ResampleInput& input,
                                        const ResampleOptions& options = {},
                                        const Progress& progress = {});

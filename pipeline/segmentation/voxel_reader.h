@@ -100,7 +100,7 @@ class VoxelReader {
         const Standing standing = standing_of(score.data(), labels.size());
         const std::uint8_t own = labels[standing.first], second = labels[standing.second];
         VoxelRead read{own};
-        if (band_vx_ <= 0 || standing.gap > reach_mm_ * field_.slope(*at.block, own, second))
+        if (band_vx_ <= 0 || standing.gap > reach_mm_ * field_.slope(own, second))
             return read;
         const Matrix3& m = slope();
         BoundaryRecord record{second};
@@ -140,7 +140,7 @@ class VoxelReader {
         for (std::size_t c = 0; c < labels.size(); ++c) {
             if (c == standing.first || c == standing.second) continue;
             if (score[c] - score[standing.second] <=
-                way_mm * field_.slope(*at.block, labels[standing.second], labels[c]))
+                way_mm * field_.slope(labels[standing.second], labels[c]))
                 return true;
         }
         return false;

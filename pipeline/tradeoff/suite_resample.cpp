@@ -71,6 +71,13 @@ Suite warp_suite() {
          "one voxel holds every place that a point can be nearest to; a wider band only adds "
          "records"},
     };
+    suite.knobs.push_back({"resample.block_vx",
+                           {"4", "8", "16"},
+                           "8",
+                           "nodes",
+                           "edge of the blocks that distances are kept in",
+                           "time and memory alone",
+                           "which labels can win at a point is told in every cell of a block"});
     suite.named = {{TrialRole::peer, "nearest label", {{"resample.method", "nearest"}}}};
     return suite;
 }

@@ -59,6 +59,11 @@ int verb_resample(int argc, char** argv) {
         ->check(CLI::Range(0.0, 2.6))
         ->capture_default_str()
         ->group(shape);
+    app.add_option("--block-vx", options.block_vx,
+                   "Edge of the blocks that distances are kept in, nodes; time and memory alone")
+        ->check(CLI::IsMember({4, 8, 16}))
+        ->capture_default_str()
+        ->group(shape);
     const char* const paper = "Method paper";
     app.add_option("--k0", options.level_set.k0, "K0 of eq. (10), 1/mm^2")
         ->check(CLI::Range(1e-3, 100.0))
