@@ -39,6 +39,13 @@ float sum(Four v) {
     return (v[0] + v[1]) + (v[2] + v[3]);
 }
 
+// The sums of four vectors at once.
+Four sums(Four a, Four b, Four c, Four d) {
+    const Four ab = __builtin_shufflevector(a, b, 0, 4, 1, 5) + __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Four cd = __builtin_shufflevector(c, d, 0, 4, 1, 5) + __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    return __builtin_shufflevector(ab, cd, 0, 1, 4, 5) + __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
+}
+
 // A label may win in a block if one of its voxels lies within this many of the block's nodes.
 constexpr int kReach = 3;
 
@@ -72,7 +79,10 @@ LabelField::LabelField(const LabelVolume& labels,
     row_ = static_cast<std::size_t>(edge + 4);  // padded
     plane_ = row_ * static_cast<std::size_t>(field_nodes);
     phi_ = plane_ * static_cast<std::size_t>(field_nodes);
-    for (int a = 0; a < 3; ++a) block_count_[a] = (nodes_.size[a] + edge - 1) >> shift_;
+    for (int a = 0; a < 3; ++a) {
+        block_count_[a] = (nodes_.size[a] + edge - 1) >> shift_;
+        per_mm_[static_cast<std::size_t>(a)] = static_cast<float>(1 / nodes_.spacing_mm[a]);
+    }
     mark_candidates(distance);
 
     std::size_t values = 0;
@@ -313,19 +323,29 @@ std::array<float, 4> LabelField::difference(const Position& position,
     const Contest& contest = *position.contest;
     const auto& [wx, wy, wz] = position.weights;
     const Four sx = slopes(position.t[0]), sy = slopes(position.t[1]), sz = slopes(position.t[2]);
+    const Four w = load(wx.data());
     const float* values = pool_.data() + position.block->values + position.offset;
-    Four value{}, along_y{}, along_z{};
+    const Four per_mm{per_mm_[0], per_mm_[1], per_mm_[2], 0};
+    Four mean{};
+    float weights = 0, count = 0;
     const auto add = [&](std::size_t term, float sign) {
         const float* phi = values + contest.phis[term] * phi_;
+        Four value{}, along_y{}, along_z{};
         for (std::size_t k = 0; k < 4; ++k) {
             const float* p = phi + k * plane_;
             const Four q = load(p), r = load(p + row_), s = load(p + 2 * row_),
                        t = load(p + 3 * row_);
-            const Four plane = sign * (wy[0] * q + wy[1] * r + wy[2] * s + wy[3] * t);
+            const Four plane = wy[0] * q + wy[1] * r + wy[2] * s + wy[3] * t;
             value += wz[k] * plane;
-            along_y += (sign * wz[k]) * (sy[0] * q + sy[1] * r + sy[2] * s + sy[3] * t);
+            along_y += wz[k] * (sy[0] * q + sy[1] * r + sy[2] * s + sy[3] * t);
             along_z += sz[k] * plane;
         }
+        const Four one = sums(value * sx, along_y * w, along_z * w, value * w);
+        const float square = sum((one * per_mm) * (one * per_mm)) + 1e-6f;  // never nothing
+        const float weight = (square * square) * (square * square);
+        mean += (sign * weight) * one;
+        weights += weight;
+        ++count;
     };
     // Terms of the one and not of the other.
     const auto begin = [&](std::size_t l) { return l > 0 ? contest.terms_end[l - 1] : 0u; };
@@ -338,9 +358,9 @@ std::array<float, 4> LabelField::difference(const Position& position,
         i += of_a <= of_b;
         j += of_b <= of_a;
     }
-    const Four w = load(wx.data());
-    return {sum(value * sx), sum(along_y * w), sum(along_z * w),
-            sum(value * w) + prices_[contest.labels[a]] - prices_[contest.labels[b]]};
+    mean *= count / weights;
+    return {mean[0], mean[1], mean[2],
+            mean[3] + prices_[contest.labels[a]] - prices_[contest.labels[b]]};
 }
 
 // The spline through a block's values, at the corners of its cells: a weighted mean of three along

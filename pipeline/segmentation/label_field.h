@@ -86,7 +86,11 @@ class LabelField {
     // Score of each label of the position's contest, but for a summand that they have in common;
     // # contest->labels.
     void scores(const Position& position, float* out) const;
-    // Gradient of score_b - score_a, per node, and its value, for two labels of the contest.
+    // Gradient per node, and value, of what is zero on the surface between two labels of the contest and
+    // grows into a by slope() a mm: score_b - score_a where all phis that part them agree. Where they
+    // do not, a wedge between other labels bends one of them, whose gradient shortens by that: each
+    // phi counts by the eighth power of its gradient's length, so that the one that goes on straight
+    // tells where the surface is and how it lies.
     std::array<float, 4> difference(const Position& position, std::size_t a, std::size_t b) const;
     // Near the surface between two labels their scores part by this much a mm.
     float slope(std::uint8_t a, std::uint8_t b) const {
@@ -120,6 +124,7 @@ class LabelField {
     int shift_ = 3;  // log2 of a block's edge
     // A phi's values in a block: with the spline's neighbours, one node below and two above.
     std::size_t row_ = 0, plane_ = 0, phi_ = 0;  // floats
+    std::array<float, 3> per_mm_{};              // nodes
     Int3 block_count_;
     std::vector<Block> blocks_;
     std::vector<float> pool_;
