@@ -342,7 +342,7 @@ std::array<float, 4> LabelField::difference(const Position& position,
         }
         const Four one = sums(value * sx, along_y * w, along_z * w, value * w);
         const float square = sum((one * per_mm) * (one * per_mm)) + 1e-6f;  // never nothing
-        const float weight = (square * square) * (square * square);
+        const float weight = square * square;
         mean += (sign * weight) * one;
         weights += weight;
         ++count;

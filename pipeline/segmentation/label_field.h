@@ -89,7 +89,7 @@ class LabelField {
     // Gradient per node, and value, of what is zero on the surface between two labels of the contest and
     // grows into a by slope() a mm: score_b - score_a where all phis that part them agree. Where they
     // do not, a wedge between other labels bends one of them, whose gradient shortens by that: each
-    // phi counts by the eighth power of its gradient's length, so that the one that goes on straight
+    // phi counts by the fourth power of its gradient's length, so that the one that goes on straight
     // tells where the surface is and how it lies.
     std::array<float, 4> difference(const Position& position, std::size_t a, std::size_t b) const;
     // Near the surface between two labels their scores part by this much a mm.

@@ -189,8 +189,12 @@ SnapReport snap_surfaces(LabelVolume* volume,
     if (g.spacing_mm.x < 1) {
         allowed.distance_vx =
             std::max(options.distance_vx, std::min(0.2, options.distance_vx / g.spacing_mm.x));
-        // What rounding twice as coarse moves is less than half of that.
-        if (g.spacing_mm.x <= 0.6) allowed.patch_step = 2 * options.patch_step;
+        if (g.spacing_mm.x <= 0.6) {
+            // What rounding twice as coarse moves is less than half of that; and a plane that is drawn
+            // half as far may lean more.
+            allowed.patch_step = 2 * options.patch_step;
+            allowed.normal_deg = 1.5 * options.normal_deg;
+        }
     }
     const Snapper snap(allowed);
     std::vector<Found> layers(static_cast<std::size_t>(bricks.z));

@@ -16,7 +16,7 @@ struct SnapOptions {
     double band_vx = 1.5;       // records exist up to this distance
     double distance_vx = 0.07;  // the most that a record's distance may change, voxels; where voxels
                                 // are smaller than 1 mm as many mm, up to 0.2 voxels
-    double normal_deg = 5;      // and its normal
+    double normal_deg = 8;      // and its normal; half as much again below 0.6 mm
     int patch_step = 1;         // of the quadrics' coefficients; twice as much below 0.6 mm
 };
 
