@@ -49,7 +49,7 @@ struct ResampleOptions {
 };
 
 // Raised whenever the same input and options give other bytes than before.
-inline constexpr int kResampleVersion = 8;
+inline constexpr int kResampleVersion = 9;
 
 struct ResampleSeconds {  // method shape; wall clock
     double distances = 0, volumes = 0, voxels = 0;

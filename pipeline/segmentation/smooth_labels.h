@@ -33,7 +33,7 @@ struct SmoothOptions {
 };
 
 // Raised whenever the same input and options give other bytes than before.
-inline constexpr int kSmoothVersion = 6;
+inline constexpr int kSmoothVersion = 7;
 
 struct SmoothResult {
     LabelVolume volume;                   // on the grid of the input
