@@ -267,6 +267,9 @@ void add(const std::string& name, const ResampleOptions& options, bool real = fa
         add("volume_iterations:" + std::to_string(n),
             with([&](auto& o) { o.volume_iterations = n; }));
     }
+    for (const int block : {4, 8, 16}) {
+        add("block_vx:" + std::to_string(block), with([&](auto& o) { o.block_vx = block; }));
+    }
     add("follow_shift:false", with([](auto& o) { o.follow_shift = false; }));
     for (const char* voxel : {"1.5", "2", "3"}) {
         add(std::string("voxel_mm:") + voxel,
