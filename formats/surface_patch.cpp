@@ -35,7 +35,8 @@ constexpr Places places_of_voxels() {
 alignas(64) constexpr Places kPlaces = places_of_voxels();
 
 // q in 1/512 voxel.
-inline std::int32_t distance_at(const std::array<std::int16_t, kPatchCoefficients>& c, std::size_t v) {
+inline std::int32_t distance_at(const std::array<std::int16_t, kPatchCoefficients>& c,
+                                std::size_t v) {
     const std::int32_t x = kPlaces.x[v], y = kPlaces.y[v], z = kPlaces.z[v];
     return 16 * c[0] + x * (4 * c[1] + c[4] * x + c[7] * y + c[8] * z) +
            y * (4 * c[2] + c[5] * y + c[9] * z) + z * (4 * c[3] + c[6] * z);
@@ -51,7 +52,10 @@ inline std::int32_t rounded(float v) {  // |v| <= 128
 }
 
 // Distance and direction packed as boundary_record.h has them, without the second label.
-inline std::uint32_t packed_plane(std::int32_t steps, std::int32_t x, std::int32_t y, std::int32_t z) {
+inline std::uint32_t packed_plane(std::int32_t steps,
+                                  std::int32_t x,
+                                  std::int32_t y,
+                                  std::int32_t z) {
     const float fx = static_cast<float>(x), fy = static_cast<float>(y), fz = static_cast<float>(z);
     const float sum = std::abs(fx) + std::abs(fy) + std::abs(fz);
     const float scale = 127.0f / std::max(sum, 1.0f);
@@ -99,9 +103,9 @@ std::uint32_t nearer_of(std::uint32_t record, std::uint32_t other) {
     return nearer ? other : record;
 }
 
-// The 10 monomials of q are fitted in voxels. Of the normal equations' matrix only the lower half is
-// kept, row by row; what a voxel's record adds to it depends on the voxel's place alone, and is a
-// multiple of 1/16, so that sums of it are exact in any order.
+// The 10 monomials of q are fitted in voxels. Of the normal equations' matrix only the lower half
+// is kept, row by row; what a voxel's record adds to it depends on the voxel's place alone, and is
+// a multiple of 1/16, so that sums of it are exact in any order.
 constexpr int kMatrix = kPatchCoefficients * (kPatchCoefficients + 1) / 2;
 constexpr int entry(int i, int j) {
     return i * (i + 1) / 2 + j;
@@ -218,8 +222,8 @@ void records_from_patches(std::span<const SurfacePatch> patches,
 SurfacePatch continued(const SurfacePatch& patch, int axis) {
     // u becomes u + 4 along the axis; in whole steps of the coefficients nothing is lost.
     const int square = 4 + axis;
-    const int cross[3][2] = {{7, 8}, {7, 9}, {8, 9}};    // the products that the axis is part of
-    const int other[3][2] = {{2, 3}, {1, 3}, {1, 2}};    // and the linear terms that they add to
+    const int cross[3][2] = {{7, 8}, {7, 9}, {8, 9}};  // the products that the axis is part of
+    const int other[3][2] = {{2, 3}, {1, 3}, {1, 2}};  // and the linear terms that they add to
     const auto at = [&](int i) { return static_cast<int>(patch.c[static_cast<std::size_t>(i)]); };
     SurfacePatch out = patch;
     const auto put = [&](int i, int value) {  // wraps on nonsense, as the reader's does

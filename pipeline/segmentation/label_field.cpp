@@ -41,9 +41,12 @@ float sum(Four v) {
 
 // The sums of four vectors at once.
 Four sums(Four a, Four b, Four c, Four d) {
-    const Four ab = __builtin_shufflevector(a, b, 0, 4, 1, 5) + __builtin_shufflevector(a, b, 2, 6, 3, 7);
-    const Four cd = __builtin_shufflevector(c, d, 0, 4, 1, 5) + __builtin_shufflevector(c, d, 2, 6, 3, 7);
-    return __builtin_shufflevector(ab, cd, 0, 1, 4, 5) + __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
+    const Four ab =
+        __builtin_shufflevector(a, b, 0, 4, 1, 5) + __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Four cd =
+        __builtin_shufflevector(c, d, 0, 4, 1, 5) + __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    return __builtin_shufflevector(ab, cd, 0, 1, 4, 5) +
+           __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
 }
 
 // A label may win in a block if one of its voxels lies within this many of the block's nodes.
@@ -251,7 +254,8 @@ LabelField::Contest LabelField::contest_of(const Block& block,
         add(block.edges.size() + e, [&](std::uint8_t l) { return l == block.alone[e]; });
     if (block.labels.size() == 2 && labels.size() == 2) {
         // A label's own distance counts here as elsewhere: else prices would move surfaces by other
-        // ways in other blocks. It is that of an edge below it, or what lacks to that of the other's.
+        // ways in other blocks. It is that of an edge below it, or what lacks to that of the
+        // other's.
         for (std::size_t i = 0; i < 2; ++i) {
             if (!tree_.between[labels[i]]) continue;
             auto& terms = of_label[of_label[i].empty() ? 1 - i : i];
@@ -290,15 +294,15 @@ LabelField::Position LabelField::locate(float x, float y, float z) const {
     p.block = &block_of(cell[0], cell[1], cell[2]);
     const std::size_t at = local[0] + ((local[1] + (local[2] << shift_)) << shift_);
     if (!p.block->contests.empty()) {
-        p.contest = &p.block->contests[p.block->contest_of_cell.empty()
-                                           ? 0
-                                           : p.block->contest_of_cell[at]];
+        p.contest =
+            &p.block->contests[p.block->contest_of_cell.empty() ? 0 : p.block->contest_of_cell[at]];
     }
     p.offset = local[0] + row_ * local[1] + plane_ * local[2];
     return p;
 }
 
 void LabelField::scores(const Position& position, float* out) const {
+    assert(position.contest != nullptr);
     const Contest& contest = *position.contest;
     const auto& [wx, wy, wz] = position.weights;
     const float* values = pool_.data() + position.block->values + position.offset;
@@ -425,8 +429,8 @@ void LabelField::find_contests(Block* block, float reach_mm, std::vector<float>*
         for (int j = 0; j < corners; ++j) {
             for (int i = 0; i < corners; ++i) {
                 const Int3 at{block->first.x + i, block->first.y + j, block->first.z + k};
-                const bool own = i < edge && j < edge && k < edge &&
-                                 nodes_.contains(at.x, at.y, at.z);
+                const bool own =
+                    i < edge && j < edge && k < edge && nodes_.contains(at.x, at.y, at.z);
                 if (count < 2) {
                     if (own) node_label_[nodes_.index(at.x, at.y, at.z)] = block->labels[0];
                     continue;
@@ -452,7 +456,8 @@ void LabelField::find_contests(Block* block, float reach_mm, std::vector<float>*
                 if (!own) continue;
                 const std::size_t node = nodes_.index(at.x, at.y, at.z);
                 node_label_[node] = winner;
-                node_margin_[node] = static_cast<std::uint8_t>(std::clamp(4 * margin, 0.0f, 254.0f));
+                node_margin_[node] =
+                    static_cast<std::uint8_t>(std::clamp(4 * margin, 0.0f, 254.0f));
             }
         }
     }
@@ -466,8 +471,8 @@ void LabelField::find_contests(Block* block, float reach_mm, std::vector<float>*
                 Near set = 0;
                 for (int corner = 0; corner < 8; ++corner) {
                     set |= near[static_cast<std::size_t>(
-                        i + (corner & 1) + corners * (j + (corner >> 1 & 1) +
-                                                       corners * (k + (corner >> 2))))];
+                        i + (corner & 1) +
+                        corners * (j + (corner >> 1 & 1) + corners * (k + (corner >> 2))))];
                 }
                 auto found = std::find(sets.begin() + 1, sets.end(), set);
                 if (found == sets.end()) {

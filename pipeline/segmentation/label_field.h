@@ -4,14 +4,13 @@
 // phi_e  smooth signed distance (label_distance.h) to the union of labels below an edge of the tree
 //        of label_tree.h, over the edges from its root to l; read with the cubic B-spline (C2)
 // price  one number a label, mm: shifts its surface outwards; label_prices.h picks them so that
-// each
-//        label keeps its volume
-// A label that the tree puts between others that touch (LabelTree::between) carries the phi of itself
-// alone as well.
+//        each label keeps its volume
+// A label that the tree puts between others that touch (LabelTree::between) carries the phi of
+// itself alone as well.
 // No gap and no overlap is possible. Only blocks that hold or touch two labels store anything;
 // elsewhere one byte a node names the label.
-// Between two labels f = score_second - score_first is zero on their surface, and f / |grad f| is
-// the distance to it.
+// Between two labels f = score_second - score_first is zero on their surface, and f / |grad f| the
+// distance to it. Before anything is read, and after prices change: find_contests().
 #pragma once
 
 #include <array>
@@ -27,8 +26,9 @@ namespace sonocase::pipeline {
 
 struct LabelFieldOptions {
     LabelDistanceOptions distance;
-    int block = 8;  // nodes an edge: 4, 8 or 16. Small ones repeat their rims, large ones hold distances
-                    // to labels that are far from most of their nodes.
+    // Nodes an edge: 4, 8 or 16. Small blocks repeat their rims, large ones hold distances to labels
+    // that are far from most of their nodes.
+    int block = 8;
 };
 
 class LabelField {
@@ -59,8 +59,8 @@ class LabelField {
         std::vector<std::uint8_t> labels;  // candidates; one: nothing is stored
         std::vector<std::uint8_t> edges;   // that part candidates: the label at their lower end
         std::vector<std::uint8_t> alone;   // labels that carry a phi of themselves alone
-        std::size_t values = 0;            // into the pool, a phi after the other: edges, then alone
-        std::vector<Contest> contests;     // the first: all candidates
+        std::size_t values = 0;         // into the pool, a phi after the other: edges, then alone
+        std::vector<Contest> contests;  // the first: all candidates
         std::vector<std::uint8_t> contest_of_cell;  // block^3; empty: the first
     };
     const std::vector<Block>& blocks() const { return blocks_; }
@@ -86,11 +86,11 @@ class LabelField {
     // Score of each label of the position's contest, but for a summand that they have in common;
     // # contest->labels.
     void scores(const Position& position, float* out) const;
-    // Gradient per node, and value, of what is zero on the surface between two labels of the contest and
-    // grows into a by slope() a mm: score_b - score_a where all phis that part them agree. Where they
-    // do not, a wedge between other labels bends one of them, whose gradient shortens by that: each
-    // phi counts by the fourth power of its gradient's length, so that the one that goes on straight
-    // tells where the surface is and how it lies.
+    // Gradient per node, and value, of what is zero on the surface between two labels of the
+    // contest and grows into a by slope() a mm: score_b - score_a where all phis that part them
+    // agree. Where they do not, a wedge between other labels bends one of them, whose gradient
+    // shortens by that: each phi counts by the fourth power of its gradient's length, so that the
+    // one that goes on straight tells where the surface is and how it lies.
     std::array<float, 4> difference(const Position& position, std::size_t a, std::size_t b) const;
     // Near the surface between two labels their scores part by this much a mm.
     float slope(std::uint8_t a, std::uint8_t b) const {
@@ -99,8 +99,7 @@ class LabelField {
 
     // With the prices as they are: how far (mm) from each node no other label can come near, which
     // answers most points by one look-up; and in each cell the contest of those labels of which a
-    // surface may lie within reach_mm, with which most others are answered by two labels instead
-    // of by all of a block. Anew after prices change.
+    // surface may lie within reach_mm, which are few beside all of a block's.
     void find_contests(float reach_mm);
     // Label at the node and its margin.
     std::uint8_t node_label(std::size_t node) const { return node_label_[node]; }

@@ -59,7 +59,8 @@ LabelPriceReport prices_up_to(double most_vx,
     const float cell_mm = static_cast<float>(std::cbrt(cell_mm3));
 
     std::fill(field->prices().begin(), field->prices().end(), 0.0f);
-    // Prices may part two labels by twice the limit, and a cell is shared along a surface that near.
+    // Prices may part two labels by twice the limit, and a cell is shared along a surface that
+    // near.
     field->find_contests(2 * limit + 2 * cell_mm);
     const auto& blocks = field->blocks();
     std::vector<BlockCells> held(blocks.size());
@@ -166,7 +167,8 @@ LabelPriceReport prices_up_to(double most_vx,
                         const int stop = std::min(g.size.x, i + field->block_edge());
                         const LabelField::Block& block = field->block_of(i, j, k * field->factor());
                         const double w =
-                            held[static_cast<std::size_t>(&block - blocks.data())].weight / cell_mm3;
+                            held[static_cast<std::size_t>(&block - blocks.data())].weight /
+                            cell_mm3;
                         for (int r = i; r < stop; ++r) volume[row[r]] += w * share * depth;
                     }
                 }
@@ -251,8 +253,8 @@ LabelPriceReport prices_up_to(double most_vx,
             all += right[l];
             all_area += area;
         }
-        // All prices as one change no volume: what all labels lack together is not to be had, and would
-        // drive all of them to the limit.
+        // All prices as one change no volume: what all labels lack together is not to be had, and
+        // would drive all of them to the limit.
         for (std::size_t l = 0; l < labels; ++l) {
             if (right[l] != 0) right[l] -= all * (matrix[l * labels + l] / 1.001) / all_area;
         }

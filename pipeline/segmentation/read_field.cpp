@@ -43,7 +43,12 @@ struct Strip {
 // Work space of one thread.
 struct Rows {
     explicit Rows(std::size_t nx, int bricks_x)
-        : x(nx), y(nx), z(nx), status(nx), record(16 * nx), slope(static_cast<std::size_t>(bricks_x)),
+        : x(nx),
+          y(nx),
+          z(nx),
+          status(nx),
+          record(16 * nx),
+          slope(static_cast<std::size_t>(bricks_x)),
           has_slope(slope.size()) {}
     std::vector<float> x, y, z;
     std::vector<MapStatus> status;
@@ -67,7 +72,8 @@ Matrix3 node_slope(const Grid& nodes, const Grid& grid, const Matrix3& frame_fro
 }
 
 // Bricks of records from the 16 rows of a strip.
-void store_bricks(const Grid& grid, int by, int bz, const std::vector<std::uint32_t>& record, Strip* strip) {
+void store_bricks(
+    const Grid& grid, int by, int bz, const std::vector<std::uint32_t>& record, Strip* strip) {
     const int bricks_x = brick_count(grid.size).x;
     strip->table.reserve(static_cast<std::size_t>(bricks_x));
     for (int bx = 0; bx < bricks_x; ++bx) {
@@ -77,9 +83,9 @@ void store_bricks(const Grid& grid, int by, int bz, const std::vector<std::uint3
             const int i = std::min(4 * bx + q % 4, grid.size.x - 1);
             const int j = std::min(q / 4 % 4, grid.size.y - 1 - 4 * by);
             const int k = std::min(q / 16, grid.size.z - 1 - 4 * bz);
-            const std::uint32_t value = record[static_cast<std::size_t>(j + 4 * k) *
-                                                   static_cast<std::size_t>(grid.size.x) +
-                                               static_cast<std::size_t>(i)];
+            const std::uint32_t value =
+                record[static_cast<std::size_t>(j + 4 * k) * static_cast<std::size_t>(grid.size.x) +
+                       static_cast<std::size_t>(i)];
             brick[static_cast<std::size_t>(q)] = value;
             empty = empty && value == kNoBoundary;
         }
@@ -125,9 +131,8 @@ std::optional<Int3> nearest_to_winning(const LabelField& field, std::uint8_t lab
             const Int3 node{block.first.x + q % edge, block.first.y + q / edge % edge,
                             block.first.z + q / edge / edge};
             if (!field.nodes().contains(node.x, node.y, node.z)) continue;
-            LabelField::Position position =
-                field.locate(static_cast<float>(node.x), static_cast<float>(node.y),
-                             static_cast<float>(node.z));
+            LabelField::Position position = field.locate(
+                static_cast<float>(node.x), static_cast<float>(node.y), static_cast<float>(node.z));
             position.contest = &block.contests[0];
             field.scores(position, score.data());
             float other = 1e30f;

@@ -102,15 +102,16 @@ Status write_segmentation_pictures(const SegmentationPictureInput& input,
         }
         return nearest_label(input.before, input.before.grid.voxel_from_point(p));
     };
-    // In voxels of `after`: steps of the map lie half a diagonal to either side of a smooth surface,
-    // and so do its own.
+    // In voxels of `after`: steps of the map lie half a diagonal to either side of a smooth
+    // surface, and so do its own.
     const double reach_vx =
         0.5 * (norm(input.before.grid.spacing_mm) + norm(g.spacing_mm)) / g.spacing_mm.x;
     const auto changed_colour = [&](int before_label, int after_label, Point3 v) {
         const Colour c = colour_of(input.after.labels, after_label);
         const auto grey = static_cast<std::uint8_t>(20 + (c[0] + 2 * c[1] + c[2]) / 10);
         if (before_label == after_label) return Colour{grey, grey, grey};
-        return label_is_within(input.after, before_label, reach_vx, v) ? Colour{150, 130, 60} : Colour{255, 40, 40};
+        return label_is_within(input.after, before_label, reach_vx, v) ? Colour{150, 130, 60}
+                                                                       : Colour{255, 40, 40};
     };
     const Point3 middle{0.5 * (g.size.x - 1), 0.5 * (g.size.y - 1), 0.5 * (g.size.z - 1)};
     const Point3 busy = busiest_place(input.after);

@@ -190,8 +190,8 @@ SnapReport snap_surfaces(LabelVolume* volume,
         allowed.distance_vx =
             std::max(options.distance_vx, std::min(0.2, options.distance_vx / g.spacing_mm.x));
         if (g.spacing_mm.x <= 0.6) {
-            // What rounding twice as coarse moves is less than half of that; and a plane that is drawn
-            // half as far may lean more.
+            // What rounding twice as coarse moves is less than half of that; and a plane that is
+            // drawn half as far may lean more.
             allowed.patch_step = 2 * options.patch_step;
             allowed.normal_deg = 1.5 * options.normal_deg;
         }

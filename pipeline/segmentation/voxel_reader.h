@@ -1,5 +1,5 @@
-// Reads a label field at single points: the label there, and the boundary record of the surface near
-// it. Internal to read_field.cpp.
+// Reads a label field at single points: the label there, and the boundary record of the surface
+// near it. Internal to read_field.cpp.
 #pragma once
 
 #include <algorithm>
@@ -100,8 +100,7 @@ class VoxelReader {
         const Standing standing = standing_of(score.data(), labels.size());
         const std::uint8_t own = labels[standing.first], second = labels[standing.second];
         VoxelRead read{own};
-        if (band_vx_ <= 0 || standing.gap > reach_mm_ * field_.slope(own, second))
-            return read;
+        if (band_vx_ <= 0 || standing.gap > reach_mm_ * field_.slope(own, second)) return read;
         const Matrix3& m = slope();
         BoundaryRecord record{second};
         if (!find_plane(at, v, m, own, &record)) return read;
@@ -135,7 +134,8 @@ class VoxelReader {
                               const float* score,
                               const Standing& standing,
                               double distance_vx) const {
-        const auto way_mm = static_cast<float>(std::max(distance_vx, 0.0) + kBeyond_vx) * stretched_mm_;
+        const auto way_mm =
+            static_cast<float>(std::max(distance_vx, 0.0) + kBeyond_vx) * stretched_mm_;
         const auto& labels = at.contest->labels;
         for (std::size_t c = 0; c < labels.size(); ++c) {
             if (c == standing.first || c == standing.second) continue;
@@ -153,13 +153,17 @@ class VoxelReader {
     }
 
     // The place `more` voxels behind the foot of a plane.
-    LabelField::Position foot(const float* v, const Matrix3& m, const BoundaryRecord& r, double more) const {
+    LabelField::Position foot(const float* v,
+                              const Matrix3& m,
+                              const BoundaryRecord& r,
+                              double more) const {
         const Vector3 back = m * ((r.distance_vx + more) * r.normal);
         return field_.locate(v[0] - static_cast<float>(back.x), v[1] - static_cast<float>(back.y),
                              v[2] - static_cast<float>(back.z));
     }
 
-    // f, the score of the second label less that of the first, and its gradient per voxel of the grid.
+    // f, the score of the second label less that of the first, and its gradient per voxel of the
+    // grid.
     double rise(const LabelField::Position& at,
                 const Matrix3& m,
                 std::uint8_t own,
@@ -202,7 +206,7 @@ class VoxelReader {
     const LabelField& field_;
     const Grid& nodes_;
     double band_vx_;
-    double flat_;      // slopes of f per voxel of the grid that are none
+    double flat_;  // slopes of f per voxel of the grid that are none
     float stretched_mm_, reach_mm_;
     std::array<float, 3> h_, last_, rim_;
 };

@@ -17,7 +17,8 @@ using sonocase::testing::norm_of;
 using sonocase::testing::Random;
 using sonocase::testing::sample_labels;
 
-// Balls in a ball, one of them in two layers, and a rod of a voxel: three to five labels at many places.
+// Balls in a ball, one of them in two layers, and a rod of a voxel: three to five labels at many
+// places.
 LabelVolume crowded(double slice_mm) {
     Grid grid = cubic_grid(56);
     grid.spacing_mm.z = slice_mm;
@@ -50,8 +51,7 @@ Standing standing(const LabelField& field, LabelField::Position at) {
     if (order.size() < 2) return {labels[order[0]], labels[order[0]], 1e9};
     const std::uint8_t first = labels[order[0]], second = labels[order[1]];
     return {first, second,
-            (score[order[1]] - score[order[0]]) /
-                static_cast<double>(field.slope(first, second))};
+            (score[order[1]] - score[order[0]]) / static_cast<double>(field.slope(first, second))};
 }
 
 class LabelFieldOf : public ::testing::TestWithParam<double> {};
@@ -124,8 +124,8 @@ TEST_P(LabelFieldOf, BlocksOfAnyEdgeSayTheSame) {
 }
 
 // Prices move surfaces by the same way on either side of a block's face. What is left is a label
-// that is a candidate on one side alone: too far off to win, but within the reach of the smoothing of
-// its neighbour's own distance. Prices that counted once here and twice there made
+// that is a candidate on one side alone: too far off to win, but within the reach of the smoothing
+// of its neighbour's own distance. Prices that counted once here and twice there made
 // steps of 0.3 mm.
 TEST_P(LabelFieldOf, NothingJumpsFromBlockToBlock) {
     LabelField field(crowded(GetParam()), {});
