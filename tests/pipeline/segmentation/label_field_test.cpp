@@ -157,6 +157,36 @@ TEST_P(LabelFieldOf, NothingJumpsFromBlockToBlock) {
     EXPECT_LT(changes[changes.size() * 95 / 100], 0.1);
 }
 
+// More candidates than a contest can be told from: all of them are weighed.
+TEST(LabelField, CubesOfTwoHundredLabelsKeepTheirMiddles) {
+    constexpr int kEdge = 3, kCubes = 6;  // 216 in the reach of one block of 16
+    LabelVolume ct;
+    ct.grid = cubic_grid(kEdge * kCubes);
+    ct.voxels.resize(ct.grid.voxel_count());
+    for (int l = 0; l < kCubes * kCubes * kCubes; ++l) ct.labels.push_back({"cube", "muscle", l, {}});
+    const auto cube = [](int i, int j, int k) {
+        return static_cast<std::uint8_t>(i / kEdge + kCubes * (j / kEdge + kCubes * (k / kEdge)));
+    };
+    const int edge = ct.grid.size.x;
+    for (int k = 0; k < edge; ++k) {
+        for (int j = 0; j < edge; ++j) {
+            for (int i = 0; i < edge; ++i) ct.voxels[ct.grid.index(i, j, k)] = cube(i, j, k);
+        }
+    }
+    LabelField field(ct, {{}, 16});
+    field.find_contests(2);
+    ASSERT_GT(field.blocks()[0].labels.size(), 64u);
+    for (int k = 1; k < edge; k += kEdge) {
+        for (int j = 1; j < edge; j += kEdge) {
+            for (int i = 1; i < edge; i += kEdge) {
+                const LabelField::Position at = field.locate(
+                    static_cast<float>(i), static_cast<float>(j), static_cast<float>(k));
+                ASSERT_EQ(standing(field, at).first, cube(i, j, k)) << i << " " << j << " " << k;
+            }
+        }
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(Slices, LabelFieldOf, ::testing::Values(1.0, 4.0));
 
 }  // namespace
