@@ -126,19 +126,19 @@ void smooth_box(const VoxelBox& box,
     }
 }
 
-std::vector<float> crop(const VoxelBox& box,
-                        const std::vector<float>& values,
-                        const VoxelBox& part) {
-    std::vector<float> out(part.count());
+void crop(const VoxelBox& box,
+          const std::vector<float>& values,
+          const VoxelBox& part,
+          std::vector<float>* out) {
+    out->resize(part.count());
     for (int k = 0; k < part.size.z; ++k) {
         for (int j = 0; j < part.size.y; ++j) {
             const std::size_t from =
                 box.index(part.first.x - box.first.x, part.first.y - box.first.y + j,
                           part.first.z - box.first.z + k);
-            std::copy_n(values.data() + from, part.size.x, out.data() + part.index(0, j, k));
+            std::copy_n(values.data() + from, part.size.x, out->data() + part.index(0, j, k));
         }
     }
-    return out;
 }
 
 }  // namespace sonocase::pipeline

@@ -31,6 +31,9 @@ void smooth_box(const VoxelBox& box,
                 std::vector<float>* other);
 
 // The values of `box` that lie in `part`, which it holds.
-std::vector<float> crop(const VoxelBox& box, const std::vector<float>& values, const VoxelBox& part);
+void crop(const VoxelBox& box,
+          const std::vector<float>& values,
+          const VoxelBox& part,
+          std::vector<float>* out);
 
 }  // namespace sonocase::pipeline

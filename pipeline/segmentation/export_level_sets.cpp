@@ -22,7 +22,8 @@ openvdb::FloatGrid::Ptr level_set(const LabelDistance& distance,
     auto grid = openvdb::FloatGrid::create(background);
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     std::vector<float> phi;
-    const VoxelBox box = distance.distance(one_label(label), &phi);
+    LabelDistance::Work work;
+    const VoxelBox box = distance.distance(one_label(label), &phi, &work);
     auto accessor = grid->getAccessor();
     for (int k = 0; k < box.size.z; ++k) {
         for (int j = 0; j < box.size.y; ++j) {

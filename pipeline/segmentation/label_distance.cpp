@@ -121,39 +121,44 @@ void LabelDistance::add_level(double sigma_vx, double tolerance_vx) {
     levels_.push_back(std::move(level));
 }
 
-VoxelBox LabelDistance::distance(const LabelSet& labels, std::vector<float>* phi) const {
+VoxelBox LabelDistance::distance(const LabelSet& labels,
+                                 std::vector<float>* phi,
+                                 Work* work) const {
     VoxelBox box;
     for (std::size_t l = 0; l < boxes_.size(); ++l) {
         if (labels[l]) box = around(box, boxes_[l]);
     }
-    phi->clear();
-    if (box.empty()) return box;
+    if (box.empty()) {
+        phi->clear();
+        return box;
+    }
     const Vector3 h = labels_.grid.spacing_mm;
     // Beyond this the labels cannot win; the kernel's reach is added so that its border is not felt.
     Int3 pad;
     for (int a = 0; a < 3; ++a) {
         const int kernel = levels_.empty() ? 0 : levels_[0].kernels.reach(a);
-        pad[a] = static_cast<int>(std::ceil(std::min(limit_mm_, 6 * h[a]) / h[a] +
-                                            kernel * nodes_.spacing_mm[a] / h[a]));
+        pad[a] = static_cast<int>(
+            std::ceil(std::min(limit_mm_, 6 * h[a]) / h[a] + kernel * nodes_.spacing_mm[a] / h[a]));
     }
     if (factor_ > 1) pad.z = 2;
     box = grow(box, pad, labels_.grid.size);
     if (factor_ > 1) {
         box.size.z = (box.size.z - 1) * factor_ + 1;
         box.first.z *= factor_;
-        shape_interpolated(labels, box, phi);
+        shape_interpolated(labels, box, phi, work);
     } else {
         signed_distance(labels_, labels, box, limit_mm_, {true, true, true}, phi);
     }
     if (levels_.empty()) return box;
-    std::vector<float> smooth = *phi, other;
-    smooth_box(box, levels_[0].kernels, &smooth, &other);
-    std::vector<float> wide = smooth;
-    smooth_box(box, wide_.kernels, &wide, &other);
-    add_detail(labels, box, *phi, 0, &smooth);
-    const std::vector<std::size_t> strays = find_strays(labels, box, wide, wide_.tolerance_vx);
-    phi->swap(wide);
-    if (!strays.empty()) blend(box, wide_.spread, strays, box, smooth, phi);
+    work->smooth = *phi;
+    smooth_box(box, levels_[0].kernels, &work->smooth, &work->other);
+    work->wide = work->smooth;
+    smooth_box(box, wide_.kernels, &work->wide, &work->other);
+    add_detail(labels, box, *phi, 0, &work->smooth, work);
+    const std::vector<std::size_t> strays =
+        find_strays(labels, box, work->wide, wide_.tolerance_vx);
+    phi->swap(work->wide);
+    if (!strays.empty()) blend(box, wide_.spread, strays, box, work->smooth, phi, work);
     return box;
 }
 
@@ -164,8 +169,7 @@ std::vector<std::size_t> LabelDistance::find_strays(const LabelSet& labels,
     const float pixel = static_cast<float>(std::max(nodes_.spacing_mm.x, nodes_.spacing_mm.y));
     const float tolerance = static_cast<float>(tolerance_vx) * pixel;
     const Grid& g = labels_.grid;
-    const std::ptrdiff_t step[3] = {1, g.size.x,
-                                    static_cast<std::ptrdiff_t>(g.size.x) * g.size.y};
+    const std::ptrdiff_t step[3] = {1, g.size.x, static_cast<std::ptrdiff_t>(g.size.x) * g.size.y};
     std::array<bool, 256> member;
     for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
     // What is one voxel thick has no depth to give. Between thick slices it is the interpolation by
@@ -185,8 +189,7 @@ std::vector<std::size_t> LabelDistance::find_strays(const LabelSet& labels,
         if ((box.first.z + k) % factor_ != 0) continue;  // only slices are known
         for (int j = 0; j < box.size.y; ++j) {
             const Int3 start{box.first.x, box.first.y + j, (box.first.z + k) / factor_};
-            const std::uint8_t* row =
-                labels_.voxels.data() + g.index(start.x, start.y, start.z);
+            const std::uint8_t* row = labels_.voxels.data() + g.index(start.x, start.y, start.z);
             const std::size_t at = box.index(0, j, k);
             for (int i = 0; i < box.size.x; ++i) {
                 const float value = phi[at + static_cast<std::size_t>(i)];
@@ -203,7 +206,8 @@ void LabelDistance::add_detail(const LabelSet& labels,
                                const VoxelBox& box,
                                const std::vector<float>& raw,
                                std::size_t level,
-                               std::vector<float>* phi) const {
+                               std::vector<float>* phi,
+                               Work* work) const {
     if (level + 1 >= levels_.size()) return;
     const std::vector<std::size_t> strays =
         find_strays(labels, box, *phi, levels_[level].tolerance_vx);
@@ -227,11 +231,12 @@ void LabelDistance::add_detail(const LabelSet& labels,
         part.first[a] = box.first[a] + first;
         part.size[a] = std::min(box.size[a], high[a] + reach + 1) - first;
     }
-    const std::vector<float> part_raw = crop(box, raw, part);
-    std::vector<float> fine = part_raw, other;
-    smooth_box(part, finer.kernels, &fine, &other);
-    add_detail(labels, part, part_raw, level + 1, &fine);
-    blend(box, levels_[level].spread, strays, part, fine, phi);
+    std::vector<float>&part_raw = work->raw[level], &fine = work->fine[level];
+    crop(box, raw, part, &part_raw);
+    fine = part_raw;
+    smooth_box(part, finer.kernels, &fine, &work->other);
+    add_detail(labels, part, part_raw, level + 1, &fine, work);
+    blend(box, levels_[level].spread, strays, part, fine, phi, work);
 }
 
 void LabelDistance::blend(const VoxelBox& box,
@@ -239,21 +244,23 @@ void LabelDistance::blend(const VoxelBox& box,
                           const std::vector<std::size_t>& strays,
                           const VoxelBox& part,
                           const std::vector<float>& fine,
-                          std::vector<float>* phi) const {
-    std::vector<float> weight(part.count(), 0.0f), other;
+                          std::vector<float>* phi,
+                          Work* work) const {
+    std::vector<float>& weight = work->weight;
+    weight.assign(part.count(), 0.0f);
     const auto nx = static_cast<std::size_t>(box.size.x), ny = static_cast<std::size_t>(box.size.y);
     for (const std::size_t s : strays) {
         weight[part.index(static_cast<int>(s % nx) + box.first.x - part.first.x,
                           static_cast<int>(s / nx % ny) + box.first.y - part.first.y,
                           static_cast<int>(s / nx / ny) + box.first.z - part.first.z)] = 1;
     }
-    smooth_box(part, spread, &weight, &other);
+    smooth_box(part, spread, &weight, &work->other);
     for (int k = 0; k < part.size.z; ++k) {
         for (int j = 0; j < part.size.y; ++j) {
             const std::size_t from = part.index(0, j, k);
-            float* to = phi->data() + box.index(part.first.x - box.first.x,
-                                                part.first.y - box.first.y + j,
-                                                part.first.z - box.first.z + k);
+            float* to =
+                phi->data() + box.index(part.first.x - box.first.x, part.first.y - box.first.y + j,
+                                        part.first.z - box.first.z + k);
             for (std::size_t i = 0; i < static_cast<std::size_t>(part.size.x); ++i) {
                 to[i] += std::min(1.0f, weight[from + i]) * (fine[from + i] - to[i]);
             }

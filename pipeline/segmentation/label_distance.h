@@ -11,6 +11,7 @@
 // structures, edges, vessels), with a smooth passage between them.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "formats/label_volume.h"
@@ -43,15 +44,24 @@ class LabelDistance {
     const SliceGroups& groups() const { return groups_; }
     double limit_mm() const { return limit_mm_; }
 
+    // Work space of one thread: the system clears what is allocated anew, which takes as long as the
+    // smoothing does.
+    struct Work {
+        std::vector<float> smooth, wide, other, weight;
+        std::array<std::vector<float>, 3> raw, fine;  // of the levels
+        std::vector<float> flat, within;              // of slices
+        std::vector<std::uint8_t> capped;
+    };
     // Smooth phi (negative inside, mm) of a union of labels on `box` of the nodes; # box.count().
-    // Outside `box` it is further than the limit. Thread-safe.
-    VoxelBox distance(const LabelSet& labels, std::vector<float>* phi) const;
+    // Outside `box` it is further than the limit. Thread-safe, a Work a thread.
+    VoxelBox distance(const LabelSet& labels, std::vector<float>* phi, Work* work) const;
 
   private:
-    void shape_interpolated(const LabelSet& labels, const VoxelBox& box, std::vector<float>* phi) const;
-    void lean(const VoxelBox& slices,
-              const std::vector<std::uint8_t>& capped,
-              std::vector<float>* flat) const;
+    void shape_interpolated(const LabelSet& labels,
+                            const VoxelBox& box,
+                            std::vector<float>* phi,
+                            Work* work) const;
+    void lean(const VoxelBox& slices, Work* work) const;
     void cap(const SliceGroup& group,
              bool own,
              const VoxelBox& slices,
@@ -89,14 +99,16 @@ class LabelDistance {
                     const VoxelBox& box,
                     const std::vector<float>& raw,
                     std::size_t level,
-                    std::vector<float>* phi) const;
+                    std::vector<float>* phi,
+                    Work* work) const;
     // phi on `box` becomes `fine` on `part` of it near the strays, with a smooth passage.
     void blend(const VoxelBox& box,
                const BoxKernels& spread,
                const std::vector<std::size_t>& strays,
                const VoxelBox& part,
                const std::vector<float>& fine,
-               std::vector<float>* phi) const;
+               std::vector<float>* phi,
+               Work* work) const;
 
     std::vector<Level> levels_;  // coarse to fine
     Level wide_;                 // after levels_[0]

@@ -1,6 +1,7 @@
 #include "pipeline/segmentation/label_field.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -117,12 +118,15 @@ LabelField::LabelField(const LabelVolume& labels,
         return blocks_of[a].size() > blocks_of[b].size();
     });
     const float beyond = static_cast<float>(distance.limit_mm());
-    parallel_for(order.size(), 1, [&](std::size_t begin, std::size_t end) {
+    // Each thread that takes part takes the next label until there is none, with the same work space.
+    std::atomic<std::size_t> next{0};
+    parallel_for(order.size(), 1, [&](std::size_t, std::size_t) {
         std::vector<float> phi;
-        for (std::size_t o = begin; o < end; ++o) {
+        LabelDistance::Work work;
+        for (std::size_t o = next++; o < order.size(); o = next++) {
             const bool alone = order[o] >= labels_count;
             const auto l = static_cast<std::uint8_t>(order[o] % labels_count);
-            const VoxelBox box = distance.distance(alone ? one_label(l) : tree_.members[l], &phi);
+            const VoxelBox box = distance.distance(alone ? one_label(l) : tree_.members[l], &phi, &work);
             for (const std::uint32_t b : blocks_of[order[o]]) {
                 const Block& block = blocks_[b];
                 const auto& terms = alone ? block.alone : block.edges;

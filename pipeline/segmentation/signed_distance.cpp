@@ -87,13 +87,21 @@ VoxelBox grow(const VoxelBox& box, Int3 voxels, Int3 size) {
     return out;
 }
 
-void signed_distance(const LabelVolume& volume,
-                     const LabelSet& labels,
-                     const VoxelBox& box,
-                     double limit_mm,
-                     std::array<bool, 3> axes,
-                     std::vector<float>* phi) {
-    assert(limit_mm > 0);
+namespace {
+
+struct DistanceWork {
+    std::vector<float> first, second;
+    std::vector<std::uint8_t> mark;
+};
+
+// phi: # box.count()
+void distances_on(const LabelVolume& volume,
+                  const std::array<std::uint8_t, 256>& member,
+                  const VoxelBox& box,
+                  double limit_mm,
+                  std::array<bool, 3> axes,
+                  float* phi,
+                  DistanceWork* work) {
     const std::size_t nx = static_cast<std::size_t>(box.size.x);
     const std::size_t plane = nx * static_cast<std::size_t>(box.size.y);
     const std::size_t count = box.count();
@@ -109,14 +117,11 @@ void signed_distance(const LabelVolume& volume,
     const float half = static_cast<float>(measured > 0 ? 0.5 * sum / measured : 0);
     const float limit = static_cast<float>(limit_mm) + half;
     const float limit_sq = limit * limit;
-
-    phi->assign(count, 0.0f);
-    std::vector<float> first(count), second(count);
-    std::vector<std::uint8_t> mark(nx);
-    std::array<std::uint8_t, 256> member;
-    for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
-    for (const bool outside :
-         {false, true}) {  // distance to the label, then to what is not the label
+    auto& [first, second, mark] = *work;
+    first.resize(count);
+    second.resize(count);
+    mark.resize(nx);
+    for (const bool outside : {false, true}) {  // distance to the label, then to what is not it
         for (int k = 0; k < box.size.z; ++k) {
             for (int j = 0; j < box.size.y; ++j) {
                 const std::uint8_t* row =
@@ -147,17 +152,41 @@ void signed_distance(const LabelVolume& volume,
             }
             first.swap(second);
         }
-        float* out = phi->data();
         if (!outside) {
-            for (std::size_t i = 0; i < count; ++i) {
-                out[i] = first[i] > 0 ? std::min(std::sqrt(first[i]), limit) - half : 0.0f;
-            }
+            for (std::size_t i = 0; i < count; ++i)
+                phi[i] = first[i] > 0 ? std::min(std::sqrt(first[i]), limit) - half : 0.0f;
         } else {
             for (std::size_t i = 0; i < count; ++i) {
                 const float d = half - std::min(std::sqrt(first[i]), limit);
-                out[i] = first[i] > 0 ? d : out[i];
+                phi[i] = first[i] > 0 ? d : phi[i];
             }
         }
+    }
+}
+
+}  // namespace
+
+void signed_distance(const LabelVolume& volume,
+                     const LabelSet& labels,
+                     const VoxelBox& box,
+                     double limit_mm,
+                     std::array<bool, 3> axes,
+                     std::vector<float>* phi) {
+    assert(limit_mm > 0);
+    phi->resize(box.count());
+    std::array<std::uint8_t, 256> member;
+    for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
+    DistanceWork work;
+    if (axes[2]) {
+        distances_on(volume, member, box, limit_mm, axes, phi->data(), &work);
+        return;
+    }
+    // Slices that know nothing of each other, in the space of one.
+    for (int k = 0; k < box.size.z; ++k) {
+        const VoxelBox slice{{box.first.x, box.first.y, box.first.z + k},
+                             {box.size.x, box.size.y, 1}};
+        distances_on(volume, member, slice, limit_mm, axes, phi->data() + box.index(0, 0, k),
+                     &work);
     }
 }
 

@@ -46,9 +46,10 @@ OutlineField outline_field(const LabelVolume& labels,
         }
     }
     const int depth = std::min(o.box.size.x, o.box.size.y) / 2 + 1;
-    signed_distance(mask, 1, {{0, 0, 0}, mask.grid.size},
-                    std::max(pad, depth) * std::max(labels.grid.spacing_mm.x, labels.grid.spacing_mm.y),
-                    {true, true, false}, &field.phi);
+    signed_distance(
+        mask, 1, {{0, 0, 0}, mask.grid.size},
+        std::max(pad, depth) * std::max(labels.grid.spacing_mm.x, labels.grid.spacing_mm.y),
+        {true, true, false}, &field.phi);
     for (const float p : field.phi) field.deepest = std::max(field.deepest, -p);
     return field;
 }
@@ -133,21 +134,21 @@ void LabelDistance::blend_group(const SliceGroup& group,
 // The distance in space to a surface is shorter than that within a slice which it crosses obliquely: by
 // the cosine of its lean, which the slices on either side tell. They tell it by their distances in
 // space, so that it is found in two rounds.
-void LabelDistance::lean(const VoxelBox& slices,
-                         const std::vector<std::uint8_t>& capped,
-                         std::vector<float>* flat) const {
+void LabelDistance::lean(const VoxelBox& slices, Work* work) const {
     if (slices.size.z < 2) return;
     constexpr int kRounds = 2;
     constexpr float kLeast = 0.2f;  // of the cosine; slices say no more
     const std::size_t plane =
         static_cast<std::size_t>(slices.size.x) * static_cast<std::size_t>(slices.size.y);
     const float h = static_cast<float>(labels_.grid.spacing_mm.z);
-    const std::vector<float> within = *flat;
+    std::vector<float>&flat = work->flat, &within = work->within;
+    const std::vector<std::uint8_t>& capped = work->capped;
+    within = flat;
     std::vector<float> below(plane), here(plane);
     for (int round = 0; round < kRounds; ++round) {
         for (int k = 0; k < slices.size.z; ++k) {
             const std::size_t at = static_cast<std::size_t>(k) * plane;
-            float* to = flat->data() + at;
+            float* to = flat.data() + at;
             const bool first = k == 0, last = k + 1 == slices.size.z;
             std::copy(to, to + plane, here.begin());
             const float* down = first ? here.data() : below.data();
@@ -217,23 +218,25 @@ void LabelDistance::cap(const SliceGroup& group,
 
 void LabelDistance::shape_interpolated(const LabelSet& labels,
                                        const VoxelBox& box,
-                                       std::vector<float>* phi) const {
+                                       std::vector<float>* phi,
+                                       Work* work) const {
     // `box` is whole slices: its nodes run from slice `first` to slice `first + slices - 1`.
     const int first = box.first.z / factor_;
     const int slices = (box.size.z - 1) / factor_ + 1;
     const VoxelBox in_slices{{box.first.x, box.first.y, first}, {box.size.x, box.size.y, slices}};
-    std::vector<float> flat;
+    std::vector<float>& flat = work->flat;
     signed_distance(labels_, labels, in_slices, limit_mm_, {true, true, false}, &flat);
-    std::vector<std::uint8_t> capped(flat.size(), 0);
+    work->capped.assign(flat.size(), 0);
     for (const bool own : {false, true}) {
         for (std::size_t l = 0; l < groups_.of_label.size(); ++l) {
             if (labels[l] != own) continue;
             for (const SliceGroup& group : groups_.of_label[l]) {
-                if (group.lower < 0 || group.upper < 0) cap(group, own, in_slices, &flat, &capped);
+                if (group.lower < 0 || group.upper < 0)
+                    cap(group, own, in_slices, &flat, &work->capped);
             }
         }
     }
-    lean(in_slices, capped, &flat);
+    lean(in_slices, work);
     phi->resize(box.count());
     const std::size_t plane =
         static_cast<std::size_t>(box.size.x) * static_cast<std::size_t>(box.size.y);
