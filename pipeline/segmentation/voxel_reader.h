@@ -162,8 +162,8 @@ class VoxelReader {
                              v[2] - static_cast<float>(back.z));
     }
 
-    // f, the score of the second label less that of the first, and its gradient per voxel of the
-    // grid.
+    // f, which is zero on the surface of the two labels (LabelField::difference), and its gradient
+    // per voxel of the grid.
     double rise(const LabelField::Position& at,
                 const Matrix3& m,
                 std::uint8_t own,

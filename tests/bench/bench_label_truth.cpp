@@ -15,6 +15,7 @@
 
 #include "pipeline/import/analytic_torso.h"
 #include "pipeline/segmentation/resample_labels.h"
+#include "segmentation_row.h"
 #include "support/label_score.h"
 #include "support/plain_body.h"
 #include "support/torso_block.h"
@@ -95,15 +96,6 @@ void judge_torso(benchmark::State& state, double slice_mm) {
     for (const char* tube : {"portal_vein_and_splenic_vein", "hepatic_vein_3mm", "hepatic_vein_2mm",
                              "hepatic_artery_1p5mm"})
         state.counters[std::string("volume_") + tube] = 100 * torso->change(tube);
-}
-
-template <class Run>
-void add_run(const std::string& name, const Run& run) {
-    benchmark::RegisterBenchmark(("Segmentation/" + name).c_str(), run)
-        ->Unit(benchmark::kMillisecond)
-        ->MeasureProcessCPUTime()
-        ->UseRealTime()
-        ->Iterations(1);
 }
 
 [[maybe_unused]] const bool registered = [] {

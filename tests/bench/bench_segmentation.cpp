@@ -21,6 +21,7 @@
 #include "pipeline/import/analytic_torso.h"
 #include "pipeline/import/label_map.h"
 #include "pipeline/segmentation/resample_labels.h"
+#include "segmentation_row.h"
 #include "support/label_score.h"
 
 namespace sonocase::pipeline {
@@ -223,15 +224,6 @@ ResampleOptions with(const Change& change) {
     ResampleOptions options;
     change(options);
     return options;
-}
-
-template <class Run>
-void add_run(const std::string& name, const Run& run) {
-    benchmark::RegisterBenchmark(("Segmentation/" + name).c_str(), run)
-        ->Unit(benchmark::kMillisecond)
-        ->MeasureProcessCPUTime()
-        ->UseRealTime()
-        ->Iterations(1);
 }
 
 void add(const std::string& name, const ResampleOptions& options, bool real = false) {
