@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/calibration/calibration_pictures.h"
 
 #include <algorithm>
@@ -5,7 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "formats/calibrate/pose_screen.h"
+#include "formats/calibration/pose_screen.h"
 #include "pipeline/pictures/chart.h"
 
 namespace sonocase::pipeline {

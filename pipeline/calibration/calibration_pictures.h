@@ -1,15 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Pictures of a calibration, for the eye that no number replaces: residuals over the recording,
 // their histogram, how far the tool was tilted each way, and the image with its mark. PNG and SVG.
 #pragma once
 
 #include <string>
 
-#include "formats/calibrate/direction.h"
-#include "formats/calibrate/image_plane.h"
-#include "formats/calibrate/lag.h"
-#include "formats/calibrate/landmarks.h"
-#include "formats/calibrate/needle.h"
-#include "formats/calibrate/point.h"
+#include "formats/calibration/direction.h"
+#include "formats/calibration/image_plane.h"
+#include "formats/calibration/lag.h"
+#include "formats/calibration/landmarks.h"
+#include "formats/calibration/needle.h"
+#include "formats/calibration/point.h"
 
 namespace sonocase::pipeline {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/calibration/refine_point.h"
 
 #include <ceres/ceres.h>
@@ -8,7 +10,7 @@
 #include <cmath>
 #include <vector>
 
-#include "formats/calibrate/pose_screen.h"
+#include "formats/calibration/pose_screen.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The probe point again, with noise in orientation as well as in position.
 //
 // The linear fit takes the rotations as exact. Where the tilt is small their noise biases it: the
@@ -11,7 +13,7 @@
 
 #include <span>
 
-#include "formats/calibrate/point.h"
+#include "formats/calibration/point.h"
 
 namespace sonocase::pipeline {
 

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/calibration/touched_points.h"
 
 #include <algorithm>
 
-#include "formats/atomic_file.h"
-#include "formats/digest.h"
-#include "pipeline/import/delimited_text.h"
+#include "formats/base/digest.h"
+#include "formats/files/atomic_file.h"
+#include "pipeline/base/delimited_text.h"
 
 namespace sonocase::pipeline {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Small tables of calibrations: named points and plain signals, as CSV.
 #pragma once
 
@@ -6,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "formats/calibrate/lag.h"
-#include "formats/geometry.h"
-#include "formats/result.h"
+#include "formats/base/geometry.h"
+#include "formats/base/result.h"
+#include "formats/calibration/lag.h"
 
 namespace sonocase::pipeline {
 

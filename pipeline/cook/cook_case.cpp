@@ -1,21 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/cook_case.h"
 
 #include <algorithm>
 #include <optional>
 
-#include "formats/nearest_name.h"
+#include "formats/text/nearest_name.h"
+#include "pipeline/anatomy/structure_cells.h"
+#include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/base/plausible_size.h"
 #include "pipeline/cook/error_budget.h"
 #include "pipeline/cook/input_files.h"
 #include "pipeline/cook/pack_case.h"
 #include "pipeline/cook/stage_codecs.h"
 #include "pipeline/cook/stage_runner.h"
-#include "pipeline/cook/structure_cells.h"
 #include "pipeline/import/label_map.h"
-#include "pipeline/import/plausible_size.h"
-#include "pipeline/import/surface_file.h"
+#include "pipeline/import/surface/surface_file.h"
 #include "pipeline/registration/landmark_file.h"
 #include "pipeline/texture/speckle.h"
-#include "pipeline/texture/tissue_table.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -331,7 +333,7 @@ Result<CookResult> cook_case(const Recipe& recipe,
         if (error != nullptr) return *error;
     cooked.echo_offset = std::move((*echo)->offset);
     const StageClock pack_clock;
-    tell(progress, 0.95, "packing");
+    report_progress(progress, 0.95, "packing");
     auto packed = pack_case({recipe.name, recipe.text, recipe.exercises, &(*ct_skin)->skin,
                              *registration, *mannequin, cooked, **bank, tissues});
     if (!packed) return packed.error();
@@ -356,7 +358,7 @@ Result<CookResult> cook_case(const Recipe& recipe,
         std::erase_if(manifest.stages.back().warnings,
                       [](const std::string& w) { return w.find("cache") != std::string::npos; });
     }
-    tell(progress, 1, "done");
+    report_progress(progress, 1, "done");
     return result;
 }
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // From a recipe to a case bundle: runs the stages in order, each through the cache.
 //
 //     import -> surface -> align -> warp -> resample -> smooth -> texture -> structure -> pack
@@ -10,11 +12,11 @@
 #include <string>
 #include <vector>
 
-#include "formats/case_bundle.h"
-#include "formats/result.h"
-#include "formats/stage_report.h"
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/bundle/case_bundle.h"
+#include "pipeline/base/progress.h"
 #include "pipeline/cook/recipe.h"
-#include "pipeline/progress.h"
 
 namespace sonocase::pipeline {
 

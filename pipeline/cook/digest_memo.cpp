@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/digest_memo.h"
 
 #include <sys/stat.h>
@@ -7,9 +9,10 @@
 #include <filesystem>
 #include <vector>
 
-#include "formats/digest.h"
+#include "formats/base/digest.h"
+#include "formats/files/atomic_file.h"
+#include "formats/files/file_digest.h"
 #include "pipeline/cook/input_files.h"
-#include "formats/atomic_file.h"
 
 namespace sonocase::pipeline {
 namespace {

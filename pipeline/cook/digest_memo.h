@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Content hashes of files that need not be read again.
 //
 // A file is known by path, inode, size, modification and change time, to the nanosecond. The change
@@ -9,7 +11,7 @@
 #include <string>
 #include <unordered_map>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 
 namespace sonocase::pipeline {
 

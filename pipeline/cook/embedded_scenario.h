@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // scenarios/demo-torso, compiled in by CMake.
 #pragma once
 
 #include <string_view>
 #include <vector>
 
-#include "formats/case_bundle.h"
+#include "formats/bundle/case_bundle.h"
 
 namespace sonocase::pipeline {
 

@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Where the millimetres of a case's error come from, read off the reports of its stages.
 //
-// Every entry is a mean displacement of surfaces, so that they can be compared and added (as the root
-// of the sum of squares: the causes have nothing to do with one another). What lies deep in the body
-// cannot be seen by a fit of skins; that entry says so and has no number, except where the map is
-// known (the analytic torso).
+// Every entry is a mean displacement of surfaces, so that they can be compared and added (as the
+// root of the sum of squares: the causes have nothing to do with one another). What lies deep in
+// the body cannot be seen by a fit of skins; that entry says so and has no number, except where the
+// map is known (the analytic torso).
 #pragma once
 
 #include <cstddef>
@@ -11,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/stage_report.h"
+#include "formats/base/stage_report.h"
 
 namespace sonocase::pipeline {
 
@@ -39,8 +41,8 @@ struct NextStep {
 // An entry is left out where its stage did not report what it is computed from.
 ErrorBudget error_budget(std::span<const StageReport> stages);
 
-// Mean displacement of surfaces through a map that is known, as a share of the map's own voxel (cube
-// root of its volume) and of the cooked voxel: measured on the analytic torso
+// Mean displacement of surfaces through a map that is known, as a share of the map's own voxel
+// (cube root of its volume) and of the cooked voxel: measured on the analytic torso
 // (tests/pipeline/tradeoff/error_budget_test.cpp repeats it).
 inline constexpr double kSampledShare = 0.085;
 inline constexpr double kCookedShare = 0.05;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Exercises written in the patient's frame.
 //
 // An author sees targets and paths in the CT, in Slicer's RAS millimetres, long before a mannequin
@@ -8,8 +10,8 @@
 #include <string>
 #include <string_view>
 
-#include "formats/registration.h"
-#include "formats/result.h"
+#include "formats/base/result.h"
+#include "formats/registration/registration.h"
 
 namespace sonocase::pipeline {
 

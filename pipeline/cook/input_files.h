@@ -1,11 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Content hashes of a recipe's inputs.
 #pragma once
 
 #include <functional>
 #include <string>
 
-#include "formats/digest.h"
-#include "formats/result.h"
+#include "formats/base/digest.h"
+#include "formats/base/result.h"
+#include "formats/files/file_digest.h"
 
 namespace sonocase::pipeline {
 

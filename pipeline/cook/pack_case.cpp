@@ -1,12 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/pack_case.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "formats/exercise.h"
-#include "formats/nearest_name.h"
+#include "formats/exercise/exercise.h"
+#include "formats/text/nearest_name.h"
 #include "pipeline/cook/exercise_frame.h"
-#include "pipeline/cook/preview_picture.h"
+#include "pipeline/pictures/preview_picture.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -53,8 +55,8 @@ void check_exercise(const Exercise& exercise,
             warnings->push_back(exercise.name + ": no-go label '" + name + "' is not in this case");
 }
 
-// To 1/4096 mm, and normals to as many digits: more than any use of a skin can tell, and what is left
-// of each number packs to half.
+// To 1/4096 mm, and normals to as many digits: more than any use of a skin can tell, and what is
+// left of each number packs to half.
 Surface rounded(Surface surface) {
     const auto round = [](auto& v) {
         for (int axis = 0; axis < 3; ++axis) v[axis] = std::round(4096 * v[axis]) / 4096;

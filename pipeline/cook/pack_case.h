@@ -1,14 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The last stage: everything that the others made becomes one bundle, and is checked against
 // itself.
 #pragma once
 
 #include <vector>
 
-#include "formats/case_bundle.h"
-#include "formats/registration.h"
-#include "formats/result.h"
-#include "formats/stage_files.h"
-#include "formats/stage_report.h"
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/registration/registration.h"
 #include "pipeline/cook/recipe.h"
 
 namespace sonocase::pipeline {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/plan_cases.h"
 
 #include <algorithm>
@@ -6,8 +8,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "formats/files/atomic_file.h"
 #include "pipeline/cook/digest_memo.h"
-#include "formats/atomic_file.h"
 
 namespace sonocase::pipeline {
 namespace {

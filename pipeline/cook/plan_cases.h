@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What a build farm has to do: which stages of which cases are not done yet, by content alone.
 //
 // A farm's folder:
@@ -12,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 #include "pipeline/cook/stage_costs.h"
 #include "pipeline/cook/stage_keys.h"
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/recipe.h"
 
 #include <algorithm>
@@ -10,12 +12,12 @@
 #define TOML_HEADER_ONLY 1
 #include <toml++/toml.h>
 
-#include "formats/exercise.h"
-#include "formats/nearest_name.h"
+#include "formats/exercise/exercise.h"
+#include "formats/files/atomic_file.h"
+#include "formats/text/nearest_name.h"
+#include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/cook/embedded_scenario.h"
 #include "pipeline/cook/exercise_frame.h"
-#include "formats/atomic_file.h"
-#include "pipeline/texture/tissue_table.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A recipe: what a case is made of and how. scenarios/<name>/case.toml.
 //
 //     name = "real-torso"
@@ -23,8 +25,8 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/case_bundle.h"
-#include "formats/tissue.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/volume/tissue.h"
 #include "pipeline/cook/stage_options.h"
 
 namespace sonocase::pipeline {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/stage_cache.h"
 
 #include <algorithm>
@@ -6,8 +8,8 @@
 #include <filesystem>
 #include <sstream>
 
-#include "formats/digest.h"
-#include "formats/atomic_file.h"
+#include "formats/base/digest.h"
+#include "formats/files/atomic_file.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Results of stages, kept under the hash of what they were made from.
 //
 // One file an entry, DIR/<stage>/<first two digits>/<key>; the key is the hash of the stage's name
@@ -14,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 
 namespace sonocase::pipeline {
 

@@ -1,11 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/stage_codecs.h"
 
 #include <algorithm>
 #include <array>
 #include <string_view>
 
-#include "formats/chunk_file.h"
-#include "formats/registration_file.h"
+#include "formats/container/chunk_file.h"
+#include "formats/registration/registration_json.h"
+#include "formats/text/stage_report_json.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // How the answers of stages become bytes in the cache and come back. Seconds are left out, so that
 // the same inputs give the same bytes and a later stage's key changes only where the answer did.
 #pragma once
@@ -6,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "formats/registration.h"
-#include "formats/result.h"
-#include "formats/stage_files.h"
-#include "pipeline/registration/skin_surface.h"
+#include "formats/base/result.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/registration/registration.h"
+#include "pipeline/registration/skin/skin_surface.h"
 
 namespace sonocase::pipeline {
 

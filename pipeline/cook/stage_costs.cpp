@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/stage_costs.h"
 
 #include <cmath>
 #include <filesystem>
 
+#include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/cook/cook_case.h"
-#include "pipeline/import/analytic_torso.h"
-#include "pipeline/import/volume_file.h"
+#include "pipeline/import/volume/volume_file.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Cores and memory that a stage's job asks a build farm for. docs/farm.md has the measurements.
 #pragma once
 

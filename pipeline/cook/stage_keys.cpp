@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/stage_keys.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <initializer_list>
 
-#include "formats/chunk_file.h"
-#include "formats/digest.h"
+#include "formats/base/digest.h"
+#include "formats/container/chunk_file.h"
 #include "pipeline/cook/pack_case.h"
 #include "pipeline/import/label_map.h"
 #include "pipeline/registration/register_surfaces.h"

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Which stages a case has, what each depends on, and the key of each.
 //
 //     import -> surface -> warp -> resample [-> smooth] -> texture, structure -> pack
@@ -12,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include "formats/case_bundle.h"
-#include "formats/result.h"
+#include "formats/base/result.h"
+#include "formats/bundle/case_bundle.h"
 #include "pipeline/cook/recipe.h"
 
 namespace sonocase::pipeline {

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/stage_options.h"
 
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 
-#include "formats/nearest_name.h"
+#include "formats/text/nearest_name.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -78,7 +80,8 @@ const std::vector<OptionKey>& table() {
          [](Options& o) -> OptionSlot { return &o.resample.record_band_vx; }},
         {"resample", "block_vx", 4, 16, "nodes", "blocks of distances, 4, 8 or 16: time and memory",
          [](Options& o) -> OptionSlot { return &o.resample.block_vx; }},
-        {"resample", "snap_vx", 0, 0.5, "voxels", "most that surfaces move to be kept short; 0: none",
+        {"resample", "snap_vx", 0, 0.5, "voxels",
+         "most that surfaces move to be kept short; 0: none",
          [](Options& o) -> OptionSlot { return &o.resample.snap_vx; }},
         {"resample", "k0", 0.001, 100, "1/mm^2", "method paper: eq. (10)",
          [](Options& o) -> OptionSlot { return &o.resample.level_set.k0; }},

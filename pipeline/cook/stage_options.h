@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The options of every stage, and the one table that names their keys in a recipe.
 #pragma once
 
@@ -8,13 +10,13 @@
 #include <variant>
 #include <vector>
 
-#include "formats/result.h"
-#include "pipeline/import/analytic_torso.h"
+#include "formats/base/result.h"
+#include "pipeline/anatomy/analytic_torso.h"
+#include "pipeline/anatomy/bake_structure.h"
 #include "pipeline/registration/register_surfaces.h"
-#include "pipeline/registration/skin_surface.h"
+#include "pipeline/registration/skin/skin_surface.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/segmentation/smooth_labels.h"
-#include "pipeline/texture/bake_structure.h"
 #include "pipeline/texture/texture_bank.h"
 
 namespace sonocase::pipeline {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Runs the stages of a case one after the other, each through the cache, and keeps their reports.
 #pragma once
 
@@ -8,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "formats/digest.h"
+#include "formats/base/digest.h"
 #include "pipeline/cook/cook_case.h"
 #include "pipeline/cook/stage_cache.h"
 #include "pipeline/cook/stage_keys.h"
@@ -117,7 +119,7 @@ class StageRunner {
                                          std::string* digest) {
         using Value = typename Codec::Value;
         const Progress part = [this, begin, share](double fraction, std::string_view doing) {
-            tell(progress_, begin + share * fraction, doing);
+            report_progress(progress_, begin + share * fraction, doing);
         };
         part(0, stage);
         bool damaged = false;

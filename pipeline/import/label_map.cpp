@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/import/label_map.h"
 
 #include <algorithm>
@@ -6,10 +8,11 @@
 #include <filesystem>
 #include <numeric>
 
-#include "formats/stage_files.h"
-#include "pipeline/import/plausible_size.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/files/stage_file.h"
+#include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/base/plausible_size.h"
 #include "pipeline/import/structure_list.h"
-#include "pipeline/texture/tissue_table.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -101,7 +104,7 @@ Result<ImportedLabels> import_label_map(const std::string& path,
     if (!std::filesystem::exists(path, code))
         return Error{"no such file or folder", path, "check the path"};
     if (path.ends_with(".labels")) return from_stage_file(path);
-    tell(progress, 0, "reading labels");
+    report_progress(progress, 0, "reading labels");
     auto list = is_mask_folder(path) ? read_mask_folder(path, options.table)
                                      : read_label_file(path, options.table);
     if (!list) return list.error();
@@ -136,7 +139,7 @@ Result<ImportedLabels> import_label_map(const std::string& path,
         [](const Structure& a, const Structure& b) { return a.entry.value < b.entry.value; });
     if (auto status = check_names(structures, path); !status) return status.error();
 
-    tell(progress, 0.6, "painting labels");
+    report_progress(progress, 0.6, "painting labels");
     LabelVolume& labels = result.labels;
     labels.grid = list->grid;
     if (options.scale != 1) {
@@ -198,7 +201,7 @@ Result<ImportedLabels> import_label_map(const std::string& path,
     };
     report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    tell(progress, 1, "labels read");
+    report_progress(progress, 1, "labels read");
     return result;
 }
 

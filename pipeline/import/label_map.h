@@ -1,13 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A segmented CT as a label volume in the `ct` frame: the first stage of every case.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "formats/label_volume.h"
-#include "formats/result.h"
-#include "formats/stage_report.h"
-#include "pipeline/progress.h"
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/volume/label_volume.h"
+#include "pipeline/base/progress.h"
 
 namespace sonocase::pipeline {
 

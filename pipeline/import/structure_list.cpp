@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/import/structure_list.h"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What the readers of label maps hand to import_label_map: structures as runs of voxels.
 #pragma once
 
@@ -5,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/import/label_table.h"
-#include "pipeline/import/volume_file.h"
+#include "pipeline/anatomy/label_table.h"
+#include "pipeline/import/volume/volume_file.h"
 
 namespace sonocase::pipeline {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A small drawing surface that keeps an anti-aliased picture and the same drawing as SVG. It needs
 // no display and gives the same bytes everywhere. Pixels, origin at the lower left, y up, as VTK's
 // 2-D contexts have it.

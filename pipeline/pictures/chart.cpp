@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/pictures/chart.h"
 
 #include <vtkAutoInit.h>
@@ -27,7 +29,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/atomic_file.h"
+#include "formats/files/atomic_file.h"
 #include "pipeline/pictures/canvas.h"
 
 // VTK finds its text renderer through an object factory.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Plots of the reports: VTK's charts, drawn by our own canvas, so that no display is needed and the
 // bytes are the same everywhere.
 #pragma once
@@ -7,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 
 namespace sonocase::pipeline {
 

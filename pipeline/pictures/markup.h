@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Text for HTML and SVG that this program writes.
 #pragma once
 

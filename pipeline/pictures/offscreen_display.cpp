@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/pictures/offscreen_display.h"
 
 #include <dirent.h>

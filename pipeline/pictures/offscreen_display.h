@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A display for VTK on machines that have none.
 //
 // Debian's VTK draws through X alone (no OSMesa, no EGL), and its GLEW refuses a context without X.
@@ -5,7 +7,7 @@
 // process.
 #pragma once
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 
 namespace sonocase::pipeline {
 

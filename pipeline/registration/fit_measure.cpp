@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/registration/fit_measure.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "pipeline/parallel.h"
-#include "pipeline/registration/matching.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/registration/matching/matching.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,12 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // How well a map lays the skin on the mannequin: exact distances from readings to the mapped skin's
 // triangles, and the share of readings that they were measured on.
 #pragma once
 
 #include <vector>
 
-#include "formats/registration.h"
-#include "pipeline/registration/skin_surface.h"
-#include "pipeline/registration/target_surface.h"
+#include "formats/registration/registration.h"
+#include "pipeline/registration/matching/target_surface.h"
+#include "pipeline/registration/skin/skin_surface.h"
 
 namespace sonocase::pipeline {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/registration/fit_pictures.h"
 
 #include <vtkActor.h>
@@ -27,7 +29,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "formats/atomic_file.h"
+#include "formats/files/atomic_file.h"
 #include "pipeline/pictures/offscreen_display.h"
 #include "pipeline/registration/fit_measure.h"
 

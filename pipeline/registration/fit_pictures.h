@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Pictures of a fit: the mapped skin coloured by its signed distance to the mannequin, from four
 // sides, and three cuts with both outlines.
 #pragma once
@@ -5,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "formats/registration.h"
-#include "formats/result.h"
-#include "formats/surface.h"
-#include "pipeline/registration/skin_surface.h"
+#include "formats/base/result.h"
+#include "formats/registration/registration.h"
+#include "formats/volume/surface.h"
+#include "pipeline/registration/skin/skin_surface.h"
 
 namespace sonocase::pipeline {
 

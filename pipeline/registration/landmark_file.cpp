@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/registration/landmark_file.h"
 
 #include <cmath>
 
-#include "formats/atomic_file.h"
-#include "pipeline/import/delimited_text.h"
+#include "formats/files/atomic_file.h"
+#include "pipeline/base/delimited_text.h"
 
 namespace sonocase::pipeline {
 

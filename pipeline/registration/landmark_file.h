@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Landmarks as a CSV: rows name,ct_x,ct_y,ct_z,x,y,z in mm, the last three on the mannequin's
 // surface.
 #pragma once
@@ -6,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 #include "pipeline/registration/register_surfaces.h"
 
 namespace sonocase::pipeline {

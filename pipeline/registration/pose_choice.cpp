@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/registration/pose_choice.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/parallel.h"
-#include "pipeline/registration/line_text.h"
+#include "pipeline/base/line_text.h"
+#include "pipeline/base/parallel.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -22,7 +24,7 @@ double penalty(double gap) {
 
 // A candidate after a stiff quadratic and a coarse field: gaps, missing counterparts, deformation
 // and hints together.
-JudgedPose judge(const FitSetting& s, const TargetSurface& target, const RigidCandidate& rigid) {
+JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCandidate& rigid) {
     JudgedPose judged;
     judged.rigid = rigid;
     judged.quadratic = RigidQuadratic::from_rigid(rigid.target_from_skin);
@@ -33,7 +35,7 @@ JudgedPose judge(const FitSetting& s, const TargetSurface& target, const RigidCa
         readings = std::move(fewer);
     }
     RefineOptions options;
-    options.skin_askers = 900;
+    options.skin_queries = 900;
     options.landmarks = s.landmarks;
     options.landmark_weight = s.hints.landmark_weight;
     double deformation = 0;
@@ -51,7 +53,7 @@ JudgedPose judge(const FitSetting& s, const TargetSurface& target, const RigidCa
     field.spacing_mm = 45;
     field.rounds = 3;
     field.tolerance = 1e-2;
-    field.skin_askers = 900;
+    field.skin_queries = 900;
     Registration map;
     map.quadratic = in_frames(judged.quadratic, s.coarse.origin, target.origin);
     map.ct_box = s.skin.box;
@@ -111,7 +113,7 @@ RunnerUp described(const JudgedPose& best, const JudgedPose& other) {
 }
 
 // One warning for each kind of pose that the surfaces cannot rule out, with the hint that can.
-void warn_of_runners_up(const FitSetting& s, PoseChoice* choice) {
+void warn_of_runners_up(const FitContext& s, PoseChoice* choice) {
     std::vector<PoseKind> told;
     for (const RunnerUp& r : choice->runners_up) {
         if (r.score_mm > kCloseScore * choice->best.score_mm) break;
@@ -157,16 +159,16 @@ TargetSurface mirrored(const TargetSurface& target, const Rigid& pose) {
 
 }  // namespace
 
-PoseChoice choose_pose(const FitSetting& s,
+PoseChoice choose_pose(const FitContext& s,
                        const RegisterOptions& options,
                        const Progress& progress) {
     RigidOptions rigid = options.rigid;
     rigid.hints = s.hints;
     rigid.seed = options.seed;
-    tell(progress, 0.05, "rigid alignment: starts");
+    report_progress(progress, 0.05, "rigid alignment: starts");
     std::vector<RigidCandidate> candidates =
         align_rigid_candidates(s.coarse, s.target, rigid, progress);
-    tell(progress, 0.2, "rigid alignment: judging candidates");
+    report_progress(progress, 0.2, "rigid alignment: judging candidates");
     std::vector<JudgedPose> judged(candidates.size());
     parallel_for(candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n) judged[n] = judge(s, s.target, candidates[n]);

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Which of the rigid candidates is the patient's pose, and what else it could have been.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "pipeline/registration/fit_setting.h"
+#include "pipeline/registration/fit_context.h"
 
 namespace sonocase::pipeline {
 
@@ -23,7 +25,7 @@ struct PoseChoice {
     std::vector<std::string> warnings;
 };
 
-PoseChoice choose_pose(const FitSetting& s,
+PoseChoice choose_pose(const FitContext& s,
                        const RegisterOptions& options,
                        const Progress& progress);
 

@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/registration/register_report.h"
 
 #include <cmath>
 
-#include "pipeline/registration/line_text.h"
+#include "pipeline/base/line_text.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -23,7 +25,7 @@ void add_target(StageReport& report, const TargetSurface& t) {
     report.measures.push_back({"reading_spacing_mm", t.spacing_mm});
 }
 
-void warn_of_readings(StageReport& report, const FitSetting& s, const FitMeasure& fit) {
+void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure& fit) {
     const TargetSurface& t = s.target;
     if (t.not_finite > 0) {
         report.warnings.push_back(
@@ -77,7 +79,7 @@ void warn_of_landmarks(StageReport& report, const RegisterOptions& options, cons
 
 }  // namespace
 
-StageReport align_report(const FitSetting& s,
+StageReport align_report(const FitContext& s,
                          const PoseChoice& choice,
                          const FitMeasure& fit,
                          double seconds) {
@@ -100,7 +102,7 @@ StageReport align_report(const FitSetting& s,
     return report;
 }
 
-StageReport warp_report(const FitSetting& s,
+StageReport warp_report(const FitContext& s,
                         const WarpFit& w,
                         const RegisterOptions& options,
                         double seconds) {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What a registration says of itself: measures for --report, warnings for people.
 #pragma once
 
@@ -6,11 +8,11 @@
 
 namespace sonocase::pipeline {
 
-StageReport align_report(const FitSetting& s,
+StageReport align_report(const FitContext& s,
                          const PoseChoice& choice,
                          const FitMeasure& fit,
                          double seconds);
-StageReport warp_report(const FitSetting& s,
+StageReport warp_report(const FitContext& s,
                         const WarpFit& warp,
                         const RegisterOptions& options,
                         double seconds);

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/registration/register_surfaces.h"
 
 #include <chrono>
@@ -17,7 +19,7 @@ Result<RegisterResult> align_surfaces(const RegisterInput& input,
                                       const RegisterOptions& options,
                                       const Progress& progress) {
     const auto start = std::chrono::steady_clock::now();
-    Result<FitSetting> s = prepare_fit(input, options);
+    Result<FitContext> s = prepare_fit(input, options);
     if (!s) return s.error();
     const PoseChoice choice = choose_pose(*s, options, progress);
     const Rigid pose =
@@ -38,7 +40,7 @@ Result<RegisterResult> warp_surfaces(const RegisterInput& input,
                                      const RegisterOptions& options,
                                      const Progress& progress) {
     const auto start = std::chrono::steady_clock::now();
-    Result<FitSetting> s = prepare_fit(input, options);
+    Result<FitContext> s = prepare_fit(input, options);
     if (!s) return s.error();
     const Rigid pose{mannequin_from_ct.rotation,
                      mannequin_from_ct * s->fine.origin - s->target.origin};
@@ -75,7 +77,7 @@ Result<RegisterResult> register_surfaces(const RegisterInput& input,
     result.report.measures.push_back({"align_seconds", align_stage.seconds});
     result.report.measures.push_back({"warp_seconds", warp_stage.seconds});
     result.report.seconds = seconds_since(start);
-    tell(progress, 1, "done");
+    report_progress(progress, 1, "done");
     return result;
 }
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Registration as a whole: the patient's skin laid on the mannequin, proven not to fold, with how
 // good it is and what the data could not tell.
 //
@@ -15,15 +17,15 @@
 #include <string>
 #include <vector>
 
-#include "formats/registration.h"
-#include "formats/result.h"
-#include "formats/surface.h"
-#include "pipeline/progress.h"
+#include "formats/base/result.h"
+#include "formats/registration/registration.h"
+#include "formats/volume/surface.h"
+#include "pipeline/base/progress.h"
 #include "pipeline/registration/fit_measure.h"
-#include "pipeline/registration/quadratic_warp.h"
-#include "pipeline/registration/residual_warp.h"
-#include "pipeline/registration/rigid_alignment.h"
-#include "pipeline/registration/skin_surface.h"
+#include "pipeline/registration/skin/skin_surface.h"
+#include "pipeline/registration/warp/quadratic_warp.h"
+#include "pipeline/registration/warp/residual_warp.h"
+#include "pipeline/registration/warp/rigid_alignment.h"
 
 namespace sonocase::pipeline {
 

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/registration/warp_fit.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/registration/fold_proof.h"
-#include "pipeline/registration/line_text.h"
+#include "pipeline/base/line_text.h"
+#include "pipeline/registration/map/fold_proof.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -26,7 +28,7 @@ struct Quadratic {
 };
 
 // Lighter and lighter, down to what the gaps deserve or the option says.
-Quadratic descend(const FitSetting& s,
+Quadratic descend(const FitContext& s,
                   const RigidQuadratic& start,
                   const RegisterOptions& options) {
     Quadratic best;
@@ -69,7 +71,7 @@ double mean_move(const DisplacementGrid& field, Point3 origin, const std::vector
 
 }  // namespace
 
-WarpFit fit_warp(const FitSetting& s,
+WarpFit fit_warp(const FitContext& s,
                  const Rigid& rigid,
                  const RegisterOptions& options,
                  const Progress& progress) {
@@ -78,7 +80,7 @@ WarpFit fit_warp(const FitSetting& s,
     w.rigid_fit = measure_fit(s.skin, s.target, in_frames(s, start));
     RansacOptions ransac = options.ransac;
     ransac.seed = options.seed;
-    tell(progress, 0.4, "quadratic warp: trials");
+    report_progress(progress, 0.4, "quadratic warp: trials");
     w.ransac = ransac_quadratic(s.fine, s.target, rigid, s.box, ransac, progress);
     RigidQuadratic q = w.ransac.map;
     RefineOptions stiff;
@@ -86,7 +88,7 @@ WarpFit fit_warp(const FitSetting& s,
     w.rigid_trust =
         trust_quadratic(s.fine, s.target, s.readings, start, stiff, options.strain, s.inside);
     if (!options.paper_warp) {
-        tell(progress, 0.55, "quadratic warp: point to surface");
+        report_progress(progress, 0.55, "quadratic warp: point to surface");
         // The trials' answer is a start like the rigid one.
         const QuadraticTrust trial =
             trust_quadratic(s.fine, s.target, s.readings, q, stiff, options.strain, s.inside);
@@ -112,7 +114,7 @@ WarpFit fit_warp(const FitSetting& s,
     w.registration.min_det_jacobian = proof.least_bound;
     w.quadratic_fit = measure_fit(s.skin, s.target, w.registration);
     if (options.residual_warp && !options.paper_warp && !w.kept_rigid) {
-        tell(progress, 0.7, "residual warp");
+        report_progress(progress, 0.7, "residual warp");
         w.residual = fit_residual(s.fine, s.target, s.readings, s.inside, options.residual,
                                   &w.registration, progress);
         if (w.residual.used) {
@@ -127,7 +129,7 @@ WarpFit fit_warp(const FitSetting& s,
     w.least_det = w.registration.min_det_jacobian = proof.least_bound;
     w.sampled_det = proof.least_sample;
     w.fit = w.residual.used ? measure_fit(s.skin, s.target, w.registration) : w.quadratic_fit;
-    tell(progress, 0.95, "measuring");
+    report_progress(progress, 0.95, "measuring");
     if (!(w.least_det > kLeastDetJacobian)) {
         w.warnings.push_back(
             text("the map is not proven free of folds (det J >= %.3f)", w.least_det));

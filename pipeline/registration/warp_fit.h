@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // From a rigid pose to the whole map: RANSAC, the quadratic from points to surfaces with the
 // freedom that the data deserve, the residual field, and the guards between them.
 #pragma once
@@ -5,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/registration/fit_setting.h"
+#include "pipeline/registration/fit_context.h"
 
 namespace sonocase::pipeline {
 
@@ -23,7 +25,7 @@ struct WarpFit {
     std::vector<std::string> warnings;
 };
 
-WarpFit fit_warp(const FitSetting& s,
+WarpFit fit_warp(const FitContext& s,
                  const Rigid& rigid,
                  const RegisterOptions& options,
                  const Progress& progress);

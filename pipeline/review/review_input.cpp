@@ -1,10 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/review/review_input.h"
 
 #include <filesystem>
 
-#include "formats/atomic_file.h"
-#include "formats/digest.h"
-#include "formats/nearest_name.h"
+#include "formats/base/digest.h"
+#include "formats/files/atomic_file.h"
+#include "formats/files/bundle_file.h"
+#include "formats/files/recording_file.h"
+#include "formats/text/nearest_name.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,16 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What a review is made from, loaded and scored.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "formats/case_bundle.h"
-#include "formats/exercise.h"
-#include "formats/progress/progress_book.h"
-#include "formats/result.h"
-#include "formats/sequence.h"
-#include "formats/session/session.h"
-#include "formats/session/session_score.h"
+#include "formats/base/result.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
+#include "formats/progress_book/progress_book.h"
+#include "formats/recording/sequence.h"
+#include "formats/recording/session.h"
+#include "formats/scoring/session_score.h"
 
 namespace sonocase::pipeline {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/review/review_page.h"
 
 #include <algorithm>
@@ -5,9 +7,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "formats/atomic_file.h"
-#include "formats/number_text.h"
-#include "formats/session/metric_table.h"
+#include "formats/exercise/metric_table.h"
+#include "formats/files/atomic_file.h"
+#include "formats/text/number_text.h"
 #include "pipeline/pictures/markup.h"
 #include "pipeline/review/review_plots.h"
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The review as one HTML page that needs nothing but itself: pictures and plots are inside.
 #pragma once
 

@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/review/review_plots.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "formats/number_text.h"
-#include "formats/session/metric_table.h"
-#include "formats/session/session_monitor.h"
+#include "formats/exercise/metric_table.h"
+#include "formats/scoring/session_monitor.h"
+#include "formats/text/number_text.h"
 #include "pipeline/pictures/markup.h"
 
 namespace sonocase::pipeline {

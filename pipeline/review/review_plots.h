@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The plots of a review as inline SVG: one time axis, a lane a subject.
 #pragma once
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/review/session_views.h"
 
 #include <vtkActor.h>

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // 3-D pictures of a session: body, structures to be spared, targets, trails of probe and needle,
 // and the needle where it came to rest. VTK, offscreen.
 #pragma once
@@ -6,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 #include "pipeline/review/review_input.h"
 
 namespace sonocase::pipeline {

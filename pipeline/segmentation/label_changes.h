@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What a stage did to each label: the guard that names every lost or shrunk structure.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "formats/label_volume.h"
-#include "formats/stage_report.h"
+#include "formats/base/stage_report.h"
+#include "formats/volume/label_volume.h"
 
 namespace sonocase::pipeline {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/segmentation/level_set_smoothing.h"
 
 #include <algorithm>
@@ -5,8 +7,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "pipeline/parallel.h"
-#include "pipeline/segmentation/signed_distance.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/segmentation/distance/signed_distance.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -174,7 +176,8 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
     const int pad = static_cast<int>(std::ceil(band_mm / h.x)) + 2;
     for (std::size_t l = 0; l < boxes.size(); ++l) {
         if (boxes[l].empty()) continue;
-        tell(progress, static_cast<double>(l) / static_cast<double>(boxes.size()), "level sets");
+        report_progress(progress, static_cast<double>(l) / static_cast<double>(boxes.size()),
+                        "level sets");
         Layer layer;
         layer.box = grow(boxes[l], {pad, pad, pad}, volume.grid.size);
         layer.h = static_cast<float>(h.x);
@@ -214,7 +217,7 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
     report_changes(result.changes, 0.2, &result.report);
     result.report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-    tell(progress, 1, "level sets");
+    report_progress(progress, 1, "level sets");
     return result;
 }
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The smoothing of the paper: one level set a label, eq. (10), recomposed by the smallest phi.
 //
 //     phi_{t+1} = phi_t + dt * (K0 * (phi_0 - phi_t) + C(x'))
@@ -16,10 +18,10 @@
 
 #include <vector>
 
-#include "formats/label_volume.h"
-#include "formats/result.h"
-#include "formats/stage_report.h"
-#include "pipeline/progress.h"
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/volume/label_volume.h"
+#include "pipeline/base/progress.h"
 #include "pipeline/segmentation/label_changes.h"
 
 namespace sonocase::pipeline {

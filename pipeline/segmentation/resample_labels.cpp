@@ -1,14 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/segmentation/resample_labels.h"
 
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
-#include "pipeline/segmentation/cooked_grid.h"
-#include "pipeline/segmentation/label_field.h"
-#include "pipeline/segmentation/label_prices.h"
-#include "pipeline/segmentation/nearest_labels.h"
-#include "pipeline/segmentation/read_field.h"
+#include "pipeline/segmentation/field/cooked_grid.h"
+#include "pipeline/segmentation/field/label_field.h"
+#include "pipeline/segmentation/field/nearest_labels.h"
+#include "pipeline/segmentation/field/sampled_field.h"
+#include "pipeline/segmentation/field/volume_correction.h"
 #include "pipeline/segmentation/snap_surfaces.h"
 
 namespace sonocase::pipeline {
@@ -20,11 +22,11 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-FieldRead through_field(const ResampleInput& input,
-                        const ResampleOptions& options,
-                        const Grid& grid,
-                        const Progress& progress,
-                        ResampleResult* result) {
+SampledField through_field(const ResampleInput& input,
+                           const ResampleOptions& options,
+                           const Grid& grid,
+                           const Progress& progress,
+                           ResampleResult* result) {
     auto start = Clock::now();
     const auto lap = [&](double* seconds) {
         *seconds = seconds_since(start);
@@ -53,12 +55,12 @@ FieldRead through_field(const ResampleInput& input,
     };
     map.jacobian = [&](Point3 ct) { return inverse(jacobian(registration, ct)); };
     map.forward = [&](Point3 ct) { return mannequin_from_ct(registration, ct); };
-    FieldRead read = read_field(&field, grid, map, {options.record_band_vx}, progress);
+    SampledField read = sample_label_field(&field, grid, map, {options.record_band_vx}, progress);
     StageReport* report = &result->report;
     if (options.snap_vx > 0 && !read.boundary.table.empty()) {
-        const SnapReport snapped = snap_surfaces(
-            &read.volume, &read.boundary,
-            {.band_vx = options.record_band_vx, .distance_vx = options.snap_vx});
+        const SnapReport snapped =
+            snap_surfaces(&read.volume, &read.boundary,
+                          {.band_vx = options.record_band_vx, .distance_vx = options.snap_vx});
         add_measures(snapped, report);
     }
     lap(&result->seconds.voxels);
@@ -80,8 +82,8 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
                      "shape, nearest or paper"};
     }
     if (options.block_vx != 4 && options.block_vx != 8 && options.block_vx != 16) {
-        return Error{"blocks of " + std::to_string(options.block_vx) + " nodes", "resample.block_vx",
-                     "4, 8 or 16"};
+        return Error{"blocks of " + std::to_string(options.block_vx) + " nodes",
+                     "resample.block_vx", "4, 8 or 16"};
     }
     const auto grid =
         cooked_grid(input.ct_labels, input.registration, {options.voxel_mm, options.margin_mm});
@@ -103,7 +105,7 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
             result.report.measures.push_back({"time_step", level_set->time_step});
         }
     } else {
-        FieldRead read = through_field(input, options, *grid, progress, &result);
+        SampledField read = through_field(input, options, *grid, progress, &result);
         result.volume = std::move(read.volume);
         result.boundary = std::move(read.boundary);
         counts = read.counts;

@@ -1,28 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // From the patient to the mannequin: a label map on any grid in `ct`, through the inverse of the
 // fitted map, into cubic voxels in `mannequin`.
 //
 // shape    the labels become one smooth partition of space (label_field.h): thick slices are
 //          interpolated by shape, steps smoothed, every label at its own volume (label_prices.h).
-//          It is read at the preimage of each voxel, and near a surface a boundary record says where
+//          It is read at the preimage of each voxel, and near a surface a boundary record says
+//          where
 //          it runs inside the voxels.
 // nearest  the paper's: the label of the nearest CT voxel; no records.
 //
 // paper    nearest, then the level sets of eq. (10) on every label (level_set_smoothing.h).
 //
-// Labels whose anatomy is smaller than a voxel are kept as one voxel and named in the report.
-// Cost: real torso (1.4 M voxels of 3 mm, 67 labels) into 1 mm about 9 s of processor time, 0.34 GB.
+// Labels whose anatomy is smaller than a voxel are kept as one voxel and named in the report. Cost:
+// real torso (1.4 M voxels of 3 mm, 67 labels) into 1 mm about 9 s of processor time, 0.34 GB.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "formats/label_volume.h"
-#include "formats/registration.h"
-#include "formats/result.h"
-#include "formats/stage_report.h"
-#include "formats/surface_patch.h"
-#include "pipeline/progress.h"
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/registration/registration.h"
+#include "formats/volume/label_volume.h"
+#include "formats/volume/surface_patch.h"
+#include "pipeline/base/progress.h"
 #include "pipeline/segmentation/label_changes.h"
 #include "pipeline/segmentation/level_set_smoothing.h"
 
@@ -56,9 +59,9 @@ struct ResampleSeconds {  // method shape; wall clock
 };
 
 struct ResampleResult {
-    LabelVolume volume;                   // `mannequin`, direction the identity
-    BoundaryBricks boundary;  // formats/boundary_record.h; empty: none made
-    std::vector<LabelChange> changes;     // against the CT's volumes times det J
+    LabelVolume volume;                // `mannequin`, direction the identity
+    BoundaryBricks boundary;           // formats/volume/boundary_record.h; empty: none made
+    std::vector<LabelChange> changes;  // against the CT's volumes times det J
     StageReport report;
     ResampleSeconds seconds;  // not in the report: its measures are part of the stage's bytes
 };

@@ -1,21 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/segmentation/smooth_labels.h"
 
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
-#include "pipeline/segmentation/label_field.h"
-#include "pipeline/segmentation/label_prices.h"
-#include "pipeline/segmentation/read_field.h"
+#include "pipeline/segmentation/field/label_field.h"
+#include "pipeline/segmentation/field/sampled_field.h"
+#include "pipeline/segmentation/field/volume_correction.h"
 #include "pipeline/segmentation/snap_surfaces.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-FieldRead read_on_itself(LabelField* field,
-                         const Grid& grid,
-                         double band_vx,
-                         const Progress& progress) {
+SampledField read_on_itself(LabelField* field,
+                            const Grid& grid,
+                            double band_vx,
+                            const Progress& progress) {
     FieldMap map;
     map.row = [&](int j, int k, float* x, float* y, float* z, MapStatus* status) {
         const Point3 start =
@@ -30,7 +32,7 @@ FieldRead read_on_itself(LabelField* field,
     };
     map.jacobian = [&](Point3) { return grid.direction; };  // d(frame) / d(axes of the grid)
     map.forward = [](Point3 p) { return p; };
-    return read_field(field, grid, map, {band_vx}, progress);
+    return sample_label_field(field, grid, map, {band_vx}, progress);
 }
 
 }  // namespace
@@ -66,14 +68,14 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
         prices = set_label_prices(&field, [](Point3) { return 1.0; },
                                   {.iterations = options.volume_iterations});
         last = i + 1 >= options.iterations;
-        FieldRead read = read_on_itself(&field, volume.grid,
-                                        last && cubic ? options.record_band_vx : 0, progress);
+        SampledField read = read_on_itself(&field, volume.grid,
+                                           last && cubic ? options.record_band_vx : 0, progress);
         result.volume.voxels = std::move(read.volume.voxels);
         result.boundary = std::move(read.boundary);
         if (options.snap_vx > 0 && !result.boundary.table.empty()) {
-            snapped = snap_surfaces(
-                &result.volume, &result.boundary,
-                {.band_vx = options.record_band_vx, .distance_vx = options.snap_vx});
+            snapped =
+                snap_surfaces(&result.volume, &result.boundary,
+                              {.band_vx = options.record_band_vx, .distance_vx = options.snap_vx});
         }
         rescued.insert(rescued.end(), read.rescued.begin(), read.rescued.end());
     }

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Smoothing of a label volume, all labels at once.
 //
 // joint      the labels become one smooth partition of space in which every label keeps its volume
@@ -11,11 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "formats/label_volume.h"
-#include "formats/result.h"
-#include "formats/stage_report.h"
-#include "formats/surface_patch.h"
-#include "pipeline/progress.h"
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/volume/label_volume.h"
+#include "formats/volume/surface_patch.h"
+#include "pipeline/base/progress.h"
 #include "pipeline/segmentation/label_changes.h"
 #include "pipeline/segmentation/level_set_smoothing.h"
 
@@ -36,8 +38,8 @@ struct SmoothOptions {
 inline constexpr int kSmoothVersion = 7;
 
 struct SmoothResult {
-    LabelVolume volume;                   // on the grid of the input
-    BoundaryBricks boundary;  // formats/boundary_record.h; empty: none made
+    LabelVolume volume;       // on the grid of the input
+    BoundaryBricks boundary;  // formats/volume/boundary_record.h; empty: none made
     std::vector<LabelChange> changes;
     StageReport report;
 };

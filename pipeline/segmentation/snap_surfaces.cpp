@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/segmentation/snap_surfaces.h"
 
 #include <algorithm>
@@ -5,9 +7,9 @@
 #include <cmath>
 #include <vector>
 
-#include "formats/boundary_record.h"
-#include "formats/surface_patch.h"
-#include "pipeline/parallel.h"
+#include "formats/volume/boundary_record.h"
+#include "formats/volume/surface_patch.h"
+#include "pipeline/base/parallel.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -67,7 +69,8 @@ class Snapper {
         best.missed = kBrickVoxels + 1;
         BrickRecords hits = brick->records;
         for (int turn = 0; turn < kTurns && best.missed > 0; ++turn) {
-            std::vector<SurfacePatch> patches = fit_patches(brick->labels, hits, options_.patch_step);
+            std::vector<SurfacePatch> patches =
+                fit_patches(brick->labels, hits, options_.patch_step);
             if (patches.empty()) break;
             Attempt now = attempt(*brick, std::move(patches));
             bool others = false;
@@ -157,8 +160,8 @@ class Snapper {
 // What one layer of bricks finds.
 struct Found {
     Change change;
-    std::vector<std::uint32_t> entry;         // stored bricks that follow patches
-    std::vector<std::uint8_t> count;          // and how many each
+    std::vector<std::uint32_t> entry;  // stored bricks that follow patches
+    std::vector<std::uint8_t> count;   // and how many each
     std::vector<SurfacePatch> patches;
 };
 
@@ -204,10 +207,10 @@ SnapReport snap_surfaces(LabelVolume* volume,
             const int k = static_cast<int>(bz) * kBrickEdge;
             for (int by = 0; by < bricks.y; ++by) {
                 for (int bx = 0; bx < bricks.x; ++bx) {
-                    const std::size_t b =
-                        static_cast<std::size_t>(bx) +
-                        static_cast<std::size_t>(bricks.x) *
-                            (static_cast<std::size_t>(by) + static_cast<std::size_t>(bricks.y) * bz);
+                    const std::size_t b = static_cast<std::size_t>(bx) +
+                                          static_cast<std::size_t>(bricks.x) *
+                                              (static_cast<std::size_t>(by) +
+                                               static_cast<std::size_t>(bricks.y) * bz);
                     const std::uint32_t entry = boundary->table[b];
                     if (entry & kUniformBrick) continue;
                     ++found.change.bricks;

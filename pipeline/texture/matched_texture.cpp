@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/texture/matched_texture.h"
 
 #include <algorithm>
@@ -6,10 +8,10 @@
 #include <cmath>
 #include <complex>
 
-#include "pipeline/texture/counter_random.h"
-#include "pipeline/texture/fourier.h"
-#include "pipeline/texture/periodic_volume.h"
-#include "pipeline/texture/torus_spectrum.h"
+#include "pipeline/base/counter_random.h"
+#include "pipeline/base/periodic_volume.h"
+#include "pipeline/texture/spectrum/fourier.h"
+#include "pipeline/texture/spectrum/torus_spectrum.h"
 
 namespace sonocase::pipeline {
 namespace {

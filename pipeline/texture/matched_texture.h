@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Solid texture with the histogram and the autocorrelation of its example.
 //
 // The grey of the example is seen as q(g), a rising function of a Gaussian field g: q carries the
@@ -20,8 +22,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/texture/autocorrelation.h"
-#include "pipeline/texture/example_image.h"
+#include "pipeline/texture/example/example_image.h"
+#include "pipeline/texture/spectrum/autocorrelation.h"
 #include "pipeline/texture/texture_bank.h"
 
 namespace sonocase::pipeline {

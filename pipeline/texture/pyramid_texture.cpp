@@ -1,12 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/texture/pyramid_texture.h"
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 
-#include "pipeline/parallel.h"
-#include "pipeline/texture/counter_random.h"
-#include "pipeline/texture/periodic_volume.h"
+#include "pipeline/base/counter_random.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/base/periodic_volume.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Solid texture by the statistics of a Laplacian pyramid: the method of the paper, eq. (15).
 //
 //     P(g, l) = K_l P_l(g) + (1 - K_l) P_{l,l-1}(g_l | g_{l-1})
@@ -28,7 +30,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/texture/example_image.h"
+#include "pipeline/texture/example/example_image.h"
 
 namespace sonocase::pipeline {
 

@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/texture/speckle.h"
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 
-#include "pipeline/parallel.h"
-#include "pipeline/texture/counter_random.h"
+#include "pipeline/base/counter_random.h"
+#include "pipeline/base/parallel.h"
 
 namespace sonocase::pipeline {
 namespace {

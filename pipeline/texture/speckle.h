@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The speckle volume of the physical image model: scatterers anchored in the tissue.
 #pragma once
 
 #include <cstdint>
 
-#include "formats/solid_texture.h"
+#include "formats/volume/solid_texture.h"
 
 namespace sonocase::pipeline {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/texture/texture_bank.h"
 
 #include <algorithm>
@@ -11,13 +13,13 @@
 #include <optional>
 #include <sstream>
 
-#include "pipeline/parallel.h"
-#include "pipeline/texture/counter_random.h"
+#include "pipeline/base/counter_random.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/texture/example/prepare_example.h"
+#include "pipeline/texture/example/read_example.h"
+#include "pipeline/texture/example/synthetic_examples.h"
 #include "pipeline/texture/matched_texture.h"
-#include "pipeline/texture/prepare_example.h"
 #include "pipeline/texture/pyramid_texture.h"
-#include "pipeline/texture/read_example.h"
-#include "pipeline/texture/synthetic_examples.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -219,7 +221,7 @@ Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
     auto specs = plan_texture_bank(tissues, options, &out.report.warnings);
     if (!specs) return specs.error();
     std::vector<std::optional<Result<SolidTextureResult>>> made(specs->size());
-    tell(progress, 0.1, "learning textures");
+    report_progress(progress, 0.1, "learning textures");
     parallel_for(made.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) made[i].emplace(make_solid_texture((*specs)[i]));
     });
@@ -232,7 +234,7 @@ Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
                                    result.warnings.end());
         synthetic += (*specs)[i].examples[0].name.rfind("synthetic ", 0) == 0;
     }
-    tell(progress, 1, "learning textures");
+    report_progress(progress, 1, "learning textures");
     out.report.measures = {{"textures", static_cast<double>(made.size())},
                            {"synthetic_examples", synthetic},
                            {"edge_voxels", static_cast<double>(options.edge)}};

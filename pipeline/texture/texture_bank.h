@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The bank of solid textures that the image model "paper" looks up: one for each texture name of
 // the tissue table, learned from example images where there are any.
 #pragma once
@@ -7,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
-#include "formats/solid_texture.h"
-#include "formats/stage_report.h"
-#include "formats/tissue.h"
-#include "pipeline/progress.h"
-#include "pipeline/texture/example_image.h"
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/volume/solid_texture.h"
+#include "formats/volume/tissue.h"
+#include "pipeline/base/progress.h"
+#include "pipeline/texture/example/example_image.h"
 #include "pipeline/texture/pyramid_texture.h"
 
 namespace sonocase::pipeline {

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/texture/texture_pictures.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "formats/geometry.h"
-#include "formats/number_text.h"
+#include "formats/base/geometry.h"
+#include "formats/text/number_text.h"
 #include "pipeline/pictures/chart.h"
 
 namespace sonocase::pipeline {

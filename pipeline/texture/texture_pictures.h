@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A page that lets the eye judge a solid texture beside its example.
 #pragma once
 
 #include <string>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 #include "pipeline/texture/texture_quality.h"
 
 namespace sonocase::pipeline {

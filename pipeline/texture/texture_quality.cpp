@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/texture/texture_quality.h"
 
 #include <algorithm>
@@ -5,7 +7,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "pipeline/texture/prepare_example.h"
+#include "pipeline/texture/example/prepare_example.h"
 
 namespace sonocase::pipeline {
 namespace {

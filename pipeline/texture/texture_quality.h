@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // How near a solid texture comes to its example, beside how near two real patches come to each
 // other.
 #pragma once
@@ -6,11 +8,11 @@
 #include <span>
 #include <vector>
 
-#include "formats/result.h"
-#include "formats/solid_texture.h"
-#include "formats/stage_report.h"
-#include "pipeline/texture/autocorrelation.h"
-#include "pipeline/texture/example_image.h"
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/volume/solid_texture.h"
+#include "pipeline/texture/example/example_image.h"
+#include "pipeline/texture/spectrum/autocorrelation.h"
 #include "pipeline/texture/texture_bank.h"
 
 namespace sonocase::pipeline {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/tradeoff/boundary_error.h"
 
 #include <algorithm>
@@ -7,8 +9,8 @@
 #include <random>
 #include <vector>
 
-#include "formats/boundary_record.h"
-#include "pipeline/parallel.h"
+#include "formats/volume/boundary_record.h"
+#include "pipeline/base/parallel.h"
 
 namespace sonocase::pipeline {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // How far the surfaces of a cooked volume lie from the true ones, in one figure that means
 // something in mm whatever the anatomy.
 //
@@ -9,12 +11,12 @@
 
 #include <cstdint>
 
-#include "formats/brick_volume.h"
-#include "formats/case_bundle.h"
-#include "formats/label_volume.h"
-#include "formats/registration.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/registration/registration.h"
+#include "formats/volume/brick_volume.h"
+#include "formats/volume/label_volume.h"
+#include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/cook/stage_options.h"
-#include "pipeline/import/analytic_torso.h"
 
 namespace sonocase::pipeline {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/tradeoff/choose_settings.h"
 
 #include <algorithm>
@@ -5,8 +7,8 @@
 #include <chrono>
 #include <cmath>
 
-#include "formats/number_text.h"
-#include "pipeline/import/analytic_torso.h"
+#include "formats/text/number_text.h"
+#include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/segmentation/resample_labels.h"
 
 namespace sonocase::pipeline {
@@ -77,8 +79,7 @@ std::string format_front(const std::vector<Trial>& trials,
         "// Written by scripts/accuracy; do not edit. The suite \"case\": settings, greatest error "
         "of the bodies\n"
         "// in mm, seconds on " +
-        timed_body +
-        "; the volume of its grid, and the seconds of the probe on that machine.\n";
+        timed_body + "; the volume of its grid, and the seconds of the probe on that machine.\n";
     text += "t.volume_mm3 = " + number_text(volume_mm3, 6) +
             ";\nt.probe_seconds = " + number_text(probe_seconds, 4) + ";\n";
     const auto of_case = [](const Trial& trial) {
@@ -111,7 +112,10 @@ double probe_seconds() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-Choice choose_settings(const FrontTable& table, const Wish& wish, double volume_mm3, double speed) {
+Choice choose_settings(const FrontTable& table,
+                       const AccuracyTarget& wish,
+                       double volume_mm3,
+                       double speed) {
     assert(!table.rows.empty());
     const CostModel model = fit_cost_model(table);
     const auto seconds = [&](const FrontRow& row) {

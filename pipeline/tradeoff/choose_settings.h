@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Which settings for a wanted accuracy, or for the time there is?
 //
 // The table of measured settings (measured_front.inc, written by scripts/accuracy from a sweep of
@@ -10,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 #include "pipeline/cook/error_budget.h"
 #include "pipeline/cook/stage_options.h"
 #include "pipeline/tradeoff/trial.h"
@@ -48,7 +50,7 @@ std::string format_front(const std::vector<Trial>& trials,
 // allowed.
 double probe_seconds();
 
-struct Wish {
+struct AccuracyTarget {
     double tolerance_mm = 0;   // > 0: the cheapest settings whose error is within
     double time_budget_s = 0;  // > 0: the best settings whose time is within; both: tolerance first
 };
@@ -62,7 +64,10 @@ struct Choice {
 
 // volume_mm3: of the case's cooked grid, about the mannequin's bounding box; speed: probe_seconds()
 // over the table's. The table has at least one row.
-Choice choose_settings(const FrontTable& table, const Wish& wish, double volume_mm3, double speed);
+Choice choose_settings(const FrontTable& table,
+                       const AccuracyTarget& wish,
+                       double volume_mm3,
+                       double speed);
 
 // What would lower the error next: the cheapest row that is better than the one a case was cooked
 // with (by its voxel).

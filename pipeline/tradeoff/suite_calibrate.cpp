@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <random>
 
-#include "formats/calibrate/point.h"
+#include "formats/calibration/point.h"
 #include "pipeline/tradeoff/suites.h"
 
 namespace sonocase::pipeline {

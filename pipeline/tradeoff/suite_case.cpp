@@ -1,7 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include <map>
 #include <memory>
 
-#include "formats/registration_file.h"
+#include "formats/registration/registration_json.h"
 #include "pipeline/cook/cook_case.h"
 #include "pipeline/tradeoff/boundary_error.h"
 #include "pipeline/tradeoff/suites.h"

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -5,9 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "formats/atomic_file.h"
+#include "formats/files/atomic_file.h"
+#include "formats/files/bundle_file.h"
 #include "pipeline/cook/cook_case.h"
-#include "pipeline/texture/read_example.h"
+#include "pipeline/texture/example/read_example.h"
 #include "pipeline/tradeoff/suites.h"
 
 namespace sonocase::pipeline {
@@ -40,9 +43,11 @@ Status start(Player& player) {
         return Error{"the player is not beside this program", player.program,
                      "build or install sonoplay, or leave --suite render out"};
     }
-    player.folder = std::filesystem::temp_directory_path() / ("sonocase-render-" + std::to_string(std::random_device{}()));
+    player.folder = std::filesystem::temp_directory_path() /
+                    ("sonocase-render-" + std::to_string(std::random_device{}()));
     std::filesystem::create_directories(player.folder, failed);
-    if (failed) return Error{failed.message(), player.folder, "check the folder for temporary files"};
+    if (failed)
+        return Error{failed.message(), player.folder, "check the folder for temporary files"};
     auto recipe = embedded_recipe();
     if (!recipe) return recipe.error();
     auto cooked = cook_case(*recipe);
@@ -52,11 +57,13 @@ Status start(Player& player) {
 }
 
 // Frames of a sweep under the settings, and the median time of one.
-Result<std::vector<ExampleImage>> play(const Player& player, const Settings& settings, double* seconds) {
+Result<std::vector<ExampleImage>> play(const Player& player,
+                                       const Settings& settings,
+                                       double* seconds) {
     const std::string out = player.folder + "/frames", stats = player.folder + "/stats.json";
     std::string command = quoted(player.program) + " " + quoted(player.bundle) +
-                          " --headless --tracker sweep:tour --frames " + std::to_string(kFrames) + " --out " +
-                          quoted(out) + " --stats " + quoted(stats);
+                          " --headless --tracker sweep:tour --frames " + std::to_string(kFrames) +
+                          " --out " + quoted(out) + " --stats " + quoted(stats);
     for (const Setting& s : settings) {
         const std::string name = s.key.substr(s.key.find('.') + 1);
         command += " --" + name + " " + quoted(s.value);
@@ -80,8 +87,8 @@ Result<std::vector<ExampleImage>> play(const Player& player, const Settings& set
     return frames;
 }
 
-// Root mean square difference in grey after averaging over 8 x 8 pixels: what is where and how bright, and not
-// the place of each grain of speckle, which any change of sampling moves.
+// Root mean square difference in grey after averaging over 8 x 8 pixels: what is where and how
+// bright, and not the place of each grain of speckle, which any change of sampling moves.
 double rms_grey(const std::vector<ExampleImage>& a, const std::vector<ExampleImage>& b) {
     constexpr int kBlock = 8;
     double sum = 0;
@@ -93,7 +100,8 @@ double rms_grey(const std::vector<ExampleImage>& a, const std::vector<ExampleIma
                 for (int v = 0; v < kBlock; ++v) {
                     for (int u = 0; u < kBlock; ++u) {
                         const std::size_t i = a[f].index(x + u, y + v);
-                        difference += static_cast<double>(a[f].grey[i]) - static_cast<double>(b[f].grey[i]);
+                        difference +=
+                            static_cast<double>(a[f].grey[i]) - static_cast<double>(b[f].grey[i]);
                     }
                 }
                 difference /= kBlock * kBlock;
@@ -116,13 +124,24 @@ Suite render_suite() {
     suite.error_name = "rms difference";
     suite.error_unit = "grey, 8 x 8 pixels averaged";
     suite.truth =
-        "Twelve frames of a sweep over the demo torso are compared with the same frames at 768 beams of 1024 "
+        "Twelve frames of a sweep over the demo torso are compared with the same frames at 768 "
+        "beams of 1024 "
         "samples; seconds are the median of a frame on one thread.";
     suite.knobs = {
-        {"render.scanlines", {"64", "96", "128", "192", "256", "384"}, "192", "", "beams of the sector",
-         "detail across the beams", "the lateral filter spans a number of beams, so few beams also change the grain"},
-        {"render.samples", {"128", "256", "512", "768"}, "512", "", "samples along a beam",
-         "detail along the beam", "the speckle's grain is met by about 512 samples"},
+        {"render.scanlines",
+         {"64", "96", "128", "192", "256", "384"},
+         "192",
+         "",
+         "beams of the sector",
+         "detail across the beams",
+         "the lateral filter spans a number of beams, so few beams also change the grain"},
+        {"render.samples",
+         {"128", "256", "512", "768"},
+         "512",
+         "",
+         "samples along a beam",
+         "detail along the beam",
+         "the speckle's grain is met by about 512 samples"},
     };
     suite.pairs = {{"render.scanlines", "render.samples"}};
     suite.named = {{TrialRole::paper, "model paper", {{"render.model", "paper"}}},

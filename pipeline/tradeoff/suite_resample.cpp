@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include <memory>
 
 #include "pipeline/cook/stage_options.h"
@@ -106,14 +108,13 @@ Suite smooth_suite() {
          "volume lost by smoothing",
          "converged after a few steps"},
     };
-    suite.knobs.push_back(
-        {"resample.snap_vx",
-         {"0", "0.03", "0.07", "0.15"},
-         "0.07",
-         "voxels",
-         "most that surfaces move onto quadrics",
-         "surfaces inside voxels, against the size of the bundle",
-         "bricks where no quadric is that near are kept as they are"});
+    suite.knobs.push_back({"resample.snap_vx",
+                           {"0", "0.03", "0.07", "0.15"},
+                           "0.07",
+                           "voxels",
+                           "most that surfaces move onto quadrics",
+                           "surfaces inside voxels, against the size of the bundle",
+                           "bricks where no quadric is that near are kept as they are"});
     suite.pairs = {{"resample.sigma_vx", "resample.volume_iterations"}};
     suite.named = {{TrialRole::paper,
                     "paper, eq. (10), K0 = 0.1",

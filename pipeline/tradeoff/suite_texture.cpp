@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include <algorithm>
 #include <chrono>
 #include <string_view>
 
-#include "pipeline/texture/prepare_example.h"
-#include "pipeline/texture/synthetic_examples.h"
+#include "pipeline/texture/example/prepare_example.h"
+#include "pipeline/texture/example/synthetic_examples.h"
 #include "pipeline/texture/texture_bank.h"
 #include "pipeline/texture/texture_quality.h"
 #include "pipeline/tradeoff/suites.h"

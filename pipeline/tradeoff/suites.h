@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The suites of the tradeoff, one function each: what is measured, against which truth, by which
 // knobs. Preparing a suite may take seconds (sampling a body); measuring one setting runs the stage
 // alone.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/tradeoff/sweep.h"
 
 #include <algorithm>
@@ -116,8 +118,8 @@ std::vector<Trial> run_sweep(const Suite& suite,
     std::vector<Trial> measured;
     const double start = now_s();
     for (std::size_t i = 0; i < plan.size(); ++i) {
-        tell(progress, static_cast<double>(i) / static_cast<double>(plan.size()),
-             suite.name + ": " + settings_text(plan[i].settings));
+        report_progress(progress, static_cast<double>(i) / static_cast<double>(plan.size()),
+                        suite.name + ": " + settings_text(plan[i].settings));
         const auto known = std::find_if(done.begin(), done.end(),
                                         [&](const Trial& t) { return same_trial(t, plan[i]); });
         if (known != done.end()) {
@@ -143,7 +145,7 @@ std::vector<Trial> run_sweep(const Suite& suite,
         measured.push_back(measure_trial(suite, plan[i], std::max(options.repeats, 1)));
         if (each) each(measured.back());
     }
-    tell(progress, 1, suite.name);
+    report_progress(progress, 1, suite.name);
     return measured;
 }
 

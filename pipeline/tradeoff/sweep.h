@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Runs a suite's settings, several times each, and remembers what is done.
 #pragma once
 
 #include <functional>
 #include <vector>
 
-#include "pipeline/progress.h"
+#include "pipeline/base/progress.h"
 #include "pipeline/tradeoff/trial.h"
 
 namespace sonocase::pipeline {
@@ -18,8 +20,8 @@ struct SweepOptions {
 // The settings of a suite, each once: standard, knobs one at a time, pairs, named ones.
 std::vector<Trial> plan_sweep(const Suite& suite, const SweepOptions& options);
 
-// Measures what `plan` asks for and `done` does not already hold, settings that differ only in naming
-// a standard value once; `each` is called after every
+// Measures what `plan` asks for and `done` does not already hold, settings that differ only in
+// naming a standard value once; `each` is called after every
 // trial, so that a killed sweep can go on. A setting that fails is kept with its message as note
 // and error NaN.
 std::vector<Trial> run_sweep(const Suite& suite,

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/tradeoff/tradeoff_page.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "formats/atomic_file.h"
-#include "formats/number_text.h"
+#include "formats/files/atomic_file.h"
+#include "formats/text/number_text.h"
 #include "pipeline/cook/stage_options.h"
 #include "pipeline/pictures/chart.h"
 #include "pipeline/pictures/markup.h"
@@ -93,13 +95,14 @@ std::string knob_rows(const Suite& suite, const std::vector<Trial>& trials, doub
     std::string html;
     for (const Knob& knob : suite.knobs) {
         const std::vector<Trial> curve = trials_of_knob(trials, knob);
-        html += "<tr><td><code>" + escaped_html(knob.key) + "</code></td><td>" + escaped_html(knob.meaning) +
-                "</td><td>" + escaped_html(knob.standard + (knob.unit.empty() ? "" : " " + knob.unit)) +
+        html += "<tr><td><code>" + escaped_html(knob.key) + "</code></td><td>" +
+                escaped_html(knob.meaning) + "</td><td>" +
+                escaped_html(knob.standard + (knob.unit.empty() ? "" : " " + knob.unit)) +
                 "</td><td>" + escaped_html(knob.trades) + "</td><td>";
         for (const Trial& t : curve) {
             html += escaped_html(t.settings.empty() ? "" : t.settings.front().value) + ": " +
-                    number(t.error) + " " + escaped_html(suite.error_unit) + " in " + number(t.seconds) +
-                    " s<br>";
+                    number(t.error) + " " + escaped_html(suite.error_unit) + " in " +
+                    number(t.seconds) + " s<br>";
         }
         html += "</td><td>";
         const CurveVerdict verdict = judge_curve(curve, noise);
@@ -108,8 +111,8 @@ std::string knob_rows(const Suite& suite, const std::vector<Trial>& trials, doub
         } else {
             html += "not monotone (" + escaped_html(verdict.worst) + "). " +
                     escaped_html(knob.why_not_monotone.empty()
-                               ? "No reason is known; look before trusting it."
-                               : knob.why_not_monotone);
+                                     ? "No reason is known; look before trusting it."
+                                     : knob.why_not_monotone);
         }
         html += "</td></tr>\n";
     }
@@ -199,10 +202,11 @@ Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
             const bool named = t.role != TrialRole::knob && t.role != TrialRole::pair;
             if (!front[i] && !named) continue;
             html += std::string("<tr") + (front[i] ? " class=\"front\"" : "") + "><td>" +
-                    (named ? escaped_html(t.name) : std::string("on the front")) + "</td><td><code>" +
-                    escaped_html(settings_text(t.settings)) + "</code></td><td>" + number(t.error) +
-                    "</td><td>" + number(t.seconds) + " (" + number(t.seconds_low) + " to " +
-                    number(t.seconds_high) + ")</td><td>" + escaped_html(t.note) + "</td></tr>\n";
+                    (named ? escaped_html(t.name) : std::string("on the front")) +
+                    "</td><td><code>" + escaped_html(settings_text(t.settings)) +
+                    "</code></td><td>" + number(t.error) + "</td><td>" + number(t.seconds) + " (" +
+                    number(t.seconds_low) + " to " + number(t.seconds_high) + ")</td><td>" +
+                    escaped_html(t.note) + "</td></tr>\n";
         }
         html += "</table>\n";
     }

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What a sweep is shown as: one plot per suite and body, and a page that explains itself.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 #include "pipeline/tradeoff/trial.h"
 
 namespace sonocase::pipeline {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What accuracy costs in time: one measured setting, and the sweep of settings that it belongs to.
 #pragma once
 
@@ -5,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 
 namespace sonocase::pipeline {
 

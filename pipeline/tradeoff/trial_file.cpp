@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/tradeoff/trial_file.h"
 
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "formats/number_text.h"
+#include "formats/text/number_text.h"
 
 namespace sonocase::pipeline {
 namespace {

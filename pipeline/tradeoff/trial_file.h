@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The sweep on disk: tradeoff.csv (which a resumed sweep reads) and tradeoff.json.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 #include "pipeline/tradeoff/trial.h"
 
 namespace sonocase::pipeline {

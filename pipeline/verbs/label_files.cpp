@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/verbs/label_files.h"
 
 #include <utility>
 
+#include "formats/files/stage_file.h"
+#include "pipeline/export/export_seg_nrrd.h"
 #include "pipeline/import/label_map.h"
-#include "pipeline/segmentation/export_seg_nrrd.h"
 
 namespace sonocase::pipeline {
 

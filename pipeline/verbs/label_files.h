@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Label volumes in and out of the verbs: .labels between stages, .seg.nrrd for other tools.
 #pragma once
 
 #include <string>
 
-#include "formats/stage_files.h"
+#include "formats/bundle/stage_files.h"
 
 namespace sonocase::pipeline {
 

@@ -1,13 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase: turns a segmented CT and a digitised mannequin into a case bundle.
 #include <cstdio>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "formats/build_facts.h"
-#include "formats/nearest_name.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
+#include "formats/base/build_facts.h"
+#include "formats/text/nearest_name.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
 
 namespace sonocase::pipeline {
 namespace {

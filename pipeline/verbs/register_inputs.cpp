@@ -1,12 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/verbs/register_inputs.h"
 
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 
-#include "formats/number_text.h"
+#include "formats/text/number_text.h"
 #include "pipeline/import/label_map.h"
-#include "pipeline/import/surface_file.h"
+#include "pipeline/import/surface/surface_file.h"
 #include "pipeline/registration/landmark_file.h"
 
 namespace sonocase::pipeline {

@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Options and inputs that register, align and warp have in common.
 #pragma once
 
 #include <string>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
+#include "pipeline/command_line/command_line.h"
 #include "pipeline/registration/register_surfaces.h"
-#include "pipeline/verbs/command_line.h"
 
 namespace sonocase::pipeline {
 

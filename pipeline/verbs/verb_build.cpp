@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase build: a recipe becomes a case bundle.
 #include <sys/resource.h>
 #include <unistd.h>
@@ -8,17 +10,16 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "formats/atomic_file.h"
-#include "formats/build_facts.h"
-#include "formats/digest.h"
+#include "formats/base/build_facts.h"
+#include "formats/base/digest.h"
+#include "formats/files/atomic_file.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
 #include "pipeline/cook/cook_case.h"
-#include "formats/atomic_file.h"
-#include "pipeline/parallel.h"
 #include "pipeline/tradeoff/boundary_error.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/tradeoff/suites.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -32,7 +33,7 @@ struct BuildOptions {
     std::string plan_key;
     std::string preview;
     bool list_keys = false;
-    Wish wish;
+    AccuracyTarget wish;
     RecipeOverrides overrides;
     CommonOptions common;
 };
@@ -61,7 +62,7 @@ double seconds_of(const CookResult& cooked) {
 }
 
 // Settings for the accuracy or the time that was asked for, put into the recipe.
-Result<Choice> choose_for(const Wish& wish, Recipe& recipe) {
+Result<Choice> choose_for(const AccuracyTarget& wish, Recipe& recipe) {
     auto size = cooked_volume_mm3(recipe);
     if (!size) return size.error();
     const FrontTable& front = measured_front();
@@ -159,11 +160,9 @@ int build(const BuildOptions& options) {
         achieved_error_mm =
             measure_boundary_error(cooked->bundle, recipe->inputs.torso).displaced_mm;
     const std::vector<std::uint8_t> bytes = write_bundle(cooked->bundle);
-    if (auto status = write_file(out, bytes); !status)
-        return fail("build", status.error());
+    if (auto status = write_file(out, bytes); !status) return fail("build", status.error());
     if (!options.preview.empty())
-        if (auto status = write_file(options.preview, cooked->bundle.preview_png);
-            !status)
+        if (auto status = write_file(options.preview, cooked->bundle.preview_png); !status)
             return fail("build", status.error());
     for (const StageRun& run : cooked->stages) print_warnings("build", run.report);
     const std::string report = build_report(*cooked, out, digest_of(bytes), bytes.size(),

@@ -1,11 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase export: a bundle's parts as files that other tools open.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "pipeline/cook/export_files.h"
-#include "pipeline/segmentation/export_level_sets.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
+#include "formats/files/bundle_file.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
+#include "pipeline/export/export_files.h"
+#include "pipeline/export/export_level_sets.h"
 
 namespace sonocase::pipeline {
 

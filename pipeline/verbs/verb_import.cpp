@@ -1,10 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase import: a segmented CT becomes labels in the `ct` frame.
 #include <CLI/CLI.hpp>
 
-#include "formats/stage_files.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/files/stage_file.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
 #include "pipeline/import/label_map.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline {
 

@@ -1,14 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase inspect and sonocase validate: what a bundle holds, and whether it is sound.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "formats/digest.h"
-#include "pipeline/cook/inspect_case.h"
-#include "formats/atomic_file.h"
+#include "formats/base/digest.h"
+#include "formats/files/atomic_file.h"
+#include "formats/files/bundle_file.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
+#include "pipeline/export/inspect_case.h"
 #include "pipeline/tradeoff/choose_settings.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline {
 
@@ -29,8 +32,8 @@ int verb_inspect(int argc, char** argv) {
     Inspection inspection{path, digest_of(*bytes), bytes->size(), {}, {}};
     inspection.seconds = recorded_seconds(*bundle, path, inspection.digest);
     const Vector3 extent = bundle->grid.bounds().extent();
-    inspection.next = next_step(measured_front(), bundle->grid.spacing_mm.x,
-                                extent.x * extent.y * extent.z);
+    inspection.next =
+        next_step(measured_front(), bundle->grid.spacing_mm.x, extent.x * extent.y * extent.z);
     const std::string text =
         json ? inspection_json(*bundle, inspection) : inspection_text(*bundle, inspection);
     std::fputs(text.c_str(), stdout);

@@ -1,17 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase map: points through a fitted map, either way, each with a status.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <limits>
 #include <vector>
 
-#include "formats/number_text.h"
-#include "formats/registration_file.h"
-#include "formats/atomic_file.h"
-#include "pipeline/import/delimited_text.h"
-#include "pipeline/parallel.h"
-#include "pipeline/registration/inverse_map.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
+#include "formats/files/atomic_file.h"
+#include "formats/files/registration_file.h"
+#include "formats/registration/registration_json.h"
+#include "formats/text/number_text.h"
+#include "pipeline/base/delimited_text.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
+#include "pipeline/registration/map/inverse_map.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,17 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase pack: the files of the stages become one bundle.
 #include <CLI/CLI.hpp>
 
-#include "formats/atomic_file.h"
-#include "formats/build_facts.h"
-#include "formats/registration_file.h"
-#include "formats/stage_files.h"
+#include "formats/base/build_facts.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/files/atomic_file.h"
+#include "formats/files/bundle_file.h"
+#include "formats/files/registration_file.h"
+#include "formats/files/stage_file.h"
+#include "formats/registration/registration_json.h"
+#include "pipeline/anatomy/structure_cells.h"
+#include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
 #include "pipeline/cook/pack_case.h"
-#include "pipeline/cook/structure_cells.h"
-#include "pipeline/import/surface_file.h"
-#include "pipeline/parallel.h"
-#include "pipeline/texture/tissue_table.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
+#include "pipeline/import/surface/surface_file.h"
 
 namespace sonocase::pipeline {
 namespace {

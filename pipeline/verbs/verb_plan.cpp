@@ -1,13 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase plan, sonocase cache: what a build farm asks before and after its jobs.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 
+#include "formats/files/atomic_file.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
 #include "pipeline/cook/plan_cases.h"
 #include "pipeline/cook/stage_cache.h"
-#include "formats/atomic_file.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline {
 

@@ -1,12 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase register, align, warp: the patient's skin onto the mannequin, in one call or stage by
 // stage.
 #include <CLI/CLI.hpp>
 
-#include "formats/registration_file.h"
-#include "pipeline/parallel.h"
+#include "formats/files/registration_file.h"
+#include "formats/registration/registration_json.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/command_line/verbs.h"
 #include "pipeline/registration/fit_pictures.h"
 #include "pipeline/verbs/register_inputs.h"
-#include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline {
 namespace {

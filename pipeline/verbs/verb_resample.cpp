@@ -1,13 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase resample: labels of the patient become cubic voxels in the mannequin's frame.
 #include <CLI/CLI.hpp>
 
-#include "formats/registration_file.h"
-#include "pipeline/parallel.h"
+#include "formats/files/registration_file.h"
+#include "formats/registration/registration_json.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
+#include "pipeline/export/segmentation_pictures.h"
 #include "pipeline/segmentation/resample_labels.h"
-#include "pipeline/segmentation/segmentation_pictures.h"
-#include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/label_files.h"
-#include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline {
 

@@ -1,12 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase review and sonocase score: what a session was worth.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "formats/atomic_file.h"
-#include "pipeline/import/surface_file.h"
+#include "formats/files/atomic_file.h"
+#include "formats/files/bundle_file.h"
+#include "formats/files/recording_file.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
+#include "pipeline/import/surface/surface_file.h"
 #include "pipeline/review/review_page.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline {
 

@@ -1,12 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase smooth: takes the steps out of a label volume.
 #include <CLI/CLI.hpp>
 
-#include "pipeline/parallel.h"
-#include "pipeline/segmentation/segmentation_pictures.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
+#include "pipeline/export/segmentation_pictures.h"
 #include "pipeline/segmentation/smooth_labels.h"
-#include "pipeline/verbs/command_line.h"
 #include "pipeline/verbs/label_files.h"
-#include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline {
 

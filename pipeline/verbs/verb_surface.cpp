@@ -1,12 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase surface: the patient's skin from a label map.
 #include <CLI/CLI.hpp>
 
-#include "formats/stage_files.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/files/stage_file.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
 #include "pipeline/import/label_map.h"
-#include "pipeline/parallel.h"
-#include "pipeline/registration/skin_surface.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
+#include "pipeline/registration/skin/skin_surface.h"
 
 namespace sonocase::pipeline {
 

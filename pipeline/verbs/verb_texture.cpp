@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase texture: learns solid textures from example images, or makes the whole bank.
 #include <CLI/CLI.hpp>
 
@@ -6,15 +8,16 @@
 #include <map>
 #include <optional>
 
-#include "formats/stage_files.h"
-#include "pipeline/parallel.h"
-#include "pipeline/texture/read_example.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/files/stage_file.h"
+#include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
+#include "pipeline/texture/example/read_example.h"
 #include "pipeline/texture/speckle.h"
 #include "pipeline/texture/texture_pictures.h"
 #include "pipeline/texture/texture_quality.h"
-#include "pipeline/texture/tissue_table.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline {
 
@@ -144,7 +147,7 @@ int verb_texture(int argc, char** argv) {
     std::vector<std::optional<Result<TextureAssessment>>> assessed(specs.size());
     {
         ProgressBar bar(common);
-        tell(bar.progress(), 0.2, "learning textures");
+        report_progress(bar.progress(), 0.2, "learning textures");
         parallel_for(specs.size(), 1, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) assessed[i].emplace(assess_texture(specs[i]));
         });

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // sonocase tradeoff: what accuracy costs in time.
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -6,16 +8,16 @@
 #include <functional>
 #include <thread>
 
-#include "formats/atomic_file.h"
+#include "formats/files/atomic_file.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/command_line/command_line.h"
+#include "pipeline/command_line/verbs.h"
 #include "pipeline/cook/cook_case.h"
-#include "pipeline/parallel.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/tradeoff/suites.h"
 #include "pipeline/tradeoff/sweep.h"
 #include "pipeline/tradeoff/tradeoff_page.h"
 #include "pipeline/tradeoff/trial_file.h"
-#include "pipeline/verbs/command_line.h"
-#include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -108,13 +110,14 @@ int tradeoff(const TradeoffOptions& options) {
         ProgressBar bar(options.common);
         const Progress progress = bar.progress();
         for (std::size_t i = 0; i < makers.size(); ++i) {
-            tell(progress, static_cast<double>(i) / static_cast<double>(makers.size()),
-                 "preparing");
+            report_progress(progress, static_cast<double>(i) / static_cast<double>(makers.size()),
+                            "preparing");
             Suite suite = makers[i]();
             const Progress part = [&](double fraction, std::string_view doing) {
-                tell(progress,
-                     (static_cast<double>(i) + fraction) / static_cast<double>(makers.size()),
-                     doing);
+                report_progress(
+                    progress,
+                    (static_cast<double>(i) + fraction) / static_cast<double>(makers.size()),
+                    doing);
             };
             const auto keep = [&](const Trial& trial) {
                 done.push_back(trial);
@@ -147,8 +150,8 @@ int tradeoff(const TradeoffOptions& options) {
         if (!recipe) return fail("tradeoff", recipe.error());
         const auto volume = cooked_volume_mm3(*recipe);
         if (!volume) return fail("tradeoff", volume.error());
-        const Status s =
-            write_file(options.front, format_front(page.trials, kTimedBody, *volume, probe_seconds()));
+        const Status s = write_file(
+            options.front, format_front(page.trials, kTimedBody, *volume, probe_seconds()));
         if (!s) return fail("tradeoff", s.error());
     }
     std::printf("%s/index.html  %zu settings of %zu suites\n", options.out.c_str(),
@@ -177,7 +180,8 @@ int verb_tradeoff(int argc, char** argv) {
                    "Folder for tradeoff.csv, tradeoff.json, plots, index.html")
         ->required()
         ->type_name("DIR");
-    app.add_option("--case", options.recipe, "Sweep a case of your own too, against its finest setting")
+    app.add_option("--case", options.recipe,
+                   "Sweep a case of your own too, against its finest setting")
         ->type_name("RECIPE");
     app.add_option("--data", options.data, "Folder that the recipe's input paths start from")
         ->type_name("DIR");

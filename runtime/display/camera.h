@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Where the 3-D view is looked at from: outside, over the probe, along the needle. The camera's
 // frame has x to the right, y up and z towards the eye.
 #pragma once
 
-#include "formats/geometry.h"
+#include "formats/base/geometry.h"
 
 namespace sonocase::runtime {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/display/image_texture.h"
 
 #include <epoxy/gl.h>

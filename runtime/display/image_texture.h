@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A grey picture on the graphics card.
 #pragma once
 

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Triangle meshes of probe, needle and targets for the 3-D view.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "formats/geometry.h"
+#include "formats/base/geometry.h"
 
 namespace sonocase::runtime {
 

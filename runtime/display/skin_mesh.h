@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A light triangle mesh of a bundle's skin for the 3-D view, straight from the labels.
 #pragma once
 
-#include "formats/case_bundle.h"
-#include "formats/surface.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/volume/surface.h"
 
 namespace sonocase::runtime {
 

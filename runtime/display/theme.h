@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Colours, spacing and fonts of the player: a dark console, so that the picture is the brightest
 // thing.
 #pragma once

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/display/view3d.h"
 
 #include <epoxy/gl.h>

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The small 3-D view: translucent skin, probe, scan plane with the live picture on it, needle,
 // targets.
 #pragma once
@@ -6,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include "formats/case_bundle.h"
-#include "formats/exercise.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
 #include "runtime/display/camera.h"
 #include "runtime/imaging/renderer.h"
 

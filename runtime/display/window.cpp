@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/display/window.h"
 
 #include <epoxy/gl.h>
@@ -25,8 +27,8 @@ void on_glfw_error(int, const char* text) {
     g_glfw_error = text ? text : "";
 }
 
-// Without a graphics card Mesa paints on threads of ours, one a core. One fewer leaves a core to the
-// thread that renders the ultrasound, so that a pose does not wait for panels to be painted.
+// Without a graphics card Mesa paints on threads of ours, one a core. One fewer leaves a core to
+// the thread that renders the ultrasound, so that a pose does not wait for panels to be painted.
 void leave_a_core_to_imaging() {
     const unsigned cores = std::thread::hardware_concurrency();
     const std::string painters = std::to_string(std::max(1u, cores - std::min(cores, 1u)));

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A window with an OpenGL 3.3 context and Dear ImGui in it. GLFW, OpenGL and ImGui's back ends stay
 // in the .cpp file. Window calls belong to the thread that opened it.
 #pragma once
@@ -8,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 
 namespace sonocase::runtime {
 

@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/imaging/effects.h"
 
 #include <algorithm>
 #include <array>
 
-#include "formats/nearest_name.h"
+#include "formats/text/nearest_name.h"
 
 namespace sonocase::runtime {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The effects of both image models, one entry each, in order of execution: the one table that the
 // plan, `--effects`, `--stats`, the on-screen panel and docs/effects.md speak of.
 #pragma once
@@ -6,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
-#include "runtime/imaging/paper_reference.h"
-#include "runtime/imaging/physical_frame.h"
+#include "formats/base/result.h"
+#include "runtime/imaging/paper/paper_reference.h"
+#include "runtime/imaging/physical/model/physical_frame.h"
 #include "runtime/imaging/renderer.h"
 
 namespace sonocase::runtime {

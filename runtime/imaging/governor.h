@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Keeps frames within a time that was asked for by giving up accuracy in a stated order.
 //
 // Levels lie on the front of measured work against precision, on which beams and samples shrink
-// together (docs/effects.md, sonocase_bench Accuracy/*), the finest first. A level is left for a coarser one when the average frame takes
-// longer than the budget, and for a finer one when that one is expected to take less than 85 % of
-// it. Constant time, no clock: the caller says how long a frame took.
+// together (docs/effects.md, sonocase_bench Accuracy/*), the finest first. A level is left for a
+// coarser one when the average frame takes longer than the budget, and for a finer one when that
+// one is expected to take less than 85 % of it. Constant time, no clock: the caller says how long a
+// frame took.
 #pragma once
 
 #include <algorithm>
@@ -45,9 +48,7 @@ class Governor {
 
   private:
     static constexpr int kPatience = 12;  // frames between changes
-    static double work(int level) {
-        return kAccuracyLevels[static_cast<std::size_t>(level)].work;
-    }
+    static double work(int level) { return kAccuracyLevels[static_cast<std::size_t>(level)].work; }
     void move(int level) {
         level_ = level;
         seen_ = 0;

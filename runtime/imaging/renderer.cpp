@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/imaging/renderer.h"
 
 #include <algorithm>
@@ -7,13 +9,13 @@
 
 #include "runtime/imaging/effects.h"
 #include "runtime/imaging/governor.h"
-#include "runtime/imaging/in_halves.h"
-#include "runtime/imaging/paper_fast.h"
-#include "runtime/imaging/physical_fast.h"
-#include "runtime/imaging/read_ahead.h"
-#include "runtime/imaging/scan_reach.h"
-#include "runtime/imaging/stopwatch.h"
-#include "runtime/imaging/simd_target.h"
+#include "runtime/imaging/paper/paper_fast.h"
+#include "runtime/imaging/physical/fast/physical_fast.h"
+#include "runtime/imaging/physical/model/read_ahead.h"
+#include "runtime/imaging/physical/model/scan_reach.h"
+#include "runtime/imaging/simd/parallel_halves.h"
+#include "runtime/imaging/simd/simd_target.h"
+#include "runtime/imaging/simd/stopwatch.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -143,7 +145,7 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
     choose_simd_target();
     auto impl = std::make_unique<Impl>(bundle, exercise, options);
     Impl& m = *impl;
-    if (bundle.blocks && options.kind == RendererKind::reference) bundle.blocks->need_all(0);
+    if (bundle.blocks && options.kind == RendererKind::reference) bundle.blocks->load_all(0);
     Result<EffectChoice> effects = choose_effects(options.model, options.effects);
     if (!effects) return effects.error();
     m.effects = *effects;
@@ -156,7 +158,7 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
         m.paper_scene = std::move(*scene);
     } else {
         std::optional<Result<PhysicalScene>> scene;
-        in_halves(2, [&](std::size_t half, std::size_t, std::size_t) {
+        parallel_halves(2, [&](std::size_t half, std::size_t, std::size_t) {
             if (half == 0) {
                 m.noise = make_physical_noise(options.seed, lines + 128);
             } else {
@@ -293,8 +295,9 @@ FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
     if (bundle.blocks) {
         const double shift_mm = norm(frame.motion.breathing_mm);
         if (ahead) ahead->frame(at.reach, frame.volume_from_probe, shift_mm);
-        at.reach.need(*bundle.blocks, bundle.grid, frame.volume_from_probe, shift_mm);
-        at.reach.need(physical_scene.words, bundle.grid, frame.volume_from_probe, shift_mm);
+        at.reach.ensure_loaded(*bundle.blocks, bundle.grid, frame.volume_from_probe, shift_mm);
+        at.reach.ensure_loaded(physical_scene.words, bundle.grid, frame.volume_from_probe,
+                               shift_mm);
     }
     physical->render(frame, breathing, input.settings.flip_left_right, effects.keep_all, pixels);
     const PhysicalPasses& p = physical->passes();

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The image that the probe sees: bundle + pose in, grey pixels out.
 //
 // Part of the portable core: no files, no clock, no blocking, memory owned by the caller, and
@@ -11,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/case_bundle.h"
-#include "formats/exercise.h"
-#include "formats/result.h"
+#include "formats/base/result.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
 
 namespace sonocase::runtime {
 

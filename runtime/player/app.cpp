@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/app.h"
 #include "runtime/player/session_run.h"
 #include "runtime/player/setup_guide.h"
@@ -11,10 +13,11 @@
 #include <cstring>
 #include <filesystem>
 
+#include "formats/files/bundle_file.h"
 #include "runtime/display/theme.h"
 #include "runtime/player/headless.h"
 #include "runtime/player/png_file.h"
-#include "runtime/tracking/make_tracker.h"
+#include "runtime/tracking/factory/make_tracker.h"
 
 namespace sonocase::runtime {
 
@@ -30,7 +33,7 @@ void notify(App& app, Notice::Kind kind, const std::string& text) {
     if (app.notices.size() > 4) app.notices.erase(app.notices.begin());
 }
 
-void rebuild_engine(App& app, bool goes_on) {
+void rebuild_engine(App& app, bool keep_session) {
     EngineOptions options;
     RenderOptions& render = options.render;
     render.width_px = app.arguments.width_px > 0 && app.arguments.headless ? app.arguments.width_px
@@ -62,7 +65,7 @@ void rebuild_engine(App& app, bool goes_on) {
     app.cine_back = app.controls.cine_back = 0;
     app.scan->set_controls(app.controls);
     app.anatomy = engine->anatomy();
-    app.scan->set_engine(std::make_unique<ScanEngine>(std::move(*engine)), goes_on);
+    app.scan->set_engine(std::make_unique<ScanEngine>(std::move(*engine)), keep_session);
 }
 
 void close_bundle(App& app) {
@@ -343,7 +346,7 @@ void check_device(App& app) {
     }
     if (health.phase != TrackerPhase::streaming || health.device == app.checked_device) return;
     app.checked_device = health.device;
-    for (const std::string& doubt : other_sensor(app.calibrations, health.device)) {
+    for (const std::string& doubt : sensor_mismatch_warnings(app.calibrations, health.device)) {
         notify(app, Notice::Kind::warning, doubt);
     }
 }
@@ -388,7 +391,7 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
         if (!calibrations) return calibrations.error();
         app.calibrations = *calibrations;
     }
-    for (const std::string& doubt : doubts(app.calibrations, "", utc_now())) {
+    for (const std::string& doubt : calibration_warnings(app.calibrations, "", utc_now())) {
         notify(app, Notice::Kind::warning, doubt);
     }
     apply_settings(app);

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The player with a window: what it holds, and the steps that its panels and keys can take. The
 // panels are free functions over this one struct, each in its own file.
 #pragma once
@@ -104,7 +106,7 @@ bool open_bundle(App& app, const std::string& path, const std::string& exercise)
 void close_bundle(App& app);
 void choose_exercise(App& app, int index);
 void choose_tracker(App& app, const std::string& spec);
-void rebuild_engine(App& app, bool goes_on = true);  // after depth, focus, model, picture size
+void rebuild_engine(App& app, bool keep_session = true);  // after depth, focus, model, picture size
 void change_depth(App& app, double by_mm);
 void change_focus(App& app, double by_mm);
 void set_frozen(App& app, bool frozen);

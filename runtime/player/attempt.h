@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // An attempt at the exercise in the window: a session that runs on the scan thread, and what the
 // screen shows of it.
 #pragma once

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/command_line.h"
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <sstream>
 
-#include "formats/build_facts.h"
+#include "formats/base/build_facts.h"
 
 namespace sonocase::runtime {
 namespace {

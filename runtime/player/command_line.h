@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What the user asked for on the command line of sonoplay.
 #pragma once
 

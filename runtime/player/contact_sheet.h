@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // One picture of a whole run: up to twelve frames, evenly spread, at a quarter of their area.
 #pragma once
 
@@ -6,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 
 namespace sonocase::runtime {
 

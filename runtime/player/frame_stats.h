@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Times of frames and effects, for --stats, the bars on screen and the benchmarks.
 #pragma once
 
@@ -52,7 +54,7 @@ class FrameStats {
     void set_first_frame_ms(double ms) { first_frame_ms_ = ms; }
 
     const TimeHistogram& frame_ms() const { return frame_ms_; }
-    // The JSON of --stats. score_json: of a recorded session (formats/session/session_score.h); its
+    // The JSON of --stats. score_json: of a recorded session (formats/scoring/session_score.h); its
     // entries, "metrics" first, are put in as they are.
     // window_json: an object whose entries come before those.
     std::string json(const std::string& score_json,

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/headless.h"
 
 #include <algorithm>
@@ -9,19 +11,19 @@
 #include <optional>
 #include <thread>
 
-#include "formats/atomic_file.h"
-#include "runtime/imaging/physical_scene.h"
+#include "formats/base/event.h"
+#include "formats/files/atomic_file.h"
+#include "runtime/engine/scan_engine.h"
+#include "runtime/imaging/physical/model/physical_scene.h"
 #include "runtime/player/contact_sheet.h"
 #include "runtime/player/frame_stats.h"
 #include "runtime/player/open_case.h"
 #include "runtime/player/png_file.h"
-#include "runtime/player/scan_engine.h"
 #include "runtime/player/serve.h"
 #include "runtime/player/session_run.h"
 #include "runtime/player/setup_guide.h"
-#include "runtime/session/bell.h"
-#include "runtime/session/settings_text.h"
-#include "runtime/tracking/make_tracker.h"
+#include "runtime/recording/settings_text.h"
+#include "runtime/tracking/factory/make_tracker.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -118,7 +120,7 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     const Exercise& exercise = open.exercises[static_cast<std::size_t>(*index)];
     const Result<Calibrations> calibrations = load_calibrations(arguments.calibrations);
     if (!calibrations) return calibrations.error();
-    for (const std::string& doubt : doubts(*calibrations, "", utc_now())) {
+    for (const std::string& doubt : calibration_warnings(*calibrations, "", utc_now())) {
         std::fprintf(stderr, "sonoplay: %s\n", doubt.c_str());
     }
 
@@ -154,7 +156,7 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     if (!made) return made.error();
     Tracker& tracker = **made;
 
-    Bell bell;
+    Event bell;
     tracker.set_wake([&bell] { bell.ring(); });
     const struct Silence {
         Tracker& tracker;
@@ -215,7 +217,8 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
         }
         if (fresh) engine->observe(reading, tracker.is_device());
         if (i == 0 && tracker.is_device()) {
-            for (const std::string& doubt : other_sensor(*calibrations, tracker.health().device)) {
+            for (const std::string& doubt :
+                 sensor_mismatch_warnings(*calibrations, tracker.health().device)) {
                 std::fprintf(stderr, "sonoplay: %s\n", doubt.c_str());
             }
         }

@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A run without a window: frames to files, times to JSON. Every frame is a function of the inputs
 // alone, so two runs give the same bytes.
 #pragma once
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 #include "runtime/player/command_line.h"
 
 namespace sonocase::runtime {

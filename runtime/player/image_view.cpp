@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/image_view.h"
 
 #include <imgui.h>

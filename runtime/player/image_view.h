@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The ultrasound picture as on a machine: depth scale, focus mark, orientation mark, grey bar,
 // distance measurement, and the words in its corners.
 #pragma once

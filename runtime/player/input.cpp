@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Keys and the mouse on the picture.
 #include <GLFW/glfw3.h>
 #include <imgui.h>

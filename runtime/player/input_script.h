@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Input from a file, for tests of the window: one command a line.
 //
 //   wait N              N pictures pass
@@ -15,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 #include "runtime/display/window.h"
 
 namespace sonocase::runtime {

@@ -1,4 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/open_case.h"
+#include "formats/files/bundle_file.h"
 
 #include <algorithm>
 #include <utility>

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A bundle opened for playing, with its exercises parsed.
 #pragma once
 
@@ -5,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "formats/case_bundle.h"
-#include "formats/exercise.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
 
 namespace sonocase::runtime {
 

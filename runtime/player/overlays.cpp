@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What lies over the page: help and notices.
 #include <imgui.h>
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The two pages of the window: the list of bundles and the scan with its panels.
 #include <imgui.h>
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The panels at the sides of the picture.
 #include <imgui.h>
 
@@ -5,7 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "formats/session/metric_table.h"
+#include "formats/exercise/metric_table.h"
 #include "runtime/display/theme.h"
 #include "runtime/player/app.h"
 

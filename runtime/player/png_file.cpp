@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/png_file.h"
 
 #include <png.h>
 
 #include <cassert>
 
-#include "formats/atomic_file.h"
+#include "formats/files/atomic_file.h"
 
 namespace sonocase::runtime {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Pictures out as PNG.
 #pragma once
 
@@ -5,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 
 namespace sonocase::runtime {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/scan_thread.h"
 
 #include <algorithm>
@@ -38,10 +40,10 @@ bool ScanThread::with_engine(const std::function<void(ScanEngine&)>& use) {
     return engine_ != nullptr;
 }
 
-void ScanThread::set_engine(std::unique_ptr<ScanEngine> engine, bool goes_on) {
+void ScanThread::set_engine(std::unique_ptr<ScanEngine> engine, bool keep_session) {
     {
         const std::lock_guard lock(mutex_);
-        if (engine && engine_ && goes_on) engine->take_over(*engine_);
+        if (engine && engine_ && keep_session) engine->take_over(*engine_);
         std::swap(engine_, engine);
         if (engine_) {
             engine_->set_calibrations(calibrations_);

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The engine on a thread of its own: a frame is rendered as soon as a pose arrives, and at an idle
 // rate when none does, because tissue breathes and noise lives. The window takes the latest frame
 // when it draws and never waits for one.
@@ -14,9 +16,9 @@
 #include <thread>
 #include <vector>
 
+#include "formats/base/mailbox.h"
+#include "runtime/engine/scan_engine.h"
 #include "runtime/player/frame_stats.h"
-#include "runtime/player/scan_engine.h"
-#include "runtime/session/mailbox.h"
 #include "runtime/tracking/tracker.h"
 
 namespace sonocase::runtime {
@@ -69,8 +71,8 @@ class ScanThread {
 
     // Each takes effect between two frames. The bundle must outlive the engine's use: set_engine
     // waits until the thread has let go of the engine before it.
-    // goes_on: the new engine continues where the old one stood.
-    void set_engine(std::unique_ptr<ScanEngine> engine, bool goes_on = false);
+    // keep_session: the new engine continues where the old one stood.
+    void set_engine(std::unique_ptr<ScanEngine> engine, bool keep_session = false);
     void set_tracker(std::shared_ptr<Tracker> tracker);
     void set_calibrations(const Calibrations& calibrations);
     void set_observer(FrameObserver observer);

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The scores of the last attempt.
 #include <imgui.h>
 
 #include <cmath>
 #include <cstdio>
 
-#include "formats/session/metric_table.h"
+#include "formats/exercise/metric_table.h"
 #include "runtime/display/theme.h"
 #include "runtime/player/app.h"
 

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A rendered frame to the OpenIGTLink server.
 #pragma once
 
 #include <span>
 
-#include "runtime/player/scan_engine.h"
-#include "runtime/tracking/igtl_server.h"
+#include "runtime/engine/scan_engine.h"
+#include "runtime/tracking/igtl/igtl_server.h"
 
 namespace sonocase::runtime {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/session_run.h"
 
 #include <algorithm>
@@ -5,9 +7,10 @@
 #include <ctime>
 #include <filesystem>
 
-#include "formats/digest.h"
-#include "formats/progress/progress_book.h"
-#include "runtime/session/settings_text.h"
+#include "formats/base/digest.h"
+#include "formats/files/recording_file.h"
+#include "formats/progress_book/progress_book.h"
+#include "runtime/recording/settings_text.h"
 
 namespace sonocase::runtime {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A session of the player from its first frame to its scores: events, recording, pictures of the
 // moments that matter. Window and headless run drive the same one.
 #pragma once
@@ -6,11 +8,11 @@
 #include <span>
 #include <string>
 
-#include "formats/session/session_monitor.h"
-#include "formats/session/session_score.h"
+#include "formats/scoring/session_monitor.h"
+#include "formats/scoring/session_score.h"
+#include "runtime/engine/scan_engine.h"
 #include "runtime/player/open_case.h"
-#include "runtime/player/scan_engine.h"
-#include "runtime/session/session_recorder.h"
+#include "runtime/recording/session_recorder.h"
 
 namespace sonocase::runtime {
 

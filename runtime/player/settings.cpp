@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/settings.h"
 
 #include <algorithm>
@@ -9,7 +11,7 @@
 #include <set>
 #include <sstream>
 
-#include "formats/atomic_file.h"
+#include "formats/files/atomic_file.h"
 
 namespace sonocase::runtime {
 namespace {

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What the player remembers between runs, in the user's XDG folders.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "formats/result.h"
+#include "formats/base/result.h"
 
 namespace sonocase::runtime {
 

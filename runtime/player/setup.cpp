@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Guided set-up: the window of setup_guide.h.
 #include <imgui.h>
 
@@ -5,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "formats/files/calibration_file.h"
 #include "runtime/display/theme.h"
 #include "runtime/player/app.h"
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/setup_guide.h"
 
 #include <algorithm>
@@ -5,7 +7,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "formats/calibrate/quality.h"
+#include "formats/calibration/quality.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -276,9 +278,9 @@ Calibrations SetupGuide::calibrations(const std::string& sensor, const std::stri
     return out;
 }
 
-std::vector<std::string> doubts(const Calibrations& calibrations,
-                                const std::string& device,
-                                const std::string& now) {
+std::vector<std::string> calibration_warnings(const Calibrations& calibrations,
+                                              const std::string& device,
+                                              const std::string& now) {
     std::vector<std::string> sentences;
     const auto look = [&](const std::optional<Calibration>& calibration) {
         if (!calibration) return;
@@ -289,12 +291,13 @@ std::vector<std::string> doubts(const Calibrations& calibrations,
     look(calibrations.probe);
     look(calibrations.needle);
     look(calibrations.mannequin);
-    for (std::string& sentence : other_sensor(calibrations, device))
+    for (std::string& sentence : sensor_mismatch_warnings(calibrations, device))
         sentences.push_back(std::move(sentence));
     return sentences;
 }
 
-std::vector<std::string> other_sensor(const Calibrations& calibrations, const std::string& device) {
+std::vector<std::string> sensor_mismatch_warnings(const Calibrations& calibrations,
+                                                  const std::string& device) {
     std::vector<std::string> sentences;
     for (const auto* calibration :
          {&calibrations.probe, &calibrations.needle, &calibrations.mannequin}) {

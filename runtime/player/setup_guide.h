@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The guided set-up without its window: what is asked for, what has been collected, how good it is.
 //
 //   trackers > probe tip > probe depth > probe lateral > needle > mannequin > done
@@ -11,11 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "formats/calibrate/direction.h"
-#include "formats/calibrate/landmarks.h"
-#include "formats/calibrate/needle.h"
-#include "formats/calibrate/point.h"
-#include "runtime/player/scan_engine.h"
+#include "formats/calibration/direction.h"
+#include "formats/calibration/landmarks.h"
+#include "formats/calibration/needle.h"
+#include "formats/calibration/point.h"
+#include "runtime/engine/scan_engine.h"
 
 namespace sonocase::runtime {
 
@@ -79,11 +81,12 @@ class SetupGuide {
 };
 
 // One sentence for each doubt about a calibration in use: age, accuracy, another sensor.
-std::vector<std::string> doubts(const Calibrations& calibrations,
-                                const std::string& device,
-                                const std::string& now);
+std::vector<std::string> calibration_warnings(const Calibrations& calibrations,
+                                              const std::string& device,
+                                              const std::string& now);
 
 // Those of another sensor alone.
-std::vector<std::string> other_sensor(const Calibrations& calibrations, const std::string& device);
+std::vector<std::string> sensor_mismatch_warnings(const Calibrations& calibrations,
+                                                  const std::string& device);
 
 }  // namespace sonocase::runtime

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Mouse and keyboard as a full tracker: a probe that lives on the skin and a needle in the other
 // hand.
 //
@@ -5,8 +7,8 @@
 // script or a test drives it as well. Distances in mm and angles in radians; all in `mannequin`.
 #pragma once
 
-#include "formats/exercise.h"
-#include "runtime/tracking/skin.h"
+#include "formats/exercise/exercise.h"
+#include "runtime/engine/skin.h"
 #include "runtime/tracking/tracker.h"
 
 namespace sonocase::runtime {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A tracker that holds one pose: for looking at a bundle with nothing plugged in, and for tests.
 #pragma once
 

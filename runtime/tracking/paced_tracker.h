@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A recording or script at another speed, and from another place: time runs faster or slower for
 // the tracker inside, or jumps. Set from any thread; poll() from one.
 #pragma once

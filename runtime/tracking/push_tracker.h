@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A tracker whose readings are pushed in by whoever has them: the window's mouse, a browser, a
 // test. push() and poll() may be called from two threads, one each.
 #pragma once
@@ -5,7 +7,7 @@
 #include <functional>
 #include <utility>
 
-#include "runtime/session/mailbox.h"
+#include "formats/base/mailbox.h"
 #include "runtime/tracking/tracker.h"
 
 namespace sonocase::runtime {

@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/tracking/replay_tracker.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "formats/sequence.h"
+#include "formats/files/recording_file.h"
+#include "formats/recording/sequence.h"
 
 namespace sonocase::runtime {
 namespace {

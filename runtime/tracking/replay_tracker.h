@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Plays recorded poses of probe and needle back at the times at which they were taken.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "formats/poses.h"
-#include "formats/result.h"
+#include "formats/base/result.h"
+#include "formats/recording/poses.h"
 #include "runtime/tracking/tracker.h"
 
 namespace sonocase::runtime {
@@ -40,7 +42,7 @@ class ReplayTracker final : public Tracker {
 };
 
 // Reads poses to replay. `files` is one CSV of the probe, or two joined by a comma, probe and
-// needle (formats/poses.h), or one IGSIO sequence. Times must rise and be finite.
+// needle (formats/recording/poses.h), or one IGSIO sequence. Times must rise and be finite.
 Result<Recording> load_recording(const std::string& files);
 
 }  // namespace sonocase::runtime

@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A scripted path of probe and needle, from an exercise.
 #pragma once
 
-#include "formats/exercise.h"
-#include "runtime/tracking/skin.h"
+#include "formats/exercise/exercise.h"
+#include "runtime/engine/skin.h"
 #include "runtime/tracking/tracker.h"
 
 namespace sonocase::runtime {

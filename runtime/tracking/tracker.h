@@ -1,44 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The one interface to whatever says where probe and needle are: a device, a recording, a script,
 // the mouse. Time is injected: seconds on the session's clock.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
 
-#include "formats/geometry.h"
+#include "runtime/engine/tracker_reading.h"
 
 namespace sonocase::runtime {
-
-inline constexpr int kMaxSensors = 16;
-inline constexpr int kProbeSensor = 0;  // unless the sensors are assigned otherwise
-inline constexpr int kNeedleSensor = 1;
-
-enum class SensorState : std::uint8_t {
-    absent,  // no such sensor
-    ok,
-    poor,  // a pose, of doubtful quality: distorted field, near the edge of the range
-    lost,  // the device sees no pose; the one given is the last good one
-};
-
-struct SensorReading {
-    SensorState state = SensorState::absent;
-    Rigid world_from_sensor;
-    float quality = -1;        // [0, 1], 1 is best; negative: the device does not say
-    std::uint8_t buttons = 0;  // bit 0: the first
-};
-
-// All sensors at one moment.
-struct TrackerReading {
-    std::uint64_t sequence = 0;  // rises with every reading of this tracker
-    double time_s = 0;           // arrival on the session's clock
-    double device_time_s = -1;   // on the device's own clock; negative: it has none
-    // The sensors are the tools themselves and `world` is the mannequin: no calibration applies.
-    bool in_mannequin = false;
-    int sensor_count = 0;
-    std::array<SensorReading, kMaxSensors> sensors{};
-};
 
 enum class TrackerPhase : std::uint8_t {
     searching,  // no device yet

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What every target of ours shares: warnings, sanitizers, reproducible floating point, and the
 # include rule that keeps the dependency law.
 
@@ -31,16 +32,54 @@ function(sonocase_keep_modules program)
   target_link_options(${program} PRIVATE -Wl,--export-dynamic-symbol=dlclose)
 endfunction()
 
-# sonocase_library(NAME FOLDER): one of the three libraries. Its headers are reached as
-# "<folder>/..." through a directory that holds a link to that folder alone, so that a target sees
-# exactly the libraries it links: the runtime cannot include a pipeline header.
-function(sonocase_library name folder)
-  add_library(${name} STATIC)
-  set(root "${CMAKE_BINARY_DIR}/include/${folder}")
-  file(MAKE_DIRECTORY "${root}")
-  file(CREATE_LINK "${CMAKE_SOURCE_DIR}/${folder}" "${root}/${folder}" SYMBOLIC)
-  target_include_directories(${name} PUBLIC "${root}")
-  target_link_libraries(${name} PRIVATE sonocase_options)
+# sonocase_doors(VARIABLE FOLDER): the include directory through which the headers of FOLDER alone are reached as
+# "<FOLDER>/...".
+function(sonocase_doors variable folder)
+  string(REPLACE "/" "_" name "${folder}")
+  set(doors "${CMAKE_BINARY_DIR}/include/${name}")
+  file(MAKE_DIRECTORY "${doors}/${folder}")
+  file(GLOB headers CONFIGURE_DEPENDS RELATIVE "${CMAKE_SOURCE_DIR}/${folder}" "${CMAKE_SOURCE_DIR}/${folder}/*.h"
+       "${CMAKE_SOURCE_DIR}/${folder}/*.inc")
+  file(GLOB links RELATIVE "${doors}/${folder}" "${doors}/${folder}/*.h" "${doors}/${folder}/*.inc")
+  foreach(link IN LISTS links)
+    if(NOT link IN_LIST headers)
+      file(REMOVE "${doors}/${folder}/${link}")
+    endif()
+  endforeach()
+  foreach(header IN LISTS headers)
+    file(CREATE_LINK "${CMAKE_SOURCE_DIR}/${folder}/${header}" "${doors}/${folder}/${header}" SYMBOLIC)
+  endforeach()
+  set(${variable} "${doors}" PARENT_SCOPE)
+endfunction()
+
+# sonocase_room(FOLDER [SOURCES ...] [PUBLIC ...] [PRIVATE ...]): the library of one folder; a/b makes the
+# target a_b. PUBLIC and PRIVATE name what it links: other rooms by their folder, libraries of others by target.
+# A room sees the headers of the rooms that it links and no others: the dependency law, and every arrow below it, is
+# kept by the compiler.
+function(sonocase_room folder)
+  cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  string(REPLACE "/" "_" name "${folder}")
+  sonocase_doors(doors ${folder})
+  foreach(scope PUBLIC PRIVATE)
+    set(${scope}_targets "")
+    foreach(target IN LISTS arg_${scope})
+      if(target MATCHES "^(formats|pipeline|runtime)/")
+        string(REPLACE "/" "_" target "${target}")
+      endif()
+      list(APPEND ${scope}_targets "${target}")
+    endforeach()
+  endforeach()
+  if(arg_SOURCES)
+    add_library(${name} STATIC ${arg_SOURCES})
+    target_include_directories(${name} PUBLIC "$<BUILD_INTERFACE:${doors}>")
+    target_link_libraries(${name} PUBLIC ${PUBLIC_targets} PRIVATE sonocase_options ${PRIVATE_targets})
+  else()
+    add_library(${name} INTERFACE)
+    target_include_directories(${name} INTERFACE "$<BUILD_INTERFACE:${doors}>")
+    target_link_libraries(${name} INTERFACE ${PUBLIC_targets})
+  endif()
+  string(REGEX REPLACE "/.*" "" library "${folder}")
+  target_link_libraries(sonocase_${library} INTERFACE ${name})
 endfunction()
 
 # sonocase_test(NAME SOURCES ... LIBRARIES ...): one GoogleTest program, one ctest entry.
@@ -62,7 +101,7 @@ function(sonocase_uses library)
   set_property(GLOBAL APPEND PROPERTY ${library}_uses ${ARGN})
 endfunction()
 
-# sonocase_build_facts(PROGRAM LIBRARY...): gives PROGRAM the functions of formats/build_facts.h.
+# sonocase_build_facts(PROGRAM LIBRARY...): gives PROGRAM the functions of formats/base/build_facts.h.
 add_custom_target(sonocase_commit
   COMMAND ${CMAKE_COMMAND} -DSOURCE=${CMAKE_SOURCE_DIR} -DFILE=${CMAKE_BINARY_DIR}/facts/commit.h
           -P ${CMAKE_SOURCE_DIR}/scripts/cmake/commit.cmake

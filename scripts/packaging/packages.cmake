@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Two Debian packages: sonocase (the pipeline, with recipes and documents) and sonoplay (the player, which needs none of
 # the pipeline's libraries).
 #   cpack --config build/release/CPackConfig.cmake -B build/release/packages

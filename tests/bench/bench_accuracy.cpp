@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What fewer beams and samples save and cost: the points from which runtime/imaging/governor.h
 // takes its levels.
 //   Accuracy/LINESxSAMPLES   time: a frame of model `physical`; error_grey: root mean square

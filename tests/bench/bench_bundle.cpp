@@ -1,10 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "bench_bundle.h"
 
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 
+#include "formats/files/bundle_file.h"
 #include "pipeline/cook/cook_case.h"
+#include "support/paths.h"
 #include "support/random.h"
 
 namespace sonocase::bench {

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The case that the frame benchmarks render, and a probe that jumps over it.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "formats/case_bundle.h"
+#include "formats/bundle/case_bundle.h"
 
 namespace sonocase::bench {
 

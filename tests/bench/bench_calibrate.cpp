@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Calibrations of 1,000 readings.
 #include <benchmark/benchmark.h>
 
-#include "formats/calibrate/direction.h"
-#include "formats/calibrate/lag.h"
-#include "formats/calibrate/landmarks.h"
-#include "formats/calibrate/needle.h"
-#include "formats/calibrate/point.h"
+#include "formats/calibration/direction.h"
+#include "formats/calibration/lag.h"
+#include "formats/calibration/landmarks.h"
+#include "formats/calibration/needle.h"
+#include "formats/calibration/point.h"
 #include "support/calibration_motion.h"
 
 namespace sonocase {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What each effect costs, and what one costs that is not there. One renderer does both sides by
 // turns on the same poses, with a switch thrown in between: the same memory, the same moment, so
 // that neither the machine's other work nor the luck of addresses tells them apart.
@@ -19,9 +21,10 @@
 #include <memory>
 
 #include "bench_scene.h"
+#include "formats/files/bundle_file.h"
 #include "runtime/imaging/effects.h"
-#include "runtime/imaging/paper_fast.h"
-#include "runtime/imaging/physical_fast.h"
+#include "runtime/imaging/paper/paper_fast.h"
+#include "runtime/imaging/physical/fast/physical_fast.h"
 
 namespace sonocase::bench {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Frames a second and what each effect costs. Ratios inside one run are what to read:
 //   Frame/paper     <= 0.5 x Peer/vtkImageReslice, and Reference/paper >= 50 x Frame/paper
 //   Frame/physical  <= 1.0 x Peer/vtkImageReslice (aim 0.6)

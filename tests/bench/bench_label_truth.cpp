@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // How true labels are on two bodies known in closed form, through one warp into voxels of 1 mm.
 //
 //   plain_body/...  the plain body from slices 1, 3 and 5 mm apart with pixels of 1 mm; those of
@@ -13,7 +15,7 @@
 #include <optional>
 #include <string>
 
-#include "pipeline/import/analytic_torso.h"
+#include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "segmentation_row.h"
 #include "support/label_score.h"

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Registration: seconds of each part, and error against time for its knobs, on the analytic torso
 // whose map is known. Counters: target_mm and target_p95_mm (distance to the true map inside the
 // body), skin_rms_mm, min_det.
@@ -6,10 +8,10 @@
 #include <algorithm>
 #include <vector>
 
-#include "pipeline/import/analytic_torso.h"
-#include "pipeline/parallel.h"
-#include "pipeline/registration/fold_proof.h"
-#include "pipeline/registration/inverse_map.h"
+#include "pipeline/anatomy/analytic_torso.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/registration/map/fold_proof.h"
+#include "pipeline/registration/map/inverse_map.h"
 #include "pipeline/registration/register_surfaces.h"
 
 namespace sonocase::pipeline {

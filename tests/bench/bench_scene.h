@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The exercise, options and inputs that all frame benchmarks share.
 #pragma once
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Resampling and smoothing of labels: each knob with its error against its time.
 //
 // Counters: dice (mean over labels), wrong_percent (voxels), lost, volume_percent (mean |dV|)
@@ -6,7 +8,8 @@
 //   real/...          into cubic voxels through a tilt
 //   real/thick6mm/... every second slice of it back into 3 mm, against the slices left out too
 //   layers/...        a ball of each label in its own 14 mm cell, 25 and 100 of them in one volume
-//   real/3mm/eq10_... eq. (10) as printed, every voxel of the grid for each label, and how many voxels
+//   real/3mm/eq10_... eq. (10) as printed, every voxel of the grid for each label, and how many
+//   voxels
 //                     come out as by the method `paper`; at 1 mm it would take 26 times as long
 //   itk_antialias     ITK's AntiAliasBinaryImageFilter on each label's layer at 3 mm, recomposed
 #include <benchmark/benchmark.h>
@@ -18,11 +21,12 @@
 
 #include "peer_eq10.h"
 #include "peer_itk.h"
-#include "pipeline/import/analytic_torso.h"
+#include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/import/label_map.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "segmentation_row.h"
 #include "support/label_score.h"
+#include "support/paths.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -41,9 +45,8 @@ const Torso& torso() {
 }
 
 void score(const LabelVolume& volume, benchmark::State& state) {
-    const auto truth =
-        testing::truth_on(volume.grid, torso().registration, torso().ct.grid,
-                          [](Point3 p) { return analytic_torso_label(p); });
+    const auto truth = testing::truth_on(volume.grid, torso().registration, torso().ct.grid,
+                                         [](Point3 p) { return analytic_torso_label(p); });
     const testing::LabelScore score = testing::score_labels(volume, truth);
     state.counters["dice"] = score.dice;
     state.counters["wrong_percent"] = 100 * score.wrong;
@@ -162,7 +165,8 @@ void resample_thick6mm(benchmark::State& state, const ResampleOptions& options) 
                           b = static_cast<int>(std::lround(v.y)),
                           c = static_cast<int>(std::lround(v.z));
                 if (g.contains(a, b, c))
-                    on_full.voxels[full.grid.index(i, j, k)] = result->volume.voxels[g.index(a, b, c)];
+                    on_full.voxels[full.grid.index(i, j, k)] =
+                        result->volume.voxels[g.index(a, b, c)];
             }
         }
     }
@@ -183,8 +187,9 @@ void many_labels(benchmark::State& state, int labels) {
                 const int cell = i / kEdge + kCells * (j / kEdge + kCells * (k / kEdge));
                 const Vector3 p{i % kEdge - 6.5, j % kEdge - 6.5, k % kEdge - 6.5};
                 ct.voxels[ct.grid.index(i, j, k)] =
-                    norm(p) < 5.5 ? static_cast<std::uint8_t>(2 + cell * labels / 513 % (labels - 1))
-                                  : std::uint8_t{1};
+                    norm(p) < 5.5
+                        ? static_cast<std::uint8_t>(2 + cell * labels / 513 % (labels - 1))
+                        : std::uint8_t{1};
             }
         }
     }

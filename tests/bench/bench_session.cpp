@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What scoring and reading of long sessions cost.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
 
 #include "bench_bundle.h"
-#include "formats/session/session_score.h"
+#include "formats/scoring/session_score.h"
 
 namespace sonocase::bench {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Textures, speckle and structure. Real patches where the data is there.
 #include <benchmark/benchmark.h>
 
@@ -5,15 +7,16 @@
 #include <map>
 #include <string>
 
-#include "pipeline/import/analytic_torso.h"
-#include "pipeline/parallel.h"
-#include "pipeline/texture/bake_structure.h"
-#include "pipeline/texture/read_example.h"
+#include "pipeline/anatomy/analytic_torso.h"
+#include "pipeline/anatomy/bake_structure.h"
+#include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/texture/example/read_example.h"
+#include "pipeline/texture/example/synthetic_examples.h"
 #include "pipeline/texture/speckle.h"
-#include "pipeline/texture/synthetic_examples.h"
 #include "pipeline/texture/texture_bank.h"
 #include "pipeline/texture/texture_quality.h"
-#include "pipeline/texture/tissue_table.h"
+#include "support/paths.h"
 
 namespace sonocase::pipeline {
 namespace {

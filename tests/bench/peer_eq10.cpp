@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "peer_eq10.h"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "pipeline/parallel.h"
-#include "pipeline/segmentation/signed_distance.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/segmentation/distance/signed_distance.h"
 
 namespace sonocase::bench {
 namespace {

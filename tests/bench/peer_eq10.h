@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Eq. (10) of the paper as it is printed: each label's level set over the whole grid, every voxel
 // of it in every iteration. The pipeline's own mode (level_set_smoothing.h) moves a band in the
 // label's box instead, to the same end.
 #pragma once
 
-#include "formats/label_volume.h"
+#include "formats/volume/label_volume.h"
 #include "pipeline/segmentation/level_set_smoothing.h"
 
 namespace sonocase::bench {

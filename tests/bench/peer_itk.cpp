@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "peer_itk.h"
 
 #include <itkAntiAliasBinaryImageFilter.h>
@@ -10,9 +12,9 @@ std::vector<float> itk_antialiased(const LabelVolume& labels, std::uint8_t label
     using Field = itk::Image<float, 3>;
     auto mask = Mask::New();
     const Int3 n = labels.grid.size;
-    mask->SetRegions(Mask::SizeType{{static_cast<itk::SizeValueType>(n.x),
-                                     static_cast<itk::SizeValueType>(n.y),
-                                     static_cast<itk::SizeValueType>(n.z)}});
+    mask->SetRegions(
+        Mask::SizeType{{static_cast<itk::SizeValueType>(n.x), static_cast<itk::SizeValueType>(n.y),
+                        static_cast<itk::SizeValueType>(n.z)}});
     mask->Allocate();
     bool inside = false, outside = false;
     for (std::size_t v = 0; v < labels.voxels.size(); ++v) {

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // ITK's AntiAliasBinaryImageFilter (Whitaker 2000), the peer of the level sets of eq. (10).
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "formats/label_volume.h"
+#include "formats/volume/label_volume.h"
 
 namespace sonocase::bench {
 

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What a user would take instead for a bare slice: vtkImageReslice on the same volume and poses.
 #pragma once
 
 #include <memory>
 #include <span>
 
-#include "formats/case_bundle.h"
+#include "formats/bundle/case_bundle.h"
 
 namespace sonocase::bench {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Draws the pictures of docs/effects.md and docs/realism.md from a bundle of scenarios/real-torso:
 //   sonocase_pictures BUNDLE FOLDER
 // writes FOLDER/effects/MODEL-EFFECT.png, the effect on the left and without it on the right,
@@ -8,7 +10,8 @@
 #include <filesystem>
 #include <map>
 
-#include "formats/case_bundle.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/files/bundle_file.h"
 #include "runtime/imaging/effects.h"
 #include "runtime/player/png_file.h"
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A row of the benchmarks of labels: once, in milliseconds of the clock and of all threads.
 #pragma once
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The main job as a user does it, with the two programs: cook, inspect, validate, play.
 #include <gtest/gtest.h>
 
@@ -7,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "support/paths.h"
 #include "support/run_command.h"
 #include "support/temporary_folder.h"
 

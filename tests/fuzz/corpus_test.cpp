@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "fuzz/targets.h"
+#include "support/paths.h"
 #include "support/random.h"
 
 namespace sonocase::fuzz {

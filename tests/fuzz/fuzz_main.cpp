@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // libFuzzer's entry: which reader is named by the environment, so that one program serves all.
 #include <cstdio>
 #include <cstdlib>

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "fuzz/targets.h"
 
 #include <sys/mman.h>
@@ -8,21 +10,22 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "formats/calibrate/point.h"
-#include "formats/calibrate/quality.h"
-#include "formats/calibration.h"
-#include "formats/case_bundle.h"
-#include "formats/exercise.h"
-#include "formats/poses.h"
-#include "formats/registration_file.h"
-#include "formats/sequence.h"
-#include "formats/stage_files.h"
-#include "pipeline/import/label_table.h"
-#include "pipeline/import/ply_file.h"
-#include "runtime/tracking/guidance_protocol.h"
-#include "runtime/tracking/igtl_message.h"
-#include "runtime/tracking/liberty_protocol.h"
-#include "runtime/tracking/viper_protocol.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/calibration/calibration.h"
+#include "formats/calibration/point.h"
+#include "formats/calibration/quality.h"
+#include "formats/exercise/exercise.h"
+#include "formats/recording/poses.h"
+#include "formats/recording/sequence.h"
+#include "formats/registration/registration_json.h"
+#include "formats/text/stage_report_json.h"
+#include "pipeline/anatomy/label_table.h"
+#include "pipeline/import/surface/ply_file.h"
+#include "runtime/tracking/igtl/igtl_message.h"
+#include "runtime/tracking/usb/guidance_protocol.h"
+#include "runtime/tracking/usb/liberty_protocol.h"
+#include "runtime/tracking/usb/viper_protocol.h"
 
 namespace sonocase::fuzz {
 namespace {

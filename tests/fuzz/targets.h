@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // One function a reader: takes any bytes, must come back. Coverage-guided fuzzing (scripts/fuzz)
 // and the test of the kept corpora call the same.
 #pragma once

@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Needle constraint and scan geometry.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "numerics/property.h"
-#include "runtime/imaging/scan_geometry.h"
-#include "runtime/needle/needle_constraint.h"
+#include "runtime/engine/needle_constraint.h"
+#include "runtime/imaging/scan/scan_geometry.h"
 
 namespace sonocase::numerics {
 namespace {
@@ -27,7 +29,7 @@ RC_GTEST_PROP(NeedleConstraintNumerics, WeightIsThatOfLongDoubleRisesAndStaysInR
         // The exponent's own rounding is multiplied by its size; below the normal numbers the
         // exponential overflows and the weight may be 0.
         const double bound = 8 * kEpsilon *
-                             (1 + std::min(700.0, std::abs(static_cast<double>(z)))) *
+                                 (1 + std::min(700.0, std::abs(static_cast<double>(z)))) *
                                  static_cast<double>(truth) +
                              std::numeric_limits<double>::min();
         RC_ASSERT(std::abs(w - static_cast<double>(truth)) <= bound);

@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Point, direction and needle calibration: limits, bounds from the condition, invariances.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "formats/calibrate/direction.h"
-#include "formats/calibrate/needle.h"
-#include "formats/calibrate/point.h"
+#include "formats/calibration/direction.h"
+#include "formats/calibration/needle.h"
+#include "formats/calibration/point.h"
 #include "numerics/property.h"
 #include "support/calibration_motion.h"
 

@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The quadratic fit of eqs. (3)-(6): exact data, poor samples, the constraint's pull.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "numerics/property.h"
-#include "pipeline/registration/quadratic_warp.h"
+#include "pipeline/registration/warp/quadratic_warp.h"
 
 namespace sonocase::numerics {
 namespace {

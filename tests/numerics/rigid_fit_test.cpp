@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Rigid fit of pairs: limits of angle, shape and scale.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "formats/calibrate/landmarks.h"
+#include "formats/calibration/landmarks.h"
 #include "numerics/property.h"
 
 namespace sonocase::numerics {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Distance transform against brute force, the level set's guard and its harm, the joint smoothing's
 // volumes.
 #include <gtest/gtest.h>
@@ -5,8 +7,8 @@
 #include <cmath>
 
 #include "numerics/property.h"
+#include "pipeline/segmentation/distance/signed_distance.h"
 #include "pipeline/segmentation/level_set_smoothing.h"
-#include "pipeline/segmentation/signed_distance.h"
 #include "pipeline/segmentation/smooth_labels.h"
 
 namespace sonocase::numerics {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Fourier transforms against the sum that defines them; speckle against its distribution.
 #include <gtest/gtest.h>
 
@@ -6,9 +8,9 @@
 #include <complex>
 
 #include "numerics/property.h"
-#include "pipeline/texture/fourier.h"
-#include "pipeline/texture/periodic_volume.h"
+#include "pipeline/base/periodic_volume.h"
 #include "pipeline/texture/speckle.h"
+#include "pipeline/texture/spectrum/fourier.h"
 
 namespace sonocase::numerics {
 namespace {

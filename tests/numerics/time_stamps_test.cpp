@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Time: pairing of recordings and lags at awkward clocks.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "formats/calibrate/lag.h"
-#include "formats/calibrate/pose_screen.h"
-#include "formats/calibrate/quality.h"
+#include "formats/calibration/lag.h"
+#include "formats/calibration/pose_screen.h"
+#include "formats/calibration/quality.h"
 #include "numerics/property.h"
 
 namespace sonocase::numerics {

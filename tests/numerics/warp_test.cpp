@@ -1,12 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The fitted map: quadratic fit, Jacobians, fold proof, Newton inverse, residual spline.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "formats/registration.h"
+#include "formats/registration/registration.h"
 #include "numerics/property.h"
-#include "pipeline/registration/fold_proof.h"
-#include "pipeline/registration/inverse_map.h"
+#include "pipeline/registration/map/fold_proof.h"
+#include "pipeline/registration/map/inverse_map.h"
 
 namespace sonocase::numerics {
 namespace {

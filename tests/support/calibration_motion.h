@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Recordings of calibration motions, made with known answers.
 #pragma once
 
 #include <vector>
 
-#include "formats/poses.h"
+#include "formats/recording/poses.h"
 #include "support/random.h"
 
 namespace sonocase::testing {

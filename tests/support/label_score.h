@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Labels of a cooked volume against the truth at every voxel.
 #pragma once
 
@@ -6,11 +8,11 @@
 #include <functional>
 #include <vector>
 
-#include "formats/label_volume.h"
-#include "formats/registration.h"
-#include "pipeline/parallel.h"
-#include "pipeline/registration/inverse_map.h"
-#include "pipeline/segmentation/cooked_grid.h"
+#include "formats/registration/registration.h"
+#include "formats/volume/label_volume.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/registration/map/inverse_map.h"
+#include "pipeline/segmentation/field/cooked_grid.h"
 
 namespace sonocase::pipeline::testing {
 

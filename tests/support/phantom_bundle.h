@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // An analytic phantom as a bundle: slightly curved skin, fat, muscle, liver with a vessel, a
 // kidney, a cyst, a rib and gas, all given by signed distances, so that labels and boundary records
 // are exact.
@@ -11,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/boundary_record.h"
-#include "formats/case_bundle.h"
-#include "formats/exercise.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
+#include "formats/volume/boundary_record.h"
 #include "support/random.h"
 
 namespace sonocase::testing {

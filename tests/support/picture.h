@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Grey pictures of a test run, kept beside the build for the eye.
 #pragma once
 

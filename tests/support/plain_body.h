@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A second known body, plainer than the analytic torso and not made like it: an elliptic trunk with
 // one layer of muscle, eight ellipsoidal organs, eight ribs that close round the front, and vessels
 // of 1.5 to 10 mm radius as chains of two or three straight pieces. 25 labels; later solids win.
@@ -9,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "formats/label_volume.h"
-#include "pipeline/parallel.h"
+#include "formats/volume/label_volume.h"
+#include "pipeline/base/parallel.h"
 
 namespace sonocase::pipeline::testing {
 

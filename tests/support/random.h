@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Seeded random shapes for the tests. A failing test prints the seed it was given.
 #pragma once
 
 #include <cstdint>
 #include <random>
 
-#include "formats/geometry.h"
+#include "formats/base/geometry.h"
 
 namespace sonocase::testing {
 

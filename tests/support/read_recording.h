@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Reads ../shared/data/tracking recordings for tests. Empty, with a word on standard output, if
 // absent.
 #pragma once
@@ -8,7 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "formats/poses.h"
+#include "formats/recording/poses.h"
+#include "support/paths.h"
 
 namespace sonocase::testing {
 

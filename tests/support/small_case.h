@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A small bundle made in memory: a round body of soft tissue with a vessel in it.
 #pragma once
 
 #include <cmath>
 #include <vector>
 
-#include "formats/case_bundle.h"
-#include "formats/exercise.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
 
 namespace sonocase::testing {
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A folder for a test's files, removed with everything in it at the end.
 #pragma once
 

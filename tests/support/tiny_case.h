@@ -1,12 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A case of a few voxels that fills every field of a bundle.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
-#include "formats/boundary_record.h"
-#include "formats/case_bundle.h"
-#include "formats/surface_patch.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/volume/boundary_record.h"
+#include "formats/volume/surface_patch.h"
 
 namespace sonocase::testing {
 
@@ -86,13 +88,11 @@ inline CaseBundle curved_case() {
                 const Vector3 in = normalized(Point3{10.3, 9.8, 8.1} - p);
                 const Vector3 n = to_ball ? (own == 2 ? in : -in) : (own == 1 ? up : -up);
                 labels.push_back(static_cast<std::uint8_t>(own));
-                boundary.push_back(
-                    d < 1.5 ? pack_boundary({static_cast<std::uint8_t>(other), d, n})
-                            : kNoBoundary);
+                boundary.push_back(d < 1.5 ? pack_boundary({static_cast<std::uint8_t>(other), d, n})
+                                           : kNoBoundary);
                 const int cell = k < 8 ? i / 2 * 3 + j / 2 * 5 + k / 2 : i * 3 + j * 5 + k;
                 const bool level = i < 4 && j < 4 && k > 11;  // a brick alike
-                echo.push_back(
-                    static_cast<std::int8_t>(level ? 7 : own == 0 ? 0 : cell % 40 - 20));
+                echo.push_back(static_cast<std::int8_t>(level ? 7 : own == 0 ? 0 : cell % 40 - 20));
             }
         }
     }

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A block of the analytic torso cooked through its known warp, and how true its surfaces are
 // against the closed forms.
 #pragma once
@@ -9,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "formats/boundary_record.h"
-#include "pipeline/import/analytic_torso.h"
-#include "pipeline/parallel.h"
-#include "pipeline/registration/inverse_map.h"
-#include "pipeline/segmentation/cooked_grid.h"
+#include "formats/volume/boundary_record.h"
+#include "pipeline/anatomy/analytic_torso.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/registration/map/inverse_map.h"
+#include "pipeline/segmentation/field/cooked_grid.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "support/random.h"
 

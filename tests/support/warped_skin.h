@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Known truths for registration: a skin carried by a known map, and readings of it.
 #pragma once
 
 #include <algorithm>
 #include <vector>
 
-#include "formats/registration.h"
-#include "formats/surface.h"
+#include "formats/registration/registration.h"
+#include "formats/volume/surface.h"
 #include "support/random.h"
 
 namespace sonocase::testing {

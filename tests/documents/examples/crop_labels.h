@@ -1,9 +1,9 @@
 // Cuts a label volume down to the box of its body and a margin.
 #pragma once
 
-#include "formats/label_volume.h"
-#include "formats/result.h"
-#include "formats/stage_report.h"
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/volume/label_volume.h"
 
 namespace sonocase::pipeline {
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/segmentation/shapes.h"
+#include "support/shapes.h"
 
 namespace sonocase::pipeline {
 namespace {

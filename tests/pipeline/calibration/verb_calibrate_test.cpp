@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The verb as a program: keys of the JSON, exit status, files.
 #include <gtest/gtest.h>
 
@@ -7,10 +9,12 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "formats/atomic_file.h"
-#include "formats/calibration.h"
-#include "formats/poses.h"
+#include "formats/calibration/calibration.h"
+#include "formats/files/atomic_file.h"
+#include "formats/files/calibration_file.h"
+#include "formats/recording/poses.h"
 #include "support/calibration_motion.h"
+#include "support/paths.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/cook_case.h"
 
 #include <gtest/gtest.h>
@@ -6,13 +8,13 @@
 #include <filesystem>
 #include <map>
 
-#include "formats/exercise.h"
+#include "formats/exercise/exercise.h"
+#include "pipeline/base/parallel.h"
 #include "pipeline/cook/exercise_frame.h"
-#include "pipeline/cook/export_files.h"
-#include "pipeline/cook/inspect_case.h"
+#include "pipeline/export/export_files.h"
+#include "pipeline/export/inspect_case.h"
 #include "pipeline/import/label_map.h"
-#include "pipeline/import/surface_file.h"
-#include "pipeline/parallel.h"
+#include "pipeline/import/surface/surface_file.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/recipe.h"
 
 #include <gtest/gtest.h>
@@ -5,6 +7,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "support/paths.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/stage_cache.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +15,7 @@
 #include <fstream>
 #include <thread>
 
-#include "formats/digest.h"
+#include "formats/base/digest.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {

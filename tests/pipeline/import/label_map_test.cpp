@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/import/label_map.h"
 
 #include <gtest/gtest.h>
@@ -8,6 +10,7 @@
 #include <filesystem>
 
 #include "pipeline/import/volume_files.h"
+#include "support/paths.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {

@@ -1,4 +1,6 @@
-#include "pipeline/import/surface_file.h"
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/import/surface/surface_file.h"
 
 #include <gtest/gtest.h>
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Small label maps written byte by byte in every format that import reads, so that the reader is
 // tested against the formats' own definitions and not against the library that it uses.
 #pragma once
@@ -7,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/grid.h"
+#include "formats/volume/grid.h"
 
 namespace sonocase::testing {
 

@@ -1,4 +1,6 @@
-#include "pipeline/registration/inverse_map.h"
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/registration/map/inverse_map.h"
 
 #include <gtest/gtest.h>
 

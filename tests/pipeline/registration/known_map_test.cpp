@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Registration against known truth: the real CT's own skin carried by random poses and quadratics.
 #include <gtest/gtest.h>
 
@@ -6,8 +8,9 @@
 #include <filesystem>
 
 #include "pipeline/import/label_map.h"
-#include "pipeline/registration/inverse_map.h"
+#include "pipeline/registration/map/inverse_map.h"
 #include "pipeline/registration/register_surfaces.h"
+#include "support/paths.h"
 #include "support/warped_skin.h"
 
 namespace sonocase::pipeline {
@@ -142,8 +145,8 @@ TEST(KnownMap, HeadDirectionAndALowLandmarkPlaceAFrontSweep) {
     for (const std::uint64_t seed : {11, 12, 13, 14}) {
         SCOPED_TRACE(::testing::Message() << "seed " << seed);
         Random random(seed);
-        const Registration truth = testing::random_quadratic_map(
-            patient()->skin.box, patient()->skin.skin, random, 14);
+        const Registration truth =
+            testing::random_quadratic_map(patient()->skin.box, patient()->skin.skin, random, 14);
         SweepPlan front;
         front.part = SweptPart::front;
         const Surface sweep = testing::sweep_of(patient()->skin.skin, truth, random, front);
@@ -151,9 +154,9 @@ TEST(KnownMap, HeadDirectionAndALowLandmarkPlaceAFrontSweep) {
         const Vector3 across = truth.mannequin_from_ct.rotation * Vector3{0.6, 0.8, 0};
         RegisterOptions options;
         options.up = normalized(head + 0.2 * across);
-        const auto lowest =
-            *std::min_element(patient()->skin.skin.points.begin(), patient()->skin.skin.points.end(),
-                              [](Point3 a, Point3 b) { return a.z < b.z; });
+        const auto lowest = *std::min_element(patient()->skin.skin.points.begin(),
+                                              patient()->skin.skin.points.end(),
+                                              [](Point3 a, Point3 b) { return a.z < b.z; });
         options.landmarks = {{"low", lowest, mannequin_from_ct(truth, lowest) + 5 * across}};
         const auto fitted = register_surfaces({patient()->skin, sweep}, options);
         ASSERT_TRUE(fitted) << fitted.error().message();

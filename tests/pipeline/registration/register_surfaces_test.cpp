@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/registration/register_surfaces.h"
 
 #include <gtest/gtest.h>
@@ -5,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/import/analytic_torso.h"
-#include "pipeline/registration/fold_proof.h"
+#include "pipeline/anatomy/analytic_torso.h"
+#include "pipeline/registration/map/fold_proof.h"
 #include "support/random.h"
 
 namespace sonocase::pipeline {

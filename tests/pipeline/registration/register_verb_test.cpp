@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // register and map as a case author meets them, with the sweeps that go wrong.
 #include <gtest/gtest.h>
 
@@ -7,9 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "formats/number_text.h"
-#include "formats/registration_file.h"
-#include "pipeline/import/surface_file.h"
+#include "formats/files/registration_file.h"
+#include "formats/registration/registration_json.h"
+#include "formats/text/number_text.h"
+#include "pipeline/import/surface/surface_file.h"
+#include "support/paths.h"
 #include "support/random.h"
 #include "support/run_command.h"
 #include "support/temporary_folder.h"

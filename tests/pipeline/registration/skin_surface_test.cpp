@@ -1,11 +1,13 @@
-#include "pipeline/registration/skin_surface.h"
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/registration/skin/skin_surface.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/import/analytic_torso.h"
+#include "pipeline/anatomy/analytic_torso.h"
 
 namespace sonocase::pipeline {
 namespace {

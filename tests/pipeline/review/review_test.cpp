@@ -1,9 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
-#include "formats/atomic_file.h"
-#include "formats/session/metric_table.h"
+#include "formats/exercise/metric_table.h"
+#include "formats/files/atomic_file.h"
+#include "formats/files/bundle_file.h"
+#include "formats/files/recording_file.h"
 #include "pipeline/review/review_page.h"
 #include "pipeline/review/review_plots.h"
 #include "support/run_command.h"

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Short cuts of the label field: they may not change what it says.
 #include <gtest/gtest.h>
 
@@ -5,9 +7,9 @@
 #include <array>
 #include <cmath>
 
-#include "pipeline/segmentation/label_field.h"
-#include "pipeline/segmentation/shapes.h"
+#include "pipeline/segmentation/field/label_field.h"
 #include "support/random.h"
+#include "support/shapes.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -35,12 +37,12 @@ LabelVolume crowded(double slice_mm) {
     });
 }
 
-struct Standing {
+struct TopTwo {
     std::uint8_t first = 0, second = 0;
     double apart_mm = 0;
 };
 
-Standing standing(const LabelField& field, LabelField::Position at) {
+TopTwo standing(const LabelField& field, LabelField::Position at) {
     std::array<float, 256> score;
     field.scores(at, score.data());
     const auto& labels = at.contest->labels;
@@ -82,7 +84,7 @@ TEST_P(LabelFieldOf, ContestsSayWhatAllCandidatesSay) {
         }
         LabelField::Position all = at;
         all.contest = &at.block->contests[0];
-        const Standing short_cut = standing(field, at), whole = standing(field, all);
+        const TopTwo short_cut = standing(field, at), whole = standing(field, all);
         ++contested;
         fewer += at.contest->labels.size() < all.contest->labels.size();
         ASSERT_EQ(short_cut.first, whole.first);
@@ -146,7 +148,7 @@ TEST_P(LabelFieldOf, NothingJumpsFromBlockToBlock) {
         v[axis] += 2 * kStep;
         const LabelField::Position after = field.locate(v[0], v[1], v[2]);
         if (before.contest == nullptr || after.contest == nullptr) continue;
-        const Standing a = standing(field, before), b = standing(field, after);
+        const TopTwo a = standing(field, before), b = standing(field, after);
         if (std::min(a.apart_mm, b.apart_mm) > 1) continue;
         changes.push_back(a.first == b.first ? std::abs(a.apart_mm - b.apart_mm)
                                              : a.apart_mm + b.apart_mm);
@@ -163,7 +165,8 @@ TEST(LabelField, CubesOfTwoHundredLabelsKeepTheirMiddles) {
     LabelVolume ct;
     ct.grid = cubic_grid(kEdge * kCubes);
     ct.voxels.resize(ct.grid.voxel_count());
-    for (int l = 0; l < kCubes * kCubes * kCubes; ++l) ct.labels.push_back({"cube", "muscle", l, {}});
+    for (int l = 0; l < kCubes * kCubes * kCubes; ++l)
+        ct.labels.push_back({"cube", "muscle", l, {}});
     const auto cube = [](int i, int j, int k) {
         return static_cast<std::uint8_t>(i / kEdge + kCubes * (j / kEdge + kCubes * (k / kEdge)));
     };

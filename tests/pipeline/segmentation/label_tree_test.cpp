@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Which unions of labels a map's surfaces are measured as.
 #include <gtest/gtest.h>
 
-#include "pipeline/segmentation/label_tree.h"
-#include "pipeline/segmentation/signed_distance.h"
-#include "pipeline/segmentation/shapes.h"
+#include "pipeline/segmentation/distance/signed_distance.h"
+#include "pipeline/segmentation/field/label_tree.h"
+#include "support/shapes.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -26,8 +28,7 @@ LabelVolume body() {
 
 TEST(LabelTree, ShellsHangInAChainAndOrgansInWhatHoldsThem) {
     const LabelTree tree = nest_labels(body());
-    EXPECT_EQ(tree.parent,
-              (std::vector<int>{LabelTree::kRoot, 0, 1, 2, 3, 3, LabelTree::kAbsent}));
+    EXPECT_EQ(tree.parent, (std::vector<int>{LabelTree::kRoot, 0, 1, 2, 3, 3, LabelTree::kAbsent}));
     EXPECT_EQ(tree.members[2], LabelSet(0b111100));  // fat and all that it encloses
     EXPECT_EQ(tree.members[4], LabelSet(0b010000));
     EXPECT_EQ(tree.steps_between(0, 1), 1);

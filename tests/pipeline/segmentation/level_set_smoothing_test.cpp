@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/segmentation/level_set_smoothing.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "pipeline/parallel.h"
-#include "pipeline/segmentation/shapes.h"
+#include "pipeline/base/parallel.h"
+#include "support/shapes.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -45,12 +47,13 @@ TEST(LevelSetSmoothing, EquilibriumDoesNotDependOnTheVoxel) {
     LevelSetOptions options;
     options.k0 = 0.5;
     options.iterations = 120;
-    const LabelVolume ball = sample_labels(cubic_grid(20, 2), 2,
-                                           [](Point3 p) { return norm_of(p) <= 10 ? 1 : 0; });
+    const LabelVolume ball =
+        sample_labels(cubic_grid(20, 2), 2, [](Point3 p) { return norm_of(p) <= 10 ? 1 : 0; });
     const auto result = level_set_smoothing(ball, options);
     ASSERT_TRUE(result);
     const auto radius = [](const LabelVolume& volume) {
-        return std::cbrt(8 * static_cast<double>(count_label(volume, 1)) * 3 / (4 * 3.14159265358979));
+        return std::cbrt(8 * static_cast<double>(count_label(volume, 1)) * 3 /
+                         (4 * 3.14159265358979));
     };
     // An eighth of a voxel. By curvatures twice as strong it would be 0.9 instead of 0.42.
     const double shrinkage = 10 - 0.5 * (10 + std::sqrt(100 - 8 / options.k0));

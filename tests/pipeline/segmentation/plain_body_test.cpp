@@ -1,7 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A second known body, so that what is asked of labels does not hold for one anatomy alone.
 #include <gtest/gtest.h>
 
-#include "pipeline/import/analytic_torso.h"
+#include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "support/label_score.h"
 #include "support/plain_body.h"

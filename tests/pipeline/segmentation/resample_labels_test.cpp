@@ -1,13 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/segmentation/resample_labels.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "pipeline/segmentation/cooked_grid.h"
-#include "pipeline/segmentation/nearest_labels.h"
-#include "pipeline/segmentation/shapes.h"
+#include "pipeline/segmentation/field/cooked_grid.h"
+#include "pipeline/segmentation/field/nearest_labels.h"
 #include "support/random.h"
+#include "support/shapes.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,17 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Resampling by shape: known solids through known maps.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "formats/boundary_record.h"
-#include "pipeline/parallel.h"
-#include "pipeline/segmentation/label_field.h"
-#include "pipeline/segmentation/label_prices.h"
+#include "formats/volume/boundary_record.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/segmentation/field/label_field.h"
+#include "pipeline/segmentation/field/volume_correction.h"
 #include "pipeline/segmentation/resample_labels.h"
-#include "pipeline/segmentation/shapes.h"
 #include "pipeline/segmentation/smooth_labels.h"
 #include "support/random.h"
+#include "support/shapes.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -136,8 +138,8 @@ TEST(ShapeResampling, ObliqueVesselStaysOnePieceThroughThickSlices) {
     EXPECT_NEAR(result->changes.at(0).change(), 0, 0.05);
 }
 
-// Cells are weighed a block at a time. What all labels together seem to lack of a weight that varies
-// inside the blocks must not drive their prices to the limit, where none is kept.
+// Cells are weighed a block at a time. What all labels together seem to lack of a weight that
+// varies inside the blocks must not drive their prices to the limit, where none is kept.
 TEST(LabelPrices, KeepVolumesWhereTheWeightVaries) {
     const LabelVolume ct = sample_labels(cubic_grid(48), 4, [](Point3 p) {
         if (norm(p - Point3{-9, 4, 0}) < 5) return 2;

@@ -1,11 +1,13 @@
-#include "pipeline/segmentation/signed_distance.h"
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/segmentation/distance/signed_distance.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "pipeline/segmentation/shapes.h"
 #include "support/random.h"
+#include "support/shapes.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,15 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/segmentation/snap_surfaces.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "formats/boundary_record.h"
-#include "formats/stage_files.h"
-#include "pipeline/parallel.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/volume/boundary_record.h"
+#include "pipeline/base/parallel.h"
 #include "pipeline/segmentation/resample_labels.h"
-#include "pipeline/segmentation/shapes.h"
 #include "support/random.h"
+#include "support/shapes.h"
 
 namespace sonocase::pipeline {
 namespace {

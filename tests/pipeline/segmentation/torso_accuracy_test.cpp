@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // How true the surfaces of a cooked torso are: whole organs of the analytic one, through its known
 // warp into voxels of 1 mm, against the closed forms. Asked for are 95th percentiles of 0.15 mm and
 // 8 degrees for organs and 0.3 mm for tubes of 2 mm radius; 5 degrees for the liver's normals from

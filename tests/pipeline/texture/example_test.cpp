@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Hard inputs: a clear result or a clear refusal.
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -11,13 +13,14 @@
 #include <set>
 #include <string>
 
-#include "pipeline/texture/counter_random.h"
-#include "pipeline/texture/prepare_example.h"
-#include "pipeline/texture/read_example.h"
-#include "pipeline/texture/synthetic_examples.h"
+#include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/base/counter_random.h"
+#include "pipeline/texture/example/prepare_example.h"
+#include "pipeline/texture/example/read_example.h"
+#include "pipeline/texture/example/synthetic_examples.h"
 #include "pipeline/texture/texture_bank.h"
 #include "pipeline/texture/texture_quality.h"
-#include "pipeline/texture/tissue_table.h"
+#include "support/paths.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,20 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/parallel.h"
-#include "pipeline/texture/autocorrelation.h"
-#include "pipeline/texture/counter_random.h"
-#include "pipeline/texture/fourier.h"
+#include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/base/counter_random.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/base/periodic_volume.h"
+#include "pipeline/texture/example/prepare_example.h"
+#include "pipeline/texture/example/synthetic_examples.h"
 #include "pipeline/texture/matched_texture.h"
-#include "pipeline/texture/periodic_volume.h"
-#include "pipeline/texture/prepare_example.h"
 #include "pipeline/texture/pyramid_texture.h"
-#include "pipeline/texture/synthetic_examples.h"
+#include "pipeline/texture/spectrum/autocorrelation.h"
+#include "pipeline/texture/spectrum/fourier.h"
 #include "pipeline/texture/texture_bank.h"
 #include "pipeline/texture/texture_quality.h"
-#include "pipeline/texture/tissue_table.h"
 
 namespace sonocase::pipeline {
 namespace {

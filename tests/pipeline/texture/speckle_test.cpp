@@ -1,10 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/texture/speckle.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "pipeline/parallel.h"
+#include "pipeline/base/parallel.h"
 
 namespace sonocase::pipeline {
 namespace {

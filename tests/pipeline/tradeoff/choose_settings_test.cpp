@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/tradeoff/choose_settings.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/cook/error_budget.h"
 
 #include <gtest/gtest.h>
@@ -27,13 +29,14 @@ TEST(ErrorBudget, AddsWhatIsKnownAndNamesWhatIsNot) {
     EXPECT_DOUBLE_EQ(budget.entries[1].mm, 0.3);
     EXPECT_TRUE(std::isnan(budget.entries[2].mm));
     EXPECT_DOUBLE_EQ(budget.entries[3].mm, kCookedShare);
-    EXPECT_NEAR(budget.known_mm, std::sqrt(4 * kSampledShare * kSampledShare + 0.09 + 0.0025), 1e-12);
+    EXPECT_NEAR(budget.known_mm, std::sqrt(4 * kSampledShare * kSampledShare + 0.09 + 0.0025),
+                1e-12);
 }
 
 TEST(ErrorBudget, LeavesOutWhatWasNotReported) {
     EXPECT_TRUE(error_budget({}).entries.empty());
-    EXPECT_TRUE(error_budget(std::vector{report("import", {{"voxel_volume_mm3", NAN}})})
-                    .entries.empty());
+    EXPECT_TRUE(
+        error_budget(std::vector{report("import", {{"voxel_volume_mm3", NAN}})}).entries.empty());
     // A known map has no fit to speak of.
     EXPECT_TRUE(error_budget(std::vector{report("warp", {})}).entries.empty());
 }
@@ -47,7 +50,8 @@ TEST(ErrorBudget, IsWhatTheAnalyticTorsoShows) {
         double voxel_mm;
     };
     const Registration truth = analytic_torso_truth();
-    for (const Setting s : {Setting{{2, 2, 3}, 1.5}, {{1.5, 1.5, 5}, 1.5}, {{3, 3, 3}, 3}, {{2,2,2}, 4}}) {
+    for (const Setting s :
+         {Setting{{2, 2, 3}, 1.5}, {{1.5, 1.5, 5}, 1.5}, {{3, 3, 3}, 3}, {{2, 2, 2}, 4}}) {
         const LabelVolume ct = sample_analytic_torso(analytic_torso_grid(s.spacing_mm));
         ResampleOptions options;
         options.voxel_mm = s.voxel_mm;
@@ -55,9 +59,8 @@ TEST(ErrorBudget, IsWhatTheAnalyticTorsoShows) {
         ASSERT_TRUE(made);
         const double error =
             measure_boundary_error(made->volume, made->boundary, truth, {}, 100000).displaced_mm;
-        const ErrorBudget budget = error_budget(
-            std::vector{report("import", {{"voxel_volume_mm3", ct.grid.voxel_volume_mm3()}}),
-                        made->report});
+        const ErrorBudget budget = error_budget(std::vector{
+            report("import", {{"voxel_volume_mm3", ct.grid.voxel_volume_mm3()}}), made->report});
         EXPECT_GT(error, budget.known_mm / 1.5) << s.spacing_mm.z << " " << s.voxel_mm;
         EXPECT_LT(error, budget.known_mm * 1.5) << s.spacing_mm.z << " " << s.voxel_mm;
     }

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "pipeline/tradeoff/trial.h"
 
 #include <gtest/gtest.h>

@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The program sonocase as a user meets it: exit statuses, one-line errors, nothing half-written.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "support/paths.h"
 #include "support/run_command.h"
 #include "support/temporary_folder.h"
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/imaging/governor.h"
 
 #include <gtest/gtest.h>
@@ -22,8 +24,8 @@ TEST(Governor, SettlesOnTheFinestLevelThatFits) {
     }
 }
 
-// Each level gives up something of both, and saves less than the samples that it leaves out: some of
-// a frame is the same for all.
+// Each level gives up something of both, and saves less than the samples that it leaves out: some
+// of a frame is the same for all.
 TEST(Governor, LevelsFallInEveryRespect) {
     for (std::size_t i = 1; i < kAccuracyLevels.size(); ++i) {
         const AccuracyLevel &finer = kAccuracyLevels[i - 1], &coarser = kAccuracyLevels[i];

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Scenes, poses and sizes at the edge of what can be asked, with both models: they render, agree
 // with the slow renderer, and look as they must.
 #include <gtest/gtest.h>

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // What the tests of the image models share.
 #pragma once
 
@@ -8,7 +10,7 @@
 #include <vector>
 
 #include "runtime/imaging/renderer.h"
-#include "runtime/imaging/simd_target.h"
+#include "runtime/imaging/simd/simd_target.h"
 #include "support/phantom_bundle.h"
 #include "support/picture.h"
 

@@ -1,11 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A bundle that is unpacked as frames need it shows what a bundle that is all there shows, wherever
 // the probe is, whatever moves.
-#include "formats/case_bundle.h"
+#include "formats/bundle/case_bundle.h"
 
 #include <gtest/gtest.h>
 
 #include <thread>
 
+#include "formats/files/bundle_file.h"
 #include "imaging_support.h"
 #include "support/temporary_folder.h"
 

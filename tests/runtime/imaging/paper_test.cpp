@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Model `paper`: the beam-space renderer against the literal one, and its own truths.
 #include <gtest/gtest.h>
 

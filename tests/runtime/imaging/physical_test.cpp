@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Model `physical`: the vectorised renderer against the slow one, and its own truths.
 #include <gtest/gtest.h>
 

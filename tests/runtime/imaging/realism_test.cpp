@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Scores of realism, with limits from real images (docs/realism.md says which and how they were
 // measured). Homogeneous or simple phantoms, so that each score tests one thing; docs/realism.md
 // has those of organs.
@@ -9,7 +11,7 @@
 #include <numeric>
 
 #include "imaging_support.h"
-#include "runtime/imaging/physical_fast.h"
+#include "runtime/imaging/physical/fast/physical_fast.h"
 
 namespace sonocase::runtime {
 namespace {

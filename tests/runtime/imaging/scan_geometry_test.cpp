@@ -1,4 +1,6 @@
-#include "runtime/imaging/scan_geometry.h"
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/scan/scan_geometry.h"
 
 #include <gtest/gtest.h>
 

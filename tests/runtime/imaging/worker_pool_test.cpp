@@ -1,4 +1,6 @@
-#include "runtime/imaging/worker_pool.h"
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/simd/worker_pool.h"
 
 #include <gtest/gtest.h>
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/frame_stats.h"
 
 #include <gtest/gtest.h>

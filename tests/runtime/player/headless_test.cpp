@@ -1,12 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The program sonoplay without a window, as a user starts it.
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "formats/calibration.h"
-#include "formats/case_bundle.h"
-#include "formats/poses.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/calibration/calibration.h"
+#include "formats/files/bundle_file.h"
+#include "formats/files/calibration_file.h"
+#include "formats/recording/poses.h"
+#include "support/paths.h"
 #include "support/run_command.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"

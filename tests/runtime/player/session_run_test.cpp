@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/session_run.h"
 
 #include <gtest/gtest.h>
 
-#include "runtime/session/settings_text.h"
+#include "runtime/recording/settings_text.h"
 #include "runtime/tracking/replay_tracker.h"
 #include "support/random.h"
 #include "support/small_case.h"

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/player/setup_guide.h"
 
 #include <gtest/gtest.h>
@@ -164,9 +166,14 @@ TEST(Doubts, NameACalibrationOfAnotherSensor) {
     calibrations.probe->condition = 5;
     calibrations.probe->poses = 100;
     calibrations.probe->date = "2026-01-01T00:00:00Z";
-    EXPECT_TRUE(doubts(calibrations, "Polhemus Viper (SN 1)", "2026-01-02T00:00:00Z").empty());
-    EXPECT_EQ(doubts(calibrations, "Polhemus Viper (SN 2)", "2026-01-02T00:00:00Z").size(), 1u);
-    EXPECT_EQ(doubts(calibrations, "Polhemus Viper (SN 1)", "2026-06-02T00:00:00Z").size(), 1u);
+    EXPECT_TRUE(calibration_warnings(calibrations, "Polhemus Viper (SN 1)", "2026-01-02T00:00:00Z")
+                    .empty());
+    EXPECT_EQ(
+        calibration_warnings(calibrations, "Polhemus Viper (SN 2)", "2026-01-02T00:00:00Z").size(),
+        1u);
+    EXPECT_EQ(
+        calibration_warnings(calibrations, "Polhemus Viper (SN 1)", "2026-06-02T00:00:00Z").size(),
+        1u);
 }
 
 }  // namespace

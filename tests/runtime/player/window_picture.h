@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Pictures of the window under a virtual display: taken, read, made small, compared.
 #pragma once
 

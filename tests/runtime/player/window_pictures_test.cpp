@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Every panel against its kept picture, at 1280 x 720 and at four times the pixels.
 //     SONOCASE_RENEW_PICTURES=1 build/release/bin/runtime_window_test
 //     --gtest_filter='WindowPictures.*'
@@ -6,8 +8,10 @@
 
 #include <filesystem>
 
-#include "formats/case_bundle.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/files/bundle_file.h"
 #include "runtime/player/window_picture.h"
+#include "support/paths.h"
 #include "support/run_command.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"

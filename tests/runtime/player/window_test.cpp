@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The window under a virtual display, driven by injected input: every panel opened, an exercise
 // attempted, pictures taken and looked into.
 #include <gtest/gtest.h>
@@ -7,9 +9,11 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "formats/case_bundle.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/files/bundle_file.h"
 #include "runtime/player/shortcuts.h"
 #include "runtime/player/window_picture.h"
+#include "support/paths.h"
 #include "support/run_command.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"

@@ -1,13 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The wire forms of the USB trackers, against vectors and against damage.
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <string>
 
-#include "runtime/tracking/byte_fields.h"
-#include "runtime/tracking/guidance_protocol.h"
-#include "runtime/tracking/liberty_protocol.h"
-#include "runtime/tracking/viper_protocol.h"
+#include "runtime/tracking/usb/byte_fields.h"
+#include "runtime/tracking/usb/guidance_protocol.h"
+#include "runtime/tracking/usb/liberty_protocol.h"
+#include "runtime/tracking/usb/viper_protocol.h"
 #include "support/random.h"
 
 namespace sonocase::runtime {

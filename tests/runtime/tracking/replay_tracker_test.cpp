@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/tracking/replay_tracker.h"
 
 #include <gtest/gtest.h>
 
-#include "runtime/tracking/make_tracker.h"
+#include "runtime/tracking/factory/make_tracker.h"
 #include "runtime/tracking/paced_tracker.h"
 #include "support/temporary_folder.h"
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The other end of an OpenIGTLink connection, built on Debian's library alone.
 //     igtl_peer serve PORT N      server: sends N rounds of TRANSFORM, TDATA, QTDATA, POSITION,
 //     STATUS igtl_peer send PORT N       client: sends N TRANSFORMs to a listening player igtl_peer

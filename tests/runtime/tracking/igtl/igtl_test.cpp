@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // OpenIGTLink: the codec by itself, then both ways against Debian's library in another process, and
 // against peers that mean harm.
 #include <gtest/gtest.h>
@@ -7,10 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "runtime/session/bell.h"
-#include "runtime/tracking/igtl_message.h"
-#include "runtime/tracking/igtl_server.h"
-#include "runtime/tracking/igtl_tracker.h"
+#include "formats/base/event.h"
+#include "runtime/tracking/igtl/igtl_message.h"
+#include "runtime/tracking/igtl/igtl_server.h"
+#include "runtime/tracking/igtl/igtl_tracker.h"
+#include "support/paths.h"
 #include "support/random.h"
 
 namespace sonocase::runtime {
@@ -26,7 +29,7 @@ double seconds_since(Clock::time_point start) {
 // Looks until it is so, at most for so long: whenever the tracker has something new, and now and
 // then, since its health has no bell.
 template <class Predicate>
-bool eventually(Bell& bell, Predicate predicate, double seconds = 15) {
+bool eventually(Event& bell, Predicate predicate, double seconds = 15) {
     const auto start = Clock::now();
     while (!predicate()) {
         if (seconds_since(start) > seconds) return false;
@@ -49,7 +52,7 @@ struct RingingTracker {
     bool eventually(Predicate predicate) {
         return runtime::eventually(bell, predicate);
     }
-    Bell bell;
+    Event bell;
     std::unique_ptr<Tracker> tracker;
 };
 
@@ -222,7 +225,7 @@ TEST(IgtlServer, IsFollowedByAClientOfTheLibrary) {
     ASSERT_TRUE(server) << server.error().message();
     Peer peer("follow", (*server)->port(), 5);
     std::atomic<bool> stop{false};
-    Bell pace;
+    Event pace;
     std::thread sender([&] {
         while (!stop) {
             ServedFrame& frame = (*server)->slot();
@@ -290,7 +293,7 @@ TEST(IgtlServer, SurvivesAThousandConnects) {
         ASSERT_TRUE(socket) << i << " " << socket.error().message();
         if (i % 3 == 0) socket->write(Bytes(100, 0xFF));
     }
-    Bell never;  // guests come and go unannounced
+    Event never;  // guests come and go unannounced
     EXPECT_TRUE(eventually(never, [&] { return (*server)->guests() == 0; }));
     auto tracker = start_tracker(0, true);
     for (int i = 0; i < 200; ++i) {

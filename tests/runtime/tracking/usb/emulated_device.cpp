@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "runtime/tracking/usb/emulated_device.h"
 
 #include <umockdev-1.0/umockdev.h>
@@ -22,7 +24,7 @@
 #include <mutex>
 #include <thread>
 
-#include "runtime/session/bell.h"
+#include "formats/base/event.h"
 
 namespace sonocase::testing {
 namespace {
@@ -330,7 +332,7 @@ ClientResult run_with_device(const DeviceSpec& spec,
     }
     ::close(pipe_ends[1]);
     std::atomic<bool> stop{false};
-    runtime::Bell bell;
+    runtime::Event bell;
     std::thread player([&] {
         Clock::time_point replug_at = Clock::time_point::max();
         while (!stop) {

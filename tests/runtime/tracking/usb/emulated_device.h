@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A USB device that is not there, under an unmodified libusb in another process: umockdev gives
 // that process a /sys and a /dev, and what it asks of the kernel is answered here. The process that
 // plays the device must run under umockdev-wrapper. See docs/usb-emulation.md.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // NDI 3D Guidance against an emulated device, polled, two sensors.
 #include <gtest/gtest.h>
 

@@ -1,7 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Polhemus Liberty and Patriot against an emulated device that streams two stations.
 #include <gtest/gtest.h>
 
-#include "runtime/tracking/byte_fields.h"
+#include "runtime/tracking/usb/byte_fields.h"
 #include "runtime/tracking/usb/usb_run.h"
 
 namespace sonocase::runtime {

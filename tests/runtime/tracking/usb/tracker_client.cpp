@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Runs one tracker of the player for a while and prints what it saw as JSON: the other side of the
 // emulated devices.
 //     tracker_client SPEC SECONDS [READINGS]   stops early after so many readings
@@ -7,9 +9,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "formats/base/event.h"
 #include "runtime/player/frame_stats.h"
-#include "runtime/session/bell.h"
-#include "runtime/tracking/make_tracker.h"
+#include "runtime/tracking/factory/make_tracker.h"
 
 using namespace sonocase;
 using namespace sonocase::runtime;
@@ -35,7 +37,7 @@ int main(int argc, char** argv) {
     TrackerReading reading, last;
     std::uint64_t gaps = 0, lost = 0;
     TimeHistogram delivery;
-    Bell bell;
+    Event bell;
     tracker.set_wake([&bell] { bell.ring(); });
     while (clock() < seconds) {
         const double now_s = clock();

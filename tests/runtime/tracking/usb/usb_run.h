@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Runs tracker_client against an emulated device and reads what it saw.
 #pragma once
 
@@ -7,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/tracking/usb/emulated_device.h"
+#include "support/paths.h"
 
 namespace sonocase::testing {
 

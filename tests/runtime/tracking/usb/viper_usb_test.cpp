@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Polhemus Viper against an emulated device, under an unmodified libusb in a process of its own.
 #include <gtest/gtest.h>
 
@@ -5,10 +7,13 @@
 #include <cstring>
 #include <iostream>
 
-#include "formats/calibration.h"
-#include "runtime/tracking/byte_fields.h"
+#include "formats/calibration/calibration.h"
+#include "formats/files/bundle_file.h"
+#include "formats/files/calibration_file.h"
+#include "runtime/tracking/usb/byte_fields.h"
 #include "runtime/tracking/usb/usb_run.h"
-#include "runtime/tracking/viper_protocol.h"
+#include "runtime/tracking/usb/viper_protocol.h"
+#include "support/paths.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
 

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The latest value from one writer thread to one reader thread. Neither ever waits: three slots and
+// one atomic exchange a side. Values in between are overwritten, which is what a display wants of
+// poses and frames: the newest, never a queue.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+namespace sonocase::runtime {
+
+template <class T>
+class Mailbox {
+  public:
+    // Writer: fill slot(), then publish(). The slot keeps what an earlier publish left in it.
+    T& slot() { return slots_[writer_]; }
+    void publish() {
+        writer_ = middle_.exchange(static_cast<std::uint8_t>(writer_ | kFresh)) & kIndex;
+    }
+    void publish(const T& value) {
+        slot() = value;
+        publish();
+    }
+
+    // Reader: true if something newer than the last read is now in value().
+    bool refresh() {
+        if (!(middle_.load() & kFresh)) return false;
+        reader_ = middle_.exchange(reader_) & kIndex;
+        return true;
+    }
+    const T& value() const { return slots_[reader_]; }
+    T& value() { return slots_[reader_]; }
+
+  private:
+    static constexpr std::uint8_t kFresh = 4, kIndex = 3;
+    std::array<T, 3> slots_{};
+    std::uint8_t writer_ = 0;  // owned by the writer
+    std::atomic<std::uint8_t> middle_{1};
+    std::uint8_t reader_ = 2;  // owned by the reader
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// A case bundle in memory: everything that the player needs, and how it was made.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/bundle/voxel_blocks.h"
+#include "formats/volume/brick_volume.h"
+#include "formats/volume/label_volume.h"
+#include "formats/volume/solid_texture.h"
+#include "formats/volume/surface.h"
+#include "formats/volume/surface_patch.h"
+#include "formats/volume/tissue.h"
+
+namespace sonocase {
+
+struct InputHash {
+    std::string path;    // as the recipe names it
+    std::string digest;  // hex
+};
+
+struct EmbeddedExercise {
+    std::string name;  // "liver-biopsy"
+    std::string toml;  // the exercise file as given; formats/exercise/exercise.h parses it
+};
+
+struct CaseManifest {
+    std::string case_name;
+    std::string producer;  // program and version
+    std::string recipe;    // the TOML text as given
+    std::vector<InputHash> inputs;
+    std::vector<StageReport> stages;
+};
+
+struct CaseBundle {
+    CaseManifest manifest;
+    Grid grid;                  // cubic voxels in the `mannequin` frame; direction is the identity
+    std::vector<Label> labels;  // palette of label_bricks; [0] is outside
+    std::vector<Tissue> tissues;  // Label::tissue names one of these
+    std::vector<EmbeddedExercise> exercises;
+
+    BrickVolume<std::uint8_t> label_bricks;
+    BrickVolume<std::int8_t> echo_offset;  // quarter dB, mid-scale structure; may be empty
+    BoundaryBricks boundary;               // formats/volume/boundary_record.h; may be empty
+    std::vector<SolidTexture> textures;
+    SpeckleVolume speckle;
+
+    Surface patient_skin;                   // `mannequin` frame, after the warp
+    Surface mannequin_skin;                 // `mannequin` frame, as digitised
+    std::vector<std::uint8_t> preview_png;  // may be empty
+
+    // Null: all of the above is there. Else the pools of `boundary` and `echo_offset` count only
+    // where they were asked for; such a bundle may be moved from, but neither copied nor assigned
+    // to.
+    std::shared_ptr<VoxelBlocks> blocks;
+};
+
+// Tissue table index of every palette entry; # labels.
+std::vector<int> tissue_of_label(const CaseBundle& bundle);
+
+// Reads a bundle from bytes. Trusts nothing: every size is checked before allocation, every offset
+// against the file, every checksum before use; docs/format.md says what is done in each malformed
+// case. where: names the bytes in errors. threads: 0 takes as many as the machine has; 1 starts
+// none.
+Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,
+                               const std::string& where,
+                               int threads = 0);
+// Same bytes for the same bundle on any machine with any number of threads.
+std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle);
+
+// For players: everything but the pools of boundary records and echo offsets, which `blocks`
+// unpacks from `bytes` as a frame needs them. Cost at 1 mm: a tenth of read_bundle.
+Result<CaseBundle> stream_bundle(RawVector<std::uint8_t> bytes,
+                                 const std::string& where,
+                                 int threads = 0);
+
+}  // namespace sonocase

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/bundle/codec/block_parts.h"
+
+#include <zstd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <new>
+
+#include "formats/bundle/codec/brick_kinds.h"
+#include "formats/bundle/codec/offset_guess.h"
+#include "formats/volume/boundary_record.h"
+
+namespace sonocase::detail {
+namespace {
+
+template <class T>
+void spread(const BrickSpans<T>& volume, std::size_t brick, T* out) {
+    const std::uint32_t entry = volume.table[brick];
+    if (entry & kUniformBrick) {
+        std::fill(out, out + kBrickVoxels, volume.uniform[entry & ~kUniformBrick]);
+    } else {
+        std::memcpy(out, volume.pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels,
+                    kBrickVoxels * sizeof(T));
+    }
+}
+
+template <class T>
+void clear(const BlockParts& parts, std::size_t block, const BrickSpans<T>& volume, T value) {
+    parts.grid.each_brick(block, [&](std::size_t brick, bool, bool) {
+        const std::uint32_t entry = volume.table[brick];
+        if (entry & kUniformBrick) return;
+        T* to = volume.pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels;
+        std::fill(to, to + kBrickVoxels, value);
+    });
+}
+
+}  // namespace
+
+BlockWork::BlockWork(const BlockParts& parts) : context_(ZSTD_createDCtx()) {
+    if (context_ == nullptr) throw std::bad_alloc();
+    bytes_.resize(std::max(parts.corrections ? parts.corrections->largest() : 0,
+                           parts.offsets ? parts.offsets->largest() : 0));
+}
+
+BlockWork::~BlockWork() {
+    ZSTD_freeDCtx(context_);
+}
+
+bool BlockWork::unpack(const BlockParts& parts, std::size_t block) noexcept {
+    const bool has_records = parts.boundary.table.empty() || records(parts, block);
+    if (!has_records) clear(parts, block, parts.boundary, kNoBoundary);
+    const bool has_offsets = parts.echo.table.empty() || offsets(parts, block);
+    if (!has_offsets) clear(parts, block, parts.echo, std::int8_t{0});
+    return has_records && has_offsets;
+}
+
+bool BlockWork::records(const BlockParts& parts, std::size_t block) noexcept {
+    if (!parts.corrections->unpack(context_, block, bytes_.data())) return false;
+    std::size_t corrected_bricks = 0;
+    parts.grid.each_brick(block, [&](std::size_t brick, bool, bool) {
+        const std::uint32_t entry = parts.boundary.table[brick];
+        if (!(entry & kUniformBrick)) corrected_bricks += parts.corrected[entry];
+    });
+    const std::size_t bytes = parts.corrections->bytes(block);
+    constexpr std::size_t kMask = kBrickVoxels / 8;
+    if (bytes < kMask * corrected_bricks || (bytes - kMask * corrected_bricks) % 4 != 0)
+        return false;
+    const std::uint8_t* mask = bytes_.data();
+    const std::size_t words = (bytes - kMask * corrected_bricks) / 4;
+    const std::uint8_t* from = mask + kMask * corrected_bricks;
+    std::size_t word = 0;
+    bool good = true;
+    parts.grid.each_brick(block, [&](std::size_t brick, bool, bool) {
+        const std::uint32_t entry = parts.boundary.table[brick];
+        if (entry & kUniformBrick) return;
+        BrickLabels alike;
+        const std::uint32_t label_entry = parts.labels.table[brick];
+        const std::uint8_t* label = alike.data();
+        if (label_entry & kUniformBrick) {
+            alike.fill(parts.labels.uniform[label_entry & ~kUniformBrick]);
+        } else {
+            label = parts.labels.pool.data() + static_cast<std::size_t>(label_entry) * kBrickVoxels;
+        }
+        std::uint32_t* to =
+            parts.boundary.pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels;
+        records_from_patches(
+            parts.patches.subspan(parts.first_patch[entry], parts.patch_count[entry]), label,
+            parts.reach_steps, to);
+        if (!parts.corrected[entry]) return;
+        std::uint64_t wrong;
+        std::memcpy(&wrong, mask, kMask);
+        mask += kMask;
+        if (static_cast<std::size_t>(std::popcount(wrong)) > words - word) {
+            good = false;
+            wrong = 0;
+        }
+        for (; wrong != 0; wrong &= wrong - 1, ++word) {
+            const auto v = static_cast<std::size_t>(std::countr_zero(wrong));
+            std::uint32_t sum = 0;
+            for (std::size_t n = 0; n < 4; ++n)
+                sum |= (((to[v] >> 8 * n) + from[n * words + word]) & 0xFFu) << 8 * n;
+            to[v] = sum;
+            good &= sum == kNoBoundary || (sum & 0xFFu) < parts.palette;
+        }
+    });
+    return good && word == words;
+}
+
+bool BlockWork::offsets(const BlockParts& parts, std::size_t block) noexcept {
+    if (!parts.offsets->unpack(context_, block, bytes_.data())) return false;
+    const std::uint8_t* from = bytes_.data();
+    const std::uint8_t* const end = from + parts.offsets->bytes(block);
+    bool good = true;
+    parts.grid.each_brick(block, [&](std::size_t brick, bool has_left, bool has_front) {
+        const std::uint32_t entry = parts.echo.table[brick];
+        if ((entry & kUniformBrick) || !good) return;
+        const bool in_cells = parts.in_cells[entry] != 0;
+        good = end - from >= (in_cells ? 8 : kBrickVoxels);
+        if (!good) return;
+        std::array<std::int8_t, kBrickVoxels> left, front, cells;
+        if (has_left) spread(parts.echo, brick - 1, left.data());
+        if (has_front)
+            spread(parts.echo, brick - static_cast<std::size_t>(parts.grid.bricks.x), front.data());
+        const std::int8_t* at_left = has_left ? left.data() : nullptr;
+        const std::int8_t* in_front = has_front ? front.data() : nullptr;
+        std::int8_t* to = parts.echo.pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels;
+        std::int8_t* values = in_cells ? cells.data() : to;
+        const auto told = [&](int v, std::uint8_t guess) {
+            return values[v] = static_cast<std::int8_t>(*from++ + guess);
+        };
+        if (!in_cells) {
+            walk_offsets<kBrickEdge>(at_left, in_front, told);
+            return;
+        }
+        walk_offsets<2>(at_left, in_front, told);
+        for (std::size_t v = 0; v < kBrickVoxels; ++v)
+            to[v] = cells[v % 4 / 2 + 2 * (v / 4 % 4 / 2) + 4 * (v / 32)];
+    });
+    return good && from == end;
+}
+
+}  // namespace sonocase::detail

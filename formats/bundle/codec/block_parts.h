@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What VoxelBlocks unpacks from and into. For the .cpp files of formats/ only.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/base/raw_vector.h"
+#include "formats/bundle/codec/packed_blocks.h"
+#include "formats/volume/surface_patch.h"
+
+namespace sonocase::detail {
+
+// The vectors of the volumes stay where they are while a bundle is moved about: only they are
+// referred to.
+template <class T>
+struct BrickSpans {
+    std::span<const std::uint32_t> table;
+    std::span<const T> uniform;
+    std::span<T> pool;
+
+    BrickSpans() = default;
+    explicit BrickSpans(BrickVolume<T>& volume)
+        : table(volume.table), uniform(volume.uniform), pool(volume.pool) {}
+};
+
+struct BlockParts {
+    BlockGrid grid;
+    Int3 size{0, 0, 0};  // voxels
+    std::size_t palette = 0;
+    int reach_steps = 0;
+    std::string where;
+
+    BrickSpans<std::uint8_t> labels;
+    BrickSpans<std::uint32_t> boundary;  // table empty: none
+    BrickSpans<std::int8_t> echo;        // table empty: none
+    // BrickPatches of `boundary`.
+    std::span<const std::uint32_t> first_patch;
+    std::span<const std::uint8_t> patch_count;
+    std::span<const SurfacePatch> patches;
+    RawVector<std::uint8_t> corrected;  // of each stored brick of `boundary`
+    RawVector<std::uint8_t> in_cells;   // of each stored brick of `echo`
+    std::optional<BlockFrames> corrections, offsets;
+};
+
+// Memory to unpack one block in.
+class BlockWork {
+  public:
+    explicit BlockWork(const BlockParts& parts);
+    ~BlockWork();
+    BlockWork(const BlockWork&) = delete;
+    BlockWork& operator=(const BlockWork&) = delete;
+    // False where the block's bytes make no sense; it is then empty.
+    bool unpack(const BlockParts& parts, std::size_t block) noexcept;
+
+  private:
+    bool records(const BlockParts& parts, std::size_t block) noexcept;
+    bool offsets(const BlockParts& parts, std::size_t block) noexcept;
+
+    ZSTD_DCtx_s* context_;
+    std::vector<std::uint8_t> bytes_;
+};
+
+}  // namespace sonocase::detail

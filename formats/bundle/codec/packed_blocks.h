@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Chunks that are unpacked in parts: a volume's bricks in blocks of edge^3, each a zstd frame of
+// its own. docs/format.md, part 2. For the .cpp files of formats/ only.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/container/chunk_file.h"
+#include "formats/volume/brick_volume.h"
+
+struct ZSTD_DCtx_s;
+
+namespace sonocase::detail {
+
+// Blocks, and the bricks of a block, lie x fastest.
+struct BlockGrid {
+    Int3 bricks{0, 0, 0};  // of the volume
+    int edge = 8;          // of a block, bricks
+
+    Int3 blocks() const {
+        const auto parts = [&](int n) { return (n + edge - 1) / edge; };
+        return {parts(bricks.x), parts(bricks.y), parts(bricks.z)};
+    }
+    std::size_t count() const {
+        const Int3 n = blocks();
+        return static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) *
+               static_cast<std::size_t>(n.z);
+    }
+    std::size_t block_bricks() const {
+        return static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge) *
+               static_cast<std::size_t>(edge);
+    }
+    Int3 first_brick(std::size_t block) const {
+        const Int3 n = blocks();
+        const auto x = static_cast<std::size_t>(n.x), y = static_cast<std::size_t>(n.y);
+        return {edge * static_cast<int>(block % x), edge * static_cast<int>(block / x % y),
+                edge * static_cast<int>(block / x / y)};
+    }
+    // visit(brick, has_left, has_front): number of the brick, and whether those beside it in x and
+    // y are of the same block.
+    template <class Visit>
+    void each_brick(std::size_t block, Visit visit) const {
+        const Int3 f = first_brick(block);
+        for (int k = f.z; k < std::min(f.z + edge, bricks.z); ++k) {
+            for (int j = f.y; j < std::min(f.y + edge, bricks.y); ++j) {
+                for (int i = f.x; i < std::min(f.x + edge, bricks.x); ++i) {
+                    visit(static_cast<std::size_t>(i) + static_cast<std::size_t>(bricks.x) *
+                                                            (static_cast<std::size_t>(j) +
+                                                             static_cast<std::size_t>(bricks.y) *
+                                                                 static_cast<std::size_t>(k)),
+                          i > f.x, j > f.y);
+                }
+            }
+        }
+    }
+};
+
+// content: appends what a block holds to an empty vector. Same bytes for any number of threads.
+std::vector<std::uint8_t> pack_blocks(
+    const BlockGrid& grid,
+    const std::function<void(std::size_t block, std::vector<std::uint8_t>*)>& content);
+
+// Where the frames of such a chunk lie. Refers to the bytes of the reader's file.
+class BlockFrames {
+  public:
+    // max_bytes: the most that a block has a use for.
+    static Result<BlockFrames> open(const ChunkReader& reader,
+                                    const std::string& type,
+                                    std::size_t blocks,
+                                    std::size_t max_bytes);
+    std::size_t bytes(std::size_t block) const { return frames_[block].bytes; }  // unpacked
+    std::size_t largest() const { return largest_; }
+    // to: bytes(block) of them. False: it does not unpack.
+    bool unpack(ZSTD_DCtx_s* context, std::size_t block, std::uint8_t* to) const noexcept;
+
+  private:
+    struct Frame {
+        std::uint64_t at = 0;
+        std::uint32_t stored = 0, bytes = 0;
+    };
+    std::span<const std::uint8_t> stored_;
+    std::vector<Frame> frames_;
+    std::size_t largest_ = 0;
+};
+
+}  // namespace sonocase::detail

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/bundle/stage_files.h"
+
+#include <new>
+
+#include "formats/bundle/codec/bundle_parts.h"
+#include "formats/bundle/codec/packed_volumes.h"
+#include "formats/bundle/codec/volume_json.h"
+#include "formats/bundle/voxel_blocks.h"
+#include "formats/text/stage_report_json.h"
+
+namespace sonocase {
+namespace {
+
+using detail::Json;
+using detail::JsonFault;
+using detail::JsonObject;
+
+constexpr std::string_view kLabelChunks[] = {"manifest", SONOCASE_VOLUME_CHUNKS};
+constexpr std::string_view kTextureChunks[] = {"manifest", "textures", "speckle"};
+constexpr std::string_view kSurfaceChunks[] = {"manifest", "surface"};
+
+// Opens, reads the manifest and hands both to `fill`; what is wrong with the manifest wins.
+template <class File, class Fill>
+Result<File> read_container(std::span<const std::uint8_t> bytes,
+                            std::string_view kind,
+                            std::span<const std::string_view> known,
+                            const std::string& where,
+                            Fill fill) {
+    try {
+        const auto reader = ChunkReader::open(bytes, kind, known, where);
+        if (!reader) return reader.error();
+        const auto json = detail::read_manifest(*reader);
+        if (!json) return json.error();
+        JsonFault fault{where + ": manifest", {}};
+        JsonObject manifest(*json, "", fault);
+        File file;
+        const Status filled = fill(file, *reader, manifest);
+        if (fault.error) return *fault.error;
+        if (!filled) return filled.error();
+        return file;
+    } catch (const std::bad_alloc&) {
+        return Error{"needs more memory than there is", where, ""};
+    }
+}
+
+Status fill_labels(LabelFile& file, const ChunkReader& reader, JsonObject& manifest) {
+    file.frame = manifest.text_or("frame", "");
+    file.volume.grid = detail::grid_from(manifest.object("grid"));
+    file.volume.labels = detail::labels_from(manifest, "labels");
+    file.reports = detail::reports_from(manifest, "stages");
+    if (!manifest.ok()) return Done{};
+    const Int3 size = file.volume.grid.size;
+    auto volumes = detail::read_volumes(reader, manifest, size, file.volume.labels.size(), 0);
+    if (!volumes) return volumes.error();
+    if (volumes->packed) {
+        VoxelBlocks blocks(std::move(volumes->packed));
+        blocks.load_all(0);
+        if (Status whole = blocks.status(); !whole) return whole;
+    }
+    file.volume.voxels = dense_from_bricks(volumes->labels);
+    file.boundary = std::move(volumes->boundary);
+    file.echo_offset = std::move(volumes->echo_offset);
+    return Done{};
+}
+
+Status fill_textures(TextureFile& file, const ChunkReader& reader, JsonObject& manifest) {
+    file.reports = detail::reports_from(manifest, "stages");
+    file.tissues = detail::tissues_from(manifest, "tissues");
+    auto textures = detail::read_textures(reader, manifest, 0);
+    if (!textures) return textures.error();
+    file.textures = std::move(*textures);
+    auto speckle = detail::read_speckle(reader, manifest, 0);
+    if (!speckle) return speckle.error();
+    file.speckle = std::move(*speckle);
+    return Done{};
+}
+
+Status fill_surface(SurfaceFile& file, const ChunkReader& reader, JsonObject& manifest) {
+    file.frame = manifest.text_or("frame", "");
+    file.reports = detail::reports_from(manifest, "stages");
+    auto surface = detail::read_surface(reader, "surface", 0);
+    if (!surface) return surface.error();
+    file.surface = std::move(*surface);
+    return Done{};
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> write_label_file(const LabelFile& file) {
+    Json manifest = Json::object();
+    manifest["format"] = "sonocase labels";
+    manifest["frame"] = file.frame;
+    manifest["grid"] = detail::json_of(file.volume.grid);
+    manifest["labels"] = detail::json_of(file.volume.labels);
+    manifest["stages"] = detail::json_of(file.reports);
+    const BrickVolume<std::uint8_t> bricks =
+        bricks_from_dense<std::uint8_t>(file.volume.voxels, file.volume.grid.size);
+    ChunkWriter writer("LABL");
+    detail::add_volumes(writer, manifest, bricks, file.boundary, file.echo_offset);
+    return writer.write();
+}
+
+Result<LabelFile> read_label_file(std::span<const std::uint8_t> bytes, const std::string& where) {
+    return read_container<LabelFile>(bytes, "LABL", kLabelChunks, where, fill_labels);
+}
+
+std::vector<std::uint8_t> write_texture_file(const TextureFile& file) {
+    Json manifest = Json::object();
+    manifest["format"] = "sonocase textures";
+    manifest["textures"] = detail::json_of_textures(file.textures);
+    manifest["speckle_edge"] = file.speckle.edge;
+    manifest["tissues"] = detail::json_of(file.tissues);
+    manifest["stages"] = detail::json_of(file.reports);
+    ChunkWriter writer("TXTR");
+    detail::add_manifest(writer, manifest);
+    if (!file.textures.empty()) detail::add_textures(writer, file.textures);
+    if (file.speckle.edge != 0) writer.add_array("speckle", false, file.speckle.voxels);
+    return writer.write();
+}
+
+Result<TextureFile> read_texture_file(std::span<const std::uint8_t> bytes,
+                                      const std::string& where) {
+    return read_container<TextureFile>(bytes, "TXTR", kTextureChunks, where, fill_textures);
+}
+
+std::vector<std::uint8_t> write_surface_file(const SurfaceFile& file) {
+    Json manifest = Json::object();
+    manifest["format"] = "sonocase surface";
+    manifest["frame"] = file.frame;
+    manifest["stages"] = detail::json_of(file.reports);
+    ChunkWriter writer("SURF");
+    detail::add_manifest(writer, manifest);
+    detail::add_surface(writer, "surface", file.surface);
+    return writer.write();
+}
+
+Result<SurfaceFile> read_surface_file(std::span<const std::uint8_t> bytes,
+                                      const std::string& where) {
+    return read_container<SurfaceFile>(bytes, "SURF", kSurfaceChunks, where, fill_surface);
+}
+
+std::string container_kind(std::span<const std::uint8_t> bytes) {
+    constexpr std::uint8_t kMagic[] = {0x89, 'S', 'O', 'N', 'O', 0x0D, 0x0A, 0x1A};
+    if (bytes.size() < 16 || !std::equal(std::begin(kMagic), std::end(kMagic), bytes.begin()))
+        return "";
+    return {reinterpret_cast<const char*>(bytes.data()) + 12, 4};
+}
+
+}  // namespace sonocase

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/bundle/voxel_blocks.h"
+
+#include <algorithm>
+#include <mutex>
+
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
+#include "formats/base/jobs.h"
+#include "formats/bundle/codec/block_parts.h"
+
+namespace sonocase {
+namespace {
+
+constexpr std::size_t kWorkers = 2;  // the frame's thread and one that reads ahead of it
+
+}  // namespace
+
+struct VoxelBlocks::Worker {
+    std::mutex mutex;
+    std::unique_ptr<detail::BlockWork> work;
+};
+
+VoxelBlocks::VoxelBlocks(std::unique_ptr<detail::BlockParts> parts)
+    : parts_(std::move(parts)),
+      workers_(std::make_unique<Worker[]>(kWorkers)),
+      blocks_(parts_->grid.blocks()),
+      edge_(kBrickEdge * parts_->grid.edge),
+      count_(parts_->grid.count()),
+      lower_(count_),
+      state_(std::make_unique<std::atomic<State>[]>(count_)),
+      left_(count_) {
+    for (std::size_t n = 0; n < kWorkers; ++n)
+        workers_[n].work = std::make_unique<detail::BlockWork>(*parts_);
+    for (std::size_t block = 0; block < count_; ++block) {
+        const Int3 brick = parts_->grid.first_brick(block);
+        lower_[block] = {kBrickEdge * brick.x, kBrickEdge * brick.y, kBrickEdge * brick.z};
+    }
+}
+
+VoxelBlocks::~VoxelBlocks() = default;
+
+void VoxelBlocks::ensure_voxel_loaded(int i, int j, int k) noexcept {
+    if (whole()) return;
+    const std::size_t block =
+        static_cast<std::size_t>(i / edge_) +
+        static_cast<std::size_t>(blocks_.x) *
+            (static_cast<std::size_t>(j / edge_) +
+             static_cast<std::size_t>(blocks_.y) * static_cast<std::size_t>(k / edge_));
+    if (!is_loaded(block)) unpack(block);
+}
+
+bool VoxelBlocks::take(std::size_t block) noexcept {
+    State packed = kPacked;
+    return state_[block].compare_exchange_strong(packed, kBeingUnpacked);
+}
+
+void VoxelBlocks::finish(std::size_t block, bool makes_sense) noexcept {
+    if (!makes_sense) damaged_ = true;
+    state_[block].store(kThere, std::memory_order_release);
+    state_[block].notify_all();
+    left_.fetch_sub(1, std::memory_order_release);
+}
+
+void VoxelBlocks::unpack(std::size_t block) noexcept {
+    if (!take(block)) {
+        state_[block].wait(kBeingUnpacked, std::memory_order_acquire);
+        return;
+    }
+    for (std::size_t n = 0;; n = (n + 1) % kWorkers) {
+        std::unique_lock lock(workers_[n].mutex, std::defer_lock);
+        if (n + 1 == kWorkers) {
+            lock.lock();
+        } else if (!lock.try_lock()) {
+            continue;
+        }
+        finish(block, workers_[n].work->unpack(*parts_, block));
+        return;
+    }
+}
+
+void VoxelBlocks::load_all(int threads) {
+    // A row of blocks a job, so that few have to find memory to work in.
+    const auto row = static_cast<std::size_t>(std::max(blocks_.x, 1));
+    detail::run_jobs((count_ + row - 1) / row, threads, [&](std::size_t job) {
+        detail::BlockWork work(*parts_);
+        for (std::size_t block = job * row; block < std::min((job + 1) * row, count_); ++block) {
+            if (take(block)) finish(block, work.unpack(*parts_, block));
+        }
+    });
+    for (std::size_t block = 0; block < count_; ++block)  // what other threads had begun
+        state_[block].wait(kBeingUnpacked, std::memory_order_acquire);
+}
+
+void VoxelBlocks::use_small_pages() noexcept {
+#ifdef __linux__
+    const auto advise = [](auto pool) {
+        constexpr std::size_t kPage = 4096;
+        const std::size_t skip = (0 - reinterpret_cast<std::uintptr_t>(pool.data())) % kPage;
+        const std::size_t bytes = pool.size_bytes();
+        if (bytes < skip + kPage) return;
+        // A system without such pages says no, and nothing is lost.
+        (void)madvise(reinterpret_cast<std::uint8_t*>(pool.data()) + skip,
+                      (bytes - skip) / kPage * kPage, MADV_NOHUGEPAGE);
+    };
+    advise(parts_->boundary.pool);
+    advise(parts_->echo.pool);
+#endif
+}
+
+std::size_t VoxelBlocks::pool_bytes() const noexcept {
+    return parts_->boundary.pool.size_bytes() + parts_->echo.pool.size_bytes();
+}
+
+Status VoxelBlocks::status() const {
+    if (!damaged()) return Done{};
+    return Error{"a block of boundary records or echo offsets makes no sense", parts_->where,
+                 "make the file again"};
+}
+
+}  // namespace sonocase

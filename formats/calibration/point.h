@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Where the tip of a tool is, seen from the sensor on it, from a recording in which the tip rests
+// on a fixed point while the tool is tilted every way. The paper's probe point and the standard
+// pivot calibration are the same problem and share this one answer.
+//
+//     R_i t + p_i = c        unknown t (tip, sensor frame) and c (pivot, tracker frame)
+//
+// [Magee] eqs. (11)-(13): with S_pos = p, S_dir and S_ori the first two columns of R,
+// t = (d1, d2 cos theta, d2 sin theta). The printed (13) is wrong: the column of d1 is -S_dir, and
+// rows 2 and 3 of the last column are -(S_dir x S_ori)_y and _z. See docs/equations.md.
+//
+// The pivot is eliminated by centring, (R_i - R_mean) t = -(p_i - p_mean), so a far origin costs
+// nothing. The singular values of the centred system, divided by sqrt(N), are called swing: how far
+// the tool turned at right angles to each direction, about the rms sine of the tilt.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/recording/poses.h"
+
+namespace sonocase {
+
+enum class RestSearch {
+    one,        // all poses rest on one point
+    automatic,  // several resting points are looked for if one explains the recording badly
+    several     // several resting points, moves between them
+};
+
+struct PointOptions {
+    RestSearch rests = RestSearch::automatic;
+    bool reject_outliers = true;
+    double outlier_sigmas =
+        5;             // a pose is left out beyond this many robust standard deviations, > 3
+    int trials = 100;  // random starts of the robust fit, >= 1
+    std::uint64_t seed = 1;
+};
+
+struct PoseResidual {
+    std::int64_t frame = 0;
+    double timestamp_s = 0;
+    double residual_mm = 0;  // |R t + p - c|
+    bool inlier = false;
+    int rest = -1;  // which resting point; -1: none
+};
+
+struct RestPoint {
+    Point3 pivot_mm;  // tracker frame
+    Vector3 sigma_mm;
+    double rms_mm = 0;
+    std::int64_t first_frame = 0, last_frame = 0;
+    int poses = 0;
+};
+
+struct PointFit {
+    Vector3 tip_mm;   // sensor frame; the undetermined part, if any, is zero
+    Point3 pivot_mm;  // tracker frame; of the rest with most poses
+    double d1_mm = 0, d2_mm = 0,
+           theta_rad = 0;  // the paper's unknowns, d2 >= 0, theta in (-pi, pi]
+
+    double rms_mm = 0;  // of the inliers' residuals |R t + p - c|
+    Vector3 sigma_mm;   // one standard deviation of the tip; infinite where undetermined
+    Vector3 pivot_sigma_mm;
+    double condition = 0;    // of the 3 N x 6 system in (t, c); infinite if singular
+    double correlation = 0;  // between residuals of successive poses; the sigmas allow for it
+    int poses = 0;           // usable readings
+    int inliers = 0;         // of them used
+
+    bool determined = false;  // false: `problem` says why not and what to do
+    std::string problem;
+    Vector3 swing;             // falling; see above
+    Vector3 weak_axis;         // sensor frame, unit: the direction that is known least
+    double weak_sigma_mm = 0;  // one standard deviation along it
+
+    std::vector<RestPoint> rests;         // at least one if determined
+    std::vector<PoseResidual> residuals;  // # poses
+    std::vector<std::string> warnings;
+};
+
+// Screens the readings (pose_screen.h), fits, and says how good the answer is. Never fails: poor
+// data give determined == false or warnings. The sigmas assume equal independent position noise,
+// widened by the correlation of successive residuals. Same readings and options, same bytes. Cost:
+// 10 ms for 1,000 poses.
+PointFit fit_point(std::span<const Pose> poses, const PointOptions& options = {});
+
+// The paper's own system, eqs. (11)-(12) put into matrix form, six unknowns, every pose used: slow
+// and obvious, kept as oracle. Poses as screened. {d1, d2 cos theta, d2 sin theta} is returned.
+Vector3 fit_point_paper(std::span<const Pose> poses, Point3* pivot_mm = nullptr);
+
+// Position of the tip in the tracker frame for every pose.
+std::vector<Point3> tip_trace(std::span<const Pose> poses, Vector3 tip_mm);
+
+// Maximal runs of poses during which the tip stays within radius_mm of its mean there: the touches
+// of a recording whose tip is known. Runs shorter than min_poses are moves.
+struct RestOptions {
+    double radius_mm = 1.5;
+    int min_poses = 10;
+};
+std::vector<RestPoint> find_rests(std::span<const Pose> poses,
+                                  Vector3 tip_mm,
+                                  const RestOptions& options = {});
+
+}  // namespace sonocase

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The container of every binary file of ours: a header, a table and chunks. docs/format.md, part 1.
+//
+// Case bundles and the files between stages share it. Little-endian. Every byte of a file is
+// accounted for: header, table and chunks carry checksums and what pads them is zero, so that any
+// change of a file is seen (a change inside a skipped optional chunk is not looked for).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "formats/base/result.h"
+
+namespace sonocase {
+
+inline constexpr std::uint32_t kContainerVersion = 1;
+inline constexpr std::size_t kChunkAlignment = 64;
+inline constexpr std::size_t kMaxChunks = 4096;
+inline constexpr std::size_t kFrameBytes = std::size_t{1} << 20;  // raw bytes of one zstd frame
+
+// kind      four characters that say what the file is: "CASE", "LABL", "TXTR", "SURF"
+// type      up to eight characters that say what a chunk is
+// required  a reader that does not know the type must refuse the file
+class ChunkWriter {
+  public:
+    explicit ChunkWriter(std::string kind);
+    void add(std::string type, bool required, std::vector<std::uint8_t> bytes);
+    // Borrows: the bytes must stay until write() returns.
+    void add_view(std::string type, bool required, std::span<const std::uint8_t> bytes);
+    // Bytes that are packed already, and that readers take as they lie.
+    void add_packed(std::string type, bool required, std::vector<std::uint8_t> bytes);
+    template <class T, class A>
+    void add_array(std::string type, bool required, const std::vector<T, A>& values) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        add_view(std::move(type), required,
+                 {reinterpret_cast<const std::uint8_t*>(values.data()), values.size() * sizeof(T)});
+    }
+    // Chunks in the order added. threads: 0 takes as many as the machine has. The bytes do not
+    // depend on it.
+    std::vector<std::uint8_t> write(int threads = 0) const;
+
+  private:
+    struct Chunk {
+        std::string type;
+        bool required;
+        std::vector<std::uint8_t> owned;
+        std::span<const std::uint8_t> view;
+        bool packed = false;
+    };
+    std::string kind_;
+    std::vector<Chunk> chunks_;
+};
+
+// Reads from memory that must outlive the reader. open() checks header, table, order, padding and
+// that every required chunk is one of `known`; a chunk's checksum is checked when it is read.
+class ChunkReader {
+  public:
+    static Result<ChunkReader> open(std::span<const std::uint8_t> bytes,
+                                    std::string_view kind,
+                                    std::span<const std::string_view> known,
+                                    const std::string& where);
+
+    bool has(std::string_view type) const;
+    std::size_t raw_bytes(std::string_view type) const;  // 0 if absent
+    // max_bytes: the most that the caller has a use for; more is an error before anything is
+    // allocated.
+    Result<std::vector<std::uint8_t>> read(std::string_view type,
+                                           std::size_t max_bytes,
+                                           int threads = 0) const;
+    // The bytes of a chunk of add_packed() as they lie in the file, their checksum checked.
+    Result<std::span<const std::uint8_t>> packed(std::string_view type) const;
+    // count: how many values the chunk must hold exactly.
+    template <class T, class Values = std::vector<T>>
+    Result<Values> read_array(std::string_view type, std::size_t count, int threads = 0) const {
+        static_assert(std::is_trivially_copyable_v<T>);
+        Values values;
+        if (Status size = check_size(type, count, sizeof(T)); !size) return size.error();
+        if (Status room = reserve([&] { values.resize(count); }, type); !room) return room.error();
+        const std::span<std::uint8_t> to(reinterpret_cast<std::uint8_t*>(values.data()),
+                                         count * sizeof(T));
+        if (Status done = unpack(type, to, threads); !done) return done.error();
+        return values;
+    }
+    const std::string& where() const { return where_; }
+    Error fault(const std::string& what, const std::string& expected = "") const;
+
+  private:
+    struct Entry {
+        std::string type;
+        bool required = false;
+        bool compressed = false;
+        std::size_t offset = 0;
+        std::size_t stored = 0;
+        std::size_t raw = 0;
+        std::uint64_t checksum = 0;
+    };
+    const Entry* find(std::string_view type) const;
+    Status check_size(std::string_view type, std::size_t count, std::size_t bytes_each) const;
+    Status check_sum(const Entry& entry) const;
+    Status unpack(std::string_view type, std::span<std::uint8_t> to, int threads) const;
+    template <class Allocate>
+    Status reserve(Allocate allocate, std::string_view type) const {
+        try {
+            allocate();
+        } catch (...) {
+            return fault("chunk '" + std::string(type) + "' needs more memory than there is");
+        }
+        return Done{};
+    }
+
+    std::span<const std::uint8_t> bytes_;
+    std::vector<Entry> entries_;
+    std::string where_;
+};
+
+}  // namespace sonocase

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Every score by name: its meaning in a line, and whether more of it is better. docs/metrics.md
+// defines each; the unit is the name's ending.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace sonocase {
+
+enum class MetricSense { neutral, less_is_better, more_is_better };
+
+struct MetricInfo {
+    const char* name;
+    const char* group;  // "session", "needle", "probe", "targets", "guidance"
+    const char* title;
+    MetricSense sense;
+};
+
+std::span<const MetricInfo> metric_table();            // in the order in which scores list them
+const MetricInfo* find_metric(std::string_view name);  // nullptr: no such metric
+std::string metric_unit(std::string_view name);        // "mm", "mm/s", "" for counts and fractions
+std::vector<std::string> metric_names();
+
+}  // namespace sonocase

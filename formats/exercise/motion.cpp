@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/exercise/motion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace sonocase {
+namespace {
+
+constexpr double kTwoPi = 6.283185307179586;
+constexpr int kCellBricks = 2;  // a cell of the field is 2 x 2 x 2 bricks
+
+bool rides_on_the_diaphragm(const std::string& name) {
+    for (const char* part :
+         {"liver", "kidney", "spleen", "pancreas", "gallbladder", "stomach", "duodenum", "adrenal",
+          "lung", "heart", "portal", "hepatic", "diaphragm", "cyst", "lesion"}) {
+        if (name.find(part) != std::string::npos) return true;
+    }
+    return false;
+}
+
+// Running mean over 2 * reach + 1 cells along one axis; the ends repeat.
+void box(std::vector<float>& cells, Int3 size, int axis, int reach) {
+    const std::array<std::size_t, 3> stride{
+        1, static_cast<std::size_t>(size.x),
+        static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y)};
+    const std::size_t s = stride[static_cast<std::size_t>(axis)];
+    const int n = size[axis];
+    std::vector<float> line(static_cast<std::size_t>(n));
+    for (std::size_t start = 0; start < cells.size(); ++start) {
+        if (start / s % static_cast<std::size_t>(n) != 0) continue;
+        for (int i = 0; i < n; ++i)
+            line[static_cast<std::size_t>(i)] = cells[start + static_cast<std::size_t>(i) * s];
+        for (int i = 0; i < n; ++i) {
+            float sum = 0;
+            for (int j = -reach; j <= reach; ++j)
+                sum += line[static_cast<std::size_t>(std::clamp(i + j, 0, n - 1))];
+            cells[start + static_cast<std::size_t>(i) * s] =
+                sum / static_cast<float>(2 * reach + 1);
+        }
+    }
+}
+
+}  // namespace
+
+double pulse_wave(double phase) {
+    // A raised cosine over the first fifth, then an exponential-like fall that ends at zero.
+    constexpr double kRise = 0.2;
+    if (phase < kRise) return 0.5 - 0.5 * std::cos(0.5 * kTwoPi * phase / kRise);
+    const double t = (phase - kRise) / (1 - kRise);
+    return (1 - t) * (1 - t) * (1 + 2 * t);
+}
+
+MotionState motion_at(const BreathingMotion& breathing, const Pulsation& pulsation, double time_s) {
+    MotionState m;
+    const double length = norm(breathing.direction);
+    if (breathing.amplitude_mm != 0 && breathing.period_s > 0 && length > 0) {
+        const double a =
+            breathing.amplitude_mm * 0.5 * (1 - std::cos(kTwoPi * time_s / breathing.period_s));
+        m.breathing_mm = (a / length) * breathing.direction;
+    }
+    if (pulsation.amplitude_mm != 0 && pulsation.rate_per_min > 0) {
+        const double beats = time_s * pulsation.rate_per_min / 60;
+        m.pulse_mm = pulsation.amplitude_mm * pulse_wave(beats - std::floor(beats));
+    }
+    return m;
+}
+
+BreathingField::BreathingField(const CaseBundle& bundle) {
+    const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
+    const Int3 n = brick_count(labels.size);
+    Int3 size;
+    for (int axis = 0; axis < 3; ++axis) size[axis] = (n[axis] + kCellBricks - 1) / kCellBricks;
+    const double edge = kBrickEdge * kCellBricks * bundle.grid.spacing_mm.x;
+    grid_ = bundle.grid;
+    grid_.size = size;
+    grid_.spacing_mm = {edge, edge, edge};
+    const double shift = 0.5 * (edge - bundle.grid.spacing_mm.x);
+    grid_.origin_mm = bundle.grid.origin_mm + Vector3{shift, shift, shift};
+
+    std::vector<float> rides;
+    for (const Label& l : bundle.labels)
+        rides.push_back(rides_on_the_diaphragm(l.name) ? 1.0f : 0.0f);
+    cells_.assign(grid_.voxel_count(), 0.0f);
+    std::vector<float> count(cells_.size(), 0.0f);
+    for (int k = 0; k < n.z; ++k) {
+        for (int j = 0; j < n.y; ++j) {
+            for (int i = 0; i < n.x; ++i) {
+                // One voxel of the brick speaks for it.
+                const int x = std::min(4 * i + 2, labels.size.x - 1),
+                          y = std::min(4 * j + 2, labels.size.y - 1),
+                          z = std::min(4 * k + 2, labels.size.z - 1);
+                const std::size_t cell =
+                    grid_.index(i / kCellBricks, j / kCellBricks, k / kCellBricks);
+                cells_[cell] += rides[labels.at(x, y, z)];
+                count[cell] += 1;
+            }
+        }
+    }
+    for (std::size_t i = 0; i < cells_.size(); ++i) cells_[i] /= std::max(count[i], 1.0f);
+    for (int pass = 0; pass < 2; ++pass) {
+        for (int axis = 0; axis < 3; ++axis) box(cells_, size, axis, 1);
+    }
+}
+
+double BreathingField::weight(Point3 p) const {
+    const Point3 v = grid_.voxel_from_point(p);
+    double sum = 0;
+    const double fx = std::floor(v.x), fy = std::floor(v.y), fz = std::floor(v.z);
+    if (!(fx >= -1 && fy >= -1 && fz >= -1 && fx < grid_.size.x && fy < grid_.size.y &&
+          fz < grid_.size.z))
+        return 0;
+    for (int c = 0; c < 8; ++c) {
+        const int i = static_cast<int>(fx) + (c & 1), j = static_cast<int>(fy) + (c >> 1 & 1),
+                  k = static_cast<int>(fz) + (c >> 2);
+        if (!grid_.contains(i, j, k)) continue;
+        sum += (c & 1 ? v.x - fx : 1 - (v.x - fx)) * (c >> 1 & 1 ? v.y - fy : 1 - (v.y - fy)) *
+               (c >> 2 ? v.z - fz : 1 - (v.z - fz)) *
+               static_cast<double>(cells_[grid_.index(i, j, k)]);
+    }
+    return sum;
+}
+
+}  // namespace sonocase

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// How the anatomy moves: breathing and the arterial pulse, as functions of time.
+//
+// Breathing shifts a point by amplitude * (1 - cos(2 pi t / period)) / 2 along the direction of
+// inspiration, times a weight in [0, 1] of the place: 1 in the organs that ride on the diaphragm,
+// 0 at skin, bone and beyond, smooth in between. The image looks tissue up where it came from.
+// The pulse widens arteries: their wall moves out by amplitude * pulse(t).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
+
+namespace sonocase {
+
+struct MotionState {
+    Vector3 breathing_mm;  // shift where the weight is 1
+    double pulse_mm = 0;   // outward shift of arterial walls
+    bool breathes() const {
+        return breathing_mm.x != 0 || breathing_mm.y != 0 || breathing_mm.z != 0;
+    }
+};
+
+MotionState motion_at(const BreathingMotion& breathing, const Pulsation& pulsation, double time_s);
+
+// Shape of one heart beat, phase in [0, 1): fast rise, slow fall, in [0, 1].
+double pulse_wave(double phase);
+
+// The weight on a coarse grid; trilinear in between, 0 outside.
+class BreathingField {
+  public:
+    BreathingField() = default;
+    explicit BreathingField(const CaseBundle& bundle);
+    double weight(Point3 p) const;  // volume frame, mm
+    bool empty() const { return cells_.empty(); }
+
+  private:
+    Grid grid_;
+    std::vector<float> cells_;
+};
+
+}  // namespace sonocase

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/files/atomic_file.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cctype>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <new>
+
+namespace sonocase {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Closes on destruction, which gives back a lock on it.
+class Descriptor {
+  public:
+    explicit Descriptor(int fd) : fd_(fd) {}
+    ~Descriptor() { close(); }
+    Descriptor(const Descriptor&) = delete;
+    Descriptor& operator=(const Descriptor&) = delete;
+    int get() const { return fd_; }
+    void open(const std::string& path, int flags) {
+        close();
+        fd_ = ::open(path.c_str(), flags | O_CLOEXEC, 0666);
+    }
+    void close() {
+        if (fd_ >= 0) ::close(fd_);
+        fd_ = -1;
+    }
+
+  private:
+    int fd_;
+};
+
+Error system_error(const char* doing, int fault, const std::string& path, const char* expected) {
+    if (fault == ENOENT) return {"no such file", path, "check the path"};
+    return {std::string(doing) + ": " + std::strerror(fault), path, expected};
+}
+
+template <class Bytes>
+Result<Bytes> read_whole(const std::string& path) {
+    const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    if (file.get() < 0)
+        return system_error("cannot open", errno, path, "check that it may be read");
+    struct stat status {};
+    if (::fstat(file.get(), &status) != 0)
+        return system_error("cannot read", errno, path, "check the disk");
+    if (S_ISDIR(status.st_mode)) return Error{"is a folder", path, "expected a file"};
+    Bytes bytes;
+    std::size_t filled = 0;
+    try {
+        bytes.resize(static_cast<std::size_t>(status.st_size) + 1);  // one more, to see the end
+        while (true) {
+            if (filled == bytes.size()) bytes.resize(2 * bytes.size());
+            const ssize_t n = ::read(file.get(), bytes.data() + filled, bytes.size() - filled);
+            if (n < 0 && errno == EINTR) continue;
+            if (n < 0) return system_error("cannot read", errno, path, "check the disk");
+            if (n == 0) break;
+            filled += static_cast<std::size_t>(n);
+        }
+        bytes.resize(filled);
+    } catch (const std::bad_alloc&) {
+        return Error{"is too large for the memory", path, ""};
+    }
+    return bytes;
+}
+
+bool write_all(int fd, std::span<const std::uint8_t> bytes) {
+    while (!bytes.empty()) {
+        const ssize_t n = ::write(fd, bytes.data(), bytes.size());
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return false;
+        bytes = bytes.subspan(static_cast<std::size_t>(n));
+    }
+    return true;
+}
+
+// A pipe or a device, or /dev/stdout, which may lead to a file: renaming would replace it.
+bool is_special(const std::string& path) {
+    struct stat status {};
+    const bool exists = ::stat(path.c_str(), &status) == 0;
+    return (exists && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode)) ||
+           path.starts_with("/dev/std") || path.starts_with("/dev/fd/") ||
+           path.starts_with("/proc/");
+}
+
+// Unlike any other name in use: by this process (counter), on this machine (process number), and,
+// with a folder shared by machines, anywhere (host name).
+std::string temporary_name(const std::string& path) {
+    static std::atomic<unsigned> counter{0};
+    char host[64] = "host";
+    ::gethostname(host, sizeof host - 1);
+    const fs::path whole(path);
+    std::string name = whole.filename().string();
+    const std::string ending =
+        name.size() > 7 && name.ends_with(".nii.gz") ? ".nii.gz" : whole.extension().string();
+    name = "." + name + "." + host + "." + std::to_string(::getpid()) + "." +
+           std::to_string(counter++) + ".tmp" + ending;
+    return (whole.parent_path() / name).string();
+}
+
+// Whether temporary_name made it: ".NAME.HOST.PID.COUNT.tmp", an ending perhaps.
+bool is_temporary_name(const std::string& name) {
+    const std::size_t tmp = name.rfind(".tmp");
+    if (!name.starts_with('.') || tmp == std::string::npos || tmp < 2) return false;
+    const std::size_t dot = name.rfind('.', tmp - 1);
+    return dot != std::string::npos && dot + 1 < tmp &&
+           std::all_of(name.begin() + static_cast<std::ptrdiff_t>(dot) + 1,
+                       name.begin() + static_cast<std::ptrdiff_t>(tmp),
+                       [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+// Opens a temporary and locks it against remove_leftovers, which may have taken it in between: the
+// file then has no name any more, and another is made.
+bool open_locked(const std::string& path, Descriptor* file) {
+    for (;;) {
+        file->open(path, O_WRONLY | O_CREAT | O_TRUNC);
+        if (file->get() < 0) return false;
+        // A file system without locks: remove_leftovers goes by age there.
+        if (::flock(file->get(), LOCK_EX) != 0) return true;
+        struct stat status {};
+        if (::fstat(file->get(), &status) != 0 || status.st_nlink > 0) return true;
+    }
+}
+
+// The new name reaches the disk with its folder; failing to flush that is not a failed write.
+void flush_folder_of(const std::string& path) {
+    const fs::path parent = fs::path(path).parent_path();
+    const Descriptor folder(
+        ::open(parent.empty() ? "." : parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (folder.get() >= 0) (void)::fsync(folder.get());
+}
+
+}  // namespace
+
+Result<std::vector<std::uint8_t>> read_file(const std::string& path) {
+    return read_whole<std::vector<std::uint8_t>>(path);
+}
+
+Result<RawVector<std::uint8_t>> read_large_file(const std::string& path) {
+    return read_whole<RawVector<std::uint8_t>>(path);
+}
+
+Result<std::string> read_text_file(const std::string& path) {
+    return read_whole<std::string>(path);
+}
+
+Status write_file(const std::string& path, std::span<const std::uint8_t> bytes) {
+    Descriptor file(-1);
+    if (is_special(path)) {
+        file.open(path, O_WRONLY | O_APPEND);
+        if (file.get() < 0 || !write_all(file.get(), bytes))
+            return system_error("cannot write", errno, path, "check that it may be written");
+        return Done{};
+    }
+    OutputFile output(path);
+    if (!open_locked(output.temporary(), &file)) {
+        return Error{std::string("cannot write: ") + std::strerror(errno), path,
+                     "check that the folder may be written"};
+    }
+    const bool written = write_all(file.get(), bytes) &&
+                         (::fsync(file.get()) == 0 || errno == EINVAL || errno == EROFS);
+    if (!written) {
+        return Error{std::string("cannot write: ") + std::strerror(errno), path,
+                     "nothing was written; check the free space"};
+    }
+    // The lock is held until the file has its name.
+    if (const Status status = output.commit(); !status) return status;
+    flush_folder_of(path);
+    return Done{};
+}
+
+Status write_file(const std::string& path, std::string_view text) {
+    return write_file(path,
+                      std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+OutputFile::OutputFile(std::string path)
+    : path_(std::move(path)), temporary_(temporary_name(path_)) {
+    std::error_code code;  // a folder that cannot be made shows when the file is opened
+    const fs::path parent = fs::path(path_).parent_path();
+    if (!parent.empty()) fs::create_directories(parent, code);
+}
+
+OutputFile::~OutputFile() {
+    if (!committed_) ::unlink(temporary_.c_str());
+}
+
+Status OutputFile::commit() {
+    if (::rename(temporary_.c_str(), path_.c_str()) != 0) {
+        return Error{std::string("cannot write: ") + std::strerror(errno), path_,
+                     "check that the folder may be written"};
+    }
+    committed_ = true;
+    return Done{};
+}
+
+std::size_t remove_leftovers(const std::string& folder) {
+    std::size_t removed = 0;
+    std::error_code code;
+    const auto now = fs::file_time_type::clock::now();
+    for (auto it = fs::recursive_directory_iterator(folder, code);
+         !code && it != fs::recursive_directory_iterator(); it.increment(code)) {
+        std::error_code item_code;
+        if (!is_temporary_name(it->path().filename().string()) || !it->is_regular_file(item_code))
+            continue;
+        const Descriptor file(::open(it->path().c_str(), O_RDONLY | O_CLOEXEC));
+        if (file.get() < 0) continue;
+        if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0) {
+            if (errno == EWOULDBLOCK) continue;
+            const auto touched = it->last_write_time(item_code);
+            if (item_code || now - touched < std::chrono::hours(1)) continue;
+        }
+        if (fs::remove(it->path(), item_code)) ++removed;
+    }
+    return removed;
+}
+
+}  // namespace sonocase

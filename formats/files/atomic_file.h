@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Whole files in and out. A file appears under its name complete or not at all.
+// Kept apart from the readers: these take bytes, so that they also run where there is no file
+// system.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/base/raw_vector.h"
+#include "formats/base/result.h"
+
+namespace sonocase {
+
+Result<std::vector<std::uint8_t>> read_file(const std::string& path);
+Result<RawVector<std::uint8_t>> read_large_file(const std::string& path);  // not cleared first
+Result<std::string> read_text_file(const std::string& path);
+
+// Writes a temporary name in the same folder, flushes it to the disk and renames it over `path`;
+// makes missing folders. On failure nothing is left behind and what `path` held before stays.
+// Devices, pipes and what leads to them (/dev/stdout) are appended to instead.
+Status write_file(const std::string& path, std::span<const std::uint8_t> bytes);
+Status write_file(const std::string& path, std::string_view text);
+
+// For libraries that write files themselves: they write temporary(), which lies in the same folder
+// with the same ending, and commit() renames it. Without commit() the temporary is removed.
+class OutputFile {
+  public:
+    explicit OutputFile(std::string path);  // makes missing folders
+    ~OutputFile();
+    OutputFile(const OutputFile&) = delete;
+    OutputFile& operator=(const OutputFile&) = delete;
+
+    const std::string& temporary() const { return temporary_; }
+    Status commit();
+
+  private:
+    std::string path_;
+    std::string temporary_;
+    bool committed_ = false;
+};
+
+// Removes the temporaries of write_file that killed programs left in `folder` and below; their
+// number. One in use holds a lock (flock), on whatever machine, and stays; where the file system
+// knows no locks, one that was touched in the last hour counts as in use.
+std::size_t remove_leftovers(const std::string& folder);
+
+}  // namespace sonocase

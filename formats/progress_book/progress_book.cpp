@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/progress_book/progress_book.h"
+
+#include <sqlite3.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+
+#include "formats/exercise/metric_table.h"
+#include "formats/text/number_text.h"
+
+namespace sonocase {
+namespace {
+
+constexpr int kVersion = 1;
+constexpr int kApplication = 0x534F4E4F;  // "SONO"
+
+constexpr const char* kSchema =
+    "CREATE TABLE session(id INTEGER PRIMARY KEY, trainee TEXT NOT NULL, case_name TEXT NOT NULL,"
+    " exercise TEXT NOT NULL, started TEXT NOT NULL, recording TEXT NOT NULL, passed INTEGER NOT "
+    "NULL,"
+    " UNIQUE(trainee, exercise, started));"
+    "CREATE TABLE score(session INTEGER NOT NULL REFERENCES session(id) ON DELETE CASCADE,"
+    " metric TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY(session, metric)) WITHOUT ROWID;";
+
+// One prepared statement; texts are bound, never pasted.
+class Statement {
+  public:
+    Statement(sqlite3* db, const char* sql) { sqlite3_prepare_v2(db, sql, -1, &raw_, nullptr); }
+    ~Statement() { sqlite3_finalize(raw_); }
+    Statement(const Statement&) = delete;
+    Statement& operator=(const Statement&) = delete;
+    Statement& bind(int at, const std::string& text) {
+        sqlite3_bind_text(raw_, at, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
+        return *this;
+    }
+    Statement& bind(int at, std::int64_t value) {
+        sqlite3_bind_int64(raw_, at, value);
+        return *this;
+    }
+    Statement& bind(int at, double value) {
+        sqlite3_bind_double(raw_, at, value);
+        return *this;
+    }
+    int step() { return raw_ ? sqlite3_step(raw_) : SQLITE_ERROR; }
+    void reset() { sqlite3_reset(raw_); }
+    std::string text(int column) const {
+        const auto* bytes = reinterpret_cast<const char*>(sqlite3_column_text(raw_, column));
+        return bytes ? std::string(bytes,
+                                   static_cast<std::size_t>(sqlite3_column_bytes(raw_, column)))
+                     : "";
+    }
+    std::int64_t integer(int column) const { return sqlite3_column_int64(raw_, column); }
+    double number(int column) const { return sqlite3_column_double(raw_, column); }
+
+  private:
+    sqlite3_stmt* raw_ = nullptr;
+};
+
+std::string csv_cell(const std::string& text) {
+    if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+    std::string out = "\"";
+    for (const char c : text) {
+        out += c;
+        if (c == '"') out += '"';
+    }
+    return out + "\"";
+}
+
+}  // namespace
+
+struct ProgressBook::Impl {
+    sqlite3* db = nullptr;
+    std::string path;
+    ~Impl() { sqlite3_close(db); }
+    Error fault(const char* doing) const {
+        return {std::string(doing) + ": " + sqlite3_errmsg(db), path,
+                "what was kept before is still there"};
+    }
+    bool run(const char* sql) {
+        return sqlite3_exec(db, sql, nullptr, nullptr, nullptr) == SQLITE_OK;
+    }
+    std::int64_t pragma(const char* sql) {
+        Statement s(db, sql);
+        return s.step() == SQLITE_ROW ? s.integer(0) : -1;
+    }
+};
+
+ProgressBook::ProgressBook(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ProgressBook::~ProgressBook() = default;
+ProgressBook::ProgressBook(ProgressBook&&) noexcept = default;
+ProgressBook& ProgressBook::operator=(ProgressBook&&) noexcept = default;
+
+Result<ProgressBook> ProgressBook::open(const std::string& path) {
+    std::error_code failed;
+    const auto folder = std::filesystem::path(path).parent_path();
+    if (!folder.empty()) std::filesystem::create_directories(folder, failed);
+    if (failed) return Error{"cannot make its folder: " + failed.message(), path, ""};
+    auto impl = std::make_unique<Impl>();
+    impl->path = path;
+    if (sqlite3_open_v2(path.c_str(), &impl->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE,
+                        nullptr) != SQLITE_OK) {
+        return impl->fault("cannot open");
+    }
+    sqlite3_busy_timeout(impl->db, 5000);
+    // Deleted rows are overwritten: a trainee who is removed is gone from the file as well.
+    if (!impl->run("PRAGMA foreign_keys=ON; PRAGMA synchronous=FULL; PRAGMA secure_delete=ON;")) {
+        return impl->fault("cannot open");
+    }
+    const std::int64_t application = impl->pragma("PRAGMA application_id");
+    const std::int64_t version = impl->pragma("PRAGMA user_version");
+    const std::int64_t tables = impl->pragma("SELECT count(*) FROM sqlite_master");
+    if (tables < 0) return impl->fault("is no progress book");
+    if (tables == 0 && version == 0) {
+        const std::string make = std::string("BEGIN IMMEDIATE;") + kSchema +
+                                 "PRAGMA application_id=" + std::to_string(kApplication) +
+                                 ";PRAGMA user_version=" + std::to_string(kVersion) + ";COMMIT;";
+        if (!impl->run(make.c_str())) {
+            impl->run("ROLLBACK");
+            // Another program may have made it in the same moment.
+            if (impl->pragma("PRAGMA user_version") != kVersion)
+                return impl->fault("cannot make the book");
+        }
+    } else if (application != kApplication) {
+        return Error{"is a database of another program", path, "name another file"};
+    } else if (version > kVersion) {
+        return Error{"comes from a newer program (version " + std::to_string(version) + ")", path,
+                     "update this one"};
+    }
+    return ProgressBook(std::move(impl));
+}
+
+Status ProgressBook::add(const ProgressEntry& entry) {
+    Impl& impl = *impl_;
+    if (!impl.run("BEGIN IMMEDIATE")) return impl.fault("cannot keep the session");
+    const auto give_up = [&]() -> Status {
+        const Error error = impl.fault("cannot keep the session");
+        impl.run("ROLLBACK");
+        return error;
+    };
+    {
+        Statement old(impl.db, "DELETE FROM session WHERE trainee=? AND exercise=? AND started=?");
+        if (old.bind(1, entry.trainee).bind(2, entry.exercise).bind(3, entry.started).step() !=
+            SQLITE_DONE) {
+            return give_up();
+        }
+        Statement row(
+            impl.db,
+            "INSERT INTO session(trainee, case_name, exercise, started, recording, passed)"
+            " VALUES(?,?,?,?,?,?)");
+        row.bind(1, entry.trainee)
+            .bind(2, entry.case_name)
+            .bind(3, entry.exercise)
+            .bind(4, entry.started);
+        row.bind(5, entry.recording).bind(6, std::int64_t{entry.passed});
+        if (row.step() != SQLITE_DONE) return give_up();
+        const std::int64_t id = sqlite3_last_insert_rowid(impl.db);
+        Statement score(impl.db,
+                        "INSERT OR REPLACE INTO score(session, metric, value) VALUES(?,?,?)");
+        for (const Metric& metric : entry.metrics) {
+            if (!std::isfinite(metric.value)) continue;
+            score.reset();
+            if (score.bind(1, id).bind(2, metric.name).bind(3, metric.value).step() != SQLITE_DONE)
+                return give_up();
+        }
+    }
+    if (!impl.run("COMMIT")) return give_up();
+    return Done{};
+}
+
+Result<std::vector<ProgressEntry>> ProgressBook::sessions(const std::string& trainee,
+                                                          const std::string& exercise) const {
+    std::vector<ProgressEntry> entries;
+    Statement rows(
+        impl_->db,
+        "SELECT id, trainee, case_name, exercise, started, recording, passed FROM session"
+        " WHERE (?1='' OR trainee=?1) AND (?2='' OR exercise=?2) ORDER BY started, id");
+    rows.bind(1, trainee).bind(2, exercise);
+    int state = 0;
+    while ((state = rows.step()) == SQLITE_ROW) {
+        ProgressEntry e;
+        e.id = rows.integer(0);
+        e.trainee = rows.text(1);
+        e.case_name = rows.text(2);
+        e.exercise = rows.text(3);
+        e.started = rows.text(4);
+        e.recording = rows.text(5);
+        e.passed = rows.integer(6) != 0;
+        entries.push_back(std::move(e));
+    }
+    if (state != SQLITE_DONE) return impl_->fault("cannot read");
+    Statement scores(impl_->db, "SELECT metric, value FROM score WHERE session=?");
+    for (ProgressEntry& e : entries) {
+        scores.reset();
+        scores.bind(1, e.id);
+        std::map<std::string, double> values;
+        while ((state = scores.step()) == SQLITE_ROW) values[scores.text(0)] = scores.number(1);
+        if (state != SQLITE_DONE) return impl_->fault("cannot read");
+        for (const MetricInfo& info : metric_table()) {
+            const auto found = values.find(info.name);
+            if (found != values.end()) e.metrics.push_back({info.name, found->second});
+        }
+    }
+    return entries;
+}
+
+Result<std::vector<std::string>> ProgressBook::trainees() const {
+    std::vector<std::string> names;
+    Statement rows(impl_->db, "SELECT DISTINCT trainee FROM session ORDER BY trainee");
+    int state = 0;
+    while ((state = rows.step()) == SQLITE_ROW) names.push_back(rows.text(0));
+    if (state != SQLITE_DONE) return impl_->fault("cannot read");
+    return names;
+}
+
+Status ProgressBook::remove_trainee(const std::string& trainee,
+                                    std::vector<std::string>* not_deleted) {
+    const auto entries = sessions(trainee, "");
+    if (!entries) return entries.error();
+    for (const ProgressEntry& e : *entries) {
+        if (e.recording.empty() || e.trainee != trainee) continue;
+        std::string pictures = e.recording;
+        const std::size_t ending = pictures.rfind(".igs.mha");
+        if (ending != std::string::npos)
+            pictures.replace(ending, std::string::npos, ".frames.igs.mha");
+        for (const std::string& file : {e.recording, pictures}) {
+            std::error_code failed;
+            std::filesystem::remove(file, failed);
+            if (failed && not_deleted) not_deleted->push_back(file);
+        }
+    }
+    Statement rows(impl_->db, "DELETE FROM session WHERE trainee=?");
+    if (rows.bind(1, trainee).step() != SQLITE_DONE) return impl_->fault("cannot remove");
+    return Done{};
+}
+
+Result<std::string> ProgressBook::csv(const std::string& trainee,
+                                      const std::string& exercise) const {
+    const auto entries = sessions(trainee, exercise);
+    if (!entries) return entries.error();
+    std::string out = "trainee,case,exercise,started,passed";
+    for (const MetricInfo& info : metric_table()) out += std::string(",") + info.name;
+    out += "\r\n";
+    for (const ProgressEntry& e : *entries) {
+        out += csv_cell(e.trainee) + "," + csv_cell(e.case_name) + "," + csv_cell(e.exercise) +
+               "," + csv_cell(e.started) + "," + (e.passed ? "1" : "0");
+        std::size_t next = 0;
+        for (const MetricInfo& info : metric_table()) {
+            out += ',';
+            if (next < e.metrics.size() && e.metrics[next].name == info.name) {
+                append_number(out, e.metrics[next++].value);
+            }
+        }
+        out += "\r\n";
+    }
+    return out;
+}
+
+ProgressEntry progress_entry(const SessionHeader& header,
+                             const SessionScore& score,
+                             const std::string& recording) {
+    ProgressEntry entry;
+    entry.trainee = header.trainee;
+    entry.case_name = header.case_name;
+    entry.exercise = header.exercise;
+    entry.started = header.started;
+    entry.recording = recording;
+    entry.passed = score.passed;
+    for (const Metric& metric : score.metrics) {
+        if (std::isfinite(metric.value)) entry.metrics.push_back(metric);
+    }
+    return entry;
+}
+
+std::string default_progress_path() {
+    const char* data = std::getenv("XDG_DATA_HOME");
+    const char* home = std::getenv("HOME");
+    const std::string base =
+        data && *data == '/' ? data : std::string(home ? home : ".") + "/.local/share";
+    return base + "/sonocase/progress.sqlite";
+}
+
+}  // namespace sonocase

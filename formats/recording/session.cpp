@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/recording/session.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/text/number_text.h"
+
+namespace sonocase {
+namespace {
+
+constexpr const char* kEventField = "Event";
+constexpr const char* kSettingsField = "Settings";
+
+struct HeaderField {
+    const char* name;
+    std::string SessionHeader::*value;
+};
+constexpr HeaderField kHeaderFields[] = {
+    {"SonocaseCase", &SessionHeader::case_name},
+    {"SonocaseCaseDigest", &SessionHeader::case_digest},
+    {"SonocaseExercise", &SessionHeader::exercise},
+    {"SonocaseExerciseDigest", &SessionHeader::exercise_digest},
+    {"SonocaseTrainee", &SessionHeader::trainee},
+    {"SonocaseStarted", &SessionHeader::started},
+    {"SonocaseProgram", &SessionHeader::program},
+    {"SonocaseRender", &SessionHeader::render}};
+
+bool has_word(const std::string& text, std::initializer_list<const char*> words) {
+    return std::any_of(words.begin(), words.end(),
+                       [&](const char* word) { return text.find(word) != std::string::npos; });
+}
+
+// "name|detail"; several events of one frame are joined by ";". Neither sign is left in their
+// texts.
+std::string without(std::string text, const char* signs) {
+    for (char& c : text) {
+        if (std::string(signs).find(c) != std::string::npos) c = ',';
+    }
+    return text;
+}
+
+void read_events(const std::string& value,
+                 const SessionSample& sample,
+                 std::vector<SessionEvent>& to) {
+    std::size_t from = 0;
+    while (from <= value.size()) {
+        const std::size_t end = std::min(value.find(';', from), value.size());
+        const std::string one(trimmed(std::string_view(value).substr(from, end - from)));
+        from = end + 1;
+        if (one.empty()) continue;
+        const std::size_t bar = one.find('|');
+        SessionEvent event{sample.time_s, sample.frame, one.substr(0, bar), ""};
+        if (bar != std::string::npos) event.detail = one.substr(bar + 1);
+        // An event that did not fall on its frame carries its own time.
+        double time_s = 0;
+        if (parse_number(detail_value(event.detail, "t"), time_s)) event.time_s = time_s;
+        to.push_back(std::move(event));
+    }
+}
+
+// Turns the needle's own frame so that its axis is z.
+Rigid z_along(Vector3 axis) {
+    const Vector3 z = normalized(axis);
+    if (z == Vector3{0, 0, 1}) return {};
+    const Vector3 x = any_perpendicular(z);
+    return {Matrix3::from_columns(x, cross(z, x), z), {}};
+}
+
+}  // namespace
+
+std::string detail_value(const std::string& detail, const std::string& key) {
+    std::size_t from = 0;
+    while (from < detail.size()) {
+        const std::size_t end = std::min(detail.find(' ', from), detail.size());
+        const std::size_t equal = detail.find('=', from);
+        if (equal != std::string::npos && equal < end &&
+            detail.compare(from, equal - from, key) == 0 && equal - from == key.size()) {
+            return detail.substr(equal + 1, end - equal - 1);
+        }
+        from = end + 1;
+    }
+    return {};
+}
+
+SessionNames guess_names(const Sequence& sequence) {
+    SessionNames names;
+    if (sequence.transform_index(kProbeTransform) >= 0 ||
+        sequence.transform_index(kNeedleTransform) >= 0) {
+        if (sequence.transform_index(kProbeTransform) < 0) names.probe.clear();
+        if (sequence.transform_index(kNeedleTransform) < 0) names.needle.clear();
+        return names;
+    }
+    names.probe.clear();
+    names.needle.clear();
+    for (const std::string& transform : sequence.transforms) {
+        if (names.needle.empty() && has_word(transform, {"Needle", "needle", "Stylus", "stylus"})) {
+            names.needle = transform;
+        } else if (names.probe.empty() &&
+                   has_word(transform, {"Probe", "probe", "Image", "Ultrasound"})) {
+            names.probe = transform;
+        }
+    }
+    return names;
+}
+
+Result<Session> session_from_sequence(const Sequence& sequence,
+                                      const SessionNames& names,
+                                      const std::string& where) {
+    Session session;
+    for (const SequenceField& field : sequence.fields) {
+        for (const HeaderField& known : kHeaderFields) {
+            if (field.name == known.name) session.header.*known.value = field.value;
+        }
+    }
+    const auto index_of = [&](const std::string& name) { return sequence.transform_index(name); };
+    const int probe = names.probe.empty() ? -1 : index_of(names.probe);
+    const int needle = names.needle.empty() ? -1 : index_of(names.needle);
+    const int drawn = names.drawn.empty() ? -1 : index_of(names.drawn);
+    for (const auto& [name, index] :
+         {std::pair(names.probe, probe), std::pair(names.needle, needle)}) {
+        if (name.empty() || index >= 0) continue;
+        std::string there;
+        for (const std::string& t : sequence.transforms) there += (there.empty() ? "" : ", ") + t;
+        return Error{"has no transform '" + name + "'", where,
+                     there.empty() ? "it has none at all" : "it has " + there};
+    }
+    const Rigid turn = z_along(names.needle_axis);
+    for (const SequenceFrame& frame : sequence.frames) {
+        SessionSample sample;
+        sample.time_s = frame.timestamp_s;
+        sample.frame = frame.number;
+        const auto pose = [&](int index, Rigid& to) {
+            if (index < 0) return false;
+            const SequencePose& from = frame.poses[static_cast<std::size_t>(index)];
+            const auto rigid = rigid_from_matrix(from.to_from);
+            if (!from.ok || !rigid) return false;
+            to = *rigid;
+            return true;
+        };
+        sample.probe_ok = pose(probe, sample.mannequin_from_probe);
+        sample.needle_ok = pose(needle, sample.mannequin_from_needle);
+        if (sample.needle_ok) sample.mannequin_from_needle = sample.mannequin_from_needle * turn;
+        if (!pose(drawn, sample.mannequin_from_drawn)) {
+            sample.mannequin_from_drawn = sample.mannequin_from_needle;
+        }
+        for (const SequenceField& field : frame.fields) {
+            if (field.name == kSettingsField) sample.settings = field.value;
+            if (field.name == kEventField) read_events(field.value, sample, session.events);
+        }
+        session.samples.push_back(std::move(sample));
+    }
+    return session;
+}
+
+SequenceFrame frame_from_sample(const SessionSample& sample,
+                                const std::vector<SessionEvent>& events) {
+    SequenceFrame frame;
+    frame.number = sample.frame;
+    frame.timestamp_s = sample.time_s;
+    frame.unfiltered_timestamp_s = sample.time_s;
+    frame.poses = {{sample.probe_ok, matrix_from_rigid(sample.mannequin_from_probe)},
+                   {sample.needle_ok, matrix_from_rigid(sample.mannequin_from_needle)},
+                   {sample.needle_ok, matrix_from_rigid(sample.mannequin_from_drawn)}};
+    if (!sample.settings.empty()) frame.fields.push_back({kSettingsField, sample.settings});
+    std::string text;
+    for (const SessionEvent& event : events) {
+        if (!text.empty()) text += ";";
+        text += without(event.name, ";|");
+        std::string detail = without(event.detail, ";|");
+        if (event.time_s != sample.time_s && detail_value(detail, "t").empty()) {
+            detail += (detail.empty() ? "t=" : " t=") + number_text(event.time_s);
+        }
+        if (!detail.empty()) text += "|" + detail;
+    }
+    if (!text.empty()) frame.fields.push_back({kEventField, text});
+    return frame;
+}
+
+std::vector<SequenceField> fields_from_header(const SessionHeader& header) {
+    std::vector<SequenceField> fields{{"SonocaseSession", "1"}};
+    for (const HeaderField& field : kHeaderFields) {
+        if (!(header.*field.value).empty()) fields.push_back({field.name, header.*field.value});
+    }
+    return fields;
+}
+
+Sequence sequence_from_session(const Session& session) {
+    Sequence sequence;
+    sequence.transforms = {kProbeTransform, kNeedleTransform, kDrawnTransform};
+    sequence.fields = fields_from_header(session.header);
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < session.samples.size(); ++i) {
+        const SessionSample& sample = session.samples[i];
+        const bool last = i + 1 == session.samples.size();
+        std::vector<SessionEvent> events;
+        while (next < session.events.size() &&
+               (last || session.events[next].time_s < session.samples[i + 1].time_s)) {
+            events.push_back(session.events[next++]);
+        }
+        sequence.frames.push_back(frame_from_sample(sample, events));
+    }
+    return sequence;
+}
+
+}  // namespace sonocase

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// A training session: what was held where and when, and what happened. On disk it is an IGSIO
+// sequence (docs/format.md, part 7), so that 3D Slicer and PLUS open it.
+//
+// Everything is in the `mannequin` frame. Times are seconds on the session's clock, first sample
+// first.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "formats/base/geometry.h"
+#include "formats/base/result.h"
+#include "formats/recording/sequence.h"
+
+namespace sonocase {
+
+struct SessionHeader {
+    std::string case_name;
+    std::string case_digest;      // of the bundle's bytes; empty: not known
+    std::string exercise;         // name
+    std::string exercise_digest;  // of its TOML
+    std::string trainee;          // a chosen name; empty: nobody's
+    std::string started;          // ISO 8601, UTC
+    std::string program;          // "sonoplay 0.1.0"
+    // What replay needs beyond poses, as "key=value" words: model, effects, seed, size. The
+    // player's.
+    std::string render;
+};
+
+struct SessionSample {
+    double time_s = 0;
+    std::int64_t frame = 0;  // the renderer's frame number, which seeds its noise
+    bool probe_ok = false;
+    Rigid mannequin_from_probe;
+    bool needle_ok = false;
+    Rigid mannequin_from_needle;  // as measured: origin at the tip, z from hub to tip
+    Rigid mannequin_from_drawn;   // as shown, after the bend constraint
+    // Console settings that changed at this frame, as "key=value" words; empty: as before.
+    std::string settings;
+};
+
+// Events have fixed names; `detail` holds "key=value" words. docs/metrics.md lists them.
+struct SessionEvent {
+    double time_s = 0;
+    std::int64_t frame = 0;
+    std::string name;    // "needle_entry", letters, digits and _
+    std::string detail;  // "insertion=1 depth_mm=2.1"
+    friend bool operator==(const SessionEvent&, const SessionEvent&) = default;
+};
+
+struct Session {
+    SessionHeader header;
+    std::vector<SessionSample> samples;
+    std::vector<SessionEvent> events;  // in order of time
+};
+
+inline constexpr const char* kProbeTransform = "ProbeToMannequin";
+inline constexpr const char* kNeedleTransform = "NeedleToMannequin";
+inline constexpr const char* kDrawnTransform = "DrawnNeedleToMannequin";
+
+// Which transforms of a recording are the probe and the needle; other people's recordings name them
+// otherwise. Empty: none. `drawn` falls back to `needle`.
+struct SessionNames {
+    std::string probe = kProbeTransform;
+    std::string needle = kNeedleTransform;
+    std::string drawn = kDrawnTransform;
+    // Axis of the needle's own frame that points from hub to tip.
+    Vector3 needle_axis{0, 0, 1};
+};
+
+// The names that a recording most likely means: ours if it has them, else the first transform whose
+// name has "Needle" or "Stylus" in it, and the first with "Probe" or "Image".
+SessionNames guess_names(const Sequence& sequence);
+
+// Poses that hold no rotation count as not tracked. An Error where a named transform is not there.
+Result<Session> session_from_sequence(const Sequence& sequence,
+                                      const SessionNames& names,
+                                      const std::string& where);
+Sequence sequence_from_session(const Session& session);
+
+// One frame and the fields of its events, as the recorder writes it.
+SequenceFrame frame_from_sample(const SessionSample& sample,
+                                const std::vector<SessionEvent>& events);
+std::vector<SequenceField> fields_from_header(const SessionHeader& header);
+
+// Value of a key in "key=value key=value"; empty if it is not there.
+std::string detail_value(const std::string& detail, const std::string& key);
+
+}  // namespace sonocase

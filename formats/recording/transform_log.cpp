@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/recording/transform_log.h"
+
+#include "formats/recording/session.h"
+#include "formats/text/number_text.h"
+
+namespace sonocase {
+namespace {
+
+std::string_view attribute(std::string_view element, std::string_view name) {
+    std::size_t from = 0;
+    while (true) {
+        from = element.find(name, from);
+        if (from == std::string_view::npos) return {};
+        const bool starts = from == 0 || element[from - 1] == ' ' || element[from - 1] == '\t';
+        const std::size_t after = from + name.size();
+        if (starts && after + 1 < element.size() && element[after] == '=' &&
+            element[after + 1] == '"') {
+            const std::size_t end = element.find('"', after + 2);
+            if (end == std::string_view::npos) return {};
+            return element.substr(after + 2, end - after - 2);
+        }
+        from = after;
+    }
+}
+
+bool parse_matrix(std::string_view text, std::array<double, 16>& matrix) {
+    for (double& value : matrix) {
+        text = trimmed(text);
+        const std::size_t end = std::min(text.find_first_of(" \t\r\n"), text.size());
+        if (!parse_number(text.substr(0, end), value)) return false;
+        text.remove_prefix(end);
+    }
+    return trimmed(text).empty();
+}
+
+}  // namespace
+
+bool looks_like_transform_log(std::string_view text) {
+    return text.substr(0, 4096).find("<TransformRecorderLog") != std::string_view::npos;
+}
+
+Result<Sequence> parse_transform_log(std::string_view xml, const std::string& where) {
+    Sequence sequence;
+    std::size_t at = 0;
+    int count = 0;
+    while ((at = xml.find("<log ", at)) != std::string_view::npos) {
+        const std::size_t end = xml.find('>', at);
+        ++count;
+        const std::string here = where + ", log " + std::to_string(count);
+        if (end == std::string_view::npos)
+            return Error{"ends inside an element", here, "copy the file again"};
+        const std::string_view element = xml.substr(at, end - at);
+        at = end;
+        double seconds = 0, nanoseconds = 0;
+        if (!parse_number(attribute(element, "TimeStampSec"), seconds) ||
+            !parse_number(attribute(element, "TimeStampNSec"), nanoseconds)) {
+            return Error{"has no time", here, "TimeStampSec and TimeStampNSec are expected"};
+        }
+        if (attribute(element, "type") == "message") {
+            if (!sequence.frames.empty()) {
+                sequence.frames.back().fields.push_back(
+                    {"Event", "message|text=" + std::string(attribute(element, "message"))});
+            }
+            continue;
+        }
+        SequencePose pose;
+        if (!parse_matrix(attribute(element, "transform"), pose.to_from)) {
+            return Error{"has no matrix", here, "16 numbers are expected"};
+        }
+        pose.ok = true;
+        const std::string tool(attribute(element, "DeviceName"));
+        int index = sequence.transform_index(tool);
+        if (index < 0) {
+            if (sequence.transforms.size() >= 64)
+                return Error{"has too many tools", here, "64 at most"};
+            index = static_cast<int>(sequence.transforms.size());
+            sequence.transforms.push_back(tool);
+        }
+        SequenceFrame frame;
+        frame.number = static_cast<std::int64_t>(sequence.frames.size());
+        frame.timestamp_s = seconds + 1e-9 * nanoseconds;
+        frame.unfiltered_timestamp_s = frame.timestamp_s;
+        frame.poses.resize(static_cast<std::size_t>(index) + 1);
+        frame.poses[static_cast<std::size_t>(index)] = pose;
+        sequence.frames.push_back(std::move(frame));
+    }
+    for (SequenceFrame& frame : sequence.frames) frame.poses.resize(sequence.transforms.size());
+    if (sequence.frames.empty())
+        return Error{"holds no readings", where, "a transform log is expected"};
+    return sequence;
+}
+
+}  // namespace sonocase

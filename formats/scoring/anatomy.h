@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What a point of the body is, for scores and events: inside or out, and which structure; and where
+// breathing moves the structures. Skin, and so the inserted length, stay where they are at rest:
+// the mannequin that the needle goes into does not breathe.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "formats/base/geometry.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/motion.h"
+#include "formats/volume/surface.h"
+
+namespace sonocase {
+
+class Anatomy {
+  public:
+    virtual ~Anatomy() = default;
+    virtual bool inside(Point3 p) const = 0;
+    // Palette index at a point; 0 outside. Where structures are not known, 1 for all that is
+    // inside.
+    virtual int label(Point3 p) const { return inside(p) ? 1 : 0; }
+    // Distance from `from` (inside) along the unit vector `direction` to where the body ends;
+    // `reach` if it does not end before. Runs of outside shorter than `gap_mm` do not end it.
+    virtual double exit_distance(Point3 from, Vector3 direction, double reach) const = 0;
+    // Where the tissue that is at p now lies at rest, and where tissue that lies at `rest` is now;
+    // at most greatest_shift_mm() apart.
+    virtual Point3 at_rest(Point3 p, double /*time_s*/) const { return p; }
+    virtual Point3 moved(Point3 rest, double /*time_s*/) const { return rest; }
+    virtual double greatest_shift_mm() const { return 0; }
+};
+
+// The cooked labels: a voxel's own label, or the second one beyond its boundary plane, which is the
+// rule that the picture follows. The bundle must outlive it. inside() and label() are constant time
+// and allocate nothing; exit_distance() costs reach / (half a voxel) of them.
+class CaseAnatomy final : public Anatomy {
+  public:
+    // breathing: as the picture shows it; by default none. Its field costs a look-up a brick.
+    explicit CaseAnatomy(const CaseBundle& bundle, const BreathingMotion& breathing = {});
+    bool inside(Point3 p) const override { return label(p) != 0; }
+    int label(Point3 p) const override;
+    double exit_distance(Point3 from, Vector3 direction, double reach) const override;
+    Point3 at_rest(Point3 p, double time_s) const override;
+    Point3 moved(Point3 rest, double time_s) const override;
+    double greatest_shift_mm() const override { return std::abs(breathing_.amplitude_mm); }
+
+  private:
+    const CaseBundle* bundle_;
+    BreathingMotion breathing_;
+    BreathingField field_;  // empty: at rest
+};
+
+// A closed triangle mesh, as trainers built on mesh anatomy use. Parity of crossings along +z,
+// nudged so that no vertex or edge is hit; inside() costs the triangles of one column of a grid.
+class MeshAnatomy final : public Anatomy {
+  public:
+    explicit MeshAnatomy(Surface mesh);
+    bool inside(Point3 p) const override;
+    double exit_distance(Point3 from, Vector3 direction, double reach) const override;
+
+  private:
+    const std::vector<std::uint32_t>& column(double x, double y) const;
+    Surface mesh_;
+    Box3 box_;
+    int columns_x_ = 1, columns_y_ = 1;
+    double column_mm_ = 1;
+    std::vector<std::vector<std::uint32_t>> triangles_of_column_;
+};
+
+// Distance of the tip along the needle to the skin: > 0 inside, <= 0 outside (how far ahead the
+// skin is, at most 10). skin: where the shaft passes it.
+double insertion_depth_mm(const Anatomy& anatomy,
+                          Point3 tip,
+                          Vector3 direction,
+                          double needle_length_mm,
+                          Point3* skin = nullptr);
+
+}  // namespace sonocase

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/scoring/image_region.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonocase {
+namespace {
+
+double radius_of(const Probe& probe) {
+    return probe.shape == ProbeShape::curvilinear ? probe.radius_mm : 0;
+}
+
+}  // namespace
+
+bool in_image(const Probe& probe, double x, double z) {
+    if (probe.shape == ProbeShape::linear) {
+        return std::abs(x) <= 0.5 * probe.width_mm && z >= 0 && z <= probe.depth_mm;
+    }
+    const double radius = radius_of(probe);
+    const double r = std::hypot(x, z + radius);
+    return r >= radius && r <= radius + probe.depth_mm &&
+           std::abs(std::atan2(x, z + radius)) <= 0.5 * probe.field_of_view_rad;
+}
+
+double distance_to_image(const Probe& probe, double x, double z) {
+    if (probe.shape == ProbeShape::linear) {
+        const double dx = std::max(std::abs(x) - 0.5 * probe.width_mm, 0.0);
+        const double dz = std::max({-z, z - probe.depth_mm, 0.0});
+        return std::hypot(dx, dz);
+    }
+    const double radius = radius_of(probe), outer = radius + probe.depth_mm;
+    const double half = 0.5 * probe.field_of_view_rad;
+    const double u = std::abs(x), w = z + radius;  // the region is the same on both sides
+    const double r = std::hypot(u, w);
+    if (std::atan2(u, w) <= half) return std::max({radius - r, r - outer, 0.0});
+    // Beside the fan: its straight edge runs from the inner arc to the outer.
+    const double along = std::clamp(u * std::sin(half) + w * std::cos(half), radius, outer);
+    return std::hypot(u - along * std::sin(half), w - along * std::cos(half));
+}
+
+double length_in_image(const Probe& probe, Point3 a, Point3 b, double half_slab_mm) {
+    const Vector3 d = b - a;
+    const double length = norm(d);
+    if (!(length > 0)) return 0;
+    double low = 0, high = 1;
+    // Keeps the part where offset + t * slope <= 0.
+    const auto clip = [&](double offset, double slope) {
+        if (slope > 0) high = std::min(high, -offset / slope);
+        if (slope < 0) low = std::max(low, -offset / slope);
+        if (slope == 0 && offset > 0) high = -1;
+    };
+    clip(a.y - half_slab_mm, d.y);
+    clip(-a.y - half_slab_mm, -d.y);
+    if (probe.shape == ProbeShape::linear) {
+        clip(a.x - 0.5 * probe.width_mm, d.x);
+        clip(-a.x - 0.5 * probe.width_mm, -d.x);
+        clip(-a.z, -d.z);
+        clip(a.z - probe.depth_mm, d.z);
+        return std::max(high - low, 0.0) * length;
+    }
+    const double radius = radius_of(probe), outer = radius + probe.depth_mm;
+    const double sine = std::sin(0.5 * probe.field_of_view_rad);
+    const double cosine = std::cos(0.5 * probe.field_of_view_rad);
+    const double w = a.z + radius;
+    clip(a.x * cosine - w * sine, d.x * cosine - d.z * sine);
+    clip(-a.x * cosine - w * sine, -d.x * cosine - d.z * sine);
+    // The face's chord keeps out what lies behind the probe.
+    clip(radius * cosine - w, -d.z);
+    const double qa = d.x * d.x + d.z * d.z, qb = a.x * d.x + w * d.z,
+                 qc = a.x * a.x + w * w - outer * outer;
+    if (qa == 0) return qc <= 0 ? std::max(high - low, 0.0) * length : 0;
+    const double root = qb * qb - qa * qc;
+    if (!(root > 0)) return 0;
+    low = std::max(low, (-qb - std::sqrt(root)) / qa);
+    high = std::min(high, (-qb + std::sqrt(root)) / qa);
+    return std::max(high - low, 0.0) * length;
+}
+
+}  // namespace sonocase

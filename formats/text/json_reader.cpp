@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/text/json_reader.h"
+
+#include <algorithm>
+
+namespace sonocase::detail {
+namespace {
+
+const Json& nothing() {
+    static const Json none = Json::object();
+    return none;
+}
+
+}  // namespace
+
+JsonObject::JsonObject(const Json& value, std::string path, JsonFault& fault)
+    : value_(&value), path_(std::move(path)), fault_(&fault) {
+    if (!value.is_object()) {
+        if (!fault.error) fault.error = Error{path_ + " is no object", fault.where, ""};
+        value_ = &nothing();
+    }
+}
+
+void JsonObject::complain(const char* key, const std::string& what, const std::string& expected) {
+    if (fault_->error) return;
+    fault_->error =
+        Error{(path_.empty() ? "" : path_ + ".") + key + " " + what, fault_->where, expected};
+}
+
+const Json* JsonObject::member(const char* key) {
+    const auto found = value_->find(key);
+    if (found == value_->end()) {
+        complain(key, "is missing");
+        return nullptr;
+    }
+    return &*found;
+}
+
+bool JsonObject::has(const char* key) const {
+    const auto found = value_->find(key);
+    return found != value_->end() && !found->is_null();
+}
+
+std::vector<std::string> JsonObject::keys() const {
+    std::vector<std::string> out;
+    for (const auto& item : value_->items()) out.push_back(item.key());
+    return out;
+}
+
+std::string JsonObject::text(const char* key) {
+    const Json* found = member(key);
+    if (!found) return {};
+    if (!found->is_string()) {
+        complain(key, "is no text");
+        return {};
+    }
+    return found->get<std::string>();
+}
+
+std::string JsonObject::text_or(const char* key, const std::string& otherwise) {
+    return has(key) ? text(key) : otherwise;
+}
+
+bool JsonObject::flag_or(const char* key, bool otherwise) {
+    if (!has(key)) return otherwise;
+    const Json* found = member(key);
+    if (!found->is_boolean()) {
+        complain(key, "is neither true nor false");
+        return otherwise;
+    }
+    return found->get<bool>();
+}
+
+double JsonObject::number(const char* key) {
+    const Json* found = member(key);
+    if (!found) return 0;
+    if (!found->is_number() || !std::isfinite(found->get<double>())) {
+        complain(key, "is no number");
+        return 0;
+    }
+    return found->get<double>();
+}
+
+double JsonObject::number_or(const char* key, double otherwise) {
+    return has(key) ? number(key) : otherwise;
+}
+
+std::int64_t JsonObject::integer(const char* key, std::int64_t low, std::int64_t high) {
+    const double value = number(key);
+    if (value != std::floor(value) || value < static_cast<double>(low) ||
+        value > static_cast<double>(high)) {
+        complain(key, "is out of range",
+                 "a whole number from " + std::to_string(low) + " to " + std::to_string(high) +
+                     " is expected");
+        return low;
+    }
+    return static_cast<std::int64_t>(value);
+}
+
+std::int64_t JsonObject::integer_or(const char* key,
+                                    std::int64_t otherwise,
+                                    std::int64_t low,
+                                    std::int64_t high) {
+    return has(key) ? integer(key, low, high) : otherwise;
+}
+
+std::vector<double> JsonObject::numbers(const char* key, std::size_t count) {
+    const Json* found = member(key);
+    std::vector<double> values;
+    if (found && (!found->is_array() || (count != 0 && found->size() != count))) {
+        complain(key, "has the wrong shape",
+                 "a list of " + std::to_string(count) + " numbers is expected");
+    } else if (found) {
+        values.reserve(found->size());
+        for (const Json& item : *found) {
+            if (!item.is_number() || !std::isfinite(item.get<double>())) {
+                complain(key, "holds something that is no number");
+                break;
+            }
+            values.push_back(item.get<double>());
+        }
+    }
+    if (!ok() && count != 0) values.assign(count, 0);
+    return values;
+}
+
+std::vector<std::string> JsonObject::texts_or_none(const char* key) {
+    std::vector<std::string> out;
+    if (!has(key)) return out;
+    const Json* found = member(key);
+    if (!found->is_array()) complain(key, "is no list");
+    if (!ok()) return out;
+    for (const Json& item : *found) {
+        if (!item.is_string()) {
+            complain(key, "holds something that is no text");
+            return out;
+        }
+        out.push_back(item.get<std::string>());
+    }
+    return out;
+}
+
+Vector3 JsonObject::vector(const char* key) {
+    const std::vector<double> v = numbers(key, 3);
+    return {v[0], v[1], v[2]};
+}
+
+Point3 JsonObject::point(const char* key) {
+    const std::vector<double> v = numbers(key, 3);
+    return {v[0], v[1], v[2]};
+}
+
+JsonObject JsonObject::object(const char* key) {
+    const Json* found = member(key);
+    return JsonObject(found ? *found : nothing(), (path_.empty() ? "" : path_ + ".") + key,
+                      *fault_);
+}
+
+std::vector<JsonObject> JsonObject::objects(const char* key) {
+    std::vector<JsonObject> out;
+    const Json* found = member(key);
+    if (found && !found->is_array()) complain(key, "is no list");
+    if (!found || !ok()) return out;
+    const std::string base = (path_.empty() ? "" : path_ + ".") + key;
+    for (std::size_t i = 0; i < found->size(); ++i) {
+        out.emplace_back((*found)[i], base + "[" + std::to_string(i) + "]", *fault_);
+    }
+    return out;
+}
+
+bool parse_json(std::string_view text, Json& out, JsonFault& fault) {
+    try {
+        out = Json::parse(text.begin(), text.end());
+    } catch (const std::exception& failure) {
+        std::string what = failure.what();
+        const std::size_t start = what.find("parse error");
+        what = start == std::string::npos ? "is no JSON" : what.substr(start);
+        std::replace(what.begin(), what.end(), '\n', ' ');
+        fault.error = Error{what, fault.where, "JSON is expected"};
+        return false;
+    }
+    if (!out.is_object()) {
+        fault.error = Error{"is no JSON object", fault.where, ""};
+        return false;
+    }
+    return true;
+}
+
+std::string json_text(const Json& value, bool indented) {
+    return value.dump(indented ? 2 : -1, ' ', false, Json::error_handler_t::replace);
+}
+
+Json json_number(double value) {
+    return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json json_of(Vector3 v) {
+    return Json::array({v.x, v.y, v.z});
+}
+Json json_of(Point3 p) {
+    return Json::array({p.x, p.y, p.z});
+}
+
+Json json_of(const Rigid& t) {
+    Json out = Json::object();
+    out["rotation"] = t.rotation.m;
+    out["translation"] = json_of(t.translation);
+    return out;
+}
+
+Rigid rigid_from(JsonObject object) {
+    Rigid t;
+    const std::vector<double> m = object.numbers("rotation", 9);
+    std::copy(m.begin(), m.end(), t.rotation.m.begin());
+    t.translation = object.vector("translation");
+    // 1e-3: what six printed decimals of nine entries leave, with room.
+    if (object.ok() && (orthonormality_error(t.rotation) > 1e-3 || determinant(t.rotation) < 0)) {
+        object.complain("rotation", "is no rotation",
+                        "nine numbers, row by row, of a right-handed rotation");
+    }
+    return t;
+}
+
+}  // namespace sonocase::detail

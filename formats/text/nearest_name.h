@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The name that a typo most likely meant, for errors of recipes, exercises and command lines.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace sonocase {
+
+// Number of single-character insertions, deletions, replacements and swaps of neighbours that turn
+// a into b (optimal string alignment). O(|a| |b|) time, O(|b|) memory.
+int edit_distance(std::string_view a, std::string_view b);
+
+// The candidate nearest to `name`; the first of several. Empty where even the nearest is no likely
+// typo: further than a third of the longer name (but one edit is always near enough).
+std::string nearest_name(std::string_view name, std::span<const std::string> candidates);
+
+// "did you mean 'x'?" or, without a near name, "valid here: a, b, c".
+std::string suggest_name(std::string_view name, std::span<const std::string> candidates);
+
+}  // namespace sonocase

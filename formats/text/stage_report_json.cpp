@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/text/stage_report_json.h"
+
+#include <limits>
+
+namespace sonocase {
+namespace detail {
+
+Json json_of(const StageReport& report) {
+    Json out = Json::object();
+    out["stage"] = report.stage;
+    out["version"] = report.version;
+    out["seconds"] = json_number(report.seconds);
+    Json measures = Json::object();
+    for (const Measure& m : report.measures) measures[m.name] = json_number(m.value);
+    out["measures"] = std::move(measures);
+    out["warnings"] = report.warnings;
+    return out;
+}
+
+StageReport report_from(JsonObject object) {
+    StageReport report;
+    report.stage = object.text("stage");
+    report.version = static_cast<int>(object.integer_or("version", 1, 0, 1000000));
+    report.seconds = object.has("seconds") ? object.number("seconds") : 0;
+    report.warnings = object.texts_or_none("warnings");
+    if (!object.has("measures")) return report;
+    JsonObject measures = object.object("measures");
+    for (const std::string& name : measures.keys()) {
+        const double nan = std::numeric_limits<double>::quiet_NaN();
+        report.measures.push_back({name, measures.number_or(name.c_str(), nan)});
+    }
+    return report;
+}
+
+Json json_of(const std::vector<StageReport>& reports) {
+    Json out = Json::array();
+    for (const StageReport& report : reports) out.push_back(json_of(report));
+    return out;
+}
+
+std::vector<StageReport> reports_from(JsonObject& object, const char* key) {
+    std::vector<StageReport> reports;
+    if (!object.has(key)) return reports;
+    for (const JsonObject& item : object.objects(key)) reports.push_back(report_from(item));
+    return reports;
+}
+
+}  // namespace detail
+
+using detail::Json;
+using detail::JsonFault;
+using detail::JsonObject;
+
+std::string stage_report_json(const StageReport& report) {
+    return detail::json_text(detail::json_of(report), true) + "\n";
+}
+
+Result<StageReport> parse_stage_report(std::string_view json, const std::string& where) {
+    Json value;
+    JsonFault fault{where, {}};
+    if (!detail::parse_json(json, value, fault)) return *fault.error;
+    StageReport report = detail::report_from(JsonObject(value, "", fault));
+    if (fault.error) return *fault.error;
+    return report;
+}
+
+}  // namespace sonocase

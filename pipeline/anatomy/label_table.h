@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Which name each value of a label map stands for.
+//
+// Sources, the first that is there: a table given by the caller (CSV), the label table in the
+// header extension of a NIfTI file as TotalSegmentator writes it, the segments of a .seg.nrrd, a
+// CSV beside the map with the same stem (labels.nii.gz -> labels.csv), and the built-in classes of
+// TotalSegmentator's task "total" (version 2, 117 classes).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/base/result.h"
+
+namespace sonocase::pipeline {
+
+struct LabelTableEntry {
+    int value = 0;
+    std::string name;
+    std::string tissue_class;  // of the CSV column tissue_class or tissue; may be empty
+    std::optional<std::array<std::uint8_t, 3>> colour;
+    int layer = 0;  // .seg.nrrd
+};
+using LabelTable = std::vector<LabelTableEntry>;
+
+// Name of a value of task "total", or empty.
+std::string_view totalsegmentator_name(int value);
+// Value of a name of task "total", or 0.
+int totalsegmentator_value(std::string_view name);
+
+// Columns by header: value (or label, index, id), name, and optionally tissue_class (or tissue).
+// Without a header the first two columns are value and name.
+Result<LabelTable> parse_label_csv(std::string_view csv, const std::string& where);
+Result<LabelTable> load_label_csv(const std::string& path);
+
+// The table in a NIfTI header extension: <Label Key=".." Red=".." ...>NAME</Label>, the name as
+// text or as CDATA. An empty table where the file has none; header damage is the volume reader's to
+// report.
+Result<LabelTable> load_nifti_label_table(const std::string& path);
+Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& where);
+
+// Slicer's Segment<N>_Name, _LabelValue, _Layer and _Color; empty where there are none.
+Result<LabelTable> segments_of_fields(const std::map<std::string, std::string>& fields,
+                                      const std::string& where);
+
+}  // namespace sonocase::pipeline

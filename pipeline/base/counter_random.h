@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Random numbers by counter: the value depends on (seed, counter) alone, so that work may be split
+// over threads in any way and give the same bytes. Constant time, no state.
+//
+// Source: the mixing function of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+namespace sonocase::pipeline {
+
+inline std::uint64_t mix_bits(std::uint64_t x) {
+    x += 0x9E3779B97F4A7C15ull;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBull;
+    return x ^ (x >> 31);
+}
+
+// A seed of its own for each purpose, so that streams do not share values.
+inline std::uint64_t derive_seed(std::uint64_t seed, std::uint64_t purpose) {
+    return mix_bits(seed ^ mix_bits(purpose));
+}
+
+// Uniform in [0, 1).
+inline double uniform_at(std::uint64_t seed, std::uint64_t counter) {
+    return static_cast<double>(mix_bits(seed + mix_bits(counter)) >> 11) * 0x1p-53;
+}
+
+struct GaussianPair {
+    double a = 0, b = 0;
+};
+
+// Two independent standard normal values (Box-Muller).
+inline GaussianPair gaussian_pair_at(std::uint64_t seed, std::uint64_t counter) {
+    const double u = 1 - uniform_at(seed, 2 * counter);  // (0, 1]: the logarithm is finite
+    const double angle = 6.283185307179586476925 * uniform_at(seed, 2 * counter + 1);
+    const double radius = std::sqrt(-2 * std::log(u));
+    return {radius * std::cos(angle), radius * std::sin(angle)};
+}
+
+}  // namespace sonocase::pipeline

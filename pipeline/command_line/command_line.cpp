@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/command_line/command_line.h"
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "formats/files/atomic_file.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const StageReport& report) {
+    Json json;
+    json["stage"] = report.stage;
+    json["version"] = report.version;
+    json["seconds"] = report.seconds;
+    for (const Measure& measure : report.measures) json[measure.name] = measure.value;
+    json["warnings"] = report.warnings;
+    return json;
+}
+
+// One line: a message from a library may hold several.
+std::string one_line(std::string text) {
+    for (char& c : text)
+        if (c == '\n' || c == '\r') c = ' ';
+    while (!text.empty() && text.back() == ' ') text.pop_back();
+    return text;
+}
+
+}  // namespace
+
+void add_common_options(CLI::App& app, CommonOptions& options) {
+    app.add_option("--report", options.report_path, "Write the run's report as JSON")
+        ->type_name("FILE.json")
+        ->group("Common");
+    app.add_option("--threads", options.threads, "Threads to use; 0 means all cores")
+        ->type_name("N")
+        ->check(CLI::Range(0, 1024))
+        ->capture_default_str()
+        ->group("Common");
+    app.add_flag("--quiet", options.quiet, "Show no progress")->group("Common");
+}
+
+std::optional<int> parse_command_line(CLI::App& app, int argc, char** argv) {
+    const std::string verb = argc > 0 ? argv[0] : "";
+    app.name("sonocase " + verb);
+    app.get_help_ptr()->group("Common");
+    app.get_formatter()->column_width(34);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::CallForHelp& call) {
+        return app.exit(call);
+    } catch (const CLI::CallForAllHelp& call) {
+        return app.exit(call);
+    } catch (const CLI::ParseError& error) {
+        return wrong_usage(verb.c_str(), error.what());
+    }
+    return std::nullopt;
+}
+
+int fail(const char* verb, const Error& error) {
+    std::fprintf(stderr, "sonocase %s: %s\n", verb, one_line(error.message()).c_str());
+    return kFailed;
+}
+
+int wrong_usage(const char* verb, const std::string& what) {
+    std::fprintf(stderr, "sonocase %s: %s; see: sonocase %s --help\n", verb, one_line(what).c_str(),
+                 verb);
+    return kWrongUsage;
+}
+
+void print_warnings(const char* verb, const StageReport& report) {
+    for (const std::string& warning : report.warnings)
+        std::fprintf(stderr, "sonocase %s: warning: %s\n", verb, one_line(warning).c_str());
+}
+
+struct ProgressBar::State {
+    using Clock = std::chrono::steady_clock;
+    bool shown = false;
+    bool drawn = false;
+    Clock::time_point last{};
+
+    void draw(double fraction, std::string_view doing) {
+        const auto now = Clock::now();
+        if (drawn && now - last < std::chrono::milliseconds(100)) return;
+        last = now;
+        drawn = true;
+        constexpr int kWidth = 28;
+        const double clamped = fraction < 0 ? 0 : fraction > 1 ? 1 : fraction;
+        const int full = static_cast<int>(clamped * kWidth);
+        std::string bar(static_cast<std::size_t>(full), '#');
+        bar.resize(kWidth, ' ');
+        std::fprintf(stderr, "\r[%s] %3d%% %.*s\x1b[K", bar.c_str(),
+                     static_cast<int>(clamped * 100),
+                     static_cast<int>(std::min<std::size_t>(doing.size(), 44)), doing.data());
+        std::fflush(stderr);
+    }
+};
+
+ProgressBar::ProgressBar(const CommonOptions& options) : state_(std::make_unique<State>()) {
+    state_->shown = !options.quiet && isatty(STDERR_FILENO) != 0;
+}
+
+ProgressBar::~ProgressBar() {
+    if (state_->drawn) std::fputs("\r\x1b[K", stderr);
+}
+
+Progress ProgressBar::progress() {
+    if (!state_->shown) return {};
+    return [state = state_.get()](double fraction, std::string_view doing) {
+        state->draw(fraction, doing);
+    };
+}
+
+std::string report_json(const StageReport& report) {
+    return json_of(report).dump(2) + "\n";
+}
+
+std::string report_json(std::span<const StageReport> reports) {
+    Json json;
+    double seconds = 0;
+    Json stages = Json::array(), warnings = Json::array();
+    for (const StageReport& report : reports) {
+        seconds += report.seconds;
+        stages.push_back(json_of(report));
+        for (const std::string& warning : report.warnings)
+            warnings.push_back(report.stage + ": " + warning);
+    }
+    json["seconds"] = seconds;
+    json["stages"] = std::move(stages);
+    json["warnings"] = std::move(warnings);
+    return json.dump(2) + "\n";
+}
+
+Status write_report(const CommonOptions& options, const StageReport& report) {
+    if (options.report_path.empty()) return Done{};
+    return write_file(options.report_path, report_json(report));
+}
+
+Stopwatch::Stopwatch() : start_ns_(std::chrono::steady_clock::now().time_since_epoch().count()) {}
+
+double Stopwatch::seconds() const {
+    return 1e-9 * static_cast<double>(std::chrono::steady_clock::now().time_since_epoch().count() -
+                                      start_ns_);
+}
+
+}  // namespace sonocase::pipeline

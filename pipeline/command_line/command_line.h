@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What the verbs of sonocase share: common options, one-line errors, progress, reports.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "pipeline/base/progress.h"
+
+namespace CLI {
+class App;
+}
+
+namespace sonocase::pipeline {
+
+enum ExitStatus : int { kDone = 0, kFailed = 1, kWrongUsage = 2 };
+
+struct CommonOptions {
+    std::string report_path;  // --report FILE.json; empty: none
+    int threads = 0;          // --threads N; 0: all cores
+    bool quiet = false;       // --quiet: no progress, even on a terminal
+};
+
+// Adds --report, --threads and --quiet.
+void add_common_options(CLI::App& app, CommonOptions& options);
+
+// Parses; an exit status where the verb is over: help was asked for, or the usage is wrong.
+std::optional<int> parse_command_line(CLI::App& app, int argc, char** argv);
+
+// Prints "sonocase VERB: message" to standard error and returns kFailed.
+int fail(const char* verb, const Error& error);
+// Prints what is wrong with the usage and where help is, and returns kWrongUsage.
+int wrong_usage(const char* verb, const std::string& what);
+// Prints "sonocase VERB: warning: ..." for each.
+void print_warnings(const char* verb, const StageReport& report);
+
+// A bar on standard error where that is a terminal; silent in a pipe. Redraws at most ten times a
+// second, and clears its line when it goes out of scope.
+class ProgressBar {
+  public:
+    explicit ProgressBar(const CommonOptions& options);
+    ~ProgressBar();
+    ProgressBar(const ProgressBar&) = delete;
+    ProgressBar& operator=(const ProgressBar&) = delete;
+    Progress progress();  // valid while the bar lives
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+// One stage as JSON: {"stage", "version", "seconds", MEASURE..., "warnings": [...]}, the measures
+// under their own names beside the others.
+std::string report_json(const StageReport& report);
+// Several: {"seconds": sum, "stages": [...], "warnings": [of all]}.
+std::string report_json(std::span<const StageReport> reports);
+// Writes the report where --report asks for it; does nothing otherwise.
+Status write_report(const CommonOptions& options, const StageReport& report);
+
+// Seconds on a steady clock since the object was made.
+class Stopwatch {
+  public:
+    Stopwatch();
+    double seconds() const;
+
+  private:
+    long long start_ns_;
+};
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/export/inspect_case.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "formats/exercise/exercise.h"
+#include "formats/files/atomic_file.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* kind_name(TissueKind kind) {
+    static constexpr std::array<const char*, 5> kNames{"outside", "soft", "fluid", "gas", "bone"};
+    return kNames[static_cast<std::size_t>(kind)];
+}
+
+std::string line(const char* format, auto... values) {
+    char text[256];
+    std::snprintf(text, sizeof text, format, values...);
+    return std::string(text) + "\n";
+}
+
+Json stage_json(const StageReport& stage, double seconds) {
+    Json json;
+    json["name"] = stage.stage;
+    json["version"] = stage.version;
+    if (seconds >= 0)
+        json["seconds"] = seconds;
+    else
+        json["seconds"] = nullptr;
+    json["errors"] = Json::object();
+    for (const Measure& measure : stage.measures) json["errors"][measure.name] = measure.value;
+    json["warnings"] = stage.warnings;
+    return json;
+}
+
+Json budget_json(const ErrorBudget& budget, const NextStep& next) {
+    Json json;
+    json["entries"] = Json::array();
+    for (const BudgetEntry& e : budget.entries) {
+        Json entry{{"stage", e.stage}, {"cause", e.cause}, {"mm", nullptr}, {"basis", e.basis}};
+        if (std::isfinite(e.mm)) entry["mm"] = e.mm;
+        json["entries"].push_back(entry);
+    }
+    json["known_mm"] = budget.known_mm;
+    json["next"] = nullptr;
+    if (!next.settings.empty())
+        json["next"] = {{"settings", next.settings},
+                        {"error_from_mm", next.error_from_mm},
+                        {"error_to_mm", next.error_to_mm},
+                        {"more_seconds", next.more_seconds}};
+    return json;
+}
+
+std::string budget_text(const ErrorBudget& budget, const NextStep& next) {
+    std::string text = "\nerror budget, mean displacement of surfaces\n";
+    for (const BudgetEntry& e : budget.entries) {
+        char mm[16] = "     ?";
+        if (std::isfinite(e.mm)) std::snprintf(mm, sizeof mm, "%6.2f", e.mm);
+        text +=
+            line("  %-10s %s mm  %s (%s)", e.stage.c_str(), mm, e.cause.c_str(), e.basis.c_str());
+    }
+    text += line("  %-10s %6.2f mm", "known", budget.known_mm);
+    if (next.settings.empty())
+        text += "  no setting that was measured does better\n";
+    else
+        text +=
+            line("  next: %s, from %.2f to %.2f mm on the synthetic bodies for %.0f s more",
+                 next.settings.c_str(), next.error_from_mm, next.error_to_mm, next.more_seconds);
+    return text;
+}
+
+Json tissue_json(const Tissue& tissue) {
+    return {{"name", tissue.name},
+            {"kind", kind_name(tissue.kind)},
+            {"casts_shadow", tissue.casts_shadow},
+            {"texture", tissue.texture},
+            {"grey_mean", tissue.grey_mean},
+            {"grey_sd", tissue.grey_sd},
+            {"echo_db", tissue.echo_db},
+            {"structure_db", tissue.structure_db},
+            {"attenuation_db_cm_mhz", tissue.attenuation_db_cm_mhz},
+            {"impedance_mrayl", tissue.impedance_mrayl},
+            {"sound_speed_m_s", tissue.sound_speed_m_s},
+            {"source", tissue.source}};
+}
+
+}  // namespace
+
+LabelVolumes label_volumes(const CaseBundle& bundle) {
+    const BrickVolume<std::uint8_t>& bricks = bundle.label_bricks;
+    std::vector<std::uint64_t> voxels(256, 0);
+    const Int3 count = brick_count(bricks.size);
+    std::size_t brick = 0;
+    for (int bk = 0; bk < count.z; ++bk) {
+        for (int bj = 0; bj < count.y; ++bj) {
+            for (int bi = 0; bi < count.x; ++bi, ++brick) {
+                const int ni = std::min(kBrickEdge, bricks.size.x - bi * kBrickEdge),
+                          nj = std::min(kBrickEdge, bricks.size.y - bj * kBrickEdge),
+                          nk = std::min(kBrickEdge, bricks.size.z - bk * kBrickEdge);
+                const std::uint32_t entry = bricks.table[brick];
+                if (entry & kUniformBrick) {
+                    voxels[bricks.uniform[entry & ~kUniformBrick]] +=
+                        static_cast<std::uint64_t>(ni) * static_cast<std::uint64_t>(nj) *
+                        static_cast<std::uint64_t>(nk);
+                    continue;
+                }
+                const std::uint8_t* pool = bricks.pool.data() + std::size_t{entry} * kBrickVoxels;
+                for (int k = 0; k < nk; ++k)
+                    for (int j = 0; j < nj; ++j)
+                        for (int i = 0; i < ni; ++i) ++voxels[pool[i + 4 * j + 16 * k]];
+            }
+        }
+    }
+    LabelVolumes volumes;
+    const double voxel_ml = bundle.grid.voxel_volume_mm3() / 1000;
+    for (std::size_t label = 0; label < bundle.labels.size(); ++label)
+        volumes.ml.push_back(static_cast<double>(voxels[label]) * voxel_ml);
+    return volumes;
+}
+
+std::vector<double> recorded_seconds(const CaseBundle& bundle,
+                                     const std::string& bundle_path,
+                                     const std::string& bundle_digest) {
+    const std::vector<StageReport>& stages = bundle.manifest.stages;
+    std::vector<double> seconds;
+    for (const StageReport& stage : stages)
+        seconds.push_back(stage.seconds > 0 ? stage.seconds : -1);
+    const auto text = read_text_file(bundle_path + ".report.json");
+    if (!text) return seconds;
+    const Json json = Json::parse(*text, nullptr, false);
+    if (!json.is_object() || json.value("digest", "") != bundle_digest ||
+        !json.contains("stages") || !json["stages"].is_array() ||
+        json["stages"].size() != stages.size())
+        return seconds;
+    for (std::size_t i = 0; i < stages.size(); ++i) {
+        const Json& stage = json["stages"][i];
+        if (stage.is_object() && stage.contains("seconds") && stage["seconds"].is_number())
+            seconds[i] = stage["seconds"].get<double>();
+    }
+    return seconds;
+}
+
+std::string inspection_json(const CaseBundle& bundle, const Inspection& inspection) {
+    const LabelVolumes volumes = label_volumes(bundle);
+    Json json;
+    json["case"] = bundle.manifest.case_name;
+    json["producer"] = bundle.manifest.producer;
+    json["bytes"] = inspection.bytes;
+    json["digest"] = inspection.digest;
+    const Grid& grid = bundle.grid;
+    json["grid"] = {{"size", {grid.size.x, grid.size.y, grid.size.z}},
+                    {"voxel_mm", grid.spacing_mm.x},
+                    {"origin_mm", {grid.origin_mm.x, grid.origin_mm.y, grid.origin_mm.z}}};
+    json["labels"] = Json::array();
+    for (std::size_t i = 0; i < bundle.labels.size(); ++i)
+        json["labels"].push_back({{"index", i},
+                                  {"name", bundle.labels[i].name},
+                                  {"tissue", bundle.labels[i].tissue},
+                                  {"volume_ml", volumes.ml[i]}});
+    json["tissues"] = Json::array();
+    for (const Tissue& tissue : bundle.tissues) json["tissues"].push_back(tissue_json(tissue));
+    json["stages"] = Json::array();
+    for (std::size_t i = 0; i < bundle.manifest.stages.size(); ++i)
+        json["stages"].push_back(stage_json(bundle.manifest.stages[i], inspection.seconds[i]));
+    json["error_budget"] = budget_json(error_budget(bundle.manifest.stages), inspection.next);
+    json["exercises"] = Json::array();
+    for (const EmbeddedExercise& embedded : bundle.exercises) {
+        Json exercise{{"name", embedded.name}};
+        if (const auto parsed = parse_exercise(embedded.toml, embedded.name)) {
+            exercise["title"] = parsed->title;
+            exercise["difficulty"] = parsed->difficulty;
+            exercise["sweeps"] = Json::array();
+            for (const Sweep& sweep : parsed->sweeps) exercise["sweeps"].push_back(sweep.name);
+        }
+        json["exercises"].push_back(exercise);
+    }
+    json["inputs"] = Json::array();
+    for (const InputHash& input : bundle.manifest.inputs)
+        json["inputs"].push_back({{"path", input.path}, {"digest", input.digest}});
+    json["surfaces"] = {{"patient_skin_points", bundle.patient_skin.points.size()},
+                        {"mannequin_points", bundle.mannequin_skin.points.size()}};
+    json["textures"] = Json::array();
+    for (const SolidTexture& texture : bundle.textures)
+        json["textures"].push_back(
+            {{"name", texture.name}, {"edge", texture.edge}, {"voxel_mm", texture.voxel_mm}});
+    json["has"] = {{"boundary", !bundle.boundary.table.empty()},
+                   {"echo_offset", !bundle.echo_offset.table.empty()},
+                   {"speckle_edge", bundle.speckle.edge}};
+    return json.dump(2) + "\n";
+}
+
+std::string inspection_text(const CaseBundle& bundle, const Inspection& inspection) {
+    const LabelVolumes volumes = label_volumes(bundle);
+    const Grid& grid = bundle.grid;
+    std::string text;
+    text += line("%s", bundle.manifest.case_name.c_str());
+    text += line("  file       %.1f MB, digest %s", static_cast<double>(inspection.bytes) / 1e6,
+                 inspection.digest.c_str());
+    text += line("  made by    %s", bundle.manifest.producer.c_str());
+    text += line("  grid       %d x %d x %d voxels of %g mm, origin (%.1f, %.1f, %.1f) mm",
+                 grid.size.x, grid.size.y, grid.size.z, grid.spacing_mm.x, grid.origin_mm.x,
+                 grid.origin_mm.y, grid.origin_mm.z);
+    text += line("  surfaces   patient %zu points, mannequin %zu points",
+                 bundle.patient_skin.points.size(), bundle.mannequin_skin.points.size());
+    text += line("\nlabels (%zu)%28s%16s", bundle.labels.size() - 1, "tissue", "ml");
+    for (std::size_t i = 1; i < bundle.labels.size(); ++i)
+        text += line("  %3zu  %-32s %-22s %10.2f", i, bundle.labels[i].name.c_str(),
+                     bundle.labels[i].tissue.c_str(), volumes.ml[i]);
+    text += line("\ntissues (%zu)              echo dB  dB/cm/MHz  MRayl  kind     texture",
+                 bundle.tissues.size() - 1);
+    for (std::size_t i = 1; i < bundle.tissues.size(); ++i) {
+        const Tissue& t = bundle.tissues[i];
+        text += line("  %-24s %7.1f %10.2f %6.2f  %-8s %s%s", t.name.c_str(), t.echo_db,
+                     t.attenuation_db_cm_mhz, t.impedance_mrayl, kind_name(t.kind),
+                     t.texture.c_str(), t.casts_shadow ? "  (shadow)" : "");
+    }
+    text += "\nstages\n";
+    double sum = 0;
+    bool all_known = true;
+    for (std::size_t i = 0; i < bundle.manifest.stages.size(); ++i) {
+        const StageReport& stage = bundle.manifest.stages[i];
+        const double seconds = inspection.seconds[i];
+        if (seconds >= 0)
+            text += line("  %-10s %8.2f s", stage.stage.c_str(), seconds);
+        else
+            text += line("  %-10s        - s", stage.stage.c_str());
+        sum += std::max(0.0, seconds);
+        all_known = all_known && seconds >= 0;
+        for (const Measure& measure : stage.measures)
+            text += line("      %-28s %.6g", measure.name.c_str(), measure.value);
+        for (const std::string& warning : stage.warnings)
+            text += "      warning: " + warning + "\n";
+    }
+    if (all_known)
+        text += line("  %-10s %8.2f s", "all", sum);
+    else
+        text += "  (seconds stand in BUNDLE.report.json, which is not beside this bundle)\n";
+    text += budget_text(error_budget(bundle.manifest.stages), inspection.next);
+    text += "\nexercises\n";
+    for (const EmbeddedExercise& embedded : bundle.exercises) {
+        const auto exercise = parse_exercise(embedded.toml, embedded.name);
+        text += "  " + embedded.name;
+        if (exercise) {
+            text += ": " + exercise->title + "; sweeps";
+            for (const Sweep& sweep : exercise->sweeps) text += " " + sweep.name;
+        }
+        text += "\n";
+    }
+    if (!bundle.manifest.inputs.empty()) text += "\ninputs\n";
+    for (const InputHash& input : bundle.manifest.inputs)
+        text += line("  %s  %s", input.digest.c_str(), input.path.c_str());
+    return text;
+}
+
+}  // namespace sonocase::pipeline

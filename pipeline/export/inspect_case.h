@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What a bundle holds, for people and as JSON; and whether it keeps its promises.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/bundle/case_bundle.h"
+#include "pipeline/cook/error_budget.h"
+
+namespace sonocase::pipeline {
+
+struct LabelVolumes {
+    std::vector<double> ml;  // # labels
+};
+
+// Volume of every label. One pass over the bricks.
+LabelVolumes label_volumes(const CaseBundle& bundle);
+
+// Stages' seconds, from the report beside the bundle; negative: not recorded. # manifest.stages.
+std::vector<double> recorded_seconds(const CaseBundle& bundle,
+                                     const std::string& bundle_path,
+                                     const std::string& bundle_digest);
+
+struct Inspection {
+    std::string path;
+    std::string digest;
+    std::size_t bytes = 0;
+    std::vector<double> seconds;  // see recorded_seconds
+    NextStep next;
+};
+
+// {"case", "producer", "bytes", "digest", "grid": {"size", "voxel_mm", "origin_mm"}, "labels":
+// [{"index", "name", "tissue", "volume_ml"}], "tissues": [...], "stages": [{"name", "version",
+// "seconds", "errors": {measure: value}, "warnings"}], "error_budget": {"entries": [{"stage",
+// "cause", "mm" or null, "basis"}], "known_mm", "next": null or {"settings", "error_from_mm",
+// "error_to_mm", "more_seconds"}}, "exercises", "inputs", "surfaces", "textures", "has"}.
+std::string inspection_json(const CaseBundle& bundle, const Inspection& inspection);
+std::string inspection_text(const CaseBundle& bundle, const Inspection& inspection);
+
+struct Finding {
+    bool error = false;  // else a remark
+    std::string text;
+};
+
+// Beyond what the reader refuses: palette and tissues fit together, textures are there, boundary
+// records agree with the labels, exercises parse and their targets lie in the body, surfaces lie at
+// the body, volumes are not zero.
+std::vector<Finding> validate_case(const CaseBundle& bundle);
+
+}  // namespace sonocase::pipeline

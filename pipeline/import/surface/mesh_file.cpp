@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The only file of the import that includes VTK.
+#include <vtkCallbackCommand.h>
+#include <vtkCellArray.h>
+#include <vtkCleanPolyData.h>
+#include <vtkNew.h>
+#include <vtkOBJReader.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkSTLReader.h>
+#include <vtkTriangleFilter.h>
+#include <vtkXMLPolyDataReader.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+
+#include "pipeline/base/delimited_text.h"
+#include "pipeline/base/quiet_library.h"
+#include "pipeline/import/surface/ply_file.h"
+#include "pipeline/import/surface/surface_readers.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+// VTK reports by events; the first error's text, without VTK's own file and line.
+void keep_first_error(vtkObject*, unsigned long, void* client, void* data) {
+    auto& kept = *static_cast<std::string*>(client);
+    if (!kept.empty() || data == nullptr) return;
+    kept = static_cast<const char*>(data);
+    if (const auto at = kept.find("): "); at != std::string::npos) kept = kept.substr(at + 3);
+    while (!kept.empty() && std::isspace(static_cast<unsigned char>(kept.back()))) kept.pop_back();
+}
+
+template <class Reader>
+vtkSmartPointer<vtkPolyData> read_with(const std::string& path, std::string* error) {
+    vtkNew<vtkCallbackCommand> observer;
+    observer->SetCallback(keep_first_error);
+    observer->SetClientData(error);
+    vtkNew<Reader> reader;
+    reader->AddObserver("ErrorEvent", observer);
+    reader->SetFileName(path.c_str());
+    reader->Update();
+    vtkSmartPointer<vtkPolyData> data = reader->GetOutput();
+    return data;
+}
+
+vtkSmartPointer<vtkPolyData> polygons_of(const PolygonFile& file) {
+    vtkNew<vtkPoints> points;
+    points->SetDataTypeToDouble();
+    for (const Point3 p : file.points) points->InsertNextPoint(p.x, p.y, p.z);
+    vtkNew<vtkCellArray> polygons;
+    for (const auto& polygon : file.polygons) {
+        polygons->InsertNextCell(static_cast<int>(polygon.size()));
+        for (const std::uint32_t corner : polygon) polygons->InsertCellPoint(corner);
+    }
+    auto data = vtkSmartPointer<vtkPolyData>::New();
+    data->SetPoints(points);
+    data->SetPolys(polygons);
+    return data;
+}
+
+// VTK takes a binary STL file of any length; its header says how long it has to be.
+bool binary_stl_is_cut_off(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    char head[84];
+    if (!file.read(head, sizeof head)) return false;  // the reader says what is wrong
+    char text[512];
+    file.read(text, sizeof text);
+    const bool ascii =
+        std::string_view(head, 5) == "solid" &&
+        std::all_of(head, head + sizeof head, [](char c) { return c >= 9 && c < 127; }) &&
+        std::all_of(text, text + file.gcount(), [](char c) { return c >= 9 && c < 127; });
+    if (ascii) return false;
+    std::uint32_t triangles = 0;
+    std::memcpy(&triangles, head + 80, sizeof triangles);
+    return std::filesystem::file_size(path) < 84 + 50ull * triangles;
+}
+
+Surface surface_of(vtkPolyData& data) {
+    Surface surface;
+    surface.points.reserve(static_cast<std::size_t>(data.GetNumberOfPoints()));
+    for (vtkIdType i = 0; i < data.GetNumberOfPoints(); ++i) {
+        double p[3];
+        data.GetPoint(i, p);
+        surface.points.push_back({p[0], p[1], p[2]});
+    }
+    if (vtkCellArray* polys = data.GetPolys()) {
+        vtkIdType count = 0;
+        const vtkIdType* ids = nullptr;
+        for (polys->InitTraversal(); polys->GetNextCell(count, ids);)
+            if (count == 3)
+                surface.triangles.push_back({static_cast<std::uint32_t>(ids[0]),
+                                             static_cast<std::uint32_t>(ids[1]),
+                                             static_cast<std::uint32_t>(ids[2])});
+    }
+    if (vtkDataArray* normals = data.GetPointData()->GetNormals();
+        normals != nullptr && surface.triangles.empty()) {
+        for (vtkIdType i = 0; i < data.GetNumberOfPoints(); ++i) {
+            double n[3];
+            normals->GetTuple(i, n);
+            surface.normals.push_back(normalized({n[0], n[1], n[2]}));
+        }
+    }
+    return surface;
+}
+
+}  // namespace
+
+Result<Surface> read_mesh_file(const std::string& path) {
+    const char* todo = "check that the file is complete; export it again";
+    const std::string ending = lower_case(std::filesystem::path(path).extension().string());
+    const QuietLibrary quiet;
+    std::string error;
+    vtkSmartPointer<vtkPolyData> data;
+    try {
+        if (ending == ".ply") {
+            auto file = read_ply_file(path);
+            if (!file) return file.error();
+            if (file->polygons.empty()) {
+                Surface cloud{file->points, file->normals, {}};
+                for (Vector3& normal : cloud.normals) normal = normalized(normal);
+                return cloud;
+            }
+            data = polygons_of(*file);
+        } else if (ending == ".stl") {
+            if (binary_stl_is_cut_off(path)) return Error{"STL file is cut off", path, todo};
+            data = read_with<vtkSTLReader>(path, &error);
+        } else if (ending == ".obj") {
+            data = read_with<vtkOBJReader>(path, &error);
+        } else {
+            data = read_with<vtkXMLPolyDataReader>(path, &error);
+        }
+        if (!error.empty() || data == nullptr)
+            return Error{"cannot be read as a mesh (" + error + ")", path, todo};
+        if (data->GetNumberOfPolys() == 0 && data->GetNumberOfStrips() == 0)
+            return surface_of(*data);
+
+        vtkNew<vtkTriangleFilter> triangles;
+        triangles->SetInputData(data);
+        triangles->PassVertsOff();
+        triangles->PassLinesOff();
+        vtkNew<vtkCleanPolyData>
+            clean;  // one vertex where several coincide, none without a triangle
+        clean->SetInputConnection(triangles->GetOutputPort());
+        clean->PointMergingOn();
+        clean->ToleranceIsAbsoluteOn();
+        clean->SetAbsoluteTolerance(0);
+        clean->ConvertPolysToLinesOff();
+        clean->ConvertLinesToPointsOff();
+        clean->Update();
+        return surface_of(*clean->GetOutput());
+    } catch (const std::exception& exception) {
+        return Error{std::string("cannot be read as a mesh (") + exception.what() + ")", path,
+                     todo};
+    }
+}
+
+}  // namespace sonocase::pipeline

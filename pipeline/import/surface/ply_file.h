@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// PLY, read here and not by VTK: version 9.1 of that aborts the program on a truncated file.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "formats/base/geometry.h"
+#include "formats/base/result.h"
+
+namespace sonocase::pipeline {
+
+struct PolygonFile {
+    std::vector<Point3> points;
+    std::vector<Vector3> normals;                      // # points, or empty
+    std::vector<std::vector<std::uint32_t>> polygons;  // >= 3 corners each, all within points
+};
+
+// ASCII and both binary forms; properties it does not know are passed over.
+Result<PolygonFile> read_ply_file(const std::string& path);
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The only file of the import that includes ITK's single-file readers.
+#include <itkImageIOBase.h>
+#include <itkMetaDataObject.h>
+#include <itkMetaImageIO.h>
+#include <itkNiftiImageIO.h>
+#include <itkNrrdImageIO.h>
+#include <itkObject.h>
+
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "pipeline/base/quiet_library.h"
+#include "pipeline/import/volume/native_volume.h"
+#include "pipeline/import/volume/volume_file.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr std::uint64_t kMaxBytes = 16ull << 30;  // no patient's volume is larger
+
+std::optional<Component> component_of(itk::IOComponentEnum type) {
+    using E = itk::IOComponentEnum;
+    constexpr bool long_is_64 = sizeof(long) == 8;
+    switch (type) {
+        case E::UCHAR:
+            return Component::u8;
+        case E::CHAR:
+            return Component::i8;
+        case E::USHORT:
+            return Component::u16;
+        case E::SHORT:
+            return Component::i16;
+        case E::UINT:
+            return Component::u32;
+        case E::INT:
+            return Component::i32;
+        case E::ULONG:
+            return long_is_64 ? Component::u64 : Component::u32;
+        case E::LONG:
+            return long_is_64 ? Component::i64 : Component::i32;
+        case E::ULONGLONG:
+            return Component::u64;
+        case E::LONGLONG:
+            return Component::i64;
+        case E::FLOAT:
+            return Component::f32;
+        case E::DOUBLE:
+            return Component::f64;
+        default:
+            return std::nullopt;
+    }
+}
+
+itk::ImageIOBase::Pointer reader_for(const std::string& path) {
+    const auto ends = [&](const char* ending) { return path.ends_with(ending); };
+    if (ends(".nii") || ends(".nii.gz")) return itk::NiftiImageIO::New().GetPointer();
+    if (ends(".nrrd") || ends(".nhdr")) return itk::NrrdImageIO::New().GetPointer();
+    return itk::MetaImageIO::New().GetPointer();
+}
+
+std::string sizes_text(const itk::ImageIOBase& io) {
+    std::string text;
+    for (unsigned d = 0; d < io.GetNumberOfDimensions(); ++d)
+        text += (d > 0 ? " x " : "") + std::to_string(io.GetDimensions(d));
+    return text;
+}
+
+Result<Grid> grid_of(const itk::ImageIOBase& io, const std::string& path) {
+    Grid grid;
+    Matrix3 direction;
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto unsigned_axis = static_cast<unsigned>(axis);
+        const auto size = io.GetDimensions(unsigned_axis);
+        if (size < 1 || size > 65535)
+            return Error{"volume of " + sizes_text(io) + " voxels", path,
+                         "expected 1 to 65535 a side"};
+        grid.size[axis] = static_cast<std::int32_t>(size);
+        grid.spacing_mm[axis] = io.GetSpacing(unsigned_axis);
+        grid.origin_mm[axis] = io.GetOrigin(unsigned_axis);
+        const std::vector<double> column = io.GetDirection(unsigned_axis);
+        for (int row = 0; row < 3; ++row)
+            direction(row, axis) = column[static_cast<std::size_t>(row)];
+        if (!(grid.spacing_mm[axis] > 0) || !std::isfinite(grid.spacing_mm[axis]) ||
+            !std::isfinite(grid.origin_mm[axis]))
+            return Error{"voxel size or origin is no positive, finite number", path,
+                         "write the volume again with its geometry in the header"};
+    }
+    // ITK speaks LPS: x to the left, y to the back.
+    for (int row = 0; row < 2; ++row) {
+        grid.origin_mm[row] = -grid.origin_mm[row];
+        for (int column = 0; column < 3; ++column) direction(row, column) = -direction(row, column);
+    }
+    for (int a = 0; a < 3; ++a) {
+        for (int b = a; b < 3; ++b) {
+            const double expected = a == b ? 1 : 0;
+            if (!(std::abs(dot(direction.column(a), direction.column(b)) - expected) < 1e-3))
+                return Error{"voxel axes are not at right angles", path,
+                             "resample the volume to an orthogonal grid (Slicer: Resample Image)"};
+        }
+    }
+    grid.direction = direction;
+    return grid;
+}
+
+}  // namespace
+
+bool is_volume_file_name(const std::string& path) {
+    for (const char* ending : {".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd"})
+        if (path.ends_with(ending)) return true;
+    return false;
+}
+
+std::string volume_stem(const std::string& path) {
+    std::string name = std::filesystem::path(path).filename().string();
+    for (const char* ending : {".nii.gz", ".nii", ".seg.nrrd", ".nrrd", ".nhdr", ".mha", ".mhd"}) {
+        if (name.ends_with(ending))
+            return name.substr(0, name.size() - std::char_traits<char>::length(ending));
+    }
+    return name;
+}
+
+std::uint64_t voxel_bytes_in_header(const std::string& path) {
+    const QuietLibrary quiet;
+    itk::Object::GlobalWarningDisplayOff();
+    try {
+        const itk::ImageIOBase::Pointer io = reader_for(path);
+        io->SetFileName(path);
+        io->ReadImageInformation();
+        return static_cast<std::uint64_t>(io->GetImageSizeInBytes());
+    } catch (const std::exception&) {  // reading it will tell
+        return 0;
+    }
+}
+
+Result<NativeVolume> read_itk_volume(const std::string& path) {
+    const char* todo = "check that the file is complete; export it again";
+    const QuietLibrary quiet;  // the C libraries below ITK print as well as throw
+    itk::Object::GlobalWarningDisplayOff();
+    try {
+        const itk::ImageIOBase::Pointer io = reader_for(path);
+        io->SetFileName(path);
+        io->ReadImageInformation();
+        const unsigned dimensions = io->GetNumberOfDimensions();
+        for (unsigned d = 3; d < dimensions; ++d) {
+            if (io->GetDimensions(d) != 1)
+                return Error{"volume of " + sizes_text(*io) + " voxels", path,
+                             "expected three dimensions; export one time step"};
+        }
+        if (dimensions < 3)
+            return Error{"an image of " + sizes_text(*io) + " pixels", path,
+                         "expected a volume of three dimensions"};
+        const auto component = component_of(io->GetComponentType());
+        if (!component)
+            return Error{"voxels of type " + io->GetComponentTypeAsString(io->GetComponentType()),
+                         path, "expected whole numbers"};
+        auto grid = grid_of(*io, path);
+        if (!grid) return grid.error();
+
+        NativeVolume volume;
+        volume.grid = *grid;
+        volume.component = *component;
+        volume.layers = static_cast<int>(io->GetNumberOfComponents());
+        const auto bytes = static_cast<std::uint64_t>(io->GetImageSizeInBytes());
+        if (bytes > kMaxBytes)
+            return Error{"header asks for " + std::to_string(bytes >> 30) + " GB of voxels", path,
+                         todo};
+        volume.bytes.resize(bytes);
+        if (auto status = check_nifti_length(path, bytes); !status) return status.error();
+        if (auto status = check_meta_length(path, bytes); !status) return status.error();
+        if (auto status = check_nrrd_length(path, bytes); !status) return status.error();
+        itk::ImageIORegion region(dimensions);
+        for (unsigned d = 0; d < dimensions; ++d) region.SetSize(d, io->GetDimensions(d));
+        io->SetIORegion(region);
+        io->Read(volume.bytes.data());
+
+        const itk::MetaDataDictionary& dictionary = io->GetMetaDataDictionary();
+        for (const std::string& key : dictionary.GetKeys()) {
+            std::string value;
+            if (itk::ExposeMetaData(dictionary, key, value)) volume.fields[key] = value;
+        }
+        return volume;
+    } catch (const itk::ExceptionObject& exception) {
+        std::string what = exception.GetDescription();
+        if (const auto at = what.find("): "); at != std::string::npos) what = what.substr(at + 3);
+        return Error{"cannot be read as a volume (" + what + ")", path, todo};
+    } catch (const std::exception& exception) {
+        return Error{std::string("cannot be read as a volume (") + exception.what() + ")", path,
+                     todo};
+    }
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The picture that a bundle carries of itself: three cuts through the body.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "formats/volume/label_volume.h"
+
+namespace sonocase::pipeline {
+
+struct Picture {
+    int width_px = 0, height_px = 0;
+    std::vector<std::uint8_t> rgb;  // # 3 * width * height, row by row from the top
+};
+
+// Axial, coronal and sagittal cut side by side, each through the middle of what is not outside, at
+// one scale, about 256 pixels high. The cuts run along the grid's axes; the patient's head
+// direction is not needed. Labels in their colours, darker at their borders.
+Picture preview_picture(const LabelVolume& volume);
+
+// As a PNG file in memory; the same bytes for the same picture.
+std::vector<std::uint8_t> png_of(const Picture& picture);
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/registration/fit_context.h"
+
+#include <cmath>
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr double kFineSkin_mm = 6, kCoarseSkin_mm = 13;
+constexpr double kLattice_mm = 20;
+constexpr double kShallowest_mm = 20;  // below the skin: what lies above is skin, fat and wall
+
+std::vector<Point3> points_inside(const SkinModel& skin, const Box3& box) {
+    const PointIndex index(skin.points);
+    std::vector<Point3> inside;
+    const Vector3 e = box.extent();
+    for (double z = 0.5 * kLattice_mm; z < e.z; z += kLattice_mm) {
+        for (double y = 0.5 * kLattice_mm; y < e.y; y += kLattice_mm) {
+            for (double x = 0.5 * kLattice_mm; x < e.x; x += kLattice_mm) {
+                const Point3 p = box.lower + Vector3{x, y, z};
+                const std::uint32_t n = index.nearest(p);
+                const Vector3 d = p - skin.points[n];
+                if (norm(d) > kShallowest_mm && dot(d, skin.normals[n]) < 0) inside.push_back(p);
+            }
+        }
+    }
+    return inside;
+}
+
+}  // namespace
+
+Result<FitContext> prepare_fit(const RegisterInput& input, const RegisterOptions& options) {
+    Result<TargetSurface> target = prepare_target(input.mannequin, options.target);
+    if (!target) return target.error();
+    FitContext s{input.skin, std::move(*target), {}, {}, {}, {}, {}, {}, {}};
+    const Point3 origin = input.skin.box.centre();
+    s.fine = thin_skin(input.skin.skin, input.skin.on_rim, origin, kFineSkin_mm);
+    s.coarse = thin_skin(input.skin.skin, input.skin.on_rim, origin, kCoarseSkin_mm);
+    s.box.include(Point3{} + (input.skin.box.lower - origin));
+    s.box.include(Point3{} + (input.skin.box.upper - origin));
+    s.readings = thin_target(s.target, 0);
+    if (options.up) {
+        const double length = norm(*options.up);
+        if (!(length > 1e-6) || !std::isfinite(length)) {
+            return Error{"the up direction has no length", "--up",
+                         "give the patient's head direction in the surface's frame, e.g. 0,1,0"};
+        }
+        s.hints.up = *options.up / length;
+    }
+    for (const Landmark& mark : options.landmarks) {
+        if (!std::isfinite(norm(mark.ct - Point3{})) ||
+            !std::isfinite(norm(mark.mannequin - Point3{}))) {
+            return Error{"landmark '" + mark.name + "' is not finite", "--landmarks",
+                         "rows are name,ct_x,ct_y,ct_z,x,y,z in mm"};
+        }
+        const Point3 a = Point3{} + (mark.ct - origin);
+        const Point3 b = Point3{} + (mark.mannequin - s.target.origin);
+        s.hints.landmarks.push_back({a, b});
+        s.landmarks.push_back({a, b});
+    }
+    s.inside = points_inside(s.coarse, s.box);
+    return s;
+}
+
+Registration in_frames(const FitContext& s, const RigidQuadratic& q) {
+    Registration r;
+    r.quadratic = in_frames(q, s.fine.origin, s.target.origin);
+    r.ct_box = s.skin.box;
+    r.mannequin_from_ct.rotation = q.rigid.rotation;
+    r.mannequin_from_ct.translation = (s.target.origin - Point3{}) + q.rigid.translation -
+                                      q.rigid.rotation * (s.fine.origin - Point3{});
+    return r;
+}
+
+}  // namespace sonocase::pipeline

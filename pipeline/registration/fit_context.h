@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What the stages of one registration share: both surfaces made ready, hints checked.
+#pragma once
+
+#include <vector>
+
+#include "pipeline/registration/register_surfaces.h"
+
+namespace sonocase::pipeline {
+
+struct FitContext {
+    const SkinSurfaceResult& skin;
+    TargetSurface target;
+    SkinModel fine, coarse;
+    Box3 box;  // ct, less the skin's origin
+    PoseHints hints;
+    std::vector<Correspondence> landmarks;
+    std::vector<std::uint32_t> readings;  // all but lift-offs
+    std::vector<Point3> inside;  // of the body, where organs lie; ct, less the skin's origin
+};
+
+// Errors: see register_surfaces.
+Result<FitContext> prepare_fit(const RegisterInput& input, const RegisterOptions& options);
+
+// The registration of a quadratic alone, in the frames themselves.
+Registration in_frames(const FitContext& s, const RigidQuadratic& q);
+
+}  // namespace sonocase::pipeline

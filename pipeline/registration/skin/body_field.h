@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The body as a smooth field on a coarse grid, cleaned of what is not trunk. Internal to the skin
+// surface: this half holds no third-party library.
+#pragma once
+
+#include <vector>
+
+#include "formats/base/result.h"
+#include "formats/volume/label_volume.h"
+#include "pipeline/registration/skin/skin_surface.h"
+
+namespace sonocase::pipeline {
+
+struct BodyField {
+    Grid grid;  // working grid; where the body is cut by a plane, cropped to the plane
+    std::vector<float> inside;  // smoothed; 1/2 at the skin
+    double round_view_mm = 0;   // radius of a round field of view that cuts the body; 0: none
+    Point3 round_view_centre;   // its axis runs along the grid's k axis through this point
+
+    // Voxels of the working grid's body that touch the named thing.
+    long cut_voxels = 0;    // a face of the field of view
+    long table_voxels = 0;  // sheets and loose parts
+    long arm_voxels = 0;    // parts beside the trunk
+    double body_ml = 0;
+    double hollow = 0;  // share of the body that was no label and had to be filled
+};
+
+Result<BodyField> make_body_field(const LabelVolume& labels, const SkinSurfaceOptions& options);
+
+}  // namespace sonocase::pipeline

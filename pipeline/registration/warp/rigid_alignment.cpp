@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/registration/warp/rigid_alignment.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/base/parallel.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+// What a point without a counterpart costs: as much as this gap. It is about the gap between two
+// bodies after a rigid alignment, so that overlap as such neither pays nor is punished.
+constexpr double kNoCounterpart_mm = 12;
+constexpr double kScoreScale_mm = 10;
+
+// Of both surfaces: who asks. The skin that is asked may hold more points than ask.
+struct Pair {
+    const SkinModel& skin;
+    PointIndex skin_index;
+    std::vector<std::uint32_t> skin_queries;
+    const TargetSurface& target;
+    std::vector<std::uint32_t> target_askers;
+};
+
+std::vector<std::uint32_t> every_nth(const std::vector<std::uint32_t>& all, int count) {
+    if (count <= 0 || all.size() <= static_cast<std::size_t>(count)) return all;
+    std::vector<std::uint32_t> some;
+    for (int n = 0; n < count; ++n) {
+        some.push_back(
+            all[static_cast<std::size_t>(n) * all.size() / static_cast<std::size_t>(count)]);
+    }
+    return some;
+}
+
+Pair make_pair_of(const SkinModel& skin, const TargetSurface& target, int points) {
+    Pair pair{skin, PointIndex(skin.points), {}, target, {}};
+    std::vector<std::uint32_t> all;
+    for (std::size_t i = 0; i < skin.points.size(); ++i) {
+        if (!skin.on_rim[i]) all.push_back(static_cast<std::uint32_t>(i));
+    }
+    pair.skin_queries = every_nth(all, points);
+    // Twice the spacing that would give the count: the cloud is thinned evenly, then cut to number.
+    pair.target_askers = every_nth(thin_target(target, 1.5 * target.spacing_mm), points);
+    return pair;
+}
+
+// Cauchy, in mm^2 near zero.
+double penalty(double gap, double scale) {
+    return scale * scale * std::log1p(gap * gap / (scale * scale));
+}
+
+// Calls row(from_target, p, n, gap) for every point that has a counterpart, p on the moved skin,
+// and missing(from_target) for the others.
+template <class RowOf, class Missing>
+void for_rows(const Pair& pair,
+              const Rigid& pose,
+              double farthest_mm,
+              const RowOf& row,
+              const Missing& missing) {
+    const TargetSurface& target = pair.target;
+    const Rigid back = inverse(pose);
+    const double farthest2 = farthest_mm * farthest_mm;
+    for (std::uint32_t j : pair.target_askers) {
+        double d2 = 0;
+        const Point3 y = target.points[j];
+        const std::uint32_t i = pair.skin_index.nearest(back * y, &d2);
+        const Vector3 n = pose * pair.skin.normals[i];
+        if (pair.skin.on_rim[i] || d2 > farthest2 || dot(n, target.normals[j]) < 0.3) {
+            missing(true);
+        } else {
+            const Point3 p = pose * pair.skin.points[i];
+            row(true, p, n, dot(n, p - y));
+        }
+    }
+    const double side = 1.2 * target.spacing_mm;
+    for (std::uint32_t i : pair.skin_queries) {
+        const Point3 p = pose * pair.skin.points[i];
+        double d2 = 0;
+        const std::uint32_t j = target.index.nearest(p, &d2);
+        const Vector3 n = target.normals[j];
+        const double gap = dot(n, p - target.points[j]);
+        const double aside2 = d2 - gap * gap;
+        // Far from the surface the nearest reading is seldom straight below.
+        const double limit = side + 0.7 * std::abs(gap);
+        if (target.lifted[j] || d2 > farthest2 || dot(n, pose * pair.skin.normals[i]) < 0.3 ||
+            aside2 > (target.on_rim[j] ? 0.15 : 1.0) * limit * limit) {
+            missing(false);
+        } else {
+            row(false, p, n, gap);
+        }
+    }
+}
+
+// One robust Gauss-Newton step on the point-to-plane gaps.
+Rigid step(const Pair& pair,
+           const PoseHints& hints,
+           const Rigid& pose,
+           double scale_mm,
+           double farthest_mm) {
+    Eigen::Matrix<double, 6, 6> a = Eigen::Matrix<double, 6, 6>::Zero();
+    Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
+    // About the moved origin of the skin and in units of 100 mm, so that turns and shifts weigh
+    // alike.
+    const Point3 centre = pose * Point3{};
+    constexpr double kUnit = 100;
+    const double target_share = 1 / static_cast<double>(pair.target_askers.size());
+    const double skin_share = 1 / static_cast<double>(pair.skin_queries.size());
+    for_rows(
+        pair, pose, farthest_mm,
+        [&](bool from_target, Point3 p, Vector3 n, double gap) {
+            const double w =
+                (from_target ? target_share : skin_share) / (1 + gap * gap / (scale_mm * scale_mm));
+            const Vector3 m = cross(p - centre, n) / kUnit;
+            const Eigen::Matrix<double, 6, 1> r{m.x, m.y, m.z, n.x, n.y, n.z};
+            a.noalias() += w * r * r.transpose();
+            b -= w * gap * r;
+        },
+        [](bool) {});
+    // Hints count against the sum of two means, hence twice.
+    for (const PoseHints::Place& place : hints.landmarks) {
+        const Point3 p = pose * place.skin;
+        const Vector3 r = p - place.target, arm = (p - centre) / kUnit;
+        const double w = 2 * hints.landmark_weight / (1 + dot(r, r) / (60 * 60));
+        for (int axis = 0; axis < 3; ++axis) {
+            Vector3 n;
+            n[axis] = 1;
+            const Vector3 m = cross(arm, n);
+            const Eigen::Matrix<double, 6, 1> row{m.x, m.y, m.z, n.x, n.y, n.z};
+            a.noalias() += w * row * row.transpose();
+            b -= w * r[axis] * row;
+        }
+    }
+    if (hints.up) {
+        const Vector3 head = pose.rotation.column(2), r = head - *hints.up;
+        for (int axis = 0; axis < 3; ++axis) {
+            Vector3 n;
+            n[axis] = 1;
+            const Vector3 m = cross(head, n) / kUnit;
+            const Eigen::Matrix<double, 6, 1> row{m.x, m.y, m.z, 0, 0, 0};
+            a.noalias() += 2 * hints.up_weight_mm2 * row * row.transpose();
+            b -= 2 * hints.up_weight_mm2 * r[axis] * row;
+        }
+    }
+    // A faint pull to rest keeps still what the rows do not see.
+    a.diagonal().array() += 1e-4 * a.trace() / 6 + 1e-12;
+    const Eigen::Matrix<double, 6, 1> x = a.ldlt().solve(b);
+    const Vector3 turn{x[0] / kUnit, x[1] / kUnit, x[2] / kUnit};
+    Vector3 shift{x[3], x[4], x[5]};
+    if (norm(shift) > 60) shift = 60 * normalized(shift);
+    const Matrix3 rotation = nearest_rotation(
+        rotation_about(normalized(turn), std::min(norm(turn), 0.5)) * pose.rotation);
+    return {rotation, (centre + shift) - Point3{}};  // the skin's origin goes to centre + shift
+}
+
+RigidCandidate scored(const Pair& pair, const PoseHints& hints, const Rigid& pose) {
+    double cost[2] = {0, 0};
+    int counterparts = 0;
+    for_rows(
+        pair, pose, 60,
+        [&](bool from_target, Point3, Vector3, double gap) {
+            cost[from_target] += std::min(penalty(gap, kScoreScale_mm), 400.0);
+            counterparts += from_target;
+        },
+        [&](bool from_target) { cost[from_target] += penalty(kNoCounterpart_mm, kScoreScale_mm); });
+    RigidCandidate c;
+    c.target_from_skin = pose;
+    c.score_mm = std::sqrt(0.5 * cost[1] / static_cast<double>(pair.target_askers.size()) +
+                           0.5 * cost[0] / static_cast<double>(pair.skin_queries.size()) +
+                           hints.cost_mm2(pose));
+    c.coverage = counterparts / static_cast<double>(pair.target_askers.size());
+    return c;
+}
+
+RigidCandidate descend(const Pair& pair,
+                       const PoseHints& hints,
+                       Rigid pose,
+                       int iterations,
+                       double first_scale_mm,
+                       double last_scale_mm) {
+    for (int n = 0; n < iterations; ++n) {
+        const double t = iterations > 1 ? static_cast<double>(n) / (iterations - 1) : 1;
+        const double scale = first_scale_mm * std::pow(last_scale_mm / first_scale_mm, t);
+        const Rigid next = step(pair, hints, pose, scale, 6 * scale);
+        const bool at_rest = same_pose(next, pose, 1e-5, 1e-3);
+        pose = next;
+        if (at_rest && n > iterations / 2) break;
+    }
+    return scored(pair, hints, pose);
+}
+
+// Rotations spread evenly over all (a super-Fibonacci spiral of quaternions, Alexa 2022), or over
+// those that carry the head within a cone about `up`.
+std::vector<Matrix3> spread_rotations(const RigidOptions& options) {
+    std::uint64_t state = options.seed;
+    const auto uniform = [&state] {  // splitmix64
+        std::uint64_t z = state += 0x9E3779B97F4A7C15ull;
+        z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
+        z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
+        return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+    };
+    const int count = std::max(1, options.starts);
+    std::vector<Matrix3> rotations;
+    if (options.hints.up) {
+        // Heads on rings of a cap, each with turns about it.
+        const Vector3 up = normalized(*options.hints.up);
+        const Vector3 u = any_perpendicular(up), v = cross(up, u);
+        const double phase = 2 * kPi * uniform();
+        constexpr double kGolden = 2.39996322972865332;
+        for (int n = 0; n < count; ++n) {
+            const double s = (n % 8 + 0.5) / 8;
+            const double tilt = options.cone_rad * std::sqrt(s) * 0.7;
+            const double around = phase + kGolden * n;
+            const Vector3 head = std::cos(tilt) * up +
+                                 std::sin(tilt) * (std::cos(around) * u + std::sin(around) * v);
+            const Vector3 x = any_perpendicular(head), y = cross(head, x);
+            const double roll = phase + 2 * kPi * n / count;
+            const Vector3 right = std::cos(roll) * x + std::sin(roll) * y;
+            rotations.push_back(Matrix3::from_columns(right, cross(head, right), head));
+        }
+        return rotations;
+    }
+    const double a = uniform(), b = uniform(), c = uniform();
+    const Matrix3 whole = rotation_from_quaternion(
+        {std::sqrt(1 - a) * std::sin(2 * kPi * b), std::sqrt(1 - a) * std::cos(2 * kPi * b),
+         std::sqrt(a) * std::sin(2 * kPi * c), std::sqrt(a) * std::cos(2 * kPi * c)});
+    for (int n = 0; n < count; ++n) {
+        const double s = n + 0.5, t = s / count;
+        const double alpha = 2 * kPi * s / std::sqrt(2.0),
+                     beta = 2 * kPi * s / 1.533751168755204288;
+        rotations.push_back(whole * rotation_from_quaternion({std::sqrt(t) * std::sin(alpha),
+                                                              std::sqrt(t) * std::cos(alpha),
+                                                              std::sqrt(1 - t) * std::sin(beta),
+                                                              std::sqrt(1 - t) * std::cos(beta)}));
+    }
+    return rotations;
+}
+
+// The shift that lays readings on those parts of the turned skin that face their way: right for a
+// sweep of one side as well as for a whole one.
+Vector3 facing_shift(const Pair& pair, const Matrix3& rotation) {
+    Vector3 sum;
+    int count = 0;
+    for (std::uint32_t j : pair.target_askers) {
+        Vector3 mean;
+        int facing = 0;
+        for (std::uint32_t i : pair.skin_queries) {
+            if (dot(rotation * pair.skin.normals[i], pair.target.normals[j]) < 0.8) continue;
+            mean = mean + (pair.skin.points[i] - Point3{});
+            ++facing;
+        }
+        if (facing == 0) continue;
+        sum = sum + ((pair.target.points[j] - Point3{}) - rotation * (mean / facing));
+        ++count;
+    }
+    return count > 0 ? sum / count : Vector3{};
+}
+
+std::vector<RigidCandidate> distinct(std::vector<RigidCandidate> all, int most) {
+    std::stable_sort(all.begin(), all.end(), [](const RigidCandidate& a, const RigidCandidate& b) {
+        return a.score_mm < b.score_mm;
+    });
+    std::vector<RigidCandidate> chosen;
+    for (const RigidCandidate& c : all) {
+        if (static_cast<int>(chosen.size()) >= most) break;
+        const bool seen = std::any_of(chosen.begin(), chosen.end(), [&](const RigidCandidate& o) {
+            return same_pose(o.target_from_skin, c.target_from_skin, 20 * kPi / 180, 40);
+        });
+        if (!seen) chosen.push_back(c);
+    }
+    return chosen;
+}
+
+}  // namespace
+
+bool same_pose(const Rigid& a, const Rigid& b, double angle_rad, double shift_mm) {
+    return norm(a.translation - b.translation) < shift_mm &&
+           rotation_angle(transpose(a.rotation) * b.rotation) < angle_rad;
+}
+
+std::vector<RigidCandidate> align_rigid_candidates(const SkinModel& skin,
+                                                   const TargetSurface& target,
+                                                   const RigidOptions& options,
+                                                   const Progress& progress) {
+    const Pair coarse = make_pair_of(skin, target, options.coarse_points);
+    const std::vector<Matrix3> rotations = spread_rotations(options);
+    const int offsets = std::max(1, options.offsets);
+    std::vector<RigidCandidate> found(rotations.size() * static_cast<std::size_t>(offsets));
+    parallel_for(rotations.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n) {
+            const Vector3 shift = facing_shift(coarse, rotations[n]);
+            for (int o = 0; o < offsets; ++o) {
+                const double along = options.offset_mm * (o - 0.5 * (offsets - 1));
+                const Rigid start{rotations[n], shift + along * rotations[n].column(2)};
+                found[n * static_cast<std::size_t>(offsets) + static_cast<std::size_t>(o)] =
+                    descend(coarse, options.hints, start, options.coarse_iterations, 25, 10);
+            }
+        }
+    });
+    report_progress(progress, 0.5, "rigid alignment: refining the best starts");
+    std::vector<RigidCandidate> best = distinct(std::move(found), std::max(options.kept, 1));
+    const Pair fine = make_pair_of(skin, target, options.fine_points);
+    parallel_for(best.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n) {
+            best[n] = descend(fine, options.hints, best[n].target_from_skin,
+                              options.fine_iterations, 12, 6);
+        }
+    });
+    if (options.hints.up) {
+        const Vector3 up = normalized(*options.hints.up);
+        const double least = std::cos(options.cone_rad);
+        std::vector<RigidCandidate> upright;
+        for (const RigidCandidate& c : best) {
+            if (dot(c.target_from_skin.rotation.column(2), up) >= least) upright.push_back(c);
+        }
+        if (!upright.empty()) best = upright;
+    }
+    return distinct(std::move(best), std::max(options.candidates, 1));
+}
+
+double PoseHints::cost_mm2(const Rigid& pose) const {
+    double cost = 0;
+    for (const Place& place : landmarks) {
+        const Vector3 r = pose * place.skin - place.target;
+        cost += landmark_weight * std::min(dot(r, r), 60.0 * 60.0);
+    }
+    if (up) {
+        const Vector3 r = pose.rotation.column(2) - *up;
+        cost += up_weight_mm2 * dot(r, r);
+    }
+    return cost;
+}
+
+RigidCandidate refine_rigid(const SkinModel& skin,
+                            const TargetSurface& target,
+                            const Rigid& start,
+                            const RigidOptions& options) {
+    return descend(make_pair_of(skin, target, options.fine_points), options.hints, start,
+                   options.fine_iterations, 12, 6);
+}
+
+}  // namespace sonocase::pipeline

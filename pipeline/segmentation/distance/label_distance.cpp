@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/segmentation/distance/label_distance.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonocase::pipeline {
+namespace {
+
+// Of sigma.
+constexpr double kWide = 1.76, kMiddle = 0.59;
+
+VoxelBox around(const VoxelBox& a, const VoxelBox& b) {
+    if (a.empty()) return b;
+    if (b.empty()) return a;
+    VoxelBox out;
+    for (int i = 0; i < 3; ++i) {
+        out.first[i] = std::min(a.first[i], b.first[i]);
+        out.size[i] = std::max(a.first[i] + a.size[i], b.first[i] + b.size[i]) - out.first[i];
+    }
+    return out;
+}
+
+}  // namespace
+
+LabelVolume slices_last(const LabelVolume& labels) {
+    const Grid& g = labels.grid;
+    int thick = 2;
+    for (const int a : {1, 0}) {
+        if (g.spacing_mm[a] > g.spacing_mm[thick] * 1.0001) thick = a;
+    }
+    if (thick == 2) return labels;
+    // A cyclic exchange keeps the frame right-handed, whatever that matters to the caller.
+    const int from[3] = {(thick + 1) % 3, (thick + 2) % 3, thick};
+    LabelVolume out;
+    out.labels = labels.labels;
+    out.grid.origin_mm = g.origin_mm;
+    for (int a = 0; a < 3; ++a) {
+        out.grid.size[a] = g.size[from[a]];
+        out.grid.spacing_mm[a] = g.spacing_mm[from[a]];
+        for (int r = 0; r < 3; ++r) out.grid.direction(r, a) = g.direction(r, from[a]);
+    }
+    out.voxels.resize(g.voxel_count());
+    for (int k = 0; k < out.grid.size.z; ++k) {
+        for (int j = 0; j < out.grid.size.y; ++j) {
+            for (int i = 0; i < out.grid.size.x; ++i) {
+                Int3 v;
+                v[from[0]] = i;
+                v[from[1]] = j;
+                v[from[2]] = k;
+                out.voxels[out.grid.index(i, j, k)] = labels.voxels[g.index(v.x, v.y, v.z)];
+            }
+        }
+    }
+    return out;
+}
+
+LabelDistance::LabelDistance(const LabelVolume& labels, const LabelDistanceOptions& options)
+    : labels_(slices_last(labels)), options_(options) {
+    const Vector3 h = labels_.grid.spacing_mm;
+    const double pixel = std::max(h.x, h.y);
+    nodes_ = labels_.grid;
+    if (options_.shape_slices && h.z >= options_.thick_ratio * pixel && labels_.grid.size.z > 1) {
+        factor_ = std::max(2, static_cast<int>(std::lround(h.z / pixel)));
+        nodes_.spacing_mm.z = h.z / factor_;
+        nodes_.size.z = (labels_.grid.size.z - 1) * factor_ + 1;
+        groups_ = find_slice_groups(labels_);
+        limit_mm_ = 4 * h.z;
+    } else {
+        limit_mm_ = (4 + 2 * options_.sigma_vx) * pixel;
+    }
+    boxes_ = label_boxes(labels_);
+    const double sigma = options_.sigma_vx;
+    if (sigma <= 0) return;
+    add_level(sigma, options_.tolerance_vx);
+    for (const double finer : {kMiddle * sigma, options_.detail_vx}) {
+        if (finer < sigma && (levels_.size() == 1 || finer < kMiddle * sigma))
+            add_level(finer, options_.tolerance_vx);
+    }
+    const double more = std::sqrt(kWide * kWide - 1) * sigma;
+    for (int a = 0; a < 3; ++a) {
+        if (nodes_.size[a] < 2) continue;
+        const auto u = static_cast<std::size_t>(a);
+        // Across slices far apart only their steps are left to flatten: at least a slice is needed.
+        const double taps = std::max(more * nodes_per_vx(a), thick(a) ? 1.0 * factor_ : 0.0);
+        // What has been smoothed once is told by every second node.
+        wide_.kernels.stride[u] = taps > 2.4 ? 2 : 1;
+        wide_.kernels.taps[u] = smoothing_kernel(taps / wide_.kernels.stride[u]);
+        wide_.spread.taps[u] =
+            spreading_kernel(thick(a) ? 0.5 * factor_ : std::max(0.8, 0.7 * taps));
+    }
+    wide_.tolerance_vx = options_.wide_tolerance_vx;
+}
+
+double LabelDistance::nodes_per_vx(int axis) const {
+    const Vector3 h = labels_.grid.spacing_mm;
+    return std::sqrt(h.x * h.y) / nodes_.spacing_mm[axis];
+}
+
+// Slices this far apart hold no noise that more would average, only curvature to lose.
+double LabelDistance::most_nodes(int axis) const {
+    const Vector3 h = labels_.grid.spacing_mm;
+    return thick(axis) && h.z >= 3.5 * std::max(h.x, h.y) ? 0.3 * factor_ : 1e9;
+}
+
+void LabelDistance::add_level(double sigma_vx, double tolerance_vx) {
+    Level level;
+    level.tolerance_vx = tolerance_vx;
+    for (int a = 0; a < 3; ++a) {
+        if (nodes_.size[a] < 2) continue;
+        double sigma = std::min(sigma_vx * nodes_per_vx(a), most_nodes(a));
+        if (thick(a) && options_.sigma_slices > 0) {
+            sigma = options_.sigma_slices * factor_ * std::min(1.0, sigma_vx / options_.sigma_vx);
+        }
+        const auto u = static_cast<std::size_t>(a);
+        // A third answers for the cubic B-spline that the nodes are later read with.
+        level.kernels.taps[u] = smoothing_kernel(sigma, 1.0 / 3);
+        // What is thin in one slice is thin half-way to the next.
+        level.spread.taps[u] =
+            spreading_kernel(thick(a) ? 0.5 * factor_ : std::max(0.8, 0.7 * sigma));
+    }
+    levels_.push_back(std::move(level));
+}
+
+VoxelBox LabelDistance::distance(const LabelSet& labels,
+                                 std::vector<float>* phi,
+                                 Scratch* work) const {
+    VoxelBox box;
+    for (std::size_t l = 0; l < boxes_.size(); ++l) {
+        if (labels[l]) box = around(box, boxes_[l]);
+    }
+    if (box.empty()) {
+        phi->clear();
+        return box;
+    }
+    const Vector3 h = labels_.grid.spacing_mm;
+    // Beyond this the labels cannot win; the kernel's reach is added so that its border is not
+    // felt.
+    Int3 pad;
+    for (int a = 0; a < 3; ++a) {
+        const int kernel = levels_.empty() ? 0 : levels_[0].kernels.reach(a);
+        pad[a] = static_cast<int>(
+            std::ceil(std::min(limit_mm_, 6 * h[a]) / h[a] + kernel * nodes_.spacing_mm[a] / h[a]));
+    }
+    if (factor_ > 1) pad.z = 2;
+    box = grow(box, pad, labels_.grid.size);
+    if (factor_ > 1) {
+        box.size.z = (box.size.z - 1) * factor_ + 1;
+        box.first.z *= factor_;
+        shape_interpolated(labels, box, phi, work);
+    } else {
+        signed_distance(labels_, labels, box, limit_mm_, {true, true, true}, phi);
+    }
+    if (levels_.empty()) return box;
+    work->smooth = *phi;
+    smooth_box(box, levels_[0].kernels, &work->smooth, &work->other);
+    work->wide = work->smooth;
+    smooth_box(box, wide_.kernels, &work->wide, &work->other);
+    add_detail(labels, box, *phi, 0, &work->smooth, work);
+    const std::vector<std::size_t> strays =
+        find_strays(labels, box, work->wide, wide_.tolerance_vx);
+    phi->swap(work->wide);
+    if (!strays.empty()) blend(box, wide_.spread, strays, box, work->smooth, phi, work);
+    return box;
+}
+
+std::vector<std::size_t> LabelDistance::find_strays(const LabelSet& labels,
+                                                    const VoxelBox& box,
+                                                    const std::vector<float>& phi,
+                                                    double tolerance_vx) const {
+    const float pixel = static_cast<float>(std::max(nodes_.spacing_mm.x, nodes_.spacing_mm.y));
+    const float tolerance = static_cast<float>(tolerance_vx) * pixel;
+    const Grid& g = labels_.grid;
+    const std::ptrdiff_t step[3] = {1, g.size.x, static_cast<std::ptrdiff_t>(g.size.x) * g.size.y};
+    std::array<bool, 256> member;
+    for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
+    // What is one voxel thick has no depth to give. Between thick slices it is the interpolation by
+    // shape that keeps what is thin.
+    const auto limit_of = [&](Int3 v) {
+        if (factor_ > 1) return tolerance;
+        const std::uint8_t* at = labels_.voxels.data() + g.index(v.x, v.y, v.z);
+        for (int a = 0; a < 3; ++a) {  // a label goes on beyond the border
+            if (v[a] == 0 || v[a] + 1 == g.size[a]) continue;
+            const std::uint8_t before = at[-step[a]], after = at[step[a]];
+            if (before != *at && after != *at) return 0.0f;
+        }
+        return tolerance;
+    };
+    std::vector<std::size_t> strays;
+    for (int k = 0; k < box.size.z; ++k) {
+        if ((box.first.z + k) % factor_ != 0) continue;  // only slices are known
+        for (int j = 0; j < box.size.y; ++j) {
+            const Int3 start{box.first.x, box.first.y + j, (box.first.z + k) / factor_};
+            const std::uint8_t* row = labels_.voxels.data() + g.index(start.x, start.y, start.z);
+            const std::size_t at = box.index(0, j, k);
+            for (int i = 0; i < box.size.x; ++i) {
+                const float value = phi[at + static_cast<std::size_t>(i)];
+                const float across = member[row[i]] ? value : -value;
+                if (across > 0 && across > limit_of({start.x + i, start.y, start.z}))
+                    strays.push_back(at + static_cast<std::size_t>(i));
+            }
+        }
+    }
+    return strays;
+}
+
+void LabelDistance::add_detail(const LabelSet& labels,
+                               const VoxelBox& box,
+                               const std::vector<float>& raw,
+                               std::size_t level,
+                               std::vector<float>* phi,
+                               Scratch* work) const {
+    if (level + 1 >= levels_.size()) return;
+    const std::vector<std::size_t> strays =
+        find_strays(labels, box, *phi, levels_[level].tolerance_vx);
+    if (strays.empty()) return;
+    const Level& finer = levels_[level + 1];
+    Int3 low = box.size, high{-1, -1, -1};
+    for (const std::size_t s : strays) {
+        const auto nx = static_cast<std::size_t>(box.size.x),
+                   ny = static_cast<std::size_t>(box.size.y);
+        const Int3 v{static_cast<int>(s % nx), static_cast<int>(s / nx % ny),
+                     static_cast<int>(s / nx / ny)};
+        for (int a = 0; a < 3; ++a) {
+            low[a] = std::min(low[a], v[a]);
+            high[a] = std::max(high[a], v[a]);
+        }
+    }
+    VoxelBox part;
+    for (int a = 0; a < 3; ++a) {
+        const int reach = levels_[level].spread.reach(a) + finer.kernels.reach(a);
+        const int first = std::max(0, low[a] - reach);
+        part.first[a] = box.first[a] + first;
+        part.size[a] = std::min(box.size[a], high[a] + reach + 1) - first;
+    }
+    std::vector<float>&part_raw = work->raw[level], &fine = work->fine[level];
+    crop(box, raw, part, &part_raw);
+    fine = part_raw;
+    smooth_box(part, finer.kernels, &fine, &work->other);
+    add_detail(labels, part, part_raw, level + 1, &fine, work);
+    blend(box, levels_[level].spread, strays, part, fine, phi, work);
+}
+
+void LabelDistance::blend(const VoxelBox& box,
+                          const BoxKernels& spread,
+                          const std::vector<std::size_t>& strays,
+                          const VoxelBox& part,
+                          const std::vector<float>& fine,
+                          std::vector<float>* phi,
+                          Scratch* work) const {
+    std::vector<float>& weight = work->weight;
+    weight.assign(part.count(), 0.0f);
+    const auto nx = static_cast<std::size_t>(box.size.x), ny = static_cast<std::size_t>(box.size.y);
+    for (const std::size_t s : strays) {
+        weight[part.index(static_cast<int>(s % nx) + box.first.x - part.first.x,
+                          static_cast<int>(s / nx % ny) + box.first.y - part.first.y,
+                          static_cast<int>(s / nx / ny) + box.first.z - part.first.z)] = 1;
+    }
+    smooth_box(part, spread, &weight, &work->other);
+    for (int k = 0; k < part.size.z; ++k) {
+        for (int j = 0; j < part.size.y; ++j) {
+            const std::size_t from = part.index(0, j, k);
+            float* to =
+                phi->data() + box.index(part.first.x - box.first.x, part.first.y - box.first.y + j,
+                                        part.first.z - box.first.z + k);
+            for (std::size_t i = 0; i < static_cast<std::size_t>(part.size.x); ++i) {
+                to[i] += std::min(1.0f, weight[from + i]) * (fine[from + i] - to[i]);
+            }
+        }
+    }
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/segmentation/distance/signed_distance.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace sonocase::pipeline {
+namespace {
+
+// Squared distance along x to the nearest voxel of the row that `is` marks, at most limit_sq.
+void row_distances(const std::uint8_t* is, int count, float spacing, float limit_sq, float* out) {
+    float run = 1e9f;
+    for (int i = 0; i < count; ++i) {
+        run = is[i] ? 0.0f : run + spacing;
+        out[i] = run;
+    }
+    run = 1e9f;
+    for (int i = count - 1; i >= 0; --i) {
+        run = is[i] ? 0.0f : run + spacing;
+        const float d = std::min(out[i], run);
+        out[i] = std::min(d * d, limit_sq);
+    }
+}
+
+// One more axis: out[l] = min over lines m of (in[m] + (l - m)^2 spacing^2), lines of `width`
+// values. Few lines lie within the limit, so that the plain minimum beats an envelope of parabolas.
+void line_distances(const float* in,
+                    std::size_t width,
+                    int lines,
+                    std::size_t stride,
+                    float spacing,
+                    float limit_sq,
+                    float* out) {
+    const int reach = static_cast<int>(std::sqrt(limit_sq) / spacing);
+    for (int l = 0; l < lines; ++l) {
+        float* to = out + static_cast<std::size_t>(l) * stride;
+        const float* own = in + static_cast<std::size_t>(l) * stride;
+        for (std::size_t i = 0; i < width; ++i) to[i] = own[i];
+        for (int m = std::max(0, l - reach); m <= std::min(lines - 1, l + reach); ++m) {
+            if (m == l) continue;
+            const float* from = in + static_cast<std::size_t>(m) * stride;
+            const float along = static_cast<float>(l - m) * spacing;
+            const float add = along * along;
+            for (std::size_t i = 0; i < width; ++i) {
+                const float d = from[i] + add;
+                to[i] = d < to[i] ? d : to[i];
+            }
+        }
+    }
+}
+
+}  // namespace
+
+std::vector<VoxelBox> label_boxes(const LabelVolume& volume) {
+    const Int3 n = volume.grid.size;
+    std::vector<Int3> low(volume.labels.size(), n), high(volume.labels.size(), {-1, -1, -1});
+    for (int k = 0; k < n.z; ++k) {
+        for (int j = 0; j < n.y; ++j) {
+            const std::uint8_t* row = volume.voxels.data() + volume.grid.index(0, j, k);
+            for (int i = 0; i < n.x;) {  // a run of one label at a time
+                int end = i + 1;
+                while (end < n.x && row[end] == row[i]) ++end;
+                Int3& a = low[row[i]];
+                Int3& b = high[row[i]];
+                a = {std::min(a.x, i), std::min(a.y, j), std::min(a.z, k)};
+                b = {std::max(b.x, end - 1), std::max(b.y, j), std::max(b.z, k)};
+                i = end;
+            }
+        }
+    }
+    std::vector<VoxelBox> boxes(volume.labels.size());
+    for (std::size_t l = 0; l < boxes.size(); ++l) {
+        if (high[l].x < 0) continue;
+        boxes[l] = {low[l],
+                    {high[l].x - low[l].x + 1, high[l].y - low[l].y + 1, high[l].z - low[l].z + 1}};
+    }
+    return boxes;
+}
+
+VoxelBox grow(const VoxelBox& box, Int3 voxels, Int3 size) {
+    VoxelBox out;
+    for (int a = 0; a < 3; ++a) {
+        out.first[a] = std::max(0, box.first[a] - voxels[a]);
+        const int end = std::min(size[a], box.first[a] + box.size[a] + voxels[a]);
+        out.size[a] = end - out.first[a];
+    }
+    return out;
+}
+
+namespace {
+
+struct DistanceWork {
+    std::vector<float> first, second;
+    std::vector<std::uint8_t> mark;
+};
+
+// phi: # box.count()
+void distances_on(const LabelVolume& volume,
+                  const std::array<std::uint8_t, 256>& member,
+                  const VoxelBox& box,
+                  double limit_mm,
+                  std::array<bool, 3> axes,
+                  float* phi,
+                  DistanceWork* work) {
+    const std::size_t nx = static_cast<std::size_t>(box.size.x);
+    const std::size_t plane = nx * static_cast<std::size_t>(box.size.y);
+    const std::size_t count = box.count();
+    const Vector3 h = volume.grid.spacing_mm;
+    // Half a voxel between the last centre inside and the surface: the mean over the axes measured.
+    double sum = 0, measured = 0;
+    for (int a = 0; a < 3; ++a) {
+        if (axes[static_cast<std::size_t>(a)]) {
+            sum += h[a];
+            measured += 1;
+        }
+    }
+    const float half = static_cast<float>(measured > 0 ? 0.5 * sum / measured : 0);
+    const float limit = static_cast<float>(limit_mm) + half;
+    const float limit_sq = limit * limit;
+    auto& [first, second, mark] = *work;
+    first.resize(count);
+    second.resize(count);
+    mark.resize(nx);
+    for (const bool outside : {false, true}) {  // distance to the label, then to what is not it
+        for (int k = 0; k < box.size.z; ++k) {
+            for (int j = 0; j < box.size.y; ++j) {
+                const std::uint8_t* row =
+                    volume.voxels.data() +
+                    volume.grid.index(box.first.x, box.first.y + j, box.first.z + k);
+                for (std::size_t i = 0; i < nx; ++i) mark[i] = member[row[i]] != outside;
+                float* to = first.data() + box.index(0, j, k);
+                if (axes[0]) {
+                    row_distances(mark.data(), box.size.x, static_cast<float>(h.x), limit_sq, to);
+                } else {
+                    for (std::size_t i = 0; i < nx; ++i) to[i] = mark[i] ? 0.0f : limit_sq;
+                }
+            }
+        }
+        if (axes[1]) {
+            for (int k = 0; k < box.size.z; ++k) {
+                const std::size_t at = static_cast<std::size_t>(k) * plane;
+                line_distances(first.data() + at, nx, box.size.y, nx, static_cast<float>(h.y),
+                               limit_sq, second.data() + at);
+            }
+            first.swap(second);
+        }
+        if (axes[2]) {
+            for (int j = 0; j < box.size.y; ++j) {  // row by row, so that the lines stay in cache
+                const std::size_t at = static_cast<std::size_t>(j) * nx;
+                line_distances(first.data() + at, nx, box.size.z, plane, static_cast<float>(h.z),
+                               limit_sq, second.data() + at);
+            }
+            first.swap(second);
+        }
+        if (!outside) {
+            for (std::size_t i = 0; i < count; ++i)
+                phi[i] = first[i] > 0 ? std::min(std::sqrt(first[i]), limit) - half : 0.0f;
+        } else {
+            for (std::size_t i = 0; i < count; ++i) {
+                const float d = half - std::min(std::sqrt(first[i]), limit);
+                phi[i] = first[i] > 0 ? d : phi[i];
+            }
+        }
+    }
+}
+
+}  // namespace
+
+void signed_distance(const LabelVolume& volume,
+                     const LabelSet& labels,
+                     const VoxelBox& box,
+                     double limit_mm,
+                     std::array<bool, 3> axes,
+                     std::vector<float>* phi) {
+    assert(limit_mm > 0);
+    phi->resize(box.count());
+    std::array<std::uint8_t, 256> member;
+    for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
+    DistanceWork work;
+    if (axes[2]) {
+        distances_on(volume, member, box, limit_mm, axes, phi->data(), &work);
+        return;
+    }
+    // Slices that know nothing of each other, in the space of one.
+    for (int k = 0; k < box.size.z; ++k) {
+        const VoxelBox slice{{box.first.x, box.first.y, box.first.z + k},
+                             {box.size.x, box.size.y, 1}};
+        distances_on(volume, member, slice, limit_mm, axes, phi->data() + box.index(0, 0, k),
+                     &work);
+    }
+}
+
+void signed_distance(const LabelVolume& volume,
+                     std::uint8_t label,
+                     const VoxelBox& box,
+                     double limit_mm,
+                     std::array<bool, 3> axes,
+                     std::vector<float>* phi) {
+    signed_distance(volume, one_label(label), box, limit_mm, axes, phi);
+}
+
+}  // namespace sonocase::pipeline

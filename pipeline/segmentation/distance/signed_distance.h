@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Signed distance to one label of a label volume, or to several as one, in a box of voxels and up
+// to a limit.
+//
+// phi < 0 inside the label, > 0 outside, in mm. The surface is taken to run half-way between a
+// voxel of the label and its neighbour outside. Exact Euclidean distance between voxel centres less
+// half a voxel, clamped to +-limit_mm. With `axes` false along the slices of a thick stack, each
+// slice is measured on its own (shape interpolation needs that). A label that reaches the border of
+// the volume is taken to go on beyond it: no surface runs along the border. Cost: O(limit /
+// spacing) a voxel and axis, vectorised; deterministic.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <vector>
+
+#include "formats/volume/label_volume.h"
+
+namespace sonocase::pipeline {
+
+// A box of voxels of a grid: first, first + 1, ... first + size - 1 in each axis.
+struct VoxelBox {
+    Int3 first{0, 0, 0};
+    Int3 size{0, 0, 0};
+    bool empty() const { return size.x <= 0 || size.y <= 0 || size.z <= 0; }
+    std::size_t count() const {
+        return empty() ? 0
+                       : static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
+                             static_cast<std::size_t>(size.z);
+    }
+    std::size_t index(int i, int j, int k) const {  // of a voxel relative to first
+        return static_cast<std::size_t>(i) +
+               static_cast<std::size_t>(size.x) *
+                   (static_cast<std::size_t>(j) +
+                    static_cast<std::size_t>(size.y) * static_cast<std::size_t>(k));
+    }
+};
+
+// The smallest box around each label, # labels; empty where a label has no voxel.
+std::vector<VoxelBox> label_boxes(const LabelVolume& volume);
+
+// `box` grown by `voxels` on each side and cut to the volume.
+VoxelBox grow(const VoxelBox& box, Int3 voxels, Int3 size);
+
+using LabelSet = std::bitset<256>;
+
+inline LabelSet one_label(std::uint8_t label) {
+    LabelSet set;
+    set.set(label);
+    return set;
+}
+
+// phi: # box.count(), x fastest. limit_mm > 0.
+void signed_distance(const LabelVolume& volume,
+                     const LabelSet& labels,
+                     const VoxelBox& box,
+                     double limit_mm,
+                     std::array<bool, 3> axes,
+                     std::vector<float>* phi);
+// Of one label.
+void signed_distance(const LabelVolume& volume,
+                     std::uint8_t label,
+                     const VoxelBox& box,
+                     double limit_mm,
+                     std::array<bool, 3> axes,
+                     std::vector<float>* phi);
+
+}  // namespace sonocase::pipeline

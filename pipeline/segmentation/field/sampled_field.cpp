@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/segmentation/field/sampled_field.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "formats/volume/boundary_record.h"
+#include "pipeline/base/parallel.h"
+#include "pipeline/segmentation/field/voxel_reader.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+// Node coordinates from frame points, single precision.
+struct NodeFromFrame {
+    float m[9];
+    float c[3];
+    explicit NodeFromFrame(const Grid& nodes) {
+        for (int a = 0; a < 3; ++a) {
+            double shift = 0;
+            for (int r = 0; r < 3; ++r) {
+                const double v = nodes.direction(r, a) / nodes.spacing_mm[a];
+                m[3 * a + r] = static_cast<float>(v);
+                shift -= v * nodes.origin_mm[r];
+            }
+            c[a] = static_cast<float>(shift);
+        }
+    }
+    void operator()(float x, float y, float z, float* out) const {
+        for (int a = 0; a < 3; ++a)
+            out[a] = m[3 * a] * x + m[3 * a + 1] * y + m[3 * a + 2] * z + c[a];
+    }
+};
+
+// One row of bricks: 4 x 4 rows of voxels.
+struct Strip {
+    std::vector<std::uint32_t> table;  // pool entries count from 0 in the strip
+    std::vector<std::uint32_t> pool;
+    PreimageCounts counts;
+};
+
+// Scratch space of one thread.
+struct Rows {
+    explicit Rows(std::size_t nx, int bricks_x)
+        : x(nx),
+          y(nx),
+          z(nx),
+          status(nx),
+          record(16 * nx),
+          slope(static_cast<std::size_t>(bricks_x)),
+          has_slope(slope.size()) {}
+    std::vector<float> x, y, z;
+    std::vector<MapStatus> status;
+    std::vector<std::uint32_t> record;  // 16 rows
+    // d(node) / d(voxel of the grid), one for each brick, made when first needed.
+    std::vector<Matrix3> slope;
+    std::vector<std::uint8_t> has_slope;
+};
+
+Matrix3 node_slope(const Grid& nodes, const Grid& grid, const Matrix3& frame_from_grid) {
+    Matrix3 slope;
+    for (int a = 0; a < 3; ++a) {
+        for (int b = 0; b < 3; ++b) {
+            double sum = 0;
+            for (int q = 0; q < 3; ++q)
+                sum += nodes.direction(q, a) / nodes.spacing_mm[a] * frame_from_grid(q, b);
+            slope(a, b) = sum * grid.spacing_mm.x;
+        }
+    }
+    return slope;
+}
+
+// Bricks of records from the 16 rows of a strip.
+void store_bricks(
+    const Grid& grid, int by, int bz, const std::vector<std::uint32_t>& record, Strip* strip) {
+    const int bricks_x = brick_count(grid.size).x;
+    strip->table.reserve(static_cast<std::size_t>(bricks_x));
+    for (int bx = 0; bx < bricks_x; ++bx) {
+        std::array<std::uint32_t, kBrickVoxels> brick;
+        bool empty = true;
+        for (int q = 0; q < kBrickVoxels; ++q) {
+            const int i = std::min(4 * bx + q % 4, grid.size.x - 1);
+            const int j = std::min(q / 4 % 4, grid.size.y - 1 - 4 * by);
+            const int k = std::min(q / 16, grid.size.z - 1 - 4 * bz);
+            const std::uint32_t value =
+                record[static_cast<std::size_t>(j + 4 * k) * static_cast<std::size_t>(grid.size.x) +
+                       static_cast<std::size_t>(i)];
+            brick[static_cast<std::size_t>(q)] = value;
+            empty = empty && value == kNoBoundary;
+        }
+        if (empty) {
+            strip->table.push_back(kUniformBrick);
+        } else {
+            strip->table.push_back(static_cast<std::uint32_t>(strip->pool.size() / kBrickVoxels));
+            strip->pool.insert(strip->pool.end(), brick.begin(), brick.end());
+        }
+    }
+}
+
+void join_bricks(std::vector<Strip>* strips, const Grid& grid, BoundaryBricks* boundary) {
+    boundary->size = grid.size;
+    boundary->uniform = {kNoBoundary};
+    std::size_t stored = 0, entries = 0;
+    for (const Strip& strip : *strips) {
+        stored += strip.pool.size();
+        entries += strip.table.size();
+    }
+    boundary->pool.reserve(stored);
+    boundary->table.reserve(entries);
+    for (Strip& strip : *strips) {
+        const auto base = static_cast<std::uint32_t>(boundary->pool.size() / kBrickVoxels);
+        for (const std::uint32_t entry : strip.table)
+            boundary->table.push_back(entry & kUniformBrick ? entry : entry + base);
+        boundary->pool.insert(boundary->pool.end(), strip.pool.begin(), strip.pool.end());
+        std::vector<std::uint32_t>().swap(strip.pool);
+    }
+}
+
+// Node at which a label comes nearest to winning; nothing if it is a candidate nowhere.
+std::optional<Int3> nearest_to_winning(const LabelField& field, std::uint8_t label) {
+    float nearest = 1e30f;
+    std::optional<Int3> place;
+    const int edge = field.block_edge();
+    std::array<float, 256> score;
+    for (const LabelField::Block& block : field.blocks()) {
+        const auto at = std::find(block.labels.begin(), block.labels.end(), label);
+        if (at == block.labels.end() || block.labels.size() < 2) continue;
+        const auto own = static_cast<std::size_t>(at - block.labels.begin());
+        for (int q = 0; q < edge * edge * edge; ++q) {
+            const Int3 node{block.first.x + q % edge, block.first.y + q / edge % edge,
+                            block.first.z + q / edge / edge};
+            if (!field.nodes().contains(node.x, node.y, node.z)) continue;
+            LabelField::Position position = field.locate(
+                static_cast<float>(node.x), static_cast<float>(node.y), static_cast<float>(node.z));
+            position.contest = &block.contests[0];
+            field.scores(position, score.data());
+            float other = 1e30f;
+            for (std::size_t c = 0; c < block.labels.size(); ++c) {
+                if (c != own) other = std::min(other, score[c]);
+            }
+            if (score[own] - other < nearest) {
+                nearest = score[own] - other;
+                place = node;
+            }
+        }
+    }
+    return place;
+}
+
+// Guard: no label of the source may vanish without a word.
+void put_back_lost(const LabelField& field, const FieldMap& map, SampledField* out) {
+    const Grid& grid = out->volume.grid;
+    const Int3 bricks = brick_count(grid.size);
+    std::array<bool, 256> in_source{}, in_answer{};
+    for (const std::uint8_t v : field.source().voxels) in_source[v] = true;
+    for (const std::uint8_t v : out->volume.voxels) in_answer[v] = true;
+    for (std::size_t l = 1; l < out->volume.labels.size(); ++l) {
+        if (!in_source[l] || in_answer[l]) continue;
+        const std::optional<Int3> node = nearest_to_winning(field, static_cast<std::uint8_t>(l));
+        Int3 v{-1, -1, -1};
+        if (node) {
+            const Point3 voxel = grid.voxel_from_point(map.forward(field.nodes().point_from_voxel(
+                {static_cast<double>(node->x), static_cast<double>(node->y),
+                 static_cast<double>(node->z)})));
+            for (int a = 0; a < 3; ++a) v[a] = static_cast<int>(std::lround(voxel[a]));
+        }
+        if (!grid.contains(v.x, v.y, v.z)) {
+            out->lost.push_back(static_cast<int>(l));
+            continue;
+        }
+        out->volume.voxels[grid.index(v.x, v.y, v.z)] = static_cast<std::uint8_t>(l);
+        out->rescued.push_back(static_cast<int>(l));
+        if (out->boundary.table.empty()) continue;
+        // The voxel is drawn whole.
+        const std::size_t brick =
+            static_cast<std::size_t>(v.x / 4) +
+            static_cast<std::size_t>(bricks.x) *
+                (static_cast<std::size_t>(v.y / 4) +
+                 static_cast<std::size_t>(bricks.y) * static_cast<std::size_t>(v.z / 4));
+        const std::uint32_t entry = out->boundary.table[brick];
+        if (!(entry & kUniformBrick)) {
+            out->boundary.pool[static_cast<std::size_t>(entry) * kBrickVoxels +
+                               static_cast<std::size_t>(v.x % 4 + 4 * (v.y % 4) + 16 * (v.z % 4))] =
+                kNoBoundary;
+        }
+    }
+}
+
+}  // namespace
+
+SampledField sample_label_field(LabelField* field,
+                                const Grid& grid,
+                                const FieldMap& map,
+                                const FieldReadOptions& options,
+                                const Progress& progress) {
+    SampledField out;
+    out.volume.grid = grid;
+    out.volume.labels = field->source().labels;
+    out.volume.voxels.assign(grid.voxel_count(), 0);
+    const bool records = options.record_band_vx > 0;
+    report_progress(progress, 0, "voxels");
+    field->find_contests(VoxelReader::reach_mm(options.record_band_vx, grid));
+    const VoxelReader reader(*field, grid, options.record_band_vx);
+    const NodeFromFrame node_from_frame(field->nodes());
+    const Int3 bricks = brick_count(grid.size);
+    std::vector<Strip> strips(static_cast<std::size_t>(bricks.y) *
+                              static_cast<std::size_t>(bricks.z));
+
+    const auto read_row = [&](int by, int bz, int r, Rows* rows, Strip* strip) {
+        const int j = 4 * by + r % 4, k = 4 * bz + r / 4;
+        if (j >= grid.size.y || k >= grid.size.z) return;
+        map.row(j, k, rows->x.data(), rows->y.data(), rows->z.data(), rows->status.data());
+        std::uint8_t* to = out.volume.voxels.data() + grid.index(0, j, k);
+        std::uint32_t* record = rows->record.data() + static_cast<std::size_t>(r) * rows->x.size();
+        for (std::size_t i = 0; i < rows->x.size(); ++i) {
+            if (rows->status[i] != MapStatus::ok) {
+                ++(rows->status[i] == MapStatus::outside ? strip->counts.outside
+                                                         : strip->counts.no_preimage);
+                continue;
+            }
+            float v[3];
+            node_from_frame(rows->x[i], rows->y[i], rows->z[i], v);
+            if (reader.beyond(v)) {
+                ++strip->counts.outside;
+                continue;
+            }
+            const VoxelRead read = reader(v, [&]() -> const Matrix3& {
+                Matrix3& slope = rows->slope[i / 4];
+                if (!rows->has_slope[i / 4]) {
+                    rows->has_slope[i / 4] = true;
+                    slope = node_slope(field->nodes(), grid,
+                                       map.jacobian({rows->x[i], rows->y[i], rows->z[i]}));
+                }
+                return slope;
+            });
+            to[i] = read.label;
+            record[i] = read.record;
+        }
+    };
+    // In a few parts, so that progress can be told from the calling thread.
+    constexpr std::size_t kParts = 20;
+    for (std::size_t part = 0; part < kParts; ++part) {
+        const std::size_t first = strips.size() * part / kParts;
+        parallel_for(strips.size() * (part + 1) / kParts - first, 4,
+                     [&](std::size_t begin, std::size_t end) {
+                         Rows rows(static_cast<std::size_t>(grid.size.x), bricks.x);
+                         for (std::size_t s = first + begin; s < first + end; ++s) {
+                             const auto y = static_cast<std::size_t>(bricks.y);
+                             const int by = static_cast<int>(s % y), bz = static_cast<int>(s / y);
+                             std::fill(rows.record.begin(), rows.record.end(), kNoBoundary);
+                             std::fill(rows.has_slope.begin(), rows.has_slope.end(), 0);
+                             for (int r = 0; r < 16; ++r) read_row(by, bz, r, &rows, &strips[s]);
+                             if (records) store_bricks(grid, by, bz, rows.record, &strips[s]);
+                         }
+                     });
+        report_progress(progress, static_cast<double>(part + 1) / kParts, "voxels");
+    }
+    if (records) join_bricks(&strips, grid, &out.boundary);
+    for (const Strip& strip : strips) {
+        out.counts.outside += strip.counts.outside;
+        out.counts.no_preimage += strip.counts.no_preimage;
+    }
+    put_back_lost(*field, map, &out);
+    return out;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/engine/needle_state.h"
+
+#include <algorithm>
+
+#include "formats/scoring/anatomy.h"
+
+namespace sonocase::runtime {
+namespace {
+
+// Turns the measured frame by the least rotation that brings its z onto `z`, so that the needle
+// does not spin when it bends.
+Matrix3 turned_onto(const Matrix3& measured, Vector3 z) {
+    const Vector3 from = measured.column(2);
+    const Vector3 axis = cross(from, z);
+    const double sine = norm(axis);
+    if (!(sine > 1e-12)) return measured;
+    return rotation_about(axis / sine, std::atan2(sine, dot(from, z))) * measured;
+}
+
+}  // namespace
+
+NeedleConstraintOptions constraint_of(const NeedleModel& needle) {
+    return {needle.bend_max_weight, needle.bend_alpha_per_m / 1000, needle.bend_delta_m * 1000};
+}
+
+NeedleState::NeedleState(const Anatomy* anatomy,
+                         const NeedleModel& needle,
+                         const InsertionOptions& options)
+    : anatomy_(anatomy),
+      constraint_(constraint_of(needle)),
+      length_mm_(needle.length_mm),
+      detector_(options) {}
+
+NeedleView NeedleState::update(double time_s, const Rigid& measured) {
+    NeedleView view;
+    view.mannequin_from_drawn = measured;
+    if (!anatomy_ || !is_finite(measured)) return view;
+    const Vector3 at = measured.translation;
+    const Point3 tip{at.x, at.y, at.z};
+    const Vector3 direction = measured.rotation.column(2);
+    Point3 skin;
+    const double depth = insertion_depth_mm(*anatomy_, tip, direction, length_mm_, &skin);
+    view.change = detector_.update(time_s, depth, direction, skin);
+    view.inserted = detector_.inserted();
+    view.depth_mm = std::max(depth, 0.0);
+    if (!view.inserted || view.depth_mm == 0) return view;
+    const Vector3 drawn = constrain_needle_direction(detector_.entry_direction(), direction,
+                                                     view.depth_mm, constraint_);
+    const double w = needle_constraint_weight(view.depth_mm, constraint_);
+    const Point3 through = skin + w * (detector_.entry_point() - skin);
+    const Point3 drawn_tip = through + view.depth_mm * drawn;
+    view.mannequin_from_drawn = {turned_onto(measured.rotation, drawn), drawn_tip - Point3{}};
+    return view;
+}
+
+}  // namespace sonocase::runtime

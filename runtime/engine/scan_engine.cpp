@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/engine/scan_engine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace sonocase::runtime {
+namespace {
+
+const SensorReading* sensor(const TrackerReading& reading, int index) {
+    if (index < 0 || index >= reading.sensor_count || index >= kMaxSensors) return nullptr;
+    const SensorReading& s = reading.sensors[static_cast<std::size_t>(index)];
+    return s.state == SensorState::ok || s.state == SensorState::poor ? &s : nullptr;
+}
+
+}  // namespace
+
+ToolPoses tool_poses(const TrackerReading& reading,
+                     const Calibrations& calibrations,
+                     const SensorAssignment& assignment) {
+    // A script and the mouse hand over tools, always in their own places.
+    const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment;
+    const auto place = [&](const SensorReading& s, const std::optional<Calibration>& tool) {
+        if (reading.in_mannequin) return s.world_from_sensor;
+        Rigid world_from_tool = s.world_from_sensor;
+        if (tool) world_from_tool = world_from_tool * tool->sensor_from_tool;
+        if (!calibrations.mannequin) return world_from_tool;
+        Rigid pose = inverse(calibrations.mannequin->sensor_from_tool) * world_from_tool;
+        if (calibrations.mannequin->scale > 0) {
+            pose.translation = pose.translation / calibrations.mannequin->scale;
+        }
+        return pose;
+    };
+    ToolPoses tools;
+    if (const SensorReading* s = sensor(reading, places.probe)) {
+        tools.has_probe = true;
+        tools.mannequin_from_probe = place(*s, calibrations.probe);
+    }
+    if (const SensorReading* s = sensor(reading, places.needle)) {
+        tools.has_needle = true;
+        tools.mannequin_from_needle = place(*s, calibrations.needle);
+    }
+    return tools;
+}
+
+bool probe_in_contact(const Skin& skin, const Probe& probe, const Rigid& mannequin_from_probe) {
+    constexpr double kGelMm = 4;
+    const Vector3 beam = mannequin_from_probe.rotation.column(2);
+    for (double part : {0.0, -0.25, 0.25, -0.5, 0.5}) {
+        Point3 face{part * probe.width_mm, 0, 0};
+        if (probe.shape == ProbeShape::curvilinear) {
+            const double angle = part * probe.field_of_view_rad;
+            face = {probe.radius_mm * std::sin(angle), 0, probe.radius_mm * (std::cos(angle) - 1)};
+        }
+        const Point3 p = mannequin_from_probe * face;
+        for (double depth = 0; depth <= kGelMm; depth += 1) {
+            if (skin.inside(p + depth * beam)) return true;
+        }
+    }
+    return false;
+}
+
+Result<ScanEngine> ScanEngine::create(const CaseBundle& bundle,
+                                      const Exercise& exercise,
+                                      const EngineOptions& options) {
+    Exercise adjusted = exercise;
+    if (options.depth_mm > 0) adjusted.probe.depth_mm = options.depth_mm;
+    if (options.focus_mm > 0) adjusted.probe.focus_mm = options.focus_mm;
+    Result<Renderer> renderer = Renderer::create(bundle, adjusted, options.render);
+    if (!renderer) return renderer.error();
+    return ScanEngine(bundle, std::move(adjusted), options, std::move(*renderer));
+}
+
+void ScanEngine::observe(const TrackerReading& reading, bool is_device) {
+    const auto watch = [&](SensorWatch& of, int index) {
+        const bool there = index >= 0 && index < reading.sensor_count && index < kMaxSensors;
+        const SensorReading none;
+        of.observe(there ? reading.sensors[static_cast<std::size_t>(index)] : none, reading.time_s,
+                   is_device);
+    };
+    const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment_;
+    watch(probe_watch_, places.probe);
+    watch(needle_watch_, places.needle);
+    reading_ = reading;
+    ToolPoses tools = tool_poses(reading, calibrations_, assignment_);
+    // A lost probe keeps its last place, so that the picture freezes rather than flickers.
+    // What comes in `mannequin` (scripts, the mouse, sessions recorded here) was checked where it
+    // was made: holding it back a second time would make a replay differ.
+    const bool checked = reading.in_mannequin;
+    if (!tools.has_probe || (!checked && probe_watch_.hold())) {
+        tools.has_probe = tools_.has_probe;
+        tools.mannequin_from_probe = tools_.mannequin_from_probe;
+    }
+    if (!checked && needle_watch_.hold()) {
+        tools.has_needle = tools_.has_needle;
+        tools.mannequin_from_needle = tools_.mannequin_from_needle;
+    }
+    tools_ = tools;
+}
+
+FrameStatus ScanEngine::frame(double now_s,
+                              const ImageSettings& settings,
+                              std::span<std::uint8_t> pixels) {
+    FrameRecord record;
+    record.tools = tools_;
+    record.reading_time_s = reading_.time_s;
+    FrameInput& input = record.input;
+    input.mannequin_from_probe = tools_.mannequin_from_probe;
+    input.has_needle = tools_.has_needle;
+    const double time_s = now_s - origin_s_;
+    if (tools_.has_needle) {
+        record.needle = needle_.update(time_s, tools_.mannequin_from_needle);
+        const Rigid& needle = record.needle.mannequin_from_drawn;
+        input.needle.tip = needle * Point3{0, 0, 0};
+        input.needle.direction = needle.rotation.column(2);
+    }
+    input.time_s = time_s;
+    input.frame = frame_++;
+    input.settings = settings;
+    last_ = record;
+    return finish(input, renderer_.render(input, pixels), pixels);
+}
+
+void ScanEngine::begin_session(double now_s) {
+    origin_s_ = now_s;
+    frame_ = 0;
+    needle_ = NeedleState(anatomy_.get(), exercise_.needle);
+}
+
+void ScanEngine::take_over(const ScanEngine& before) {
+    needle_ = before.needle_;
+    needle_.set_anatomy(anatomy_.get());
+    probe_watch_ = before.probe_watch_;
+    needle_watch_ = before.needle_watch_;
+    reading_ = before.reading_;
+    tools_ = before.tools_;
+    last_ = before.last_;
+    frame_ = before.frame_;
+    origin_s_ = before.origin_s_;
+}
+
+FrameStatus ScanEngine::frame_again(const FrameRecord& record, std::span<std::uint8_t> pixels) {
+    return finish(record.input, renderer_.render(record.input, pixels), pixels);
+}
+
+FrameStatus ScanEngine::finish(const FrameInput& input,
+                               FrameStatus status,
+                               std::span<std::uint8_t> pixels) {
+    if (status != FrameStatus::rendered ||
+        probe_in_contact(skin_, exercise_.probe, input.mannequin_from_probe)) {
+        return status;
+    }
+    // Model physical darkens by itself, beam by beam; the paper's image formation knows no air.
+    if (options_.render.model == ImageModel::paper) {
+        std::fill(pixels.begin(), pixels.end(), std::uint8_t{0});
+    }
+    return FrameStatus::no_contact;
+}
+
+}  // namespace sonocase::runtime

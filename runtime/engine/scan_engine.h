@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// From tracker readings to pixels: calibrations, sensor checks, needle, renderer. One frame is one
+// call; nothing here waits, reads a file or asks a clock, so that the window, the headless run, a
+// test and a browser drive the same engine.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "formats/bundle/case_bundle.h"
+#include "formats/calibration/calibration.h"
+#include "formats/exercise/exercise.h"
+#include "formats/scoring/anatomy.h"
+#include "formats/scoring/session_score.h"
+#include "runtime/engine/needle_state.h"
+#include "runtime/engine/sensor_watch.h"
+#include "runtime/engine/skin.h"
+#include "runtime/engine/tracker_reading.h"
+#include "runtime/imaging/renderer.h"
+
+namespace sonocase::runtime {
+
+struct Calibrations {
+    std::optional<Calibration> probe, needle, mannequin;
+    double needle_lag_s = 0;  // the needle's recording is so much later than the probe's
+};
+
+// Which sensor is on which tool; -1: none.
+struct SensorAssignment {
+    int probe = kProbeSensor;
+    int needle = kNeedleSensor;
+    friend bool operator==(const SensorAssignment&, const SensorAssignment&) = default;
+};
+
+// Tools in `mannequin`, out of a reading.
+struct ToolPoses {
+    bool has_probe = false, has_needle = false;
+    Rigid mannequin_from_probe;
+    Rigid mannequin_from_needle;  // origin at the tip, z from hub to tip
+};
+
+// Applies sensor_from_tool and world_from_mannequin (with its scale). A sensor that is absent or
+// lost gives no tool. Constant time.
+ToolPoses tool_poses(const TrackerReading& reading,
+                     const Calibrations& calibrations,
+                     const SensorAssignment& assignment);
+
+// A frame's input as it was rendered, enough to render the same pixels again: the cine loop keeps
+// these instead of pictures.
+struct FrameRecord {
+    FrameInput input;
+    ToolPoses tools;
+    NeedleView needle;  // as drawn, after the bend constraint
+    double reading_time_s = 0;
+};
+
+struct EngineOptions {
+    RenderOptions render;
+    double depth_mm = 0;  // > 0 overrides the exercise's
+    double focus_mm = 0;  // > 0 overrides the exercise's
+};
+
+// True if the face of the probe touches the skin somewhere: body within 4 mm, what gel bridges, of
+// one of five points across it. Constant time.
+bool probe_in_contact(const Skin& skin, const Probe& probe, const Rigid& mannequin_from_probe);
+
+class ScanEngine {
+  public:
+    // The bundle must outlive the engine.
+    static Result<ScanEngine> create(const CaseBundle& bundle,
+                                     const Exercise& exercise,
+                                     const EngineOptions& options);
+
+    // Takes a new reading; the next frame shows it.
+    void observe(const TrackerReading& reading, bool is_device);
+    // Renders the frame of the last reading; pixels # width * height. Neither throws nor allocates.
+    FrameStatus frame(double now_s, const ImageSettings& settings, std::span<std::uint8_t> pixels);
+    // Begins a session: its time and its frame numbers count from here, and no needle is inserted
+    // yet. What is rendered afterwards depends on readings, settings and times since now_s alone,
+    // so that a replay of the recording gives the same pixels.
+    void begin_session(double now_s);
+    // Goes on where another engine of the same bundle and exercise stood: session clock, frame
+    // numbers, tools, inserted needle. For a change of depth in the middle of a session.
+    void take_over(const ScanEngine& before);
+    // Renders a past frame again: the same pixels.
+    FrameStatus frame_again(const FrameRecord& record, std::span<std::uint8_t> pixels);
+
+    void set_calibrations(const Calibrations& calibrations) { calibrations_ = calibrations; }
+    void set_assignment(const SensorAssignment& assignment) { assignment_ = assignment; }
+
+    const FrameRecord& last() const { return last_; }
+    std::shared_ptr<const Anatomy> anatomy() const { return anatomy_; }
+    SensorVerdict probe_verdict(double now_s) const { return probe_watch_.verdict(now_s); }
+    SensorVerdict needle_verdict(double now_s) const { return needle_watch_.verdict(now_s); }
+    int jumps() const { return probe_watch_.jumps() + needle_watch_.jumps(); }
+    const Renderer& renderer() const { return renderer_; }
+    const Exercise& exercise() const { return exercise_; }
+    const RenderOptions& render_options() const { return options_.render; }
+
+  private:
+    ScanEngine(const CaseBundle& bundle,
+               Exercise exercise,
+               EngineOptions options,
+               Renderer renderer)
+        : skin_(bundle),
+          anatomy_(std::make_shared<CaseAnatomy>(
+              bundle,
+              breathing_shown(
+                  exercise, options.render.model == ImageModel::physical, options.render.effects))),
+          needle_(anatomy_.get(), exercise.needle),
+          exercise_(std::move(exercise)),
+          options_(std::move(options)),
+          renderer_(std::move(renderer)) {}
+
+    FrameStatus finish(const FrameInput& input, FrameStatus status, std::span<std::uint8_t> pixels);
+
+    Skin skin_;
+    std::shared_ptr<CaseAnatomy> anatomy_;  // stays in place when the engine moves
+    NeedleState needle_;
+    Exercise exercise_;
+    EngineOptions options_;
+    Renderer renderer_;
+    Calibrations calibrations_;
+    SensorAssignment assignment_;
+    SensorWatch probe_watch_, needle_watch_;
+    TrackerReading reading_;
+    FrameRecord last_;
+    ToolPoses tools_;
+    std::uint32_t frame_ = 0;
+    double origin_s_ = 0;  // of the session
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/engine/sensor_watch.h"
+
+#include <algorithm>
+
+namespace sonocase::runtime {
+
+const char* verdict_sentence(SensorVerdict verdict) {
+    switch (verdict) {
+        case SensorVerdict::fine:
+        case SensorVerdict::absent:
+            return "";
+        case SensorVerdict::lost:
+            return "Out of range: bring the sensor nearer to the transmitter.";
+        case SensorVerdict::stale:
+            return "No new reading: check the cable of the tracker.";
+        case SensorVerdict::frozen:
+            return "Frozen: readings arrive but never change; replug the sensor.";
+        case SensorVerdict::jumped:
+            return "Jumped faster than a hand can: check for loose mounts and metal nearby.";
+        case SensorVerdict::poor:
+            return "Distorted field: move metal away from the sensor.";
+    }
+    return "";
+}
+
+void SensorWatch::observe(const SensorReading& reading, double time_s, bool is_device) {
+    device_ = is_device;
+    const bool usable = (reading.state == SensorState::ok || reading.state == SensorState::poor) &&
+                        is_finite(reading.world_from_sensor);
+    if (!seen_ || !(reading.world_from_sensor == last_.world_from_sensor)) changed_s_ = time_s;
+    hold_ = false;
+    if (usable) {
+        if (!seen_ || trusted_s_ < 0) {
+            trusted_ = reading.world_from_sensor;
+        } else {
+            const auto reach = [&](double dt) {
+                // 5 mm of grace: the noise of a distorted sensor at 240 Hz is not a jump.
+                return 5 + options_.top_speed_mm_s * std::max(dt, 0.0);
+            };
+            const double moved = norm(reading.world_from_sensor.translation - trusted_.translation);
+            const double since_last =
+                norm(reading.world_from_sensor.translation - last_.world_from_sensor.translation);
+            const bool far = moved > reach(time_s - trusted_s_);
+            const bool confirmed =
+                last_.state != SensorState::lost && since_last <= reach(time_s - last_s_);
+            if (far && !confirmed) {
+                hold_ = device_;
+                if (device_) ++jumps_, jump_s_ = time_s;
+            } else {
+                trusted_ = reading.world_from_sensor;
+            }
+        }
+        if (!hold_) trusted_s_ = time_s;
+    }
+    last_ = reading;
+    last_s_ = time_s;
+    seen_ = true;
+}
+
+SensorVerdict SensorWatch::verdict(double now_s) const {
+    if (!seen_ || last_.state == SensorState::absent) return SensorVerdict::absent;
+    if (device_ && now_s - last_s_ > options_.stale_after_s) return SensorVerdict::stale;
+    if (last_.state == SensorState::lost) return SensorVerdict::lost;
+    if (device_ && last_s_ - changed_s_ > options_.frozen_after_s) return SensorVerdict::frozen;
+    if (now_s - jump_s_ < options_.jump_shown_s) return SensorVerdict::jumped;
+    if (last_.state == SensorState::poor) return SensorVerdict::poor;
+    return SensorVerdict::fine;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/engine/skin.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonocase::runtime {
+
+bool Skin::inside(Point3 p) const {
+    const Point3 v = bundle_->grid.voxel_from_point(p);
+    const Int3 size = bundle_->label_bricks.size;
+    // Compared before the conversion, so that no far-off or unordered value reaches it.
+    if (!(v.x > -0.5 && v.y > -0.5 && v.z > -0.5 && v.x < size.x - 0.5 && v.y < size.y - 0.5 &&
+          v.z < size.z - 0.5)) {
+        return false;
+    }
+    return bundle_->label_bricks.at(static_cast<int>(v.x + 0.5), static_cast<int>(v.y + 0.5),
+                                    static_cast<int>(v.z + 0.5)) != 0;
+}
+
+std::optional<Point3> Skin::enter(Point3 start, Vector3 direction, double reach_mm) const {
+    const double step = 0.5 * bundle_->grid.spacing_mm.x;
+    if (inside(start)) return std::nullopt;
+    double outside = 0;
+    for (double t = step; t <= reach_mm; t += step) {
+        if (!inside(start + t * direction)) {
+            outside = t;
+            continue;
+        }
+        double body = t;
+        while (body - outside > 0.01) {
+            const double middle = 0.5 * (outside + body);
+            (inside(start + middle * direction) ? body : outside) = middle;
+        }
+        return start + body * direction;
+    }
+    return std::nullopt;
+}
+
+std::optional<Point3> Skin::project(Point3 near, Vector3 direction, double reach_mm) const {
+    // Starts that are already inside (a thick limb in the way) move closer until they are out.
+    for (double back = 1.5 * reach_mm; back >= 0; back -= std::max(0.125 * reach_mm, 0.5)) {
+        const Point3 start = near - back * direction;
+        if (!inside(start)) return enter(start, direction, back + reach_mm);
+    }
+    return std::nullopt;
+}
+
+bool Skin::at_border(Point3 p) const {
+    const Point3 v = bundle_->grid.voxel_from_point(p);
+    const Int3 size = bundle_->label_bricks.size;
+    for (int a = 0; a < 3; ++a) {
+        if (!(v[a] >= 1) || !(v[a] <= size[a] - 2)) return true;
+    }
+    return false;
+}
+
+bool Skin::inside_extended(Point3 p) const {
+    Point3 v = bundle_->grid.voxel_from_point(p);
+    const Int3 size = bundle_->label_bricks.size;
+    for (int a = 0; a < 3; ++a) v[a] = std::clamp(v[a], 0.0, size[a] - 1.0);
+    return inside(bundle_->grid.point_from_voxel(v));
+}
+
+Vector3 Skin::normal(Point3 p, double radius_mm) const {
+    constexpr int kSteps = 4;
+    Vector3 extended, bare;
+    for (int k = -kSteps; k <= kSteps; ++k) {
+        for (int j = -kSteps; j <= kSteps; ++j) {
+            for (int i = -kSteps; i <= kSteps; ++i) {
+                const Vector3 offset{double(i) / kSteps, double(j) / kSteps, double(k) / kSteps};
+                const double r2 = dot(offset, offset);
+                if (r2 > 1) continue;
+                const Point3 q = p + radius_mm * offset;
+                if (inside_extended(q)) extended = extended - (1 - r2) * offset;
+                if (inside(q)) bare = bare - (1 - r2) * offset;
+            }
+        }
+    }
+    // A volume cropped to the very skin has no air of its own; then the border is the skin.
+    const Vector3 sum = norm(extended) > 1 ? extended : bare;
+    return norm(sum) > 1e-9 ? normalized(sum) : Vector3{0, 0, 0};
+}
+
+}  // namespace sonocase::runtime

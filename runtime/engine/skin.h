@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The skin as the player feels it: where the cooked labels begin. Read from the label volume itself
+// and not from a mesh, so that what the mouse touches is exactly what the picture shows, in every
+// bundle, with or without a surface.
+#pragma once
+
+#include <optional>
+
+#include "formats/bundle/case_bundle.h"
+
+namespace sonocase::runtime {
+
+class Skin {
+  public:
+    // The bundle must outlive the skin.
+    explicit Skin(const CaseBundle& bundle) : bundle_(&bundle) {}
+
+    bool inside(Point3 p_mannequin) const;
+
+    // First crossing from outside to inside on the segment from `start` along the unit vector
+    // `direction`, to a hundredth of a millimetre; nothing when there is none within `reach_mm` or
+    // `start` lies inside. Cost: reach / (half a voxel) look-ups.
+    std::optional<Point3> enter(Point3 start, Vector3 direction, double reach_mm) const;
+
+    // Skin point on the line through `near` along `direction`: searched from 1.5 x reach before it
+    // to reach beyond, so that `near` may lie on either side.
+    std::optional<Point3> project(Point3 near, Vector3 direction, double reach_mm) const;
+
+    // Outward unit normal: the direction out of the body over a ball of radius_mm about p. A real
+    // probe face bridges small dents, so a radius of half a face is right. Zero vector where the
+    // ball holds only body or only air. Where the volume ends inside the body, the body is taken to
+    // go on. Cost: about 500 look-ups.
+    Vector3 normal(Point3 p, double radius_mm = 12) const;
+
+    // True within a voxel of the volume's border: what is met there is a cut and not skin.
+    bool at_border(Point3 p) const;
+
+  private:
+    bool inside_extended(Point3 p) const;
+
+    const CaseBundle* bundle_;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What a tracker says of all its sensors at one moment. Time is injected: seconds on the session's
+// clock.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "formats/base/geometry.h"
+
+namespace sonocase::runtime {
+
+inline constexpr int kMaxSensors = 16;
+inline constexpr int kProbeSensor = 0;  // unless the sensors are assigned otherwise
+inline constexpr int kNeedleSensor = 1;
+
+enum class SensorState : std::uint8_t {
+    absent,  // no such sensor
+    ok,
+    poor,  // a pose, of doubtful quality: distorted field, near the edge of the range
+    lost,  // the device sees no pose; the one given is the last good one
+};
+
+struct SensorReading {
+    SensorState state = SensorState::absent;
+    Rigid world_from_sensor;
+    float quality = -1;        // [0, 1], 1 is best; negative: the device does not say
+    std::uint8_t buttons = 0;  // bit 0: the first
+};
+
+// All sensors at one moment.
+struct TrackerReading {
+    std::uint64_t sequence = 0;  // rises with every reading of this tracker
+    double time_s = 0;           // arrival on the session's clock
+    double device_time_s = -1;   // on the device's own clock; negative: it has none
+    // The sensors are the tools themselves and `world` is the mannequin: no calibration applies.
+    bool in_mannequin = false;
+    int sensor_count = 0;
+    std::array<SensorReading, kMaxSensors> sensors{};
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The needle prepared for a block of beams: where it can show, and its constants in single
+// precision.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "runtime/imaging/needle/needle_chord.h"
+#include "runtime/imaging/scan/scan_geometry.h"
+
+namespace sonocase::runtime {
+
+inline constexpr int kBeamBlock = 16;  // beams worked on together; a cache line of floats
+
+// Beams relative to the needle's tip; see needle_share().
+struct NeedleRow {
+    alignas(64) float origin_x[kBeamBlock];
+    alignas(64) float origin_z[kBeamBlock];
+    alignas(64) float direction_x[kBeamBlock];
+    alignas(64) float direction_z[kBeamBlock];
+    float step, wy, ax, ay, az, a, radius, length, slab, tip_opacity, shaft_opacity, inverse_reach;
+};
+
+// The part of the needle that the slab can show, projected on the plane: a segment with a radius.
+class NeedleStrip {
+  public:
+    NeedleStrip() = default;
+    explicit NeedleStrip(const NeedleShape& n, double extra_mm = 0)
+        : radius_(n.radius_mm + extra_mm) {
+        const double reach = 0.5 * n.slab_mm + n.radius_mm;
+        double u0 = -n.length_mm, u1 = 0;  // along the axis, 0 at the tip
+        if (std::abs(n.axis.y) > 1e-9) {
+            const double a = (-reach - n.tip.y) / n.axis.y, b = (reach - n.tip.y) / n.axis.y;
+            u0 = std::max(u0, std::min(a, b));
+            u1 = std::min(u1, std::max(a, b));
+        } else if (std::abs(n.tip.y) > reach) {
+            u1 = u0 - 1;
+        }
+        near_ = u0 <= u1;
+        if (!near_) return;
+        origin_ = {n.tip.x + u0 * n.axis.x, n.tip.z + u0 * n.axis.z};
+        const double dx = (u1 - u0) * n.axis.x, dz = (u1 - u0) * n.axis.z;
+        length_ = std::hypot(dx, dz);
+        if (length_ > 1e-9) direction_ = {dx / length_, dz / length_};
+    }
+
+    bool near_plane() const { return near_; }
+
+    // Samples [k0, k1) of a beam that can show the needle; false if none.
+    bool range(const ScanGeometry& g, int line, int& k0, int& k1) const {
+        if (!near_) return false;
+        const auto& [o, d] = g.beams[static_cast<std::size_t>(line)];
+        const double ox = o.x - origin_.x, oz = o.z - origin_.z;
+        double r0 = 0, r1 = g.depth_mm;
+        const auto clip = [&](double at0, double slope, double low, double high) {
+            if (std::abs(slope) < 1e-12) {
+                if (at0 < low || at0 > high) r1 = r0 - 1;
+                return;
+            }
+            const double a = (low - at0) / slope, b = (high - at0) / slope;
+            r0 = std::max(r0, std::min(a, b));
+            r1 = std::min(r1, std::max(a, b));
+        };
+        clip(oz * direction_.x - ox * direction_.z, d.z * direction_.x - d.x * direction_.z,
+             -radius_, radius_);
+        clip(ox * direction_.x + oz * direction_.z, d.x * direction_.x + d.z * direction_.z,
+             -radius_, length_ + radius_);
+        if (r1 < r0) return false;
+        k0 = std::max(0, static_cast<int>(r0 / g.step_mm - 0.5) - 1);
+        k1 = std::min(g.samples, static_cast<int>(r1 / g.step_mm - 0.5) + 3);
+        return k0 < k1;
+    }
+
+    bool prepare_block(const NeedleShape& n,
+                       const ScanGeometry& g,
+                       int line,
+                       bool whole,
+                       NeedleRow& row,
+                       int& k0,
+                       int& k1) const {
+        k0 = g.samples;
+        k1 = 0;
+        for (int v = 0; v < kBeamBlock; ++v) {
+            int a = 0, b = 0;
+            if (!range(g, std::min(line + v, g.scanlines - 1), a, b)) continue;
+            k0 = std::min(k0, a);
+            k1 = std::max(k1, b);
+        }
+        if (whole) {
+            k0 = 0;
+            k1 = g.samples;
+        }
+        if (k0 >= k1) return false;
+        for (int v = 0; v < kBeamBlock; ++v) {
+            const int l = std::min(line + v, g.scanlines - 1);
+            const auto& [o, d] = g.beams[static_cast<std::size_t>(l)];
+            row.origin_x[v] = static_cast<float>(o.x - n.tip.x);
+            row.origin_z[v] = static_cast<float>(o.z - n.tip.z);
+            row.direction_x[v] = static_cast<float>(d.x);
+            row.direction_z[v] = static_cast<float>(d.z);
+        }
+        row.step = static_cast<float>(g.step_mm);
+        row.wy = static_cast<float>(-n.tip.y);
+        row.ax = static_cast<float>(n.axis.x);
+        row.ay = static_cast<float>(n.axis.y);
+        row.az = static_cast<float>(n.axis.z);
+        row.a = static_cast<float>(1 - n.axis.y * n.axis.y);
+        row.radius = static_cast<float>(n.radius_mm);
+        row.length = static_cast<float>(n.length_mm);
+        row.slab = static_cast<float>(n.slab_mm);
+        row.tip_opacity = static_cast<float>(n.tip_opacity);
+        row.shaft_opacity = static_cast<float>(n.shaft_opacity);
+        row.inverse_reach = static_cast<float>(1 / kTipReachMm);
+        return true;
+    }
+
+  private:
+    bool near_ = false;
+    PlanePoint origin_, direction_{1, 0};
+    double length_ = 0, radius_ = 0;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Repeatable noise: a hash, and a tile of Gaussian values that rows of samples read from random
+// starts.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace sonocase::runtime {
+
+// A bijective 32-bit mixing function (two multiply-xorshift rounds); every output bit depends on
+// every input bit. Constant time.
+inline std::uint32_t hash32(std::uint32_t x) {
+    x ^= x >> 16;
+    x *= 0x21F0AAADu;
+    x ^= x >> 15;
+    x *= 0x735A2D97u;
+    return x ^ x >> 15;
+}
+
+double inverse_normal(double probability);  // in (0, 1); relative error below 2e-9
+
+// Start of a row's noise inside the tile, for this frame.
+inline constexpr std::uint32_t kNoiseTile = 1u << 16;
+inline std::uint32_t noise_row_start(std::uint32_t seed, std::uint32_t frame, std::uint32_t row) {
+    return hash32(hash32(seed ^ 0x9E3779B9u * frame) + row) & (kNoiseTile - 1);
+}
+
+// # kNoiseTile + overhang values, Gaussian with the given deviation, rounded; the overhang repeats
+// the beginning so that a row may be read in one piece from any start.
+std::vector<std::int8_t> make_noise_tile(double sigma, std::uint32_t seed, int overhang);
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Model `paper` down a block of beams: material and grey, needle, noise, shadow and brightness.
+#include "runtime/imaging/paper/paper_kernels.h"
+
+#include <algorithm>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "paper_beams.cpp"
+#include <hwy/cache_control.h>
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace sonocase::runtime::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int kPrefetchStep = 8;  // samples: shorter than a brick
+
+// Material and grey of one block of beams. Returns the union of all stage values.
+template <bool kTexture, bool kInside>
+std::uint32_t sample_block_as(const PaperBlock& b) {
+    const hn::CappedTag<std::int32_t, kPaperBlock> d;
+    const hn::RebindToUnsigned<decltype(d)> du;
+    const hn::Rebind<std::uint16_t, decltype(d)> d16;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const auto three = hn::Set(d, 3);
+    const auto byte = hn::Set(d, 0xFF);
+    const auto bx = hn::Set(d, b.bricks_x), bxy = hn::Set(d, b.bricks_xy);
+    const auto sx = hn::Set(du, static_cast<std::uint32_t>(b.size.x));
+    const auto sy = hn::Set(du, static_cast<std::uint32_t>(b.size.y));
+    const auto sz = hn::Set(du, static_cast<std::uint32_t>(b.size.z));
+    const int e = b.edge_log2;
+    auto met = hn::Zero(d);
+    for (int v = 0; v < kPaperBlock; v += lanes) {
+        const auto load = [&](const std::int32_t* p, int axis)
+                              HWY_ATTR { return hn::LoadU(d, p + axis * b.lines + v); };
+        auto x = load(b.start, 0), y = load(b.start, 1), z = load(b.start, 2);
+        const auto dx = load(b.step, 0), dy = load(b.step, 1), dz = load(b.step, 2);
+        auto tx = hn::BitCast(du, load(b.start, 3)), ty = hn::BitCast(du, load(b.start, 4)),
+             tz = hn::BitCast(du, load(b.start, 5));
+        const auto dtx = hn::BitCast(du, load(b.step, 3)), dty = hn::BitCast(du, load(b.step, 4)),
+                   dtz = hn::BitCast(du, load(b.step, 5));
+        std::uint16_t* out = b.stage + v;
+        HWY_ALIGN std::int32_t ahead[kPaperBlock] = {};  // bricks that a later sample will ask
+        for (int k = 0; k < b.samples; ++k, out += kPaperBlock) {
+            if (kInside && k % kPrefetchStep == 0) {
+                // Words of the bricks two steps ahead, voxels one step ahead.
+                for (int lane = 0; lane < lanes && k > 0; ++lane) {
+                    const std::int32_t entry = b.table[ahead[lane]];
+                    if (entry >= 0) hwy::Prefetch(b.pool + 16 * entry);
+                }
+                const auto reach = hn::Set(d, std::min(2 * kPrefetchStep, b.samples - 1 - k));
+                const auto at = [&](decltype(x) p, decltype(x) step) HWY_ATTR {
+                    return hn::ShiftRight<18>(hn::Add(p, hn::Mul(step, reach)));
+                };
+                hn::Store(
+                    hn::Add(at(x, dx), hn::Add(hn::Mul(at(y, dy), bx), hn::Mul(at(z, dz), bxy))), d,
+                    ahead);
+                for (int lane = 0; lane < lanes; ++lane) hwy::Prefetch(b.table + ahead[lane]);
+            }
+            const auto i = hn::ShiftRight<16>(x), j = hn::ShiftRight<16>(y),
+                       l = hn::ShiftRight<16>(z);
+            auto brick = hn::Add(hn::ShiftRight<2>(i), hn::Add(hn::Mul(hn::ShiftRight<2>(j), bx),
+                                                               hn::Mul(hn::ShiftRight<2>(l), bxy)));
+            const auto inside =
+                hn::And(hn::Lt(hn::BitCast(du, i), sx),
+                        hn::And(hn::Lt(hn::BitCast(du, j), sy), hn::Lt(hn::BitCast(du, l), sz)));
+            const auto valid = hn::RebindMask(d, inside);
+            if constexpr (!kInside) brick = hn::IfThenElseZero(valid, brick);
+            const auto entry = hn::GatherIndex(d, b.table, brick);
+            const auto uniform = hn::Lt(entry, hn::Zero(d));
+            auto material = entry;
+            if (!hn::AllTrue(d, uniform)) {
+                const auto cell =
+                    hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
+                                                     hn::ShiftLeft<4>(hn::And(l, three))));
+                const auto address =
+                    hn::IfThenZeroElse(uniform, hn::Or(hn::ShiftLeft<6>(entry), cell));
+                const auto voxel = hn::GatherOffset(d, b.pool, address);
+                material = hn::IfThenElse(uniform, entry, voxel);
+            }
+            material = hn::And(material, byte);
+            if constexpr (!kInside) material = hn::IfThenElseZero(valid, material);
+            const auto look = hn::And(material, hn::Set(d, 0x7F));
+            auto grey = look;
+            if constexpr (kTexture) {
+                const auto cx = hn::ShiftRightSame(tx, 32 - e), cy = hn::ShiftRightSame(ty, 32 - e),
+                           cz = hn::ShiftRightSame(tz, 32 - e);
+                const auto cell =
+                    hn::Or(cx, hn::Or(hn::ShiftLeftSame(cy, e), hn::ShiftLeftSame(cz, 2 * e)));
+                const auto address = hn::Or(hn::BitCast(d, cell), hn::ShiftLeftSame(look, 3 * e));
+                grey = hn::And(hn::GatherOffset(d, b.atlas, address), byte);
+                tx = hn::Add(tx, dtx);
+                ty = hn::Add(ty, dty);
+                tz = hn::Add(tz, dtz);
+            } else {
+                grey = hn::And(hn::GatherOffset(d, b.flat, look), byte);
+            }
+            const auto value = hn::Or(grey, hn::ShiftLeft<1>(hn::And(material, hn::Set(d, 0x80))));
+            met = hn::Or(met, value);
+            hn::StoreU(hn::DemoteTo(d16, value), d16, out);
+            x = hn::Add(x, dx);
+            y = hn::Add(y, dy);
+            z = hn::Add(z, dz);
+        }
+    }
+    HWY_ALIGN std::int32_t all[HWY_MAX_BYTES / 4];
+    hn::StoreU(met, d, all);
+    std::uint32_t bits = 0;
+    for (int v = 0; v < lanes; ++v) bits |= static_cast<std::uint32_t>(all[v]);
+    return bits;
+}
+
+std::uint32_t sample_block(const PaperBlock& b) {
+    if (b.texture)
+        return b.inside ? sample_block_as<true, true>(b) : sample_block_as<true, false>(b);
+    return b.inside ? sample_block_as<false, true>(b) : sample_block_as<false, false>(b);
+}
+
+// The needle over the stage, rows [row_begin, row_end). Same formula as needle_share().
+void draw_needle(const PaperBlock& b, const NeedleRow& n, int row_begin, int row_end) {
+    const hn::CappedTag<float, kPaperBlock> d;
+    const hn::RebindToSigned<decltype(d)> di;
+    const hn::Rebind<std::uint16_t, decltype(d)> d16;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const auto zero = hn::Zero(d);
+    for (int v = 0; v < kPaperBlock; v += lanes) {
+        const auto ox = hn::LoadU(d, n.origin_x + v), oz = hn::LoadU(d, n.origin_z + v);
+        const auto dx = hn::LoadU(d, n.direction_x + v), dz = hn::LoadU(d, n.direction_z + v);
+        for (int k = row_begin; k < row_end; ++k) {
+            const auto r = hn::Set(d, (static_cast<float>(k) + 0.5f) * n.step);
+            const auto wx = hn::Add(ox, hn::Mul(r, dx)), wz = hn::Add(oz, hn::Mul(r, dz));
+            const auto wy = hn::Set(d, n.wy);
+            const auto u0 = hn::Add(hn::Add(hn::Mul(wx, hn::Set(d, n.ax)), hn::Set(d, n.wy * n.ay)),
+                                    hn::Mul(wz, hn::Set(d, n.az)));
+            auto low = hn::Set(d, -0.5f * n.slab), high = hn::Set(d, 0.5f * n.slab);
+            const auto bb = hn::Sub(wy, hn::Mul(u0, hn::Set(d, n.ay)));
+            // Perpendicular part first: the difference of two large squares would lose the needle's
+            // radius.
+            const auto px = hn::Sub(wx, hn::Mul(u0, hn::Set(d, n.ax)));
+            const auto pz = hn::Sub(wz, hn::Mul(u0, hn::Set(d, n.az)));
+            const auto c =
+                hn::Sub(hn::Add(hn::Add(hn::Mul(px, px), hn::Mul(bb, bb)), hn::Mul(pz, pz)),
+                        hn::Set(d, n.radius * n.radius));
+            auto hit = hn::Lt(c, hn::Set(d, 1e30f));
+            if (n.a > 1e-6f) {
+                const auto disc = hn::Sub(hn::Mul(bb, bb), hn::Mul(hn::Set(d, n.a), c));
+                hit = hn::Gt(disc, zero);
+                const auto root = hn::Sqrt(hn::Max(disc, zero));
+                const auto a = hn::Set(d, n.a);
+                low = hn::Max(low, hn::Div(hn::Sub(hn::Neg(bb), root), a));
+                high = hn::Min(high, hn::Div(hn::Add(hn::Neg(bb), root), a));
+            } else {
+                hit = hn::Le(c, zero);
+            }
+            if (std::abs(n.ay) > 1e-6f) {
+                const auto y0 = hn::Div(hn::Sub(hn::Set(d, -n.length), u0), hn::Set(d, n.ay));
+                const auto y1 = hn::Div(hn::Neg(u0), hn::Set(d, n.ay));
+                low = hn::Max(low, hn::Min(y0, y1));
+                high = hn::Min(high, hn::Max(y0, y1));
+            } else {
+                hit = hn::And(hit, hn::And(hn::Le(u0, zero), hn::Ge(u0, hn::Set(d, -n.length))));
+            }
+            if (hn::AllFalse(d, hit)) continue;
+            const auto share = hn::IfThenElseZero(
+                hit, hn::Div(hn::Max(hn::Sub(high, low), zero), hn::Set(d, n.slab)));
+            const auto along = hn::Max(hn::Neg(u0), zero);
+            const auto near_tip = hn::Min(
+                hn::Max(hn::Sub(hn::Set(d, 1.0f), hn::Mul(along, hn::Set(d, n.inverse_reach))),
+                        zero),
+                hn::Set(d, 1.0f));
+            const auto opacity =
+                hn::Add(hn::Set(d, n.shaft_opacity),
+                        hn::Mul(hn::Set(d, n.tip_opacity - n.shaft_opacity), near_tip));
+            std::uint16_t* stage = b.stage + k * kPaperBlock + v;
+            const auto value = hn::PromoteTo(di, hn::LoadU(d16, stage));
+            const auto grey = hn::ConvertTo(d, hn::And(value, hn::Set(di, 0xFF)));
+            const auto lit =
+                hn::Add(grey, hn::Mul(hn::Sub(hn::Set(d, 255.0f), grey), hn::Mul(share, opacity)));
+            const auto out = hn::Or(hn::NearestInt(lit), hn::And(value, hn::Set(di, 0x100)));
+            hn::StoreU(hn::DemoteTo(d16, out), d16, stage);
+        }
+    }
+}
+
+// Noise, shadow and brightness over one block of beams, into the image.
+template <bool kNoise, bool kShadow>
+void finish_block_as(const PaperBlock& b) {
+    const hn::CappedTag<std::uint16_t, kPaperBlock> d;
+    const hn::RebindToSigned<decltype(d)> di;
+    const hn::Rebind<std::int8_t, decltype(di)> d8;
+    const hn::Rebind<std::uint8_t, decltype(di)> du8;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    for (int v = 0; v < kPaperBlock; v += lanes) {
+        auto light = hn::Set(d, 0xFFFF);
+        const auto dim = hn::Set(d, b.shadow_factor);
+        const std::uint16_t* stage = b.stage + v;
+        std::uint8_t* out = b.image + v;
+        for (int k = 0; k < b.samples; ++k, stage += kPaperBlock, out += b.image_stride) {
+            const auto value = hn::LoadU(d, stage);
+            auto grey = hn::BitCast(di, hn::And(value, hn::Set(d, 0xFF)));
+            if constexpr (kNoise) {
+                const auto noise = hn::PromoteTo(di, hn::LoadU(d8, b.noise + b.noise_start[k] + v));
+                grey = hn::Min(hn::Max(hn::Add(grey, noise), hn::Zero(di)), hn::Set(di, 255));
+            }
+            auto fixed = hn::ShiftLeft<7>(hn::BitCast(d, grey));
+            if constexpr (kShadow) {
+                const auto blocked = hn::TestBit(value, hn::Set(d, 0x100));
+                light = hn::IfThenElse(blocked, hn::MulHigh(light, dim), light);
+                // Full light is exactly 1, so that skipping the shadow changes nothing.
+                fixed = hn::IfThenElse(hn::Eq(light, hn::Set(d, 0xFFFF)), fixed,
+                                       hn::MulHigh(fixed, light));
+            }
+            fixed = hn::MulHigh(fixed, hn::Set(d, b.row_scale[k]));
+            const auto rounded = hn::ShiftRight<3>(hn::Add(fixed, hn::Set(d, 4)));
+            hn::StoreU(hn::DemoteTo(du8, hn::BitCast(di, rounded)), du8, out);
+        }
+    }
+}
+
+void finish_block(const PaperBlock& b) {
+    if (b.with_noise) {
+        b.with_shadow ? finish_block_as<true, true>(b) : finish_block_as<true, false>(b);
+    } else {
+        b.with_shadow ? finish_block_as<false, true>(b) : finish_block_as<false, false>(b);
+    }
+}
+
+// One row: taps across beams. `in` has a margin of `reach` values before and behind.
+void blur_row(
+    const std::uint8_t* in, int count, const std::uint16_t* taps, int reach, std::uint8_t* out) {
+    const hn::ScalableTag<std::uint16_t> d;
+    const hn::RebindToSigned<decltype(d)> di;
+    const hn::Rebind<std::uint8_t, decltype(d)> d8;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    for (int i = 0; i < count; i += lanes) {
+        auto sum = hn::Set(d, 128);
+        for (int t = -reach; t <= reach; ++t) {
+            const auto g = hn::PromoteTo(d, hn::LoadU(d8, in + i + t));
+            sum = hn::Add(sum, hn::Mul(g, hn::Set(d, taps[t + reach])));
+        }
+        hn::StoreU(hn::DemoteTo(d8, hn::BitCast(di, hn::ShiftRight<8>(sum))), d8, out + i);
+    }
+}
+
+}  // namespace sonocase::runtime::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace sonocase::runtime {
+
+HWY_EXPORT(sample_block);
+HWY_EXPORT(draw_needle);
+HWY_EXPORT(finish_block);
+HWY_EXPORT(blur_row);
+
+std::uint32_t sample_paper_block(const PaperBlock& block) {
+    return HWY_DYNAMIC_DISPATCH(sample_block)(block);
+}
+
+void draw_paper_needle(const PaperBlock& block,
+                       const NeedleRow& needle,
+                       int row_begin,
+                       int row_end) {
+    HWY_DYNAMIC_DISPATCH(draw_needle)(block, needle, row_begin, row_end);
+}
+
+void finish_paper_block(const PaperBlock& block) {
+    HWY_DYNAMIC_DISPATCH(finish_block)(block);
+}
+
+void blur_paper_row(
+    const std::uint8_t* in, int count, const std::uint16_t* taps, int reach, std::uint8_t* out) {
+    HWY_DYNAMIC_DISPATCH(blur_row)(in, count, taps, reach, out);
+}
+
+}  // namespace sonocase::runtime
+#endif

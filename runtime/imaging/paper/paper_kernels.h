@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What one vectorised call of model `paper` works on: a block of neighbouring beams.
+#pragma once
+
+#include <cstdint>
+
+#include "formats/base/geometry.h"
+#include "runtime/imaging/needle/needle_strip.h"
+
+namespace sonocase::runtime {
+
+inline constexpr int kPaperBlock = kBeamBlock;
+
+struct PaperBlock {
+    const std::int32_t *start = nullptr, *step = nullptr;  // six rows of `lines` values
+    int lines = 0, samples = 0;
+    const std::int32_t *table = nullptr, *pool = nullptr, *atlas = nullptr, *flat = nullptr;
+    Int3 size;
+    int bricks_x = 0, bricks_xy = 0, edge_log2 = 0;
+    bool texture = true;
+    bool inside = false;  // every sample of the block lies in the volume
+    bool with_noise = true, with_shadow = true;
+    const std::int8_t* noise = nullptr;
+    const std::uint32_t* noise_start = nullptr;
+    const std::uint16_t* row_scale = nullptr;
+    std::uint16_t shadow_factor = 0;
+    std::uint16_t* stage = nullptr;  // samples x kPaperBlock: grey, bit 8 where a shadow is cast
+    std::uint8_t* image = nullptr;
+    int image_stride = 0;
+};
+
+// Vectorised; integer or single precision in fixed order.
+// Fills the stage; returns the union of all its values.
+std::uint32_t sample_paper_block(const PaperBlock& block);
+// The needle over the stage, samples [row_begin, row_end). Same formula as needle_share().
+void draw_paper_needle(const PaperBlock& block,
+                       const NeedleRow& needle,
+                       int row_begin,
+                       int row_end);
+// Noise, shadow and brightness of the stage, into the image.
+void finish_paper_block(const PaperBlock& block);
+// One row: taps across beams. `in` has a margin of `reach` values before and behind.
+void blur_paper_row(
+    const std::uint8_t* in, int count, const std::uint16_t* taps, int reach, std::uint8_t* out);
+
+}  // namespace sonocase::runtime

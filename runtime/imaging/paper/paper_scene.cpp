@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/paper/paper_scene.h"
+#include "runtime/imaging/simd/gather_slack.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonocase::runtime {
+namespace {
+
+const SolidTexture* find_texture(const CaseBundle& bundle, const std::string& name) {
+    for (const SolidTexture& t : bundle.textures) {
+        if (t.name == name && t.edge > 0 && t.voxel_mm > 0) return &t;
+    }
+    return nullptr;
+}
+
+// A tissue's cube of grey. A texture of another voxel size is resampled to the scene's; one that
+// does not fill the cube repeats, and both keep its period a divisor of the cube's.
+void bake(const Tissue& tissue,
+          const SolidTexture* texture,
+          int edge,
+          double voxel_mm,
+          std::uint8_t* out) {
+    std::array<std::uint8_t, 256> grey{};
+    for (int v = 0; v < 256; ++v) {
+        const double g = tissue.grey_mean + (v - 128) / 32.0 * tissue.grey_sd;
+        grey[static_cast<std::size_t>(v)] =
+            static_cast<std::uint8_t>(std::lround(std::clamp(g, 0.0, 255.0)));
+    }
+    if (texture == nullptr) {
+        std::fill_n(out, static_cast<std::size_t>(edge) * edge * edge, grey[128]);
+        return;
+    }
+    int period = 1;
+    while (period < edge && period * 1.4142 * voxel_mm < texture->edge * texture->voxel_mm)
+        period *= 2;
+    std::vector<std::size_t> source(static_cast<std::size_t>(edge));
+    for (int i = 0; i < edge; ++i) {
+        source[static_cast<std::size_t>(i)] =
+            static_cast<std::size_t>((i % period) * texture->edge / period);
+    }
+    const auto n = static_cast<std::size_t>(texture->edge);
+    for (const std::size_t k : source) {
+        for (const std::size_t j : source) {
+            const std::uint8_t* row = texture->voxels.data() + n * (j + n * k);
+            for (const std::size_t i : source) *out++ = grey[row[i]];
+        }
+    }
+}
+
+}  // namespace
+
+Result<PaperScene> make_paper_scene(const CaseBundle& bundle) {
+    PaperScene scene;
+    scene.grid = bundle.grid;
+    scene.bricks = brick_count(bundle.label_bricks.size);
+    if (bundle.labels.empty() || bundle.label_bricks.table.empty()) {
+        return Error{"the bundle holds no label volume", "", "build the case again"};
+    }
+
+    const std::vector<int> tissue_of = tissue_of_label(bundle);
+    std::vector<bool> used(bundle.tissues.size(), false);
+    for (std::size_t l = 1; l < tissue_of.size(); ++l) {
+        if (tissue_of[l] >= 0) used[static_cast<std::size_t>(tissue_of[l])] = true;
+    }
+    // The commonest edge and the finest voxel in use decide the cube.
+    int edge = 0;
+    double voxel_mm = 0;
+    for (std::size_t t = 0; t < bundle.tissues.size(); ++t) {
+        const SolidTexture* texture =
+            used[t] ? find_texture(bundle, bundle.tissues[t].texture) : nullptr;
+        if (texture == nullptr) continue;
+        edge = std::max(edge, texture->edge);
+        voxel_mm = voxel_mm > 0 ? std::min(voxel_mm, texture->voxel_mm) : texture->voxel_mm;
+    }
+    if (edge == 0) {
+        edge = 8;
+        voxel_mm = 0.5;
+    }
+    scene.texture_voxel_mm = voxel_mm;
+    scene.edge_log2 = 0;
+    while ((1 << scene.edge_log2) < edge) ++scene.edge_log2;
+    edge = 1 << scene.edge_log2;
+    const std::size_t cube = static_cast<std::size_t>(edge) * edge * edge;
+
+    scene.atlas.assign(cube, 0);
+    scene.flat_grey.assign(1, 0);
+    std::vector<std::uint8_t> material_of_tissue(bundle.tissues.size(), 0);
+    for (std::size_t t = 0; t < bundle.tissues.size(); ++t) {
+        if (!used[t] || bundle.tissues[t].kind == TissueKind::outside) continue;
+        const std::size_t index = scene.flat_grey.size();
+        if (index > 127)
+            return Error{"the bundle uses more than 127 tissues", "",
+                         "merge tissues in the recipe"};
+        const Tissue& tissue = bundle.tissues[t];
+        scene.atlas.resize(cube * (index + 1));
+        bake(tissue, find_texture(bundle, tissue.texture), edge, voxel_mm,
+             scene.atlas.data() + cube * index);
+        scene.flat_grey.push_back(
+            static_cast<std::uint8_t>(std::lround(std::clamp(tissue.grey_mean, 0.0, 255.0))));
+        material_of_tissue[t] =
+            static_cast<std::uint8_t>(index | (tissue.casts_shadow ? PaperScene::kShadowBit : 0u));
+        scene.has_shadow = scene.has_shadow || tissue.casts_shadow;
+    }
+    scene.materials = static_cast<int>(scene.flat_grey.size());
+    scene.atlas.resize(scene.atlas.size() + kGatherSlack);
+
+    std::array<std::uint8_t, 256> material{};
+    for (std::size_t l = 1; l < tissue_of.size() && l < material.size(); ++l) {
+        if (tissue_of[l] >= 0)
+            material[l] = material_of_tissue[static_cast<std::size_t>(tissue_of[l])];
+    }
+    const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
+    scene.table.resize(labels.table.size());
+    for (std::size_t b = 0; b < labels.table.size(); ++b) {
+        const std::uint32_t entry = labels.table[b];
+        scene.table[b] = entry & kUniformBrick
+                             ? kUniformBrick | material[labels.uniform[entry & ~kUniformBrick]]
+                             : entry;
+    }
+    scene.pool.resize(labels.pool.size() + kGatherSlack);
+    for (std::size_t i = 0; i < labels.pool.size(); ++i) scene.pool[i] = material[labels.pool[i]];
+    return scene;
+}
+
+std::uint32_t material_at(const PaperScene& s, int i, int j, int k) {
+    if (i < 0 || j < 0 || k < 0 || i >= s.grid.size.x || j >= s.grid.size.y || k >= s.grid.size.z)
+        return 0;
+    const std::size_t brick =
+        static_cast<std::size_t>(i / kBrickEdge) +
+        static_cast<std::size_t>(s.bricks.x) *
+            (static_cast<std::size_t>(j / kBrickEdge) +
+             static_cast<std::size_t>(s.bricks.y) * static_cast<std::size_t>(k / kBrickEdge));
+    const std::uint32_t entry = s.table[brick];
+    if (entry & kUniformBrick) return entry & 0xFFu;
+    return s.pool[static_cast<std::size_t>(entry) * kBrickVoxels +
+                  static_cast<std::size_t>((i % 4) + 4 * (j % 4) + 16 * (k % 4))];
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Effects attenuation, bone_tail and gas_ring_down: the light that is left on each beam, and the
+// tails behind bone and gas.
+#include "runtime/imaging/simd/simd_math-inl.h"
+//
+#include "runtime/imaging/physical/fast/beam_chunk.h"
+
+#if defined(SONOCASE_BEAM_LIGHT_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SONOCASE_BEAM_LIGHT_INL_H
+#undef SONOCASE_BEAM_LIGHT_INL_H
+#else
+#define SONOCASE_BEAM_LIGHT_INL_H
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace sonocase::runtime::HWY_NAMESPACE {
+
+// Amplitudes that a vector of beams carries down from stretch to stretch.
+template <class D>
+struct BeamLight {
+    using V = hn::Vec<D>;
+    using I = hn::Vec<hn::RebindToSigned<D>>;
+    V light;  // one way there and back; 0 once dead
+    V bone, bone_slow, bone_floor, gas;
+    V reverb, period, next;  // amplitude of the next line, mm between lines, depth of the next
+    I before, before_that;   // kinds of the two samples above
+    int tail_from = 0;
+};
+
+template <class D>
+HWY_INLINE void fade_tails(D d, const PhysicalBlock& b, BeamLight<D>& t) {
+    t.bone = hn::Mul(t.bone, hn::Set(d, b.decay.bone));
+    t.bone_slow = hn::Mul(t.bone_slow, hn::Set(d, b.decay.bone_slow));
+    t.bone_floor = hn::Mul(t.bone_floor, hn::Set(d, b.decay.bone_floor));
+    t.gas = hn::Mul(t.gas, hn::Set(d, b.decay.gas));
+}
+
+// Lines between the probe's face and one of gas.
+template <class D>
+HWY_INLINE hn::Vec<D> reverb_power(D d, const PhysicalBlock& b, float r, BeamLight<D>& t) {
+    const auto off = hn::Mul(hn::Sub(hn::Set(d, r), t.next), hn::Set(d, 1 / b.reverb_mm));
+    const auto one = hn::Set(d, 1.0f);
+    const auto pulse = hn::Mul(t.reverb, hn::Max(hn::Sub(one, hn::Mul(off, off)), hn::Zero(d)));
+    const auto past = hn::Gt(off, one);
+    t.next = hn::Add(t.next, hn::IfThenElseZero(past, t.period));
+    t.reverb = hn::IfThenElse(
+        past, hn::Mul(t.reverb, hn::Set(d, static_cast<float>(physical::kReverbLoss))), t.reverb);
+    return hn::Mul(pulse, pulse);
+}
+
+template <class D>
+HWY_INLINE hn::Vec<D> tail_power(D d, const PhysicalBlock& b, int k, BeamLight<D>& t) {
+    auto power = hn::Zero(d);
+    if (b.bone_tail) {
+        power = hn::Add(hn::Add(hn::Mul(t.bone, t.bone), hn::Mul(t.bone_slow, t.bone_slow)),
+                        hn::Mul(t.bone_floor, t.bone_floor));
+    }
+    if (b.gas_tail) {
+        power = hn::Add(power, hn::Mul(t.gas, t.gas));
+        power = hn::Add(power, reverb_power(d, b, b.r[k], t));
+    }
+    return power;
+}
+
+// A face of bone or gas lights its tails: of gas from the second sample on, as one alone is a
+// neighbour's that a random look-up brought. above_mm: depth of the sample above.
+template <class D, class V, class I>
+HWY_INLINE void light_tails(
+    D d, V light_and_gain, V facing, I kind, float above_mm, BeamLight<D>& t) {
+    using namespace physical;
+    const hn::RebindToSigned<D> di;
+    const auto is = [&](I what, PackedKind which) HWY_ATTR {
+        return hn::Eq(what, hn::Set(di, static_cast<std::int32_t>(which) << 16));
+    };
+    const auto to_bone =
+        hn::RebindMask(d, hn::AndNot(is(t.before, kPackedBone), is(kind, kPackedBone)));
+    const auto to_gas =
+        hn::RebindMask(d, hn::AndNot(is(t.before_that, kPackedGas),
+                                     hn::And(is(t.before, kPackedGas), is(kind, kPackedGas))));
+    const auto raise = [&](V tail, V to) HWY_ATTR { return hn::Max(tail, to); };
+    const auto face = hn::Mul(hn::Mul(light_and_gain, facing),
+                              hn::Set(d, static_cast<float>(kBoneTail * kMaxReflection)));
+    const auto slow = hn::Mul(face, hn::Set(d, static_cast<float>(kBoneTailSlow)));
+    const auto floor = hn::Mul(hn::Min(light_and_gain, hn::Set(d, 1.0f)),
+                               hn::Set(d, static_cast<float>(kBoneFloor)));
+    const auto ring = hn::Mul(light_and_gain, hn::Set(d, static_cast<float>(kGasTail)));
+    t.bone = hn::IfThenElse(to_bone, raise(t.bone, face), t.bone);
+    t.bone_slow = hn::IfThenElse(to_bone, raise(t.bone_slow, slow), t.bone_slow);
+    t.bone_floor = hn::IfThenElse(to_bone, raise(t.bone_floor, floor), t.bone_floor);
+    t.gas = hn::IfThenElse(to_gas, raise(t.gas, ring), t.gas);
+    // Only a surface that was seen to face the beam is a mirror.
+    const auto mirror =
+        hn::IfThenElseZero(hn::Lt(facing, hn::Set(d, 1.0f)),
+                           hn::Mul(hn::Mul(light_and_gain, facing),
+                                   hn::Set(d, static_cast<float>(kReverb * kReverbLoss))));
+    const auto brighter = hn::And(to_gas, hn::Gt(mirror, t.reverb));
+    const auto depth = hn::Set(d, above_mm);
+    t.reverb = hn::IfThenElse(brighter, mirror, t.reverb);
+    t.period = hn::IfThenElse(brighter, depth, t.period);
+    t.next = hn::IfThenElse(brighter, hn::Add(depth, depth), t.next);
+}
+
+// kTails: the stretch holds bone or gas, or follows some.
+template <bool kTails, class D>
+HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, BeamLight<D>& t) {
+    const hn::RebindToSigned<D> di;
+    const auto zero = hn::Zero(d);
+    const auto least = hn::Set(d, b.dead_light);
+    const auto kind_bits = hn::Set(di, 7 << 16);
+    const float* dim = b.attenuation ? b.dim : b.dim_off;
+    const auto uniform = hn::Set(d, dim[c.label.row(0)[0]]);
+    const auto step = hn::Set(d, b.step_mm);
+    for (int row = 0; row < c.rows; ++row) {
+        const int k = c.first + row;
+        const std::ptrdiff_t out = static_cast<std::ptrdiff_t>(k) * b.stride + c.beam;
+        const auto alive = hn::Ge(t.light, least);
+        t.light = hn::IfThenElseZero(alive, t.light);
+        if (!hn::AllTrue(d, alive)) {
+            std::int32_t* echoes = b.echoes + out;
+            const auto lit = hn::RebindMask(di, alive);
+            hn::StoreU(hn::IfThenElseZero(lit, hn::LoadU(di, echoes)), di, echoes);
+        }
+        hn::StoreU(t.light, d, b.light + out);
+        if constexpr (kTails) {
+            const auto kind = hn::And(hn::Load(di, c.look.row(row)), kind_bits);
+            fade_tails(d, b, t);
+            const auto facing = c.surfaces ? hn::Load(d, c.facing.row(row)) : hn::Set(d, 1.0f);
+            light_tails(d, hn::Mul(t.light, hn::Set(d, b.gain[k])), facing, kind,
+                        b.r[k] - b.step_mm, t);
+            t.before_that = t.before;
+            t.before = kind;
+            hn::StoreU(tail_power(d, b, k, t), d, b.tail + out);
+        }
+        auto left = uniform;
+        if (!c.one_label) left = hn::GatherIndex(d, dim, hn::Load(di, c.label.row(row)));
+        if (c.refracts) {
+            const auto loss = hn::Mul(hn::Load(d, c.edge_loss.row(row)), step);
+            left = hn::Mul(left, exp2_fading(d, hn::Sub(zero, loss)));
+        }
+        t.light = hn::Mul(t.light, left);
+    }
+    if constexpr (!kTails)
+        t.before_that = t.before = hn::And(hn::Load(di, c.look.row(c.rows - 1)), kind_bits);
+}
+
+// kHard: the scene holds bone or gas at all.
+template <bool kHard, class D>
+HWY_NOINLINE void light_chunk(D d, const PhysicalBlock& b, const BeamChunk& c, BeamLight<D>& t) {
+    if constexpr (!kHard) {
+        light_rows<false>(d, b, c, t);
+        return;
+    }
+    if (c.hard || b.keep_all) t.tail_from = std::min(t.tail_from, c.first);
+    if (t.tail_from <= c.first) {
+        light_rows<true>(d, b, c, t);
+    } else {
+        light_rows<false>(d, b, c, t);
+    }
+}
+
+// From a sample on all beams are dead: only their tails go on.
+template <class D>
+HWY_INLINE void dark_rows(D d, const PhysicalBlock& b, int beam, int first, BeamLight<D>& t) {
+    const hn::RebindToSigned<D> di;
+    for (int k = first; k < b.samples; ++k) {
+        const std::ptrdiff_t out = static_cast<std::ptrdiff_t>(k) * b.stride + beam;
+        hn::StoreU(hn::Zero(di), di, b.echoes + out);
+        hn::StoreU(hn::Zero(d), d, b.light + out);
+        if (t.tail_from > k) continue;
+        fade_tails(d, b, t);
+        hn::StoreU(tail_power(d, b, k, t), d, b.tail + out);
+    }
+}
+
+}  // namespace sonocase::runtime::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

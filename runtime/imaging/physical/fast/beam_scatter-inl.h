@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Effects structure, fine_structure and speckle: the scatterers of a stretch, with the echoes of
+// its surfaces.
+#include "runtime/imaging/physical/fast/beam_place-inl.h"
+
+#if defined(SONOCASE_BEAM_SCATTER_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SONOCASE_BEAM_SCATTER_INL_H
+#undef SONOCASE_BEAM_SCATTER_INL_H
+#else
+#define SONOCASE_BEAM_SCATTER_INL_H
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace sonocase::runtime::HWY_NAMESPACE {
+
+// Looks of the labels; in most places all beams are in one.
+template <class D>
+HWY_NOINLINE void look_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
+    const hn::RebindToSigned<D> di;
+    const std::int32_t first = c.label.row(0)[0];
+    auto other = hn::Zero(di);
+    for (int row = 0; row < c.rows; ++row)
+        other = hn::Or(other, hn::Xor(hn::Load(di, c.label.row(row)), hn::Set(di, first)));
+    c.one_label = hn::AllTrue(di, hn::Eq(other, hn::Zero(di)));
+    const auto kind_bits = hn::Set(di, 7 << 16);
+    auto hardest = hn::Zero(di);
+    for (int row = 0; row < c.rows; ++row) {
+        auto look = hn::Set(di, b.looks[first]);
+        if (!c.one_label) look = hn::GatherIndex(di, b.looks, hn::Load(di, c.label.row(row)));
+        hardest = hn::Max(hardest, hn::And(look, kind_bits));
+        hn::Store(look, di, c.look.row(row));
+    }
+    c.hard =
+        !hn::AllTrue(di, hn::Lt(hardest, hn::Set(di, static_cast<std::int32_t>(kPackedGas) << 16)));
+}
+
+// Baked echo offsets.
+template <class D>
+HWY_NOINLINE void structure_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
+    const hn::RebindToSigned<D> di;
+    for (int row = 0; row < c.rows; ++row) {
+        const auto word = hn::Load(di, c.echo_word.row(row));
+        auto offset = word;
+        if (c.echo_pooled) {
+            const auto voxel = pool_byte(di, b.echo, hn::Load(di, c.structure.row(row)));
+            offset = hn::IfThenElse(hn::Lt(word, hn::Zero(di)), word, voxel);
+        }
+        const auto tissue = hn::Lt(hn::Load(di, c.label.row(row)), hn::Set(di, b.label_count));
+        hn::Store(hn::IfThenElseZero(
+                      tissue, hn::ShiftLeft<2>(hn::ShiftRight<24>(hn::ShiftLeft<24>(offset)))),
+                  di, c.structure.row(row));
+    }
+}
+
+// Fibres and septa, 1/16 dB. Label by label: one as a rule, and no lane depends on its neighbours.
+template <class D>
+HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) {
+    static_assert(physical::kFineEdge == 64);
+    const hn::RebindToSigned<D> di;
+    auto sum = hn::Zero(di);
+    auto left = hn::TestBit(hn::Load(di, c.look.row(row)), hn::Set(di, kLookFine));
+    const std::int32_t* labels = c.label.row(row);
+    while (!hn::AllFalse(di, left)) {
+        const std::int32_t label = labels[hn::FindFirstTrue(di, left)];
+        const auto mine = hn::And(left, hn::Eq(hn::Load(di, labels), hn::Set(di, label)));
+        const float* m = b.fine_frames + 10 * label;
+        const auto coordinate = [&](int r) HWY_ATTR {
+            const auto term = [&](const float* p, int axis) HWY_ATTR {
+                return hn::Mul(hn::Load(d, p), hn::Set(d, m[3 * r + axis]));
+            };
+            const auto u = hn::Add(hn::Add(term(c.x.row(row), 0), term(c.y.row(row), 1)),
+                                   term(c.z.row(row), 2));
+            return hn::And(rounded_bits(d, u), hn::Set(di, physical::kFineEdge - 1));
+        };
+        const auto at = hn::Or(coordinate(0), hn::Or(hn::ShiftLeft<6>(coordinate(1)),
+                                                     hn::ShiftLeft<12>(coordinate(2))));
+        const auto word =
+            hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(b.fine),
+                             hn::Add(at, hn::Set(di, static_cast<std::int32_t>(m[9]))));
+        sum = hn::IfThenElse(mine, hn::ShiftLeft<2>(hn::ShiftRight<24>(hn::ShiftLeft<24>(word))),
+                             sum);
+        left = hn::AndNot(mine, left);
+        b.fine_met = true;
+    }
+    return sum;
+}
+
+// The scatterers' pairs, in the order of speckle_hash().
+template <class D>
+HWY_NOINLINE void speckle_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
+    using namespace physical;
+    const hn::RebindToSigned<D> di;
+    const int v = c.beam;
+    const auto beam = [&](int number)
+                          HWY_ATTR { return hn::LoadU(d, b.beams + number * b.lines + v); };
+    const auto ox = beam(kSpeckleOrigin), oy = beam(kSpeckleOrigin + 1),
+               oz = beam(kSpeckleOrigin + 2);
+    const auto vx = beam(kSpecklePerMm), vy = beam(kSpecklePerMm + 1), vz = beam(kSpecklePerMm + 2);
+    const auto gap = beam(kGap);
+    const auto mask = hn::Set(di, (1 << kSpeckleLog2) - 1);
+    for (int row = 0; row < c.rows; ++row) {
+        const int k = c.first + row;
+        const auto s = hn::Add(hn::Set(d, b.r[k]), hn::Mul(gap, hn::Set(d, b.contact[k])));
+        auto x = hn::Add(ox, hn::Mul(vx, s)), y = hn::Add(oy, hn::Mul(vy, s)),
+             z = hn::Add(oz, hn::Mul(vz, s));
+        if (b.breathing != nullptr) {
+            const auto w = breathing_weight(d, b, v, k);
+            x = hn::Sub(x, hn::Mul(w, hn::Set(d, b.shift_speckle[0])));
+            y = hn::Sub(y, hn::Mul(w, hn::Set(d, b.shift_speckle[1])));
+            z = hn::Sub(z, hn::Mul(w, hn::Set(d, b.shift_speckle[2])));
+        }
+        // Cells that carry kRoundingBits.
+        const auto i = rounded_bits(d, x), j = rounded_bits(d, y), l = rounded_bits(d, z);
+        const auto period = [&](auto cell, std::uint32_t factor) HWY_ATTR {
+            const auto number = hn::Sub(hn::ShiftRight<kSpeckleLog2>(cell),
+                                        hn::Set(di, kRoundingBits >> kSpeckleLog2));
+            return hn::Mul(number, hn::Set(di, static_cast<std::int32_t>(factor)));
+        };
+        const auto hash = hn::Xor(period(i, 0x9E3779B1u),
+                                  hn::Xor(period(j, 0x85EBCA77u), period(l, 0xC2B2AE3Du)));
+        const auto wi = hn::And(hn::Xor(i, hn::ShiftRight<kShuffleX>(hash)), mask);
+        const auto wj = hn::And(hn::Xor(j, hn::ShiftRight<kShuffleY>(hash)), mask);
+        const auto wl = hn::And(hn::Xor(l, hn::ShiftRight<kShuffleZ>(hash)), mask);
+        const auto at = hn::Or(
+            wi, hn::Or(hn::ShiftLeft<kSpeckleLog2>(wj), hn::ShiftLeft<2 * kSpeckleLog2>(wl)));
+        // Two pairs a word: the half that is asked for comes to the top.
+        const auto word = hn::GatherIndex(di, b.speckle, hn::ShiftRight<1>(at));
+        const auto odd = hn::TestBit(at, hn::Set(di, 1));
+        hn::Store(hn::IfThenElse(odd, word, hn::ShiftLeft<16>(word)), di, c.scatterers.row(row));
+    }
+}
+
+template <class D>
+HWY_NOINLINE void scatter_chunk(D d, PhysicalBlock& b, const BeamChunk& c) {
+    const hn::RebindToSigned<D> di;
+    const auto per_log2 = hn::Set(d, static_cast<float>(1 / (16 * physical::kDbPerLog2)));
+    const auto unit = hn::Set(d, 0.70710678f / 32);
+    for (int row = 0; row < c.rows; ++row) {
+        const auto look = hn::Load(di, c.look.row(row));
+        auto echo = hn::ShiftRight<20>(look);  // 1/16 dB
+        if (b.structure) echo = hn::Add(echo, hn::Load(di, c.structure.row(row)));
+        if (b.fine != nullptr) echo = hn::Add(echo, fine_offset(d, b, c, row));
+        const auto solid = hn::Ne(hn::And(look, hn::Set(di, 7 << 16)), hn::Zero(di));
+        const auto amplitude = hn::IfThenElseZero(
+            hn::RebindMask(d, solid), exp2_near(d, hn::Mul(hn::ConvertTo(d, echo), per_log2)));
+        auto re = amplitude, im = hn::Zero(d);
+        if (b.speckled) {
+            const auto pair = hn::Load(di, c.scatterers.row(row));
+            const auto scaled = hn::Mul(amplitude, unit);
+            re = hn::Mul(scaled, signed_byte<2>(d, pair));
+            im = hn::Mul(scaled, signed_byte<3>(d, pair));
+        }
+        if (c.surfaces) {
+            re = hn::Add(re, hn::Load(d, c.echo_re.row(row)));
+            im = hn::Add(im, hn::Load(d, c.echo_im.row(row)));
+        }
+        const std::ptrdiff_t out = static_cast<std::ptrdiff_t>(c.first + row) * b.stride + c.beam;
+        hn::StoreU(pack_echo(d, re, im), di, b.echoes + out);
+    }
+}
+
+}  // namespace sonocase::runtime::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

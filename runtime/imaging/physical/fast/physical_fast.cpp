@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/physical/fast/physical_fast.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+
+#include "runtime/imaging/scan/scan_convert.h"
+
+namespace sonocase::runtime {
+using namespace physical;
+
+namespace {
+
+constexpr int kSlack = kRowSlack, kMargin = kRowMargin;
+
+double lap_ms(std::chrono::steady_clock::time_point& clock) {
+    const auto now = std::chrono::steady_clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - clock).count();
+    clock = now;
+    return ms;
+}
+
+std::int32_t pack_look(const AcousticProperties& look, double frequency_mhz) {
+    const double loss = look.attenuation * frequency_mhz * 0.1 * 2 / kDbPerLog2;
+    const auto attenuation =
+        static_cast<std::uint32_t>(std::lround(std::clamp(loss * 4096, 0.0, 65535.0)));
+    const auto echo =
+        static_cast<std::int32_t>(std::lround(std::clamp(look.echo_db * 16, -2047.0, 2047.0)));
+    const std::uint32_t kind = look.kind == TissueKind::outside ? kPackedOutside
+                               : look.kind == TissueKind::fluid ? kPackedFluid
+                               : look.kind == TissueKind::gas   ? kPackedGas
+                               : look.kind == TissueKind::bone  ? kPackedBone
+                                                                : kPackedSoft;
+    return static_cast<std::int32_t>(attenuation | kind << 16 |
+                                     static_cast<std::uint32_t>(echo) << 20);
+}
+
+std::int32_t pack_pair(const PairEcho& p) {
+    std::int32_t word = 0;
+    if (p.amplitude > 0)
+        word = static_cast<std::int32_t>(
+            std::lround(std::clamp(std::log2(p.amplitude) * 128 + 2048, 1.0, 4095.0)));
+    word |= static_cast<std::int32_t>(std::lround(std::clamp(32 / p.sigma_mm, 1.0, 255.0))) << 12;
+    word |= static_cast<std::int32_t>(std::lround(std::clamp(128 * p.split_mm, 0.0, 127.0))) << 24;
+    if (p.hard) word |= kPairHard;
+    if (p.refracts) word |= kPairRefracts;
+    if (p.pulse > 0) word |= kPairOwnPulse;
+    if (p.pulse < 0) word |= kPairSecondPulse;
+    return word;
+}
+
+}  // namespace
+
+PhysicalFast::PhysicalFast(const PhysicalScene& scene,
+                           const ScanGeometry& geometry,
+                           const Tables& tables,
+                           const PhysicalNoise& noise,
+                           WorkerPool& workers)
+    : scene_(scene), geometry_(geometry), tables_(tables), noise_(noise), workers_(workers) {
+    const auto samples = static_cast<std::size_t>(geometry.samples);
+    lines_ = (geometry.scanlines + kBeamBlock - 1) / kBeamBlock * kBeamBlock;
+    stride_ = kMargin + lines_ + kMargin + kSlack;
+    pair_stride_ = (lines_ + kSlack - 1) / kSlack * kSlack;
+    cells_k_ = (geometry.samples + kHazeCell - 1) / kHazeCell;
+    cells_l_ = (geometry.scanlines + kHazeCell - 1) / kHazeCell;
+    conversion_ = make_scan_conversion_table(geometry, pair_stride_);
+    conversion_.offset.resize(conversion_.offset.size() + kSlack);
+    conversion_.weight.resize(conversion_.weight.size() + kSlack);
+
+    for (const AcousticProperties& look : scene.looks)
+        looks_.push_back(pack_look(look, tables.frequency_mhz));
+    looks_.resize(256, 0);
+    dim_off_.assign(256, 1.0f);
+    for (const std::int32_t look : looks_)
+        dim_.push_back(static_cast<float>(std::exp2(-(look & 0xFFFF) / 4096.0 * geometry.step_mm)));
+    fine_frames_.assign(10 * 256, 0.0f);
+    for (std::size_t l = 0; l < scene.fine.frames.size() && l < 256; ++l) {
+        const FineFrame& frame = scene.fine.frames[l];
+        if (frame.cube < 0) continue;
+        looks_[l] |= kLookFine;
+        std::copy(frame.cube_from_voxel.begin(), frame.cube_from_voxel.end(),
+                  fine_frames_.begin() + static_cast<std::ptrdiff_t>(10 * l));
+        fine_frames_[10 * l + 9] =
+            static_cast<float>(frame.cube * kFineEdge * kFineEdge * kFineEdge);
+    }
+    for (const TargetBall& t : scene.targets) {
+        targets_.push_back({static_cast<float>(t.centre_vx.x), static_cast<float>(t.centre_vx.y),
+                            static_cast<float>(t.centre_vx.z), static_cast<float>(t.radius_mm),
+                            t.look, static_cast<float>(t.wall), t.fluid});
+    }
+    near_targets_.reserve(targets_.size());
+    for (const PairEcho& pair : scene.pairs) pairs_word_.push_back(pack_pair(pair));
+    for (const Row& row : tables.rows) {
+        r_.push_back(static_cast<float>(row.r_mm));
+        contact_.push_back(static_cast<float>(row.contact));
+        elevation_.push_back(static_cast<float>(row.elevation_mm / 32));
+        interface_scale_.push_back(static_cast<float>(row.interface_scale));
+        gain_.push_back(static_cast<float>(row.gain));
+    }
+    elevation_off_.assign(samples, 0.0f);
+    for (auto* starts : {&elevation_start_, &lookup_start_, &clutter_start_, &haze_start_})
+        starts->resize(2 * samples);
+    noise_start_.resize(2 * kPersistedFrames * samples);
+
+    const auto lines = static_cast<std::size_t>(lines_);
+    raw_gaps_.assign(lines + kSlack, 0.0f);
+    gaps_.assign(lines + kSlack, 0.0f);
+    beams_.assign(kBeamNumbers * lines + kSlack, 0.0f);
+    breathing_.assign((samples / kBreathingNode + 2) * lines + kSlack, 0.0f);
+    const std::size_t area = samples * static_cast<std::size_t>(stride_) + kSlack;
+    // One allocation, rows on cache lines.
+    const std::size_t line_of_floats = 16;
+    planes_.assign(4 * area + line_of_floats, 0.0f);
+    void* start = planes_.data();
+    std::size_t space = planes_.size() * sizeof(float);
+    auto* plane = static_cast<float*>(
+        std::align(line_of_floats * sizeof(float), 4 * area * sizeof(float), start, space));
+    echoes_ = reinterpret_cast<std::int32_t*>(plane);
+    light_ = plane + area;
+    tail_ = plane + 2 * area;
+    power_ = plane + 3 * area;
+    tail_from_.assign(lines / kBeamBlock, 0);
+    const auto threads = static_cast<std::size_t>(workers.threads());
+    work_.assign(threads * 2 * static_cast<std::size_t>(stride_), 0.0f);
+    const auto ring_rows = static_cast<std::size_t>(std::max(2 * tables.axial_reach + 1, 3));
+    ring_.assign(threads * 2 * ring_rows * static_cast<std::size_t>(stride_), 0.0f);
+    next_row_.assign(threads, -1);
+    envelope_.assign(threads * static_cast<std::size_t>(stride_), 0.0f);
+    haze_.assign(static_cast<std::size_t>(cells_k_) * static_cast<std::size_t>(stride_), 0.0f);
+    shade_.assign(threads * 2 * static_cast<std::size_t>(lines_ + kSlack), 0);
+    pairs_.assign(samples * static_cast<std::size_t>(pair_stride_) + kSlack, 0);
+}
+
+const float* PhysicalFast::power_row(int sample) const {
+    return power_ + static_cast<std::ptrdiff_t>(sample) * stride_ + kMargin;
+}
+
+int PhysicalFast::shade(int sample, int line) const {
+    return pairs_[static_cast<std::size_t>(sample) * static_cast<std::size_t>(pair_stride_) +
+                  static_cast<std::size_t>(line)] &
+           0xFF;
+}
+
+void PhysicalFast::render(const PhysicalFrame& f,
+                          const BreathingField& breathing,
+                          bool flip,
+                          bool keep_all,
+                          std::span<std::uint8_t> pixels) {
+    auto clock = std::chrono::steady_clock::now();
+    passes_ = {};
+    find_contact(f);
+    passes_.contact_ms = lap_ms(clock);
+    sample_beams(f, breathing, keep_all);
+    passes_.beams_ms = std::max(lap_ms(clock) - passes_.needle_ms, 0.0);
+    filter_rows(f);
+    passes_.filter_ms = lap_ms(clock);
+    make_grey(f);
+    passes_.grey_ms = lap_ms(clock);
+    scan_convert(workers_, conversion_, pairs_, geometry_, flip, pixels);
+    passes_.convert_ms = lap_ms(clock);
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What the vectorised calls of model `physical` work on.
+#pragma once
+
+#include <cstdint>
+
+#include "formats/base/geometry.h"
+#include "runtime/imaging/needle/needle_strip.h"
+#include "runtime/imaging/physical/model/physical_model.h"
+
+namespace sonocase::runtime {
+
+// Labels' looks in one word: attenuation (bits 0-15, log2 of amplitude per mm there and back,
+// 1/4096), kind (16-18), fine structure (19), echo (20-31, signed, 1/16 dB).
+enum PackedKind : std::uint32_t {
+    kPackedOutside,
+    kPackedSoft,
+    kPackedFluid,
+    kPackedGas,
+    kPackedBone
+};
+
+inline constexpr int kLookFine = 1 << 19;
+
+// A pair's echo in one word: log2 of the amplitude (bits 0-11, 1/128, + 2048; 0: none), one over
+// the thickness (12-19, 1/32 per mm), hard (20), refracts (21), own label pulses (22), second label
+// pulses (23), split into two layers (24-30, 1/128 mm).
+inline constexpr int kPairHard = 1 << 20, kPairRefracts = 1 << 21, kPairOwnPulse = 1 << 22,
+                     kPairSecondPulse = 1 << 23;
+
+// Rows of per-beam numbers, `lines` apart.
+enum BeamNumber {
+    kVoxelOrigin = 0,
+    kVoxelPerMm = 3,
+    kSpeckleOrigin = 6,
+    kSpecklePerMm = 9,
+    kBeam = 12,
+    kGap = 15,
+    kBeamNumbers = 16
+};
+
+inline constexpr int kRowSlack = 64;   // behind rows and buffers: the widest vector
+inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 3
+
+inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
+
+struct PhysicalTarget {
+    float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels
+    std::int32_t look = 0;                     // index
+    float wall = 0;
+    bool fluid = false;
+};
+
+struct PhysicalBlock {
+    const float* beams = nullptr;
+    int lines = 0, samples = 0;
+    const float *r = nullptr, *contact = nullptr, *elevation = nullptr, *interface_scale = nullptr,
+                *gain = nullptr;
+    float across[3] = {0, 0, 0};    // voxels per mm across the plane
+    float sideways[3] = {0, 0, 0};  // voxels per unit of look-up jitter
+    const std::int8_t* white = nullptr;
+    const std::uint32_t *elevation_start = nullptr, *lookup_start = nullptr;
+
+    const float* breathing = nullptr;  // null: still. weight at nodes, `lines` apart
+    float shift_voxel[3] = {0, 0, 0}, shift_speckle[3] = {0, 0, 0};
+    float pulse_mm = 0;
+
+    const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
+    const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr, *speckle = nullptr;
+    const std::int8_t* fine = nullptr;   // null: off. Two cubes
+    const float* fine_frames = nullptr;  // ten a label: rows of the frame, offset of its cube
+    const PhysicalTarget* targets = nullptr;
+    int target_count = 0;
+    Int3 size;
+    int blocks_x = 0, blocks_xy = 0, block_log2 = 3;  // of the table: BrickTable
+    int label_count = 0;
+    const float *dim = nullptr, *dim_off = nullptr;  // per look: light that one sample leaves
+    float dead_light = 0;
+    struct {
+        float bone = 0, bone_slow = 0, bone_floor = 0, gas = 0;
+    } decay;                 // of the tails, a sample
+    float reverb_mm = 0.5f;  // half the width of a line
+    float voxel_mm = 1, rough_per_voxel = 2, step_mm = 0.3f;
+    bool structure = true, speckled = true, interfaces = true, edge_shadow = true,
+         attenuation = true;
+    bool bone_tail = true, gas_tail = true;
+    bool keep_all = false;
+    bool hard_scene = true;  // some label is bone or gas
+
+    // At the block's first beam. Echoes are complex amplitudes of 8 bits' precision each: the upper
+    // halves of two floats in one word, real part on top. What fits in the second cache counts.
+    std::int32_t* echoes = nullptr;
+    float *light = nullptr, *tail = nullptr;
+    int stride = 0;
+    int tail_from = 0;  // out: first sample with a tail; samples if none
+    bool boundary_met = false, refraction_met = false, hard_met = false, fine_met = false,
+         target_met = false;  // out
+};
+
+// A row's filter across the beams, and the noise that reaches the receiver with it.
+struct PhysicalRowTask {
+    int lines = 0, scanlines = 0;
+    const std::int32_t* echoes = nullptr;
+    const float* light = nullptr;
+    const float* lateral = nullptr;  // centre tap
+    int reach = 0;
+    bool point_spread = true;
+    float *work_re = nullptr, *work_im = nullptr;  // with margins
+    float *out_re = nullptr, *out_im = nullptr;
+
+    float inverse_gain = 1, near_field = 0, noise = 0;
+    const float* tail = nullptr;              // null: none
+    const std::int32_t* tail_from = nullptr;  // per block
+    int sample = 0;
+    const std::int8_t *clutter_re = nullptr, *clutter_im = nullptr;
+    int noise_rows = 0;  // 0: none
+    const std::int8_t* noise_re[4] = {nullptr, nullptr, nullptr, nullptr};
+    const std::int8_t* noise_im[4] = {nullptr, nullptr, nullptr, nullptr};
+    float noise_weight[4] = {0, 0, 0, 0};
+};
+
+// A row's filter along the beams; the envelope's power.
+struct PhysicalPowerTask {
+    int lines = 0;
+    const float* const* re = nullptr;  // rows of the filter; null rows count as zero
+    const float* const* im = nullptr;
+    const float* axial = nullptr;  // first tap
+    int axial_count = 1;
+    float gain = 1;
+    float* envelope_sum = nullptr;  // accumulates the envelope; null: not wanted
+    float* power = nullptr;
+};
+
+// Haze, log compression and the post-filter's lateral half.
+struct PhysicalGreyTask {
+    int lines = 0, scanlines = 0;
+    const float* power = nullptr;
+    const float *haze_above = nullptr, *haze_below = nullptr;  // null: none
+    float haze_mix = 0;
+    const std::int8_t* haze_re[2] = {nullptr, nullptr};  // rows to blend
+    const std::int8_t* haze_im[2] = {nullptr, nullptr};
+    float haze_first = 1, haze_second = 0;
+    float offset = 0, per_log2 = 0;
+    bool post_filter = true;
+    float* work = nullptr;  // with margins
+    float* out = nullptr;
+};
+
+// The post-filter's axial half, the grey map, and bytes.
+struct PhysicalShadeTask {
+    int lines = 0;
+    const float *above = nullptr, *here = nullptr, *below = nullptr;  // grey rows
+    bool post_filter = true, grey_map = true;
+    std::uint8_t* out = nullptr;
+};
+
+}  // namespace sonocase::runtime

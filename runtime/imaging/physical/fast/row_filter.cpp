@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Effects point_spread, near_field, noise and persistence: what the receiver makes of a row.
+#include "runtime/imaging/physical/fast/row_filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "row_filter.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+//
+#include "runtime/imaging/simd/simd_math-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sonocase::runtime::HWY_NAMESPACE {
+using namespace physical;
+
+// Light of the aperture times echoes, then the point spread across beams.
+void filter_across(const PhysicalRowTask& t) {
+    const hn::CappedTag<float, kBeamBlock> d;
+    const hn::RebindToSigned<decltype(d)> di;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    float* mre = t.work_re;
+    float* mim = t.work_im;
+    for (int i = 0; i < t.lines; i += lanes) {
+        const auto at = [&](int j) HWY_ATTR { return hn::LoadU(d, t.light + i + j); };
+        auto sum = hn::Mul(hn::Add(at(-3), at(3)), hn::Set(d, 1 / 15.0f));
+        sum = hn::Add(sum, hn::Mul(hn::Add(at(-2), at(2)), hn::Set(d, 2 / 15.0f)));
+        sum = hn::Add(sum, hn::Mul(hn::Add(hn::Add(at(-1), at(1)), at(0)), hn::Set(d, 3 / 15.0f)));
+        const auto echo = hn::LoadU(di, t.echoes + i);
+        hn::StoreU(hn::Mul(echo_real(d, echo), sum), d, mre + i);
+        hn::StoreU(hn::Mul(echo_imaginary(d, echo), sum), d, mim + i);
+    }
+    const int reach = t.point_spread ? t.reach : 0;
+    for (int j = 0; j < reach; ++j) {  // mirrored at the sector's edges
+        const int left = std::min(j, t.scanlines - 1), right = std::max(t.scanlines - 1 - j, 0);
+        mre[-1 - j] = mre[left];
+        mim[-1 - j] = mim[left];
+        mre[t.scanlines + j] = mre[right];
+        mim[t.scanlines + j] = mim[right];
+    }
+    const auto centre = hn::Set(d, t.point_spread ? t.lateral[0] : 1.0f);
+    const auto near = hn::Set(d, t.near_field * t.near_field);
+    const auto half = hn::Set(d, 0.5f);
+    const auto unit = hn::Set(d, t.inverse_gain / 32);
+    const auto noise_level = hn::Set(d, t.noise);
+    for (int i = 0; i < t.lines; i += lanes) {
+        auto re = hn::Mul(hn::LoadU(d, mre + i), centre),
+             im = hn::Mul(hn::LoadU(d, mim + i), centre);
+        for (int j = 1; j <= reach; ++j) {
+            const auto tap = hn::Set(d, t.lateral[j]);
+            re = hn::Add(
+                re, hn::Mul(hn::Add(hn::LoadU(d, mre + i - j), hn::LoadU(d, mre + i + j)), tap));
+            im = hn::Add(
+                im, hn::Mul(hn::Add(hn::LoadU(d, mim + i - j), hn::LoadU(d, mim + i + j)), tap));
+        }
+        auto power = near;
+        if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock])
+            power = hn::Add(power, hn::LoadU(d, t.tail + i));
+        const auto level = hn::Mul(hn::Sqrt(hn::Mul(half, power)), unit);
+        re = hn::Add(re, hn::Mul(level, noise_of(d, t.clutter_re + i)));
+        im = hn::Add(im, hn::Mul(level, noise_of(d, t.clutter_im + i)));
+        if (t.noise_rows > 0) {
+            auto n_re = hn::Zero(d), n_im = hn::Zero(d);
+            for (int j = 0; j < t.noise_rows; ++j) {
+                const auto w = hn::Set(d, t.noise_weight[j]);
+                n_re = hn::Add(n_re, hn::Mul(w, noise_of(d, t.noise_re[j] + i)));
+                n_im = hn::Add(n_im, hn::Mul(w, noise_of(d, t.noise_im[j] + i)));
+            }
+            re = hn::Add(re, hn::Mul(noise_level, n_re));
+            im = hn::Add(im, hn::Mul(noise_level, n_im));
+        }
+        hn::StoreU(re, d, t.out_re + i);
+        hn::StoreU(im, d, t.out_im + i);
+    }
+}
+
+// Point spread along the beam and gain; the envelope's power.
+void make_power(const PhysicalPowerTask& t) {
+    const hn::ScalableTag<float> d;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const auto gain = hn::Set(d, t.gain);
+    for (int i = 0; i < t.lines; i += lanes) {
+        auto re = hn::Zero(d), im = hn::Zero(d);
+        for (int j = 0; j < t.axial_count; ++j) {
+            if (t.re[j] == nullptr) continue;
+            const auto tap = hn::Set(d, t.axial[j]);
+            re = hn::Add(re, hn::Mul(hn::LoadU(d, t.re[j] + i), tap));
+            im = hn::Add(im, hn::Mul(hn::LoadU(d, t.im[j] + i), tap));
+        }
+        re = hn::Mul(re, gain);
+        im = hn::Mul(im, gain);
+        const auto power = hn::Add(hn::Mul(re, re), hn::Mul(im, im));
+        if (t.envelope_sum != nullptr) {
+            hn::StoreU(hn::Add(hn::LoadU(d, t.envelope_sum + i), hn::Sqrt(power)), d,
+                       t.envelope_sum + i);
+        }
+        hn::StoreU(power, d, t.power + i);
+    }
+}
+
+}  // namespace sonocase::runtime::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace sonocase::runtime {
+
+HWY_EXPORT(filter_across);
+HWY_EXPORT(make_power);
+
+void filter_row_across(const PhysicalRowTask& task) {
+    HWY_DYNAMIC_DISPATCH(filter_across)(task);
+}
+void make_power_row(const PhysicalPowerTask& task) {
+    HWY_DYNAMIC_DISPATCH(make_power)(task);
+}
+
+}  // namespace sonocase::runtime
+#endif

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Rows of samples, filtered across the beams and along them.
+#pragma once
+
+#include "runtime/imaging/physical/fast/physical_kernels.h"
+
+namespace sonocase::runtime {
+
+// Light of the aperture times echoes, point spread across the beams, clutter and noise.
+void filter_row_across(const PhysicalRowTask& task);
+
+// Point spread along the beams and gain; the envelope's power.
+void make_power_row(const PhysicalPowerTask& task);
+
+}  // namespace sonocase::runtime

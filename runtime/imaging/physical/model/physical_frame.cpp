@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/physical/model/physical_frame.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonocase::runtime {
+namespace {
+
+std::int8_t to_byte(double v) {
+    return static_cast<std::int8_t>(std::lround(std::clamp(v, -127.0, 127.0)));
+}
+
+// Unit-deviation noise smoothed by a Gaussian of the given width, as bytes of 1/32.
+std::vector<std::int8_t> smoothed_tile(double sigma, std::uint32_t seed, int overhang) {
+    const std::vector<std::int8_t> raw = make_noise_tile(32, seed, 0);
+    const int reach = static_cast<int>(std::ceil(3 * sigma));
+    std::vector<float> taps;
+    float power = 0;
+    for (int i = -reach; i <= reach; ++i) {
+        taps.push_back(sigma > 0 ? static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma)))
+                                 : 1.0f);
+        power += taps.back() * taps.back();
+    }
+    std::vector<std::int8_t> out(kNoiseTile + static_cast<std::size_t>(overhang));
+    for (std::uint32_t i = 0; i < kNoiseTile; ++i) {
+        float sum = 0;
+        for (int j = -reach; j <= reach; ++j) {
+            sum += taps[static_cast<std::size_t>(j + reach)] *
+                   static_cast<float>(raw[(i + static_cast<std::uint32_t>(j)) & (kNoiseTile - 1)]);
+        }
+        out[i] = to_byte(static_cast<double>(sum) / std::sqrt(static_cast<double>(power)));
+    }
+    for (int i = 0; i < overhang; ++i)
+        out[kNoiseTile + static_cast<std::size_t>(i)] = out[static_cast<std::size_t>(i)];
+    return out;
+}
+
+}  // namespace
+
+PhysicalNoise make_physical_noise(std::uint32_t seed, int overhang) {
+    return {smoothed_tile(0.8, seed + 1, overhang), smoothed_tile(2.5, seed + 2, overhang),
+            smoothed_tile(0, seed + 3, overhang)};
+}
+
+int label_at(const PhysicalScene& s, int i, int j, int k) {
+    if (!s.grid.contains(i, j, k)) return 0;
+    return s.bundle->label_bricks.at(i, j, k);
+}
+
+void find_gaps(const PhysicalScene& scene,
+               const ScanGeometry& g,
+               const PhysicalFrame& frame,
+               int first,
+               int last,
+               std::span<float> raw) {
+    // Of a voxel coordinate within 1e5 and a step: cheaper than a call of floor().
+    const auto nearest = [](double v) {
+        constexpr int kShift = 1 << 18;
+        return static_cast<int>(v + (kShift + 0.5)) - kShift;
+    };
+    for (int l = first; l < last; ++l) {
+        float& gap = raw[static_cast<std::size_t>(l)];
+        gap = -1;
+        const auto& [o, d] = g.beams[static_cast<std::size_t>(l)];
+        const Point3 p = scene.grid.voxel_from_point(frame.volume_from_probe * Point3{o.x, 0, o.z});
+        const Vector3 v = (physical::kGapStepMm / scene.voxel_mm) *
+                          (frame.volume_from_probe.rotation * Vector3{d.x, 0, d.z});
+        if (!(std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5 && std::abs(p.z) < 1e5)) continue;
+        for (int step = 0; step * physical::kGapStepMm <= physical::kMaxGapMm; ++step) {
+            const Point3 q = p + static_cast<double>(step) * v;
+            const int label = label_at(scene, nearest(q.x), nearest(q.y), nearest(q.z));
+            if (label == 0) continue;
+            gap = static_cast<float>(step * physical::kGapStepMm);
+            break;
+        }
+    }
+}
+
+int smooth_gaps(int scanlines, std::span<const float> raw, std::span<float> gaps) {
+    int touching = 0;
+    for (int l = 0; l < scanlines; ++l) {
+        gaps[static_cast<std::size_t>(l)] = -1;
+        if (raw[static_cast<std::size_t>(l)] < 0) continue;
+        ++touching;
+        float sum = 0;
+        int n = 0;
+        for (int j = std::max(l - 4, 0); j <= std::min(l + 4, scanlines - 1); ++j) {
+            const float gap = raw[static_cast<std::size_t>(j)];
+            if (gap < 0) continue;
+            sum += gap;
+            ++n;
+        }
+        gaps[static_cast<std::size_t>(l)] = sum / static_cast<float>(n);
+    }
+    return touching;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Writes a session while it runs, on a thread of its own. The frame loop hands over a record and
+// never waits; a batch is on the disk within half a second.
+//
+// Files: FILE.igs.mha, whole at every moment (formats/files/growing_sequence.h), and beside it
+// FILE.frames.igs.mha with the pictures of the moments that matter, which appears with the first of
+// them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/base/result.h"
+#include "formats/exercise/exercise.h"
+#include "formats/recording/session.h"
+#include "formats/scoring/session_monitor.h"
+#include "formats/volume/label_volume.h"
+
+namespace sonocase::runtime {
+
+// One frame of the player. Fixed size, so that handing it over allocates nothing.
+struct RecordedFrame {
+    double time_s = 0;       // FrameInput::time_s
+    std::int64_t frame = 0;  // FrameInput::frame
+    bool probe_ok = false, needle_ok = false;
+    Rigid mannequin_from_probe, mannequin_from_needle, mannequin_from_drawn;
+    // Console settings in words where they changed (settings_text.h); empty otherwise.
+    std::array<char, 224> settings{};
+};
+
+struct RecorderStatus {
+    std::size_t frames_written = 0;
+    std::size_t frames_dropped = 0;  // the writer was more than a minute behind
+    std::string problem;             // a whole sentence for the trainee; empty: all is well
+};
+
+class SessionRecorder {
+  public:
+    // exercise and labels give names to events; copied.
+    static Result<std::unique_ptr<SessionRecorder>> start(const std::string& path,
+                                                          const SessionHeader& header,
+                                                          const Exercise& exercise,
+                                                          const std::vector<Label>& labels);
+    ~SessionRecorder();  // writes what is left
+    SessionRecorder(const SessionRecorder&) = delete;
+    SessionRecorder& operator=(const SessionRecorder&) = delete;
+
+    // From the frame loop. Never blocks, never allocates; at most 8 events a frame are kept. False
+    // where the writer is so far behind that the frame is lost; status() counts them.
+    bool push(const RecordedFrame& frame, std::span<const LiveEvent> events);
+    // Keeps the picture of the frame just pushed: grey, # width * height. The picture is copied;
+    // when two come within the time of a write, the second is left out. `why` is a literal.
+    void push_picture(std::int64_t frame,
+                      double time_s,
+                      const char* why,
+                      int width_px,
+                      int height_px,
+                      std::span<const std::uint8_t> pixels);
+
+    // Returns when there is room for frames and a picture: for runs faster than life, which may
+    // wait.
+    void wait_for_room();
+
+    RecorderStatus status() const;  // for the screen; takes a lock for the time of a copy
+    // Writes what is left and ends the thread. An Error where frames did not reach the disk.
+    Status finish();
+
+  private:
+    struct Impl;
+    explicit SessionRecorder(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+// "x.igs.mha" -> "x.frames.igs.mha".
+std::string pictures_path(const std::string& session_path);
+
+}  // namespace sonocase::runtime

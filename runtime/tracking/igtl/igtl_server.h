@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Sends the picture and the tools to programs that connect (3D Slicer, PLUS), over OpenIGTLink:
+//   IMAGE      Ultrasound            placed in `mannequin`
+//   TRANSFORM  ProbeToMannequin, NeedleToMannequin
+// The frame loop hands a frame over and never waits; a slow or silent guest loses frames, not time.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "formats/base/geometry.h"
+#include "formats/base/mailbox.h"
+#include "formats/base/result.h"
+#include "runtime/tracking/igtl/socket.h"
+
+namespace sonocase::runtime {
+
+struct ServedFrame {
+    double unix_time_s = 0;
+    int width_px = 0, height_px = 0;
+    double mm_per_px = 1;
+    double origin_x_px = 0, origin_y_px = 0;  // pixel of the probe's origin
+    Rigid mannequin_from_probe, mannequin_from_needle;
+    bool has_probe = false, has_needle = false;
+    std::vector<std::uint8_t> pixels;
+};
+
+class IgtlServer {
+  public:
+    static Result<std::unique_ptr<IgtlServer>> start(const std::string& address, int port);
+    ~IgtlServer();
+    IgtlServer(const IgtlServer&) = delete;
+    IgtlServer& operator=(const IgtlServer&) = delete;
+
+    // "[ADDRESS:]PORT"; loopback unless an address is given.
+    static Result<std::unique_ptr<IgtlServer>> start(const std::string& address_and_port);
+
+    int port() const { return listener_.port(); }
+    int guests() const { return guests_.load(); }
+    // From the frame loop: fill slot(), publish(). Allocates only when the picture's size grows.
+    ServedFrame& slot() { return box_.slot(); }
+    void publish() { box_.publish(); }
+
+  private:
+    struct Guest {
+        Socket socket;
+        std::vector<std::uint8_t> unsent;
+        std::size_t at = 0;
+    };
+    explicit IgtlServer(Socket listener);
+    void run();
+
+    Socket listener_;
+    Mailbox<ServedFrame> box_;
+    std::atomic<bool> stop_{false};
+    std::atomic<int> guests_{0};
+    std::thread thread_;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Poses over OpenIGTLink: from a server such as PLUS (client), or from whoever connects
+// (listening).
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "formats/base/mailbox.h"
+#include "formats/base/result.h"
+#include "runtime/tracking/igtl/igtl_message.h"
+#include "runtime/tracking/igtl/socket.h"
+#include "runtime/tracking/tracker.h"
+
+namespace sonocase::runtime {
+
+struct IgtlTrackerOptions {
+    std::string host = "127.0.0.1";
+    int port = 18944;
+    bool listening = false;
+    double retry_s = 0.5;
+    double silence_s = 5;  // a connection without a byte for so long is opened again
+};
+
+// A device's name tells the tool: one that begins with Probe, Transducer or Image is the probe, one
+// that begins with Needle or Stylus the needle, others take the next free sensors in order. A name
+// that ends in ToMannequin carries a tool in `mannequin`.
+class IgtlTracker final : public Tracker {
+  public:
+    static Result<std::unique_ptr<Tracker>> start(const IgtlTrackerOptions& options,
+                                                  SessionClock clock);
+    ~IgtlTracker() override;
+    bool poll(double now_s, TrackerReading& reading) override;
+    TrackerHealth health() const override;
+    void set_wake(std::function<void()> wake) override;
+    bool is_device() const override { return true; }
+    int port() const { return listener_.open() ? listener_.port() : options_.port; }
+
+  private:
+    IgtlTracker(const IgtlTrackerOptions& options, SessionClock clock, Socket listener);
+    void run();
+    void converse(Socket socket);
+    void take(const std::vector<igtl::NamedPose>& poses, double device_time_s);
+    int sensor_of(const std::string& name);
+    void say(TrackerPhase phase, const std::string& message);
+
+    IgtlTrackerOptions options_;
+    SessionClock clock_;
+    Socket listener_;
+    std::atomic<bool> stop_{false};
+    Mailbox<TrackerReading> box_;
+    TrackerReading reading_;
+    std::vector<std::string> names_;  // of the sensors; "" where free
+    mutable std::mutex mutex_;
+    TrackerHealth health_;
+    std::function<void()> wake_;
+    double last_s_ = -1, mean_period_s_ = 0;
+    std::thread thread_;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// A USB tracker on a thread of its own: waits for the device, starts it, hands over readings, and
+// begins again when it is unplugged. What differs between makers is a UsbDriver.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <thread>
+
+#include "formats/base/mailbox.h"
+#include "formats/base/result.h"
+#include "runtime/tracking/tracker.h"
+#include "runtime/tracking/usb/usb_pipe.h"
+
+namespace sonocase::runtime {
+
+// Which half of the transmitter's field the sensors are in.
+enum class Hemisphere : std::uint8_t { plus_x, minus_x, plus_y, minus_y, plus_z, minus_z };
+
+struct UsbTrackerOptions {
+    Hemisphere hemisphere = Hemisphere::plus_x;
+    double rate_hz = 240;    // the nearest that the device has
+    double retry_s = 0.5;    // between looks for a device
+    double silence_s = 1.0;  // without a reading before it is started anew
+};
+
+class UsbDriver {
+  public:
+    virtual ~UsbDriver() = default;
+    virtual std::span<const UsbId> ids() const = 0;  // the first names the family
+    // Brings a device from any state to streaming. `name` becomes what is shown.
+    virtual Status start(UsbPipe& pipe, const UsbTrackerOptions& options, std::string& name) = 0;
+    // Waits up to 0.1 s for a reading; true with ok when there is one. Anything but ok and timeout
+    // ends the connection, except stalled, which is cleared and gone on from.
+    virtual bool read(UsbPipe& pipe, TrackerReading& reading, UsbOutcome& outcome) = 0;
+    virtual void stop(UsbPipe& pipe) = 0;
+    virtual std::uint64_t bad_frames() const = 0;
+    virtual std::string warning() const { return {}; }  // a sentence, or nothing
+};
+
+class UsbTracker final : public Tracker {
+  public:
+    UsbTracker(std::unique_ptr<UsbDriver> driver,
+               SessionClock clock,
+               UsbTrackerOptions options = {});
+    ~UsbTracker() override;
+    bool poll(double now_s, TrackerReading& reading) override;
+    TrackerHealth health() const override;
+    void set_wake(std::function<void()> wake) override;
+    bool is_device() const override { return true; }
+
+  private:
+    void run();
+    void stream(UsbPipe& pipe);
+    void say(TrackerPhase phase, const std::string& message);
+    void pause(double seconds);
+
+    std::unique_ptr<UsbDriver> driver_;
+    SessionClock clock_;
+    UsbTrackerOptions options_;
+    std::atomic<bool> stop_{false};
+    Mailbox<TrackerReading> box_;
+    mutable std::mutex mutex_;
+    TrackerHealth health_;
+    std::string note_;        // two alike
+    bool unplugged_ = false;  // and not back yet
+    bool silent_ = false;     // started again since the last reading
+    double mean_period_s_ = 0;
+    std::function<void()> wake_;
+    std::thread thread_;
+};
+
+std::unique_ptr<UsbDriver> make_viper_driver();
+std::unique_ptr<UsbDriver> make_guidance_driver();
+std::unique_ptr<UsbDriver> make_liberty_driver();
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The bytes of four bundles and of sixty frames of each image model, as they were when the digests
+// were written down: what is not meant to change the product does not change it. A change that is
+// meant to writes its new digests here (a failing test prints them) and says why in its commit.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "formats/base/digest.h"
+#include "formats/files/file_digest.h"
+#include "support/paths.h"
+#include "support/run_command.h"
+#include "support/temporary_folder.h"
+
+namespace sonocase {
+namespace {
+
+namespace fs = std::filesystem;
+
+using sonocase::testing::read_text;
+using sonocase::testing::run_command;
+
+// Recorded at commit aa0be5b.
+constexpr const char* kDraft = "@draft@";
+constexpr const char* kBalanced = "@balanced@";
+constexpr const char* kSlender = "@slender@";
+constexpr const char* kReal = "@real@";
+constexpr const char* kDraftPhysical = "@draft_physical@";
+constexpr const char* kDraftPaper = "@draft_paper@";
+constexpr const char* kRealPhysical = "@real_physical@";
+constexpr const char* kRealPaper = "@real_paper@";
+
+class SameBytes : public ::testing::Test {
+  protected:
+    std::string cook(const std::string& arguments, int threads) {
+        const std::string bundle = folder_ / "case.sonocase";
+        const auto built = run_command(SONOCASE_BIN "/sonocase build " + arguments +
+                                       " --quiet --threads " + std::to_string(threads) + " -o " +
+                                       bundle);
+        EXPECT_EQ(built.status, 0) << built.error;
+        return bundle;
+    }
+
+    // Of the names and bytes of sixty frames of the sweep with the needle.
+    std::string frames_digest(const std::string& bundle, const std::string& model, int threads) {
+        const std::string out = folder_ / "frames";
+        fs::remove_all(out);
+        const auto played =
+            run_command(SONOCASE_BIN "/sonoplay " + bundle +
+                        " --headless --exercise liver-biopsy --tracker sweep:needle --frames 60"
+                        " --size 512x512 --model " +
+                        model + " --threads " + std::to_string(threads) + " --out " + out);
+        EXPECT_EQ(played.status, 0) << played.error;
+        std::vector<std::string> names;
+        for (const auto& entry : fs::directory_iterator(out)) {
+            const std::string name = entry.path().filename().string();
+            if (name.rfind("frame_", 0) == 0) names.push_back(name);
+        }
+        std::sort(names.begin(), names.end());
+        EXPECT_EQ(names.size(), 60u);
+        Digest digest;
+        for (const std::string& name : names) digest.add(name).add(read_text(out + "/" + name));
+        return digest.hex();
+    }
+
+    void expect_frames(const std::string& bundle, const char* physical, const char* paper) {
+        for (const int threads : {1, 2}) {
+            EXPECT_EQ(frames_digest(bundle, "physical", threads), physical) << threads;
+            EXPECT_EQ(frames_digest(bundle, "paper", threads), paper) << threads;
+        }
+    }
+
+    sonocase::testing::TemporaryFolder folder_;
+};
+
+TEST_F(SameBytes, DemoTorsoDraftAndItsFrames) {
+    const std::string recipe = SONOCASE_SOURCE "/scenarios/demo-torso/case.toml --preset draft";
+    EXPECT_EQ(*digest_of_file(cook(recipe, 1)), kDraft);
+    const std::string bundle = cook(recipe, 2);
+    EXPECT_EQ(*digest_of_file(bundle), kDraft);
+    expect_frames(bundle, kDraftPhysical, kDraftPaper);
+}
+
+TEST_F(SameBytes, DemoTorsoBalanced) {
+    const std::string recipe = SONOCASE_SOURCE "/scenarios/demo-torso/case.toml";
+    EXPECT_EQ(*digest_of_file(cook(recipe, 2)), kBalanced);
+}
+
+TEST_F(SameBytes, SlenderTorso) {
+    fs::copy(SONOCASE_SOURCE "/scenarios/demo-torso", folder_ / "slender");
+    std::string text = read_text(folder_ / "slender/case.toml");
+    const std::string section = "\n[analytic]\n", name = "name = \"demo-torso\"";
+    ASSERT_NE(text.find(section), std::string::npos);
+    ASSERT_NE(text.find(name), std::string::npos);
+    text.replace(text.find(section), section.size(), section + "body = \"slender\"\n");
+    text.replace(text.find(name), name.size(), "name = \"slender\"");
+    folder_.write("slender/case.toml", text);
+    EXPECT_EQ(*digest_of_file(cook(folder_ / "slender/case.toml", 2)), kSlender);
+}
+
+TEST_F(SameBytes, RealTorsoAndItsFrames) {
+    if (!fs::exists(SONOCASE_DATA "/ct/labels.nii.gz")) GTEST_SKIP() << "no " SONOCASE_DATA;
+    const std::string bundle =
+        cook(SONOCASE_SOURCE "/scenarios/real-torso/case.toml --data " SONOCASE_DATA, 2);
+    EXPECT_EQ(*digest_of_file(bundle), kReal);
+    expect_frames(bundle, kRealPhysical, kRealPaper);
+}
+
+}  // namespace
+}  // namespace sonocase

@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/bundle/case_bundle.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <cstring>
+
+#include "formats/bundle/stage_files.h"
+#include "formats/container/chunk_file.h"
+#include "formats/files/atomic_file.h"
+#include "formats/files/bundle_file.h"
+#include "formats/volume/boundary_record.h"
+#include "support/paths.h"
+#include "support/random.h"
+#include "support/temporary_folder.h"
+#include "support/tiny_case.h"
+
+namespace sonocase {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+using testing::tiny_case;
+
+template <class T>
+void expect_same_volume(const BrickVolume<T>& a, const BrickVolume<T>& b) {
+    EXPECT_EQ(a.size, b.size);
+    ASSERT_EQ(a.table.size(), b.table.size());
+    if (!a.table.empty()) {
+        EXPECT_EQ(dense_from_bricks(a), dense_from_bricks(b));
+    }
+    EXPECT_EQ(a.uniform, b.uniform);
+    EXPECT_EQ(a.pool.size(), b.pool.size());  // the order of its bricks is free
+}
+
+void expect_same(const Surface& a, const Surface& b) {
+    EXPECT_EQ(a.points, b.points);
+    EXPECT_EQ(a.normals, b.normals);
+    EXPECT_EQ(a.triangles, b.triangles);
+}
+
+void expect_same(const CaseBundle& a, const CaseBundle& b) {
+    EXPECT_EQ(a.manifest.case_name, b.manifest.case_name);
+    EXPECT_EQ(a.manifest.producer, b.manifest.producer);
+    EXPECT_EQ(a.manifest.recipe, b.manifest.recipe);
+    EXPECT_EQ(a.manifest.stages, b.manifest.stages);
+    ASSERT_EQ(a.manifest.inputs.size(), b.manifest.inputs.size());
+    for (std::size_t i = 0; i < a.manifest.inputs.size(); ++i) {
+        EXPECT_EQ(a.manifest.inputs[i].path, b.manifest.inputs[i].path);
+        EXPECT_EQ(a.manifest.inputs[i].digest, b.manifest.inputs[i].digest);
+    }
+    EXPECT_EQ(a.grid, b.grid);
+    EXPECT_EQ(a.labels, b.labels);
+    ASSERT_EQ(a.tissues.size(), b.tissues.size());
+    for (std::size_t i = 0; i < a.tissues.size(); ++i) {
+        const Tissue &s = a.tissues[i], &t = b.tissues[i];
+        EXPECT_EQ(s.name, t.name);
+        EXPECT_EQ(s.kind, t.kind);
+        EXPECT_EQ(s.casts_shadow, t.casts_shadow);
+        EXPECT_EQ(s.texture, t.texture);
+        EXPECT_EQ(s.source, t.source);
+        EXPECT_EQ(std::tie(s.grey_mean, s.grey_sd, s.echo_db, s.structure_db,
+                           s.attenuation_db_cm_mhz, s.impedance_mrayl, s.sound_speed_m_s),
+                  std::tie(t.grey_mean, t.grey_sd, t.echo_db, t.structure_db,
+                           t.attenuation_db_cm_mhz, t.impedance_mrayl, t.sound_speed_m_s));
+    }
+    ASSERT_EQ(a.exercises.size(), b.exercises.size());
+    for (std::size_t i = 0; i < a.exercises.size(); ++i) {
+        EXPECT_EQ(a.exercises[i].name, b.exercises[i].name);
+        EXPECT_EQ(a.exercises[i].toml, b.exercises[i].toml);
+    }
+    expect_same_volume(a.label_bricks, b.label_bricks);
+    expect_same_volume(a.echo_offset, b.echo_offset);
+    expect_same_volume<std::uint32_t>(a.boundary, b.boundary);
+    ASSERT_EQ(a.textures.size(), b.textures.size());
+    for (std::size_t i = 0; i < a.textures.size(); ++i) {
+        EXPECT_EQ(a.textures[i].name, b.textures[i].name);
+        EXPECT_EQ(a.textures[i].edge, b.textures[i].edge);
+        EXPECT_EQ(a.textures[i].voxel_mm, b.textures[i].voxel_mm);
+        EXPECT_EQ(a.textures[i].voxels, b.textures[i].voxels);
+    }
+    EXPECT_EQ(a.speckle.edge, b.speckle.edge);
+    EXPECT_EQ(a.speckle.voxels, b.speckle.voxels);
+    expect_same(a.patient_skin, b.patient_skin);
+    expect_same(a.mannequin_skin, b.mannequin_skin);
+    EXPECT_EQ(a.preview_png, b.preview_png);
+}
+
+TEST(CaseBundle, ComesBackAsItWas) {
+    const CaseBundle bundle = tiny_case();
+    const Bytes bytes = write_bundle(bundle);
+    const auto back = read_bundle(bytes, "tiny");
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(*back, bundle);
+    EXPECT_EQ(write_bundle(*back), bytes);
+    EXPECT_EQ(container_kind(bytes), "CASE");
+}
+
+TEST(CaseBundle, AnEmptyOneComesBackToo) {
+    CaseBundle bundle;
+    bundle.labels = {{"outside", "outside", 0, {0, 0, 0}}};
+    Tissue outside;
+    outside.name = "outside";
+    bundle.tissues = {outside};
+    const auto back = read_bundle(write_bundle(bundle), "empty");
+    ASSERT_TRUE(back) << back.error().message();
+    EXPECT_TRUE(back->textures.empty());
+    EXPECT_TRUE(back->label_bricks.table.empty());
+}
+
+TEST(CaseBundle, EveryTruncationIsAnError) {
+    const Bytes file = write_bundle(tiny_case());
+    for (std::size_t n = 0; n < file.size(); ++n) {
+        EXPECT_FALSE(read_bundle(std::span(file).first(n), "cut")) << n;
+    }
+}
+
+TEST(CaseBundle, EveryDamagedByteIsAnError) {
+    Bytes file = write_bundle(tiny_case());
+    for (std::size_t i = 0; i < file.size(); ++i) {
+        for (const int change : {0x01, 0x80}) {
+            file[i] = static_cast<std::uint8_t>(file[i] ^ change);
+            EXPECT_FALSE(read_bundle(file, "damaged", 1)) << "byte " << i;
+            file[i] = static_cast<std::uint8_t>(file[i] ^ change);
+        }
+    }
+}
+
+// The file with one chunk changed, and right checksums.
+template <class Change>
+Bytes with_chunk(const Bytes& file, const std::string& type, Change change) {
+    static constexpr std::string_view known[] = {
+        "manifest", "lab.t",    "lab.u",    "lab.p",    "echo.t",  "echo.u",  "echo.p",
+        "bnd.t",    "bnd.u",    "bnd.p",    "vox.kind", "vox.one", "vox.mix", "vox.pair",
+        "vox.low",  "vox.high", "vox.fix",  "ofs.kind", "ofs.one", "ofs.val", "textures",
+        "speckle",  "skin.pat", "skin.man", "preview"};
+    const auto reader = ChunkReader::open(file, "CASE", known, "test");
+    EXPECT_TRUE(reader);
+    ChunkWriter writer("CASE");
+    for (const std::string_view name : known) {
+        if (!reader->has(name)) continue;
+        Bytes bytes = *reader->read(name, SIZE_MAX / 4);
+        if (name == type) change(bytes);
+        if (name == "vox.fix" || name == "ofs.val") {
+            writer.add_packed(std::string(name), false, std::move(bytes));
+        } else {
+            writer.add(std::string(name), false, std::move(bytes));
+        }
+    }
+    return writer.write(1);
+}
+
+Bytes file_of_version_1() {
+    return *read_file(std::string(SONOCASE_SOURCE) + "/tests/data/versions/case-1.sonocase");
+}
+
+TEST(CaseBundle, TablesOfTheFirstLayoutMayNotPointOutside) {
+    for (const std::uint32_t word : {100000u, kUniformBrick | 77u}) {
+        const Bytes file = with_chunk(file_of_version_1(), "lab.t",
+                                      [&](Bytes& b) { std::memcpy(b.data() + 4, &word, 4); });
+        const auto back = read_bundle(file, "forged");
+        ASSERT_FALSE(back);
+        EXPECT_NE(back.error().message().find("names a brick"), std::string::npos);
+    }
+}
+
+// Surfaces that patches describe, and others: whatever bytes the chunks hold, what is read is
+// whole.
+TEST(CaseBundle, AnyByteOfThePackedVolumesIsRefusedOrHarmless) {
+    const Bytes file = write_bundle(testing::curved_case());
+    for (const char* type : {"vox.kind", "vox.one", "vox.mix", "vox.pair", "vox.low", "vox.high",
+                             "vox.fix", "ofs.kind", "ofs.one", "ofs.val"}) {
+        std::size_t size = 0;
+        with_chunk(file, type, [&](Bytes& b) { size = b.size(); });
+        EXPECT_GT(size, 0u) << type;
+        const std::size_t stride = std::max<std::size_t>(1, size / 60);
+        for (std::size_t at = 0; at < size; at += stride) {
+            for (const int value : {0x03, 0x1F, 0x7F, 0xFF}) {
+                const auto back = read_bundle(
+                    with_chunk(file, type,
+                               [&](Bytes& b) { b[at] = static_cast<std::uint8_t>(value); }),
+                    "forged", 1);
+                if (!back) continue;
+                const BrickVolume<std::uint8_t>& labels = back->label_bricks;
+                for (const std::uint8_t v : labels.pool) ASSERT_LT(v, back->labels.size());
+                for (const std::uint8_t v : labels.uniform) ASSERT_LT(v, back->labels.size());
+                for (const std::uint32_t v : back->boundary.pool)
+                    ASSERT_TRUE(v == kNoBoundary || (v & 0xFFu) < back->labels.size());
+                ASSERT_EQ(labels.at(0, 0, 0), labels.at(0, 0, 0));
+            }
+        }
+        EXPECT_FALSE(read_bundle(with_chunk(file, type, [](Bytes& b) { b.push_back(0); }), "long"));
+        EXPECT_FALSE(read_bundle(with_chunk(file, type, [](Bytes& b) { b.pop_back(); }), "short"));
+    }
+}
+
+TEST(CaseBundle, PackedVolumesComeBackExactlyAndSmall) {
+    const CaseBundle bundle = testing::curved_case();
+    const Bytes bytes = write_bundle(bundle);
+    const auto back = read_bundle(bytes, "curved");
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(*back, bundle);
+    EXPECT_EQ(write_bundle(*back), bytes);
+    const auto one = read_bundle(bytes, "curved", 1);
+    ASSERT_TRUE(one);
+    expect_same(*one, bundle);
+}
+
+// What a player does: blocks in any order, each when it is asked for.
+TEST(CaseBundle, OpenedIsAsLoadedBlockByBlock) {
+    const CaseBundle bundle = testing::curved_case();
+    const testing::TemporaryFolder folder;
+    const std::string path = folder / "curved.sonocase";
+    ASSERT_TRUE(save_bundle(bundle, path));
+    auto opened = open_bundle(path);
+    ASSERT_TRUE(opened) << opened.error().message();
+    ASSERT_TRUE(opened->blocks);
+    expect_same_volume(opened->label_bricks, bundle.label_bricks);
+    EXPECT_FALSE(opened->blocks->whole());
+    const CaseBundle moved = std::move(*opened);
+    const Int3 size = bundle.grid.size;
+    for (int k = size.z - 1; k >= 0; --k) {
+        for (int j = 0; j < size.y; ++j) {
+            for (int i = 0; i < size.x; ++i) {
+                moved.blocks->ensure_voxel_loaded(i, j, k);
+                ASSERT_EQ(moved.boundary.at(i, j, k), bundle.boundary.at(i, j, k));
+                ASSERT_EQ(moved.echo_offset.at(i, j, k), bundle.echo_offset.at(i, j, k));
+            }
+        }
+    }
+    EXPECT_TRUE(moved.blocks->whole());
+    EXPECT_TRUE(moved.blocks->status());
+}
+
+// A block with right checksums that makes no sense: seen when it is asked for, and empty.
+TEST(CaseBundle, ABlockThatMakesNoSenseSaysSoAndHoldsNothing) {
+    const testing::TemporaryFolder folder;
+    const std::string path = folder / "forged.sonocase";
+    const Bytes good = write_bundle(testing::curved_case());
+    for (const char* type : {"vox.fix", "ofs.val"}) {
+        const Bytes file =
+            with_chunk(good, type, [](Bytes& b) { std::fill(b.end() - 40, b.end(), 0x5A); });
+        EXPECT_FALSE(read_bundle(file, "forged"));
+        ASSERT_TRUE(write_file(path, file));
+        const auto opened = open_bundle(path);
+        ASSERT_TRUE(opened) << opened.error().message();
+        EXPECT_TRUE(opened->blocks->status());
+        opened->blocks->ensure_loaded([](Int3) { return true; });
+        EXPECT_TRUE(opened->blocks->damaged());
+        ASSERT_FALSE(opened->blocks->status());
+        EXPECT_NE(opened->blocks->status().error().message().find(path), std::string::npos);
+        for (const std::uint32_t v : opened->boundary.pool)
+            ASSERT_TRUE(v == kNoBoundary || (v & 0xFFu) < opened->labels.size());
+    }
+}
+
+// Written by our own writer with right checksums, so that only the checks of the contents can see
+// it.
+void expect_refused(const CaseBundle& bundle, const std::string& says) {
+    const auto back = read_bundle(write_bundle(bundle), "forged");
+    ASSERT_FALSE(back) << says;
+    EXPECT_NE(back.error().message().find(says), std::string::npos) << back.error().message();
+}
+
+TEST(CaseBundle, ContentsThatWouldBreakTheRendererAreRefused) {
+    CaseBundle b = tiny_case();
+    b.label_bricks.pool[5] = 3;
+    expect_refused(b, "label beyond the palette");
+    b = tiny_case();
+    b.boundary.pool[3] = 200;
+    expect_refused(b, "boundary record");
+    b = tiny_case();
+    b.patient_skin.triangles[0][2] = 4;
+    expect_refused(b, "triangle");
+    b = tiny_case();
+    b.patient_skin.points[0].x = NAN;
+    expect_refused(b, "not finite");
+    b = tiny_case();
+    b.grid.spacing_mm.y = 3;
+    expect_refused(b, "no cubes");
+    b = tiny_case();
+    b.grid.size.x = 1000;
+    expect_refused(b, "calls for");
+    b = tiny_case();
+    b.grid.size = {60000, 60000, 60000};
+    expect_refused(b, "out of range");
+    b = tiny_case();
+    b.labels[1].name = "liver";
+    expect_refused(b, "twice");
+    b = tiny_case();
+    b.labels[1].tissue = "cheese";
+    expect_refused(b, "cheese");
+    b = tiny_case();
+    b.textures[0].edge = 16;
+    expect_refused(b, "calls for");
+    b = tiny_case();
+    b.labels.clear();
+    expect_refused(b, "1 to 255");
+}
+
+TEST(CaseBundle, RandomBytesInAManifestNeverCrash) {
+    testing::Random random(5);
+    const std::string text =
+        R"({"grid":{"size":[1,1,1],"spacing_mm":[1,1,1],"origin_mm":[0,0,0],)"
+        R"("direction":[1,0,0,0,1,0,0,0,1]},"labels":[{"name":"o","tissue":"t"}],)"
+        R"("tissues":[{"name":"t","kind":"soft"}],"textures":[],"speckle_edge":0})";
+    for (int i = 0; i < 3000; ++i) {
+        std::string changed = text;
+        for (int k = 0; k < 1 + i % 3; ++k) {
+            changed[static_cast<std::size_t>(random.uniform(0, static_cast<double>(text.size())))] =
+                static_cast<char>(random.uniform(0, 256));
+        }
+        ChunkWriter writer("CASE");
+        writer.add("manifest", true, Bytes(changed.begin(), changed.end()));
+        (void)read_bundle(writer.write(1), "fuzz", 1);
+    }
+}
+
+TEST(CaseBundle, DeeplyNestedManifestIsAnErrorNotAnOverflow) {
+    const std::string text = "{\"a\":" + std::string(200000, '[');
+    ChunkWriter writer("CASE");
+    writer.add("manifest", true, Bytes(text.begin(), text.end()));
+    EXPECT_FALSE(read_bundle(writer.write(1), "deep", 1));
+}
+
+TEST(CaseBundle, TissueOfLabelFollowsTheNames) {
+    EXPECT_EQ(tissue_of_label(tiny_case()), (std::vector<int>{0, 1, 2}));
+}
+
+// One bundle of every released layout stays readable. The newest is written anew only by
+//     SONOCASE_WRITE_GOLDEN=1 formats_container_test
+TEST(CaseBundle, GoldenFileOfVersion1StaysReadable) {
+    const std::string path = std::string(SONOCASE_SOURCE) + "/tests/data/versions/case-1.sonocase";
+    const auto back = load_bundle(path);
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(*back, tiny_case());
+}
+
+// The second layout: volumes packed.
+TEST(CaseBundle, GoldenFileOfThePackedLayoutStaysReadable) {
+    const std::string path =
+        std::string(SONOCASE_SOURCE) + "/tests/data/versions/case-1-packed.sonocase";
+    if (std::getenv("SONOCASE_WRITE_GOLDEN")) {
+        ASSERT_TRUE(save_bundle(testing::curved_case(), path));
+    }
+    const auto back = load_bundle(path);
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(*back, testing::curved_case());
+}
+
+TEST(CaseBundle, AFutureVersionSaysSo) {
+    const std::string path =
+        std::string(SONOCASE_SOURCE) + "/tests/data/versions/case-future.sonocase";
+    const auto back = load_bundle(path);
+    ASSERT_FALSE(back);
+    EXPECT_NE(back.error().message().find("format version 9"), std::string::npos)
+        << back.error().message();
+    EXPECT_NE(back.error().message().find("up to version 1"), std::string::npos)
+        << back.error().message();
+}
+
+}  // namespace
+}  // namespace sonocase

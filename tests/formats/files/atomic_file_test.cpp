@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/files/atomic_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include <csignal>
+#include <thread>
+
+#include "formats/base/digest.h"
+#include "formats/files/file_digest.h"
+#include "support/temporary_folder.h"
+
+namespace sonocase {
+namespace {
+
+using testing::TemporaryFolder;
+
+TEST(AtomicFile, WritesAndReadsBack) {
+    const TemporaryFolder folder;
+    ASSERT_TRUE(write_file(folder / "a", std::string_view("first")));
+    ASSERT_TRUE(write_file(folder / "a", std::string_view("second")));
+    EXPECT_EQ(*read_text_file(folder / "a"), "second");
+    EXPECT_EQ(folder.names().size(), 1u);
+    ASSERT_TRUE(write_file(folder / "empty", std::string_view()));
+    EXPECT_TRUE(read_file(folder / "empty")->empty());
+}
+
+TEST(AtomicFile, AFullDiskLeavesTheOldFileAndNothingElse) {
+    const TemporaryFolder folder;
+    ASSERT_TRUE(write_file(folder / "a", std::string_view("first")));
+    // A limit on file size fails a write in its middle as a full disk does.
+    rlimit before{};
+    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit small{1000, before.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const Status status = write_file(folder / "a", std::string(5000, 'x'));
+    setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
+    ASSERT_FALSE(status);
+    EXPECT_NE(status.error().message().find("nothing was written"), std::string::npos);
+    EXPECT_EQ(*read_text_file(folder / "a"), "first");
+    EXPECT_EQ(folder.names().size(), 1u);
+}
+
+TEST(AtomicFile, ErrorsNameThePath) {
+    const TemporaryFolder folder;
+    const auto missing = read_file(folder / "none");
+    ASSERT_FALSE(missing);
+    EXPECT_NE(missing.error().message().find("none: no such file"), std::string::npos);
+    EXPECT_FALSE(read_file(folder / ""));
+    // No folder can be made below a file.
+    ASSERT_TRUE(write_file(folder / "file", std::string_view("x")));
+    const Status below = write_file(folder / "file/below", std::string_view("x"));
+    ASSERT_FALSE(below);
+    EXPECT_NE(below.error().message().find("file/below"), std::string::npos);
+}
+
+TEST(AtomicFile, MakesMissingFoldersAndAppendsToPipes) {
+    const TemporaryFolder folder;
+    ASSERT_TRUE(write_file(folder / "some/new/folder/a", std::string_view("x")));
+    EXPECT_EQ(*read_text_file(folder / "some/new/folder/a"), "x");
+    const std::string pipe = folder / "pipe";
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    std::string read;
+    std::jthread reader([&] { read = *read_text_file(pipe); });
+    ASSERT_TRUE(write_file(pipe, std::string_view("through")));
+    reader.join();
+    EXPECT_EQ(read, "through");
+}
+
+TEST(Digest, IsTheOneOfXxh3AndTellsPartsApart) {
+    // The published 128-bit XXH3 value of the empty input with seed 0.
+    EXPECT_EQ(digest_of(std::string_view()), "99aa06d3014798d86001c324468d497f");
+    EXPECT_NE(Digest().add(std::string_view("ab")).add(std::string_view("c")).hex(),
+              Digest().add(std::string_view("a")).add(std::string_view("bc")).hex());
+    EXPECT_EQ(Digest().add(0.0).hex(), Digest().add(-0.0).hex());
+    EXPECT_NE(Digest().add(std::int64_t{1}).hex(), Digest().add(std::int64_t{2}).hex());
+}
+
+TEST(Digest, OfAFileIsThatOfItsBytes) {
+    const TemporaryFolder folder;
+    ASSERT_TRUE(write_file(folder / "a", std::string_view("content")));
+    EXPECT_EQ(*digest_of_file(folder / "a"), digest_of(std::string_view("content")));
+    EXPECT_FALSE(digest_of_file(folder / "b"));
+}
+
+}  // namespace
+}  // namespace sonocase

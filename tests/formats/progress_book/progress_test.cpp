@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "formats/files/atomic_file.h"
+#include "formats/progress_book/progress_book.h"
+#include "support/random.h"
+#include "support/temporary_folder.h"
+
+namespace sonocase {
+namespace {
+
+namespace fs = std::filesystem;
+
+using testing::TemporaryFolder;
+
+ProgressEntry entry(const std::string& trainee, int number) {
+    ProgressEntry e;
+    e.trainee = trainee;
+    e.case_name = "demo";
+    e.exercise = number % 2 ? "liver" : "kidney";
+    e.started = "2026-01-01T00:00:" + std::to_string(10 + number) + "Z";
+    e.passed = number % 3 == 0;
+    e.metrics = {{"elapsed_time_s", 1.0 / 3 + number}, {"targets_hit", 1}};
+    return e;
+}
+
+TEST(ProgressBook, KeepsListsComparesAndExports) {
+    const TemporaryFolder folder(/*in_memory=*/true);
+    const std::string path = folder / "deep/er/progress.sqlite";
+    {
+        auto book = ProgressBook::open(path);
+        ASSERT_TRUE(book) << book.error().message();
+        for (int i = 0; i < 6; ++i)
+            ASSERT_TRUE(book->add(entry(i < 4 ? "Ada" : "O'Brien, \"Bob\"", i)));
+        ASSERT_TRUE(book->add(entry("Ada", 2)));  // the same session again takes its place
+    }
+    auto book = ProgressBook::open(path);
+    ASSERT_TRUE(book) << book.error().message();
+    EXPECT_EQ(*book->trainees(), (std::vector<std::string>{"Ada", "O'Brien, \"Bob\""}));
+    const auto mine = book->sessions("Ada", "liver");
+    ASSERT_TRUE(mine);
+    ASSERT_EQ(mine->size(), 2u);
+    EXPECT_EQ((*mine)[0].started, "2026-01-01T00:00:11Z");
+    EXPECT_EQ((*mine)[1].metrics.at(0).name, "elapsed_time_s");
+    EXPECT_EQ((*mine)[1].metrics.at(0).value, 1.0 / 3 + 3);
+    EXPECT_TRUE((*mine)[1].passed);
+    EXPECT_EQ(book->sessions("", "")->size(), 6u);
+    const std::string csv = *book->csv("", "");
+    EXPECT_EQ(csv.substr(0, 53), "trainee,case,exercise,started,passed,elapsed_time_s,t");
+    EXPECT_NE(csv.find("\r\n\"O'Brien, \"\"Bob\"\"\",demo,kidney,"), std::string::npos);
+    EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 7);
+}
+
+TEST(ProgressBook, ARemovedTraineeIsGoneWithFilesAndBytes) {
+    const TemporaryFolder folder(/*in_memory=*/true);
+    const std::string path = folder / "progress.sqlite";
+    auto book = ProgressBook::open(path);
+    ProgressEntry e = entry("Zaphod-Unmistakable", 1);
+    e.recording = folder / "z.igs.mha";
+    ASSERT_TRUE(write_file(e.recording, std::string_view("x")));
+    ASSERT_TRUE(write_file(folder / "z.frames.igs.mha", std::string_view("x")));
+    ASSERT_TRUE(book->add(e));
+    ASSERT_TRUE(book->add(entry("Ada", 1)));
+    ASSERT_NE(read_text_file(path)->find("Zaphod-Unmistakable"), std::string::npos);
+    std::vector<std::string> left;
+    ASSERT_TRUE(book->remove_trainee("Zaphod-Unmistakable", &left));
+    EXPECT_TRUE(left.empty());
+    EXPECT_FALSE(fs::exists(e.recording));
+    EXPECT_FALSE(fs::exists(folder / "z.frames.igs.mha"));
+    EXPECT_EQ(book->sessions("", "")->size(), 1u);
+    EXPECT_EQ(read_text_file(path)->find("Zaphod-Unmistakable"), std::string::npos);
+}
+
+TEST(ProgressBook, KilledWhileWritingItStaysConsistent) {
+    const TemporaryFolder folder(/*in_memory=*/true);
+    testing::Random random(3);
+    const std::string path = folder / "progress.sqlite";
+    ASSERT_TRUE(ProgressBook::open(path));
+    int told = 0;
+    for (int run = 0; run < 40; ++run) {
+        int ends[2];
+        ASSERT_EQ(::pipe(ends), 0);
+        const pid_t child = ::fork();
+        if (child == 0) {
+            auto book = ProgressBook::open(path);
+            for (int i = 0; book; ++i) {
+                ProgressEntry e = entry("run" + std::to_string(run), i % 50);
+                e.started = std::to_string(i);
+                if (!book->add(e) || ::write(ends[1], "x", 1) != 1) ::_exit(1);
+            }
+            ::_exit(1);
+        }
+        ::close(ends[1]);
+        char byte = 0;
+        int commits = static_cast<int>(random.uniform(0, 12));
+        for (int i = 0; i < commits; ++i) ASSERT_EQ(::read(ends[0], &byte, 1), 1);
+        volatile double sink = 0;
+        for (int i = 0; i < random.uniform(0, 200000); ++i) sink = sink + i;
+        ::kill(child, SIGKILL);
+        while (::read(ends[0], &byte, 1) == 1) ++commits;
+        ::close(ends[0]);
+        ::waitpid(child, nullptr, 0);
+        told += commits;
+        auto book = ProgressBook::open(path);
+        ASSERT_TRUE(book) << run << ": " << book.error().message();
+        const auto all = book->sessions("", "");
+        ASSERT_TRUE(all) << all.error().message();
+        EXPECT_GE(static_cast<int>(all->size()), told);
+        for (const ProgressEntry& e : *all) ASSERT_EQ(e.metrics.size(), 2u);
+    }
+}
+
+TEST(ProgressBook, AFileThatIsNoneIsRefusedAndLeftAlone) {
+    const TemporaryFolder folder(/*in_memory=*/true);
+    const std::string path = folder / "a.sqlite";
+    const std::string text(5000, 'x');
+    ASSERT_TRUE(write_file(path, text));
+    const auto book = ProgressBook::open(path);
+    ASSERT_FALSE(book);
+    EXPECT_NE(book.error().message().find("a.sqlite"), std::string::npos);
+    EXPECT_EQ(*read_text_file(path), text);
+}
+
+}  // namespace
+}  // namespace sonocase

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/text/nearest_name.h"
+
+#include <gtest/gtest.h>
+
+namespace sonocase {
+namespace {
+
+TEST(EditDistance, KnownPairs) {
+    EXPECT_EQ(edit_distance("", ""), 0);
+    EXPECT_EQ(edit_distance("", "abc"), 3);
+    EXPECT_EQ(edit_distance("kitten", "sitting"), 3);
+    EXPECT_EQ(edit_distance("voxel_mm", "voxle_mm"), 1);  // a swap is one edit
+    EXPECT_EQ(edit_distance("preset", "presets"), 1);
+}
+
+TEST(EditDistance, IsSymmetric) {
+    for (const char* a : {"labels", "lables", "surface", "x", ""})
+        for (const char* b : {"labels", "seed", "surf", "yx"})
+            EXPECT_EQ(edit_distance(a, b), edit_distance(b, a)) << a << " " << b;
+}
+
+TEST(NearestName, FindsTheTypoAndRefusesTheStranger) {
+    const std::vector<std::string> names{"labels", "surface", "ultrasound", "up"};
+    EXPECT_EQ(nearest_name("lables", names), "labels");
+    EXPECT_EQ(nearest_name("surfaces", names), "surface");
+    EXPECT_EQ(nearest_name("pu", names), "up");
+    EXPECT_EQ(nearest_name("mannequin", names), "");
+    EXPECT_EQ(nearest_name("anything", {}), "");
+}
+
+TEST(SuggestName, NamesTheNearestOrAllValidOnes) {
+    const std::vector<std::string> names{"labels", "surface"};
+    EXPECT_EQ(suggest_name("label", names), "did you mean 'labels'?");
+    EXPECT_EQ(suggest_name("mannequin", names), "valid here: labels, surface");
+}
+
+}  // namespace
+}  // namespace sonocase

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/engine/sensor_watch.h"
+
+#include <gtest/gtest.h>
+
+namespace sonocase::runtime {
+namespace {
+
+SensorReading at(double x) {
+    SensorReading reading;
+    reading.state = SensorState::ok;
+    reading.world_from_sensor.translation = {x, 0, 0};
+    return reading;
+}
+
+TEST(SensorWatch, IsContentWithANoisyMovingSensor) {
+    SensorWatch watch;
+    for (int i = 0; i < 500; ++i) {
+        const double t = i / 240.0;
+        watch.observe(at(300 * t + 0.02 * (i % 3)), t, true);
+        EXPECT_EQ(watch.verdict(t), SensorVerdict::fine) << i;
+        EXPECT_FALSE(watch.hold());
+    }
+}
+
+TEST(SensorWatch, NoticesAFrozenSensorOfADeviceOnly) {
+    SensorWatch device, script;
+    for (int i = 0; i < 240; ++i) {
+        device.observe(at(7), i / 240.0, true);
+        script.observe(at(7), i / 240.0, false);
+    }
+    EXPECT_EQ(device.verdict(1), SensorVerdict::frozen);
+    EXPECT_EQ(script.verdict(1), SensorVerdict::fine);
+    device.observe(at(7.001), 1, true);
+    EXPECT_EQ(device.verdict(1), SensorVerdict::fine);
+}
+
+TEST(SensorWatch, HoldsBackASingleWildReading) {
+    SensorWatch watch;
+    for (int i = 0; i < 10; ++i) watch.observe(at(0.01 * i), i / 240.0, true);
+    watch.observe(at(400), 10 / 240.0, true);
+    EXPECT_TRUE(watch.hold());
+    EXPECT_EQ(watch.verdict(10 / 240.0), SensorVerdict::jumped);
+    watch.observe(at(0.11), 11 / 240.0, true);
+    EXPECT_FALSE(watch.hold());
+    EXPECT_EQ(watch.jumps(), 1);
+}
+
+TEST(SensorWatch, BelievesANewPlaceThatIsConfirmed) {
+    SensorWatch watch;
+    for (int i = 0; i < 10; ++i) watch.observe(at(0.01 * i), i / 240.0, true);
+    watch.observe(at(400), 10 / 240.0, true);
+    watch.observe(at(400.2), 11 / 240.0, true);
+    EXPECT_FALSE(watch.hold());
+    EXPECT_EQ(watch.verdict(2), SensorVerdict::stale);  // and nothing more came
+}
+
+TEST(SensorWatch, TellsLostFromStale) {
+    SensorWatch watch;
+    EXPECT_EQ(watch.verdict(0), SensorVerdict::absent);
+    SensorReading lost = at(0);
+    lost.state = SensorState::lost;
+    watch.observe(lost, 0, true);
+    EXPECT_EQ(watch.verdict(0.1), SensorVerdict::lost);
+    EXPECT_EQ(watch.verdict(1), SensorVerdict::stale);
+    // The first pose after a start without one is no jump.
+    watch.observe(at(500), 1.1, true);
+    EXPECT_EQ(watch.verdict(1.1), SensorVerdict::fine);
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
