@@ -39,9 +39,9 @@ class SameBytes : public ::testing::Test {
   protected:
     std::string cook(const std::string& arguments, int threads) {
         const std::string bundle = folder_ / "case.sonocase";
-        const auto built = run_command(SONOCASE_BIN "/sonocase build " + arguments +
-                                       " --quiet --threads " + std::to_string(threads) + " -o " +
-                                       bundle);
+        const auto built =
+            run_command(SONOCASE_BIN "/sonocase build " + arguments + " --quiet --threads " +
+                        std::to_string(threads) + " -o " + bundle);
         EXPECT_EQ(built.status, 0) << built.error;
         return bundle;
     }
