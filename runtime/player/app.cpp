@@ -99,11 +99,11 @@ bool open_bundle(App& app, const std::string& path, const std::string& exercise)
     app.damage_told = false;
     for (const std::string& warning : app.open->warnings)
         notify(app, Notice::Kind::warning, warning);
-    app.skin = std::make_unique<Skin>(app.open->bundle);
-    app.view3d->set_case(app.open->bundle);
+    app.skin = std::make_unique<Skin>(*app.open->bundle);
+    app.view3d->set_case(*app.open->bundle);
     app.page = Page::scan;
     choose_exercise(app, *index);
-    app.window->set_title(app.open->bundle.manifest.case_name + " - sonocase");
+    app.window->set_title(app.open->bundle->manifest.case_name + " - sonocase");
     std::error_code ignored;
     const std::string whole = std::filesystem::weakly_canonical(path, ignored).string();
     auto& recent = app.settings.recent;
@@ -244,7 +244,7 @@ void start_attempt(App& app, const std::string& path) {
     if (app.attempt || !app.open) return;
     std::string file = path;
     if (file.empty())
-        file = new_session_path(app.open->bundle.manifest.case_name, app.current().name);
+        file = new_session_path(app.open->bundle->manifest.case_name, app.current().name);
     if (file.empty()) {
         notify(app, Notice::Kind::error,
                "There is no folder to record to: set HOME or XDG_DATA_HOME.");
@@ -443,7 +443,7 @@ Status run_window(const PlayerArguments& arguments, double start_s) {
         if (between_s > 0) app.ui_rate += 0.08 * (1 / between_s - app.ui_rate);
         last_shown_s = now_s;
 
-        const VoxelBlocks* blocks = app.open ? app.open->bundle.blocks.get() : nullptr;
+        const VoxelBlocks* blocks = app.open ? app.open->bundle.blocks() : nullptr;
         if (blocks && blocks->damaged() && !app.damage_told) {
             notify(app, Notice::Kind::error, blocks->status().error().message());
             app.damage_told = true;

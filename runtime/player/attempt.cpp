@@ -90,7 +90,7 @@ void Attempt::observe(const FrameRecord& record,
     view_.tip_in_view = monitor.tip_in_view();
     view_.in_no_go = monitor.in_no_go();
     for (const LiveEvent& event : events) {
-        std::string words = words_of(event, exercise_, open_->bundle.labels);
+        std::string words = words_of(event, exercise_, open_->bundle->labels);
         if (words.empty()) continue;
         view_.news.push_back(std::move(words));
         if (view_.news.size() > 6) view_.news.erase(view_.news.begin());

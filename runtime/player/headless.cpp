@@ -142,7 +142,7 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     if (!engine) return engine.error();
     engine->set_calibrations(*calibrations);
 
-    const Skin skin(open.bundle);
+    const Skin skin(*open.bundle);
     TrackerContext context;
     context.skin = &skin;
     context.exercise = &exercise;
@@ -228,8 +228,8 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
         const double before_s = steady_seconds();
         engine->frame(now_s, settings, pixels);
         const double after_s = steady_seconds();
-        if (open.bundle.blocks && open.bundle.blocks->damaged())
-            return open.bundle.blocks->status();
+        const VoxelBlocks* blocks = open.bundle.blocks();
+        if (blocks && blocks->damaged()) return blocks->status();
         stats.add((after_s - before_s) * 1e3, engine->renderer().costs());
         if (tracker.is_device()) pose_to_pixel.add((context.clock() - reading.time_s) * 1e3);
         if (session) session->observe(engine->last(), pixels, !tracker.is_device());

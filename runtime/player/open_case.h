@@ -7,14 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/streamed_bundle.h"
 #include "formats/exercise/exercise.h"
 
 namespace sonocase::runtime {
 
 struct OpenCase {
     std::string path;
-    CaseBundle bundle;
+    StreamedBundle bundle;
     std::vector<Exercise> exercises;    // at least one: a bundle without any gets free scanning
     std::vector<std::string> warnings;  // whole sentences
 };

@@ -237,7 +237,7 @@ void draw_scan_page(App& app) {
     const ImageSettings& image = app.controls.settings;
     const Probe& probe = app.current().probe;
     input.left_lines = {
-        app.open->bundle.manifest.case_name,
+        app.open->bundle->manifest.case_name,
         std::string(shape_name(probe.shape)) + text("  %.1f MHz", probe.frequency_mhz),
         text("Depth %.1f cm", app.depth_mm / 10), text("Focus %.1f cm", app.focus_mm / 10)};
     input.right_lines = {text("Gain %+.0f dB", image.gain_db),

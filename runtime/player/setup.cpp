@@ -147,7 +147,7 @@ void draw_step(App& app, SetupGuide& guide) {
 }  // namespace
 
 void draw_setup(App& app) {
-    if (!app.guide) app.guide = std::make_unique<SetupGuide>(app.open->bundle);
+    if (!app.guide) app.guide = std::make_unique<SetupGuide>(*app.open->bundle);
     SetupGuide& guide = *app.guide;
     guide.observe(app.frame().reading, app.controls.assignment, app.now_s);
     // What is known already is in use at once, so that the picture shows it.
