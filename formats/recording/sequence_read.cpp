@@ -192,7 +192,7 @@ Status Reader::read_structure() {
     return check_shape();
 }
 
-// Takes the shape of images from the sizes, and refuses what no image has before memory is asked for.
+// Takes the shape of the images from the sizes; refuses an impossible one before any allocation.
 Status Reader::check_shape() {
     if (header_.nrrd && channels_first_ && sizes_.size() > 3) {
         if (sizes_[0] < 1 || sizes_[0] > 16)
