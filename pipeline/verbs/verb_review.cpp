@@ -125,7 +125,7 @@ int verb_score(int argc, char** argv) {
     if (!exercise) return fail("score", exercise.error());
     std::unique_ptr<Anatomy> anatomy;
     if (!a.body.empty()) {
-        auto mesh = import_surface(a.body);
+        auto mesh = import_surface(a.body, {.torso = false});
         if (!mesh) return fail("score", mesh.error());
         if (mesh->triangles.empty()) {
             return fail("score", Error{"holds points and no triangles", a.body, "a closed mesh"});
