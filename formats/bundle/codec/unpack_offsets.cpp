@@ -27,7 +27,7 @@ Status read_offsets(const ChunkReader& reader,
         for (unsigned v = 0; v < kOffsetKinds; ++v) known += kinds.count(k, v);
     }
     if (known != kind->size())
-        return reader.fault("a brick of 'ofs.kind' is of no known kind", "make it again");
+        return reader.fault("a brick of 'ofs.kind' is of an unknown kind", "make it again");
     const auto one = reader.read_array<std::uint8_t, Bytes>("ofs.one", first_one[layers], jobs);
     if (!one) return one.error();
     auto frames = BlockFrames::open(reader, "ofs.val", parts->grid.count(),
@@ -44,7 +44,7 @@ Status read_offsets(const ChunkReader& reader,
     out->table.resize(kind->size());
     PoolOrder places(*kind, parts->grid, jobs, [](unsigned v) { return v >= kMixedOffsets; });
     out->pool.resize(places.total() * kBrickVoxels);
-    if (!out->pool.empty()) out->pool[0] = 0;  // read where there is no use for one
+    if (!out->pool.empty()) out->pool[0] = 0;  // renderers read it where they do not use it
     parts->in_cells.resize(places.total());
     jobs.run(layers, [&](std::size_t k) {
         std::size_t next_one = first_one[k];

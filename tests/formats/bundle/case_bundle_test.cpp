@@ -236,8 +236,8 @@ TEST(CaseBundle, OpenedIsAsLoadedBlockByBlock) {
     EXPECT_TRUE(moved.blocks()->status());
 }
 
-// A block with right checksums that makes no sense: seen when it is asked for, and empty.
-TEST(CaseBundle, ABlockThatMakesNoSenseSaysSoAndHoldsNothing) {
+// A block with right checksums and invalid contents: found when it is asked for, and empty.
+TEST(CaseBundle, AnInvalidBlockSaysSoAndHoldsNothing) {
     const testing::TemporaryFolder folder;
     const std::string path = folder / "forged.sonocase";
     const Bytes good = write_bundle(testing::curved_case());
