@@ -20,16 +20,6 @@ struct Streams {  // of one layer of bricks
     std::vector<std::uint32_t> first_patch;  // # bricks of the layer
 };
 
-// A patch in units of `step`, as it is coded; and back.
-SurfacePatch in_steps(SurfacePatch patch, int step) {
-    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c / step);
-    return patch;
-}
-SurfacePatch in_units(SurfacePatch patch, int step) {
-    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c * step);
-    return patch;
-}
-
 std::vector<SurfacePatch> patches_for(const BoundaryBricks& boundary,
                                       std::size_t brick,
                                       const BrickLabels& label,
@@ -41,6 +31,36 @@ std::vector<SurfacePatch> patches_for(const BoundaryBricks& boundary,
             return {known.begin(), known.end()};
     }
     return fit_patches(label, record, boundary.patches.step);
+}
+
+// What stands for a brick's boundary records.
+struct PatchedBrick {
+    std::vector<SurfacePatch> patches;
+    bool is_exact = true;       // the patches give the records back
+    bool gives_labels = false;  // one patch, and the labels are those of its sides
+};
+
+PatchedBrick patched_brick(const BoundaryBricks& boundary,
+                           std::size_t brick,
+                           const BrickLabels& label,
+                           int reach_steps) {
+    PatchedBrick out;
+    BrickRecords record;
+    brick_values(boundary, brick, record.data());
+    if (std::all_of(record.begin(), record.end(), [](std::uint32_t r) { return r == kNoBoundary; }))
+        return out;
+    out.patches = patches_for(boundary, brick, label, record);
+    const int step = boundary.patches.step;
+    for (SurfacePatch& patch : out.patches) patch = from_steps(in_steps(patch, step), step);
+    BrickRecords prediction;
+    records_from_patches(out.patches, label.data(), reach_steps, prediction.data());
+    out.is_exact = prediction == record;
+    if (out.patches.size() == 1 && !all_alike(label.data())) {
+        BrickLabels by_side;
+        labels_from_patch(out.patches[0], by_side.data());
+        out.gives_labels = by_side == label;
+    }
+    return out;
 }
 
 Streams packed_layer(const BrickVolume<std::uint8_t>& labels,
@@ -56,38 +76,18 @@ Streams packed_layer(const BrickVolume<std::uint8_t>& labels,
     for (std::size_t b = 0; b < count; ++b) {
         const std::size_t brick = static_cast<std::size_t>(layer) * count + b;
         BrickLabels label;
-        BrickRecords record;
         brick_values(labels, brick, label.data());
-        const bool uniform = all_alike(label.data());
-        bool none = true;
-        if (!boundary.table.empty()) {
-            brick_values(boundary, brick, record.data());
-            none = std::all_of(record.begin(), record.end(),
-                               [](std::uint32_t r) { return r == kNoBoundary; });
-        }
-        unsigned kind = 0;
-        bool sides = false;
-        std::vector<SurfacePatch> patches;
-        if (!none) {
-            patches = patches_for(boundary, brick, label, record);
-            const int step = boundary.patches.step;
-            for (SurfacePatch& patch : patches) patch = in_units(in_steps(patch, step), step);
-            BrickRecords prediction;
-            records_from_patches(patches, label.data(), reach_steps, prediction.data());
-            if (prediction != record) kind = kCorrected;
-            if (patches.size() == 1 && !uniform) {
-                BrickLabels by_side;
-                labels_from_patch(patches[0], by_side.data());
-                sides = by_side == label;
-            }
-        }
-        const unsigned labels_as = sides                ? kSidesOfPatch
-                                   : !uniform           ? kMixedLabels
-                                   : label[0] == before ? kAsBefore
-                                                        : kOneLabel;
+        PatchedBrick patched;
+        if (!boundary.table.empty()) patched = patched_brick(boundary, brick, label, reach_steps);
+        const std::vector<SurfacePatch>& patches = patched.patches;
+        const unsigned labels_as = patched.gives_labels       ? kSidesOfPatch
+                                   : !all_alike(label.data()) ? kMixedLabels
+                                   : label[0] == before       ? kAsBefore
+                                                              : kOneLabel;
         if (labels_as == kOneLabel) out.one.push_back(before = label[0]);
         if (labels_as == kMixedLabels) out.mix.insert(out.mix.end(), label.begin(), label.end());
-        kind |= labels_as | static_cast<unsigned>(patches.size()) << 2;
+        const unsigned kind = labels_as | static_cast<unsigned>(patches.size()) << 2 |
+                              (patched.is_exact ? 0 : kCorrected);
         out.kind.push_back(static_cast<std::uint8_t>(kind));
         out.first_patch.push_back(static_cast<std::uint32_t>(out.patches.size()));
         for (const SurfacePatch& patch : patches) {

@@ -55,6 +55,16 @@ class PatchRows {
     std::vector<std::uint32_t> first_;  // # bricks of the layer + 1
 };
 
+// Files hold coefficients in units of BrickPatches::step.
+inline SurfacePatch in_steps(SurfacePatch patch, int step) {
+    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c / step);
+    return patch;
+}
+inline SurfacePatch from_steps(SurfacePatch patch, int step) {
+    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c * step);
+    return patch;
+}
+
 // Zigzag code: small numbers of either sign become small numbers without one.
 inline std::uint16_t folded(std::int16_t v) {
     return static_cast<std::uint16_t>(v < 0 ? -2 * v - 1 : 2 * v);

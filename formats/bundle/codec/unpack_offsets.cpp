@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "formats/base/jobs.h"
+#include "formats/base/memory.h"
 #include "formats/bundle/codec/brick_kinds.h"
 #include "formats/bundle/codec/value_order.h"
 
@@ -41,8 +41,10 @@ Status read_offsets(const ChunkReader& reader,
         for (std::size_t n = first_one[k]; n < first_one[k + 1]; ++n) order.met((*one)[n]);
     }
     for (const std::uint8_t v : order.values()) out->uniform.push_back(static_cast<std::int8_t>(v));
-    out->table.resize(kind->size());
     PoolOrder places(*kind, parts->grid, jobs, [](unsigned v) { return v >= kMixedOffsets; });
+    if (!can_allocate(places.total() * kBrickVoxels))
+        return reader.fault("needs more memory than is available", "use larger voxels");
+    out->table.resize(kind->size());
     out->pool.resize(places.total() * kBrickVoxels);
     if (!out->pool.empty()) out->pool[0] = 0;  // renderers read it where they do not use it
     parts->in_cells.resize(places.total());

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <tuple>
 
-#include "formats/base/jobs.h"
+#include "formats/base/memory.h"
 #include "formats/bundle/codec/brick_kinds.h"
 #include "formats/bundle/codec/patch_rows.h"
 #include "formats/bundle/codec/value_order.h"
@@ -58,12 +58,6 @@ SurfacePatch decoded_patch(const Packed& in,
     return patch;
 }
 
-// Patches are coded in units of `step`.
-SurfacePatch in_units(SurfacePatch patch, int step) {
-    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c * step);
-    return patch;
-}
-
 void unpack_layer(const Packed& in,
                   Starts at,
                   std::size_t patches,
@@ -105,7 +99,7 @@ void unpack_layer(const Packed& in,
             if (labels_as == kMixedLabels) {
                 std::memcpy(to, in.mix.data() + at.mix * kBrickVoxels, kBrickVoxels);
             } else {
-                labels_from_patch(in_units(own[at.patch - first_patch], step), to);
+                labels_from_patch(from_steps(own[at.patch - first_patch], step), to);
             }
             out->labels.table[brick] = static_cast<std::uint32_t>(at.label_pool);
         }
@@ -120,7 +114,7 @@ void unpack_layer(const Packed& in,
         }
         at.add(kind, 1);
     }
-    for (std::size_t p = 0; p < at.patch - first_patch; ++p) own[p] = in_units(own[p], step);
+    for (std::size_t p = 0; p < at.patch - first_patch; ++p) own[p] = from_steps(own[p], step);
 }
 
 bool below(const Bytes& values, std::size_t limit) {
@@ -191,11 +185,14 @@ Status read_surfaces(const ChunkReader& reader,
         if (kinds.begins_as_before(k, [](unsigned kind) { return label_kind(kind); })) order.met(0);
         for (std::size_t n = starts[k].one; n < starts[k + 1].one; ++n) order.met(in.one[n]);
     }
+    PoolOrder places(in.kind, parts->grid, jobs, has_records);
+    if (!can_allocate(total.label_pool * kBrickVoxels) ||
+        !can_allocate(places.total() * kBrickVoxels * sizeof(std::uint32_t)))
+        return reader.fault("needs more memory than is available", "use larger voxels");
     out->labels.uniform = order.values();
     out->labels.table.resize(in.kind.size());
     out->labels.pool.resize(total.label_pool * kBrickVoxels);
     out->boundary.patches.patches.resize(total.patch);
-    PoolOrder places(in.kind, parts->grid, jobs, has_records);
     if (with_records) {
         out->boundary.table.resize(in.kind.size());
         out->boundary.pool.resize(places.total() * kBrickVoxels);
