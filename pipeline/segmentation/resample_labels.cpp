@@ -41,10 +41,10 @@ SampledField through_field(const ResampleInput& input,
     LabelField field(input.ct_labels, field_options, progress);
     lap(&result->seconds.distances);
     const Registration registration = with_voxel_rim(input.registration, input.ct_labels.grid);
-    LabelPriceOptions price_options;
-    price_options.iterations = options.volume_iterations;
-    const LabelPriceReport prices = set_label_prices(
-        &field, [&](Point3 ct) { return determinant(jacobian(registration, ct)); }, price_options);
+    VolumeCorrectionOptions correction;
+    correction.iterations = options.volume_iterations;
+    const VolumeCorrectionReport corrected = correct_volumes(
+        &field, [&](Point3 ct) { return determinant(jacobian(registration, ct)); }, correction);
     lap(&result->seconds.volumes);
     const InverseMap inverse_map(registration);
     FieldMap map;
@@ -65,8 +65,8 @@ SampledField through_field(const ResampleInput& input,
     }
     lap(&result->seconds.voxels);
     report->measures.push_back({"slice_factor", static_cast<double>(field.factor())});
-    report->measures.push_back({"volume_steps", static_cast<double>(prices.iterations)});
-    report->measures.push_back({"volume_miss", prices.largest_miss});
+    report->measures.push_back({"volume_steps", static_cast<double>(corrected.iterations)});
+    report->measures.push_back({"volume_miss", corrected.largest_error});
     return read;
 }
 

@@ -4,7 +4,7 @@
 // fitted map, into cubic voxels in `mannequin`.
 //
 // shape    the labels become one smooth partition of space (label_field.h): thick slices are
-//          interpolated by shape, steps smoothed, every label at its own volume (label_prices.h).
+//          interpolated by shape, steps smoothed, every label at its own volume (volume_correction.h).
 //          It is read at the preimage of each voxel, and near a surface a boundary record says
 //          where
 //          it runs inside the voxels.

@@ -57,7 +57,7 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
     const bool cubic = std::max({h.x, h.y, h.z}) < 1.001 * std::min({h.x, h.y, h.z});
     result.volume = volume;
     std::vector<int> rescued;
-    LabelPriceReport prices;
+    VolumeCorrectionReport corrected;
     SnapReport snapped;
     bool last = false;
     for (int i = 0; i < std::max(1, options.iterations); ++i) {
@@ -65,8 +65,8 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
         field_options.distance = {
             .sigma_vx = options.sigma_vx, .detail_vx = options.detail_vx, .shape_slices = false};
         LabelField field(result.volume, field_options, progress);
-        prices = set_label_prices(&field, [](Point3) { return 1.0; },
-                                  {.iterations = options.volume_iterations});
+        corrected = correct_volumes(&field, [](Point3) { return 1.0; },
+                                    {.iterations = options.volume_iterations});
         last = i + 1 >= options.iterations;
         SampledField read = read_on_itself(&field, volume.grid,
                                            last && cubic ? options.record_band_vx : 0, progress);
@@ -89,8 +89,8 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
     result.report.stage = "smooth";
     result.report.version = kSmoothVersion;
     result.report.measures = {{"sigma_vx", options.sigma_vx},
-                              {"volume_steps", static_cast<double>(prices.iterations)},
-                              {"volume_miss", prices.largest_miss}};
+                              {"volume_steps", static_cast<double>(corrected.iterations)},
+                              {"volume_miss", corrected.largest_error}};
     if (snapped.bricks > 0) add_measures(snapped, &result.report);
     if (!cubic && options.record_band_vx > 0) {
         result.report.warnings.emplace_back(

@@ -3,7 +3,7 @@
 // Smoothing of a label volume, all labels at once.
 //
 // joint      the labels become one smooth partition of space in which every label keeps its volume
-//            (label_field.h, label_prices.h), read back on the same voxels, with boundary records.
+//            (label_field.h, volume_correction.h), read back on the same voxels, with boundary records.
 //            No gap, no overlap and no lost label is possible. On thick slices the steps stay steps
 //            of whole voxels; resample_labels.h is what makes cubic voxels of them.
 // level_set  the paper's eq. (10) per label (level_set_smoothing.h): cubic voxels only, no records.

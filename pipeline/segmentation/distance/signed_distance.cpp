@@ -91,7 +91,7 @@ VoxelBox grow(const VoxelBox& box, Int3 voxels, Int3 size) {
 
 namespace {
 
-struct DistanceWork {
+struct DistanceScratch {
     std::vector<float> first, second;
     std::vector<std::uint8_t> mark;
 };
@@ -103,7 +103,7 @@ void distances_on(const LabelVolume& volume,
                   double limit_mm,
                   std::array<bool, 3> axes,
                   float* phi,
-                  DistanceWork* work) {
+                  DistanceScratch* work) {
     const std::size_t nx = static_cast<std::size_t>(box.size.x);
     const std::size_t plane = nx * static_cast<std::size_t>(box.size.y);
     const std::size_t count = box.count();
@@ -178,7 +178,7 @@ void signed_distance(const LabelVolume& volume,
     phi->resize(box.count());
     std::array<std::uint8_t, 256> member;
     for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
-    DistanceWork work;
+    DistanceScratch work;
     if (axes[2]) {
         distances_on(volume, member, box, limit_mm, axes, phi->data(), &work);
         return;

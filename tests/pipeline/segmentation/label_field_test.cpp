@@ -45,7 +45,7 @@ struct TopTwo {
 TopTwo standing(const LabelField& field, LabelField::Position at) {
     std::array<float, 256> score;
     field.scores(at, score.data());
-    const auto& labels = at.contest->labels;
+    const auto& labels = at.candidates->labels;
     std::vector<std::size_t> order(labels.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
     std::sort(order.begin(), order.end(),
@@ -62,8 +62,9 @@ TEST_P(LabelFieldOf, ContestsSayWhatAllCandidatesSay) {
     constexpr float kReach = 2;
     LabelField field(crowded(GetParam()), {});
     Random random(5);
-    for (float& price : field.prices()) price = static_cast<float>(random.uniform(-0.4, 0.4));
-    field.find_contests(kReach);
+    for (float& offset : field.volume_offsets_mm())
+        offset = static_cast<float>(random.uniform(-0.4, 0.4));
+    field.find_candidates(kReach);
     const Vector3 h = field.nodes().spacing_mm;
     std::size_t contested = 0, fewer = 0, sure = 0;
     for (int n = 0; n < 40000; ++n) {
@@ -78,15 +79,15 @@ TEST_P(LabelFieldOf, ContestsSayWhatAllCandidatesSay) {
         }
         const LabelField::Position at = field.locate(v[0], v[1], v[2]);
         const std::size_t node = field.nodes().index(near.x, near.y, near.z);
-        if (at.contest == nullptr) {
+        if (at.candidates == nullptr) {
             ASSERT_EQ(field.node_label(node), at.block->labels[0]);
             continue;
         }
         LabelField::Position all = at;
-        all.contest = &at.block->contests[0];
+        all.candidates = &at.block->candidate_sets[0];
         const TopTwo short_cut = standing(field, at), whole = standing(field, all);
         ++contested;
-        fewer += at.contest->labels.size() < all.contest->labels.size();
+        fewer += at.candidates->labels.size() < all.candidates->labels.size();
         ASSERT_EQ(short_cut.first, whole.first);
         if (whole.apart_mm < kReach) {
             ASSERT_EQ(short_cut.second, whole.second);
@@ -109,7 +110,7 @@ TEST_P(LabelFieldOf, ContestsSayWhatAllCandidatesSay) {
 TEST_P(LabelFieldOf, BlocksOfAnyEdgeSayTheSame) {
     const LabelVolume ct = crowded(GetParam());
     LabelField eight(ct, {{}, 8}), sixteen(ct, {{}, 16}), four(ct, {{}, 4});
-    for (LabelField* field : {&eight, &sixteen, &four}) field->find_contests(2);
+    for (LabelField* field : {&eight, &sixteen, &four}) field->find_candidates(2);
     Random random(6);
     int others = 0;
     for (int n = 0; n < 20000; ++n) {
@@ -118,7 +119,7 @@ TEST_P(LabelFieldOf, BlocksOfAnyEdgeSayTheSame) {
             v[a] = static_cast<float>(random.uniform(0, eight.nodes().size[a] - 1));
         const auto winner = [&](const LabelField& field) {
             const LabelField::Position at = field.locate(v[0], v[1], v[2]);
-            return at.contest == nullptr ? at.block->labels[0] : standing(field, at).first;
+            return at.candidates == nullptr ? at.block->labels[0] : standing(field, at).first;
         };
         others += winner(eight) != winner(sixteen) || winner(eight) != winner(four);
     }
@@ -132,8 +133,9 @@ TEST_P(LabelFieldOf, BlocksOfAnyEdgeSayTheSame) {
 TEST_P(LabelFieldOf, NothingJumpsFromBlockToBlock) {
     LabelField field(crowded(GetParam()), {});
     Random random(7);
-    for (float& price : field.prices()) price = static_cast<float>(random.uniform(-0.4, 0.4));
-    field.find_contests(2);
+    for (float& offset : field.volume_offsets_mm())
+        offset = static_cast<float>(random.uniform(-0.4, 0.4));
+    field.find_candidates(2);
     constexpr float kStep = 1e-3f;  // nodes
     std::vector<double> changes;
     for (int n = 0; n < 40000; ++n) {
@@ -147,7 +149,7 @@ TEST_P(LabelFieldOf, NothingJumpsFromBlockToBlock) {
         const LabelField::Position before = field.locate(v[0], v[1], v[2]);
         v[axis] += 2 * kStep;
         const LabelField::Position after = field.locate(v[0], v[1], v[2]);
-        if (before.contest == nullptr || after.contest == nullptr) continue;
+        if (before.candidates == nullptr || after.candidates == nullptr) continue;
         const TopTwo a = standing(field, before), b = standing(field, after);
         if (std::min(a.apart_mm, b.apart_mm) > 1) continue;
         changes.push_back(a.first == b.first ? std::abs(a.apart_mm - b.apart_mm)
@@ -177,7 +179,7 @@ TEST(LabelField, CubesOfTwoHundredLabelsKeepTheirMiddles) {
         }
     }
     LabelField field(ct, {{}, 16});
-    field.find_contests(2);
+    field.find_candidates(2);
     ASSERT_GT(field.blocks()[0].labels.size(), 64u);
     for (int k = 1; k < edge; k += kEdge) {
         for (int j = 1; j < edge; j += kEdge) {

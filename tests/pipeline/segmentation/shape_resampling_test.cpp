@@ -138,21 +138,21 @@ TEST(ShapeResampling, ObliqueVesselStaysOnePieceThroughThickSlices) {
     EXPECT_NEAR(result->changes.at(0).change(), 0, 0.05);
 }
 
-// Cells are weighed a block at a time. What all labels together seem to lack of a weight that
-// varies inside the blocks must not drive their prices to the limit, where none is kept.
-TEST(LabelPrices, KeepVolumesWhereTheWeightVaries) {
+// Cells are weighted block by block. The deficit that all labels seem to share under a weight that
+// varies inside the blocks must not drive their offsets to the limit, where none is kept.
+TEST(VolumeCorrection, KeepVolumesWhereTheWeightVaries) {
     const LabelVolume ct = sample_labels(cubic_grid(48), 4, [](Point3 p) {
         if (norm(p - Point3{-9, 4, 0}) < 5) return 2;
         if (norm(p - Point3{9, 0, -6}) < 2) return 3;
         return norm_of(p) < 19 ? 1 : 0;
     });
     LabelField field(ct, {});
-    const LabelPriceReport report = set_label_prices(
+    const VolumeCorrectionReport report = correct_volumes(
         &field, [](Point3 p) { return 1 + 0.8 * std::cos(0.785398 * (p.x + 20)); });
-    EXPECT_LT(report.largest_miss, 0.01);
+    EXPECT_LT(report.largest_error, 0.01);
     for (std::size_t l = 0; l < 4; ++l) {
         EXPECT_NEAR(report.reached_mm3[l] / report.target_mm3[l], 1, 0.01) << l;
-        EXPECT_LT(std::abs(field.prices()[l]), 0.6) << l;  // the limit is 1.5
+        EXPECT_LT(std::abs(field.volume_offsets_mm()[l]), 0.6) << l;  // the limit is 1.5
     }
 }
 
