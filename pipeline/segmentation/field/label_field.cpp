@@ -73,7 +73,7 @@ std::vector<LabelSet> LabelField::swept_labels(const LabelDistance& distance) co
             Int3 high{-1, -1, (group.slice + 1) * factor_};
             for (const int o : {group.lower, group.upper}) {
                 if (o < 0) continue;
-                const VoxelBox& box = groups.outlines[static_cast<std::size_t>(o)].box;
+                const VoxelBox& box = groups.outlines.outlines[static_cast<std::size_t>(o)].box;
                 for (int a = 0; a < 2; ++a) {
                     low[a] = std::min(low[a], box.first[a]);
                     high[a] = std::max(high[a], box.first[a] + box.size[a]);
