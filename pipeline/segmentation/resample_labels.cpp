@@ -70,7 +70,7 @@ void explain_changes(const std::string& method,
         if (std::find(rescued.begin(), rescued.end(), c.label) != rescued.end()) {
             c.note = "smaller than a voxel, kept as one";
         } else if (c.lost()) {
-            c.note = method == "shape"   ? "its place lies outside the grid"
+            c.note = method == "shape"   ? "its location is outside the grid"
                      : method == "paper" ? "thinner than 4 / sqrt(K0) or than a voxel"
                                          : "no voxel centre falls on it";
         }

@@ -27,7 +27,7 @@ namespace sonocase::pipeline {
 
 struct LabelDistanceOptions {
     double sigma_vx = 1.7;   // smoothing, in-plane voxels of the map; 0: none
-    double detail_vx = 0.5;  // smoothing of what is too fine for any other width
+    double detail_vx = 0.5;  // smoothing of structures too fine for any other width
     // How far on the wrong side of the surface a voxel of the map may end; 0 applies where the label
     // is one voxel thick.
     double tolerance_vx = 0.25;

@@ -13,7 +13,7 @@
 
 namespace sonocase::pipeline {
 
-// How the voxels round the nodes of a field are cut into cells.
+// How the voxels around the nodes of a field are cut into cells.
 struct CellLayout {
     std::array<int, 3> per_node;  // cells per node along each axis, [1, 4]
     double volume_mm3 = 0;        // of a cell
