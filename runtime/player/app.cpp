@@ -18,6 +18,7 @@
 #include "runtime/player/headless.h"
 #include "runtime/player/png_file.h"
 #include "runtime/tracking/factory/make_tracker.h"
+#include "runtime/workers/thread_host.h"
 
 namespace sonocase::runtime {
 
@@ -44,6 +45,9 @@ void rebuild_engine(App& app, bool keep_session) {
         app.arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
     render.threads = app.arguments.threads;
     render.read_ahead = true;
+    if (!app.textures) app.textures = make_physical_textures();
+    render.textures = app.textures;
+    render.host = thread_host();
     render.scanlines = app.arguments.scanlines;
     render.samples = app.arguments.samples;
     render.effects = app.arguments.effects.empty() ? app.current().effects : app.arguments.effects;

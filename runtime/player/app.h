@@ -60,10 +60,11 @@ struct App {
     std::string tracker_spec = "mouse";
     std::unique_ptr<MouseTracker> mouse;  // while tracker_spec is mouse
     std::shared_ptr<PushTracker> mouse_feed;
-    std::shared_ptr<PacedTracker> paced;     // while it is a recording or a script
-    std::string checked_device;              // whose calibrations were compared with it
-    std::shared_ptr<const Anatomy> anatomy;  // of the open case, as the picture breathes
-    bool exact = false;                      // a session is recorded: no accuracy is given up
+    std::shared_ptr<PacedTracker> paced;               // while it is a recording or a script
+    std::string checked_device;                        // whose calibrations were compared with it
+    std::shared_ptr<const Anatomy> anatomy;            // of the open case, as the picture breathes
+    std::shared_ptr<const PhysicalTextures> textures;  // made with the first engine
+    bool exact = false;  // a session is recorded: no accuracy is given up
     std::unique_ptr<ScanThread> scan;
     ScanControls controls;
 

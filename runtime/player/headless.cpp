@@ -14,7 +14,6 @@
 #include "formats/base/event.h"
 #include "formats/files/atomic_file.h"
 #include "runtime/engine/scan_engine.h"
-#include "runtime/imaging/physical/model/physical_scene.h"
 #include "runtime/player/contact_sheet.h"
 #include "runtime/player/frame_stats.h"
 #include "runtime/player/open_case.h"
@@ -24,6 +23,7 @@
 #include "runtime/player/setup_guide.h"
 #include "runtime/recording/settings_text.h"
 #include "runtime/tracking/factory/make_tracker.h"
+#include "runtime/workers/thread_host.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -100,16 +100,16 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     if (arguments.bundle.empty()) {
         return Error{"no bundle given", "", "sonoplay BUNDLE --headless needs one"};
     }
-    // What no bundle has a say in, while it is read.
-    std::thread tables([] {
+    // What depends on no bundle is made while the bundle is read.
+    std::shared_ptr<const PhysicalTextures> textures;
+    std::thread making([&textures] {
         try {
-            (void)rough_surfaces();
-            (void)fine_cubes();
-        } catch (const std::bad_alloc&) {  // whoever needs them will say so
+            textures = make_physical_textures();
+        } catch (const std::bad_alloc&) {  // the renderer makes its own, or says so
         }
     });
     Result<std::unique_ptr<OpenCase>> opened = open_case(arguments.bundle);
-    tables.join();
+    making.join();
     if (!opened) return opened.error();
     const OpenCase& open = **opened;
     for (const std::string& warning : open.warnings) {
@@ -135,6 +135,8 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     render.kind = arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
     render.threads = arguments.threads;
     render.read_ahead = true;
+    render.textures = std::move(textures);
+    render.host = thread_host();
     render.scanlines = arguments.scanlines;
     render.samples = arguments.samples;
     render.effects = arguments.effects.empty() ? exercise.effects : arguments.effects;
