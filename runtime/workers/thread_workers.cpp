@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/imaging/simd/worker_pool.h"
+#include "runtime/workers/thread_workers.h"
 
 #include <hwy/cache_control.h>
 
 namespace sonocase::runtime {
 namespace {
 
-// Passes of one frame follow within microseconds: worth a short wait before sleeping, some tens of
-// microseconds. Where threads outnumber cores, waiting would only hold up who has work.
+// The passes of one frame follow within microseconds: worth a short wait before sleeping, tens of
+// microseconds. Where threads outnumber cores, waiting would only hold up those that have work.
 constexpr int kSpins = 1000;
 
 constexpr std::uint32_t kClosed = 0x80000000u;
@@ -19,12 +19,13 @@ constexpr std::uint64_t range_of(std::uint64_t first, std::uint64_t last) {
 
 }  // namespace
 
-WorkerPool::WorkerPool(int threads) : shares_(static_cast<std::size_t>(threads)), inside_{kClosed} {
+ThreadWorkers::ThreadWorkers(int threads)
+    : shares_(static_cast<std::size_t>(threads)), inside_{kClosed} {
     if (static_cast<unsigned>(threads) <= std::thread::hardware_concurrency()) spins_ = kSpins;
     for (int part = 1; part < threads; ++part) workers_.emplace_back([this, part] { work(part); });
 }
 
-WorkerPool::~WorkerPool() {
+ThreadWorkers::~ThreadWorkers() {
     {
         const std::lock_guard lock(mutex_);
         stop_ = true;
@@ -33,7 +34,7 @@ WorkerPool::~WorkerPool() {
     for (std::thread& worker : workers_) worker.join();
 }
 
-bool WorkerPool::take_first(Share& share, int& item) {
+bool ThreadWorkers::take_first(Share& share, int& item) {
     std::uint64_t left = share.left.load();
     do {
         const std::uint64_t first = left >> 32, last = left & 0xFFFFFFFFu;
@@ -43,7 +44,7 @@ bool WorkerPool::take_first(Share& share, int& item) {
     return true;
 }
 
-bool WorkerPool::take_last(Share& share, int& item) {
+bool ThreadWorkers::take_last(Share& share, int& item) {
     std::uint64_t left = share.left.load();
     do {
         const std::uint64_t first = left >> 32, last = left & 0xFFFFFFFFu;
@@ -53,7 +54,7 @@ bool WorkerPool::take_last(Share& share, int& item) {
     return true;
 }
 
-void WorkerPool::help(int part) {
+void ThreadWorkers::help(int part) {
     int item = 0;
     while (take_first(shares_[static_cast<std::size_t>(part)], item)) job_(context_, part, item);
     for (int step = 1; step < threads(); ++step) {
@@ -62,7 +63,7 @@ void WorkerPool::help(int part) {
     }
 }
 
-void WorkerPool::run(int items, Job job, void* context) {
+void ThreadWorkers::run(int items, Job job, void* context) {
     const int parts = threads();
     if (parts == 1) {
         for (int item = 0; item < items; ++item) job(context, 0, item);
@@ -78,8 +79,8 @@ void WorkerPool::run(int items, Job job, void* context) {
     }
     inside_.fetch_and(~kClosed);
     generation_.fetch_add(1);
-    // Either this sees who fell asleep before, or that one sees the new generation: both orders are
-    // sequentially consistent.
+    // Either this load sees the worker that fell asleep before it, or that worker sees the new
+    // generation: all of these operations are sequentially consistent.
     if (asleep_.load() > 0) {
         { const std::lock_guard lock(mutex_); }
         wake_.notify_all();
@@ -95,7 +96,7 @@ void WorkerPool::run(int items, Job job, void* context) {
     }
 }
 
-void WorkerPool::work(int part) {
+void ThreadWorkers::work(int part) {
     std::uint32_t seen = 0;
     for (;;) {
         for (int spin = 0; spin < spins_ && generation_.load() == seen; ++spin) hwy::Pause();

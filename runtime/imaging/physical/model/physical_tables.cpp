@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/imaging/physical/model/physical_model.h"
+#include "runtime/imaging/physical/model/physical_tables.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,8 +37,8 @@ Tables make_tables(const Probe& probe, const ScanGeometry& g) {
     constexpr double kSigmaPerFwhm = 1 / 2.3548200450309493;
     Tables t;
     t.frequency_mhz = probe.frequency_mhz;
-    // Scatterers no finer than a tenth of a millimetre, or the volume's period would show; one a
-    // sample, or the speckle's power would drift with the depth setting.
+    // Scatterers no finer than a tenth of a millimetre, or the volume's period would show; at least
+    // one per sample, or the speckle's power would drift with the depth setting.
     t.scatter_mm = std::max(0.1, std::min(0.30 * 3.5 / probe.frequency_mhz, g.step_mm));
     const double wavelength = 1.54 / probe.frequency_mhz;
     const double axial_fwhm = 0.58 * std::pow(3.5 / probe.frequency_mhz, 0.7);  // 0.33 mm at 8 MHz

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/imaging/simd/worker_pool.h"
+#include "runtime/workers/thread_workers.h"
 
 #include <gtest/gtest.h>
 
@@ -10,25 +10,25 @@
 namespace sonocase::runtime {
 namespace {
 
-TEST(WorkerPool, DoesEveryItemOnceForAnyNumberOfThreads) {
+TEST(ThreadWorkers, DoesEveryItemOnceForAnyNumberOfThreads) {
     for (const int threads : {1, 2, 3, 7, 16}) {
-        WorkerPool pool(threads);
+        ThreadWorkers workers(threads);
         for (const int items : {0, 1, 2, 5, 12, 1000}) {
             // Plain integers: that a caller sees them afterwards is part of the promise.
             std::vector<int> done(static_cast<std::size_t>(items), 0);
             for (int round = 0; round < 50; ++round)
-                pool.for_each(items,
-                              [&](int, int item) { ++done[static_cast<std::size_t>(item)]; });
+                workers.for_each(items,
+                                 [&](int, int item) { ++done[static_cast<std::size_t>(item)]; });
             EXPECT_EQ(done, std::vector<int>(done.size(), 50)) << threads << " threads";
         }
     }
 }
 
-TEST(WorkerPool, APartIsOneThread) {
-    WorkerPool pool(4);
+TEST(ThreadWorkers, APartIsOneThread) {
+    ThreadWorkers workers(4);
     std::vector<std::thread::id> owner(4);
     for (int round = 0; round < 200; ++round) {
-        pool.for_each(64, [&](int part, int) {
+        workers.for_each(64, [&](int part, int) {
             ASSERT_TRUE(part >= 0 && part < 4);
             std::thread::id& id = owner[static_cast<std::size_t>(part)];
             if (id == std::thread::id()) id = std::this_thread::get_id();
@@ -39,26 +39,26 @@ TEST(WorkerPool, APartIsOneThread) {
 }
 
 // Its items are in order, so that what one leaves behind the next can go on with.
-TEST(WorkerPool, OneThreadGoesInOrder) {
-    WorkerPool pool(1);
+TEST(ThreadWorkers, OneThreadGoesInOrder) {
+    ThreadWorkers workers(1);
     std::vector<int> seen;
-    pool.for_each(9, [&](int, int item) { seen.push_back(item); });
+    workers.for_each(9, [&](int, int item) { seen.push_back(item); });
     EXPECT_EQ(seen, (std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8}));
 }
 
 // Jobs that find all workers asleep, and jobs that follow at once, by turns.
-TEST(WorkerPool, WakesForEveryJob) {
-    WorkerPool pool(3);
+TEST(ThreadWorkers, WakesForEveryJob) {
+    ThreadWorkers workers(3);
     for (int job = 0; job < 300; ++job) {
         int sum[3] = {0, 0, 0};
-        pool.for_each(30, [&](int part, int item) { sum[part] += item; });
+        workers.for_each(30, [&](int part, int item) { sum[part] += item; });
         ASSERT_EQ(sum[0] + sum[1] + sum[2], 29 * 30 / 2);
         if (job % 10 == 0) std::this_thread::yield();
     }
 }
 
-TEST(WorkerPool, EndsWithoutAJob) {
-    for (int i = 0; i < 50; ++i) WorkerPool pool(4);
+TEST(ThreadWorkers, EndsWithoutAJob) {
+    for (int i = 0; i < 50; ++i) ThreadWorkers workers(4);
 }
 
 }  // namespace

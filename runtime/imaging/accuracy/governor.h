@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Keeps frames within a time that was asked for by giving up accuracy in a stated order.
+// Keeps frames within a requested time by giving up accuracy in a fixed order.
 //
-// Levels lie on the front of measured work against precision, on which beams and samples shrink
-// together (docs/effects.md, sonocase_bench Accuracy/*), the finest first. A level is left for a
-// coarser one when the average frame takes longer than the budget, and for a finer one when that
-// one is expected to take less than 85 % of it. Constant time, no clock: the caller says how long a
-// frame took.
+// The levels lie on the front of measured work against precision, along which beams and samples
+// shrink together (docs/effects.md, sonocase_bench Accuracy/*), the finest first. A level is left
+// for a coarser one when the average frame takes longer than the budget, and for a finer one when
+// that one is expected to take less than 85 % of it. Constant time, no clock: the caller reports
+// how long each frame took.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 
 namespace sonocase::runtime {
 
 struct AccuracyLevel {
-    double lines, samples;  // of the full number
-    double work;            // measured time of a frame, of the full one's
+    double lines, samples;  // relative to full accuracy
+    double work;            // measured time of a frame, relative to full accuracy
 };
 
 inline constexpr std::array<AccuracyLevel, 4> kAccuracyLevels{
@@ -28,12 +29,11 @@ class Governor {
     explicit Governor(double budget_ms) : budget_ms_(budget_ms) {}  // <= 0: off
 
     bool on() const { return budget_ms_ > 0; }
-    int level() const { return level_; }  // 0 finest
-    double average_ms() const { return average_ms_; }
+    int level() const { return level_; }  // 0 is the finest
 
     void frame_took(double ms) {
         if (!on()) return;
-        // A single late frame is the machine's doing, not the picture's.
+        // A single late frame is the machine's doing, not the scene's.
         average_ms_ =
             seen_ == 0 ? ms : average_ms_ + 0.15 * (std::min(ms, 2 * average_ms_) - average_ms_);
         if (++seen_ < kPatience) return;
