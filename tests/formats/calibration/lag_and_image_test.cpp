@@ -88,7 +88,7 @@ TEST(Lag, TroubleHasItsOwnWords) {
 TEST(Lag, ShiftedRecordingOfAHandIsFound) {
     const std::vector<Pose> poses =
         read_recording("probe_translation_watertank/probe_to_tracker.csv");
-    if (poses.empty()) return;
+    if (poses.empty()) GTEST_SKIP() << "shared/data/tracking is absent";
     std::vector<Pose> late = poses;
     for (Pose& p : late) p.timestamp_s += 0.073;
     EXPECT_NEAR(fit_lag(position_signal(poses), position_signal(late)).lag_s, 0.073, 0.002);
@@ -172,10 +172,10 @@ TEST(Quality, OldPoorAndStrangeCalibrationsAreNamed) {
     concern([](Calibration& c) { c.date = "2027-01-01"; }, "future");
     concern([](Calibration& c) { c.rms_mm = 3; }, "3.0 mm rms");
     concern([](Calibration& c) { c.rms_mm = -1; }, "does not say");
-    concern([](Calibration& c) { c.sigma_mm.y = INFINITY; }, "known to inf");
+    concern([](Calibration& c) { c.sigma_mm.y = INFINITY; }, "only to inf");
     concern([](Calibration& c) { c.condition = 1e4; }, "hardly determines");
     concern([](Calibration& c) { c.poses = 5; }, "5 readings");
-    concern([](Calibration& c) { c.sensor_from_tool.rotation(0, 0) = 2; }, "no proper rotation");
+    concern([](Calibration& c) { c.sensor_from_tool.rotation(0, 0) = 2; }, "not hold a proper rotation");
     concern([](Calibration& c) { c.scale = 0.001; }, "units");
 }
 
