@@ -83,7 +83,7 @@ MetaHeader read_meta_header(const std::string& path) {
         header.voxels_at = static_cast<std::uint64_t>(file.tellg());
     } else if (names_many_files(data_file)) {
         header.many_files = true;
-    } else {
+    } else if (!data_file.empty()) {
         header.data_path = beside(path, data_file);
         header.voxels_at = skip;
     }
@@ -94,7 +94,9 @@ Status check_data_files(const std::string& path) {
     if (path.ends_with(".mha") || path.ends_with(".mhd")) {
         const MetaHeader header = read_meta_header(path);
         if (header.many_files) return check_source_folder(folder_of(path), kExpected);
-        return header.data_path == path ? Done{} : check_data_file(path, header.data_path);
+        // A header that is cut off names no file: the reader reports it.
+        if (header.data_path.empty() || header.data_path == path) return Done{};
+        return check_data_file(path, header.data_path);
     }
     if (path.ends_with(".nrrd") || path.ends_with(".nhdr")) {
         const std::string data_file = nrrd_data_file(path);

@@ -12,7 +12,7 @@ namespace sonocase::pipeline {
 
 // What a MetaImage header (.mha, .mhd) says about its voxels.
 struct MetaHeader {
-    std::string data_path;        // the header's own path if the voxels follow it
+    std::string data_path;        // the header's own path if the voxels follow it; may be empty
     std::uint64_t voxels_at = 0;  // bytes to skip in that file
     bool compressed = false;
     bool many_files = false;  // a list or a numbered pattern; data_path is then empty
