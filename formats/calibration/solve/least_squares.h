@@ -2,11 +2,11 @@
 
 // Tall linear least squares in a few unknowns, row by row: min |A x - b|.
 //
-// Rows are folded into a triangular factor by Givens rotations, so the condition of A is not
-// squared and nothing is allocated however many rows there are. Solving takes the singular values
-// of that factor by one-sided Jacobi rotations: they tell what the rows determine, and an answer of
-// least length comes out where they leave a direction open. Cost: about 6 n^2 flops a row, n the
-// number of unknowns. Constant memory; may run in the frame loop.
+// Rows are folded into a triangular factor by Givens rotations, so that the condition number of A
+// is not squared and nothing is allocated however many rows are added. solve() computes the
+// singular values of that factor by one-sided Jacobi rotations: they show what the rows determine,
+// and where a direction is left open the solution of least length is returned. Cost: about 6 n^2
+// flops per row for n unknowns. Constant memory; may run in the frame loop.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ struct LeastSquaresFit {
     int unknowns = 0;
     int rank = 0;                                 // singular values above tolerance * largest
     std::array<double, kMaxUnknowns> x{};         // of least length if rank < unknowns
-    std::array<double, kMaxUnknowns> singular{};  // falling
+    std::array<double, kMaxUnknowns> singular{};  // in decreasing order
     // Right singular vectors: direction[k] belongs to singular[k]; unit length.
     std::array<std::array<double, kMaxUnknowns>, kMaxUnknowns> direction{};
     double residual_sum = 0;  // |A x - b|^2

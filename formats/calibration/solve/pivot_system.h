@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The pivot problem over chosen poses, in two forms: sums for the search, orthogonal for the
-// answer. Internal to formats/calibrate.
+// The pivot problem over chosen poses in two forms: PivotSums, a few additions per pose, for the
+// search; solve_pivots, an orthogonal factorisation, for the answer. Internal to
+// formats/calibration.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
-#include "formats/calibration/least_squares.h"
+#include "formats/calibration/solve/least_squares.h"
 #include "formats/recording/poses.h"
 
 namespace sonocase::calibrate {
@@ -49,35 +51,5 @@ struct PivotSolution {
 PivotSolution solve_pivots(std::span<const Pose> poses,
                            std::span<const PoseGroup> groups,
                            double rank_tolerance = 1e-12);
-
-// Deterministic stream of indices, the same on every platform.
-class IndexStream {
-  public:
-    explicit IndexStream(std::uint64_t seed) : state_(seed) {}
-    std::size_t below(std::size_t count) {
-        state_ += 0x9e3779b97f4a7c15ull;
-        std::uint64_t z = state_;
-        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-        z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-        z ^= z >> 31;
-        return static_cast<std::size_t>(z % count);
-    }
-
-  private:
-    std::uint64_t state_;
-};
-
-// Poses of the densest half: tip of the least-trimmed-squares fit (random triples, concentration
-// steps). False if no triple determines a tip. Poses' positions centred.
-bool search_tip(std::span<const Pose> poses, int trials, std::uint64_t seed, Vector3* tip);
-
-// Groups of successive poses, each resting on its own point, that one tip explains; empty if none.
-std::vector<PoseGroup> search_rests(std::span<const Pose> poses, std::uint64_t seed);
-
-// Runs as in find_rests, as indices.
-std::vector<PoseGroup> runs_at_rest(std::span<const Pose> poses,
-                                    Vector3 tip,
-                                    double radius_mm,
-                                    std::size_t min_poses);
 
 }  // namespace sonocase::calibrate

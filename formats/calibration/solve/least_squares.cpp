@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "formats/calibration/least_squares.h"
+#include "formats/calibration/solve/least_squares.h"
 
 #include <algorithm>
 #include <cassert>
