@@ -11,7 +11,8 @@ StageTable make_table() {
                     resample_stage(),  smooth_stage(), tissues_step(),  texture_stage(),
                     structure_stage(), pack_stage()};
     table.common = OptionsOf<CaseOptions>("case").number(
-        "seed", [](auto& o) { return &o.seed; }, 0, 2e9, "", "of everything random in the case");
+        "seed", [](auto& o) { return &o.seed; }, 0, 2e9, "",
+        "seed of everything random in the case");
     table.presets = {{"draft", {{"resample.voxel_mm", "2"}, {"texture.edge", "32"}}},
                      {"balanced", {{"resample.voxel_mm", "1"}}},
                      {"accurate", {{"resample.voxel_mm", "0.75"}, {"surface.working_mm", "2"}}}};

@@ -21,11 +21,11 @@ void add_grid(OptionsOf<Resample>& options) {
         .sweep({"warp",
                 {"3", "2", "1.5", "1", "0.75"},
                 "surfaces between voxels; memory goes with its cube",
-                "below the map's own sampling the voxels hold nothing new"})
+                "voxels finer than the map's own sampling hold nothing new"})
         .sweep({"case",
                 {"3", "2", "1.5", "1", "0.75"},
                 "surfaces between voxels",
-                "once finer than the fit of the skin, voxels buy nothing more"})
+                "voxels finer than the fit of the skin is good gain nothing"})
         .number(
             "margin_mm", [](auto& o) { return &o.margin_mm; }, 0, 50, "mm",
             "air kept round the body")
@@ -74,7 +74,7 @@ void add_shape(OptionsOf<Resample>& options) {
         .sweep({"warp",
                 {"4", "8", "16"},
                 "time and memory alone",
-                "which labels can win at a point is told in every cell of a block"})
+                "which labels can win at a point is decided in every cell of a block"})
         .number(
             "snap_vx", [](auto& o) { return &o.snap_vx; }, 0, 0.5, "voxels",
             "most that surfaces move onto quadrics, which are short to store; 0: none")

@@ -20,7 +20,7 @@ void add_joint(OptionsOf<SmoothStageOptions>& options) {
     options
         .choice(
             "method", [](auto& o) { return &o.method; }, {"auto", "none", "joint", "level_set"}, "",
-            "auto: joint, in a case after resample.method nearest alone")
+            "auto: joint, or none in a case that resample has smoothed")
         .help_group("Method joint")
         .number(
             "sigma_vx", [](auto& o) { return &o.smooth.sigma_vx; }, 0, 4, "voxels",
@@ -77,6 +77,8 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     const auto labels = inputs.get<LabelFile>("labels");
     if (!labels) return labels.error();
     const auto& options = inputs.options<SmoothStageOptions>("smooth");
+    if (options.method == "none")
+        return Error{"method none smooths nothing", "", "choose auto, joint or level_set"};
     SmoothOptions smooth = options.smooth;
     smooth.method = options.method == "level_set" ? "level_set" : "joint";
     auto result = smooth_labels((*labels)->volume, smooth, progress);

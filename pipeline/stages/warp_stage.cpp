@@ -25,7 +25,7 @@ void add_align(OptionsOf<Fit>& options) {
         .sweep({"register",
                 {"10", "30", "60", "120", "240"},
                 "the chance of a wrong pose",
-                "once one start falls into the right valley, more of them end in the same place"})
+                "once one start converges to the right pose, more of them end in the same place"})
         .number(
             "offsets", [](auto& o) { return &o.rigid.offsets; }, 1, 20, "",
             "starts along the long axis for each rotation")
@@ -77,23 +77,23 @@ void add_residual(OptionsOf<Fit>& options) {
             "B-spline displacement after the quadratic")
         .number(
             "spacing_mm", [](auto& o) { return &o.residual.spacing_mm; }, 10, 200, "mm",
-            "spacing of its control points")
+            "spacing of the residual's control points")
         .sweep({"register",
                 {"80", "60", "40", "30", "20"},
                 "bumps of the skin",
-                "finer than the readings lie, control points follow their noise"})
+                "control points closer together than the readings follow their noise"})
         .number(
             "bending", [](auto& o) { return &o.residual.bending; }, 1e-09, 10, "",
-            "weight of its bending")
+            "weight of the residual's bending")
         .number(
             "stretching", [](auto& o) { return &o.residual.stretching; }, 0, 10, "",
-            "weight of its stretching")
+            "weight of the residual's stretching")
         .number(
             "inside_mm", [](auto& o) { return &o.residual.inside_mm; }, 0, 100, "mm",
-            "mean displacement of the inside that it may cause")
+            "most that the residual may move the inside of the body, on average")
         .number(
             "fade_mm", [](auto& o) { return &o.residual.fade_mm; }, 1, 500, "mm",
-            "depth at which it has faded");
+            "depth at which the residual has faded");
 }
 
 OptionGroup options() {

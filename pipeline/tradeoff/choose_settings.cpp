@@ -27,7 +27,7 @@ double voxels(double volume_mm3, const Settings& settings) {
     return volume_mm3 / (h * h * h);
 }
 
-// Of a row, for a case of another volume. What does not depend on the voxels stays.
+// Seconds of a row for a case of another volume. The part that does not depend on voxels stays.
 double seconds_at(const FrontRow& row,
                   const FrontTable& table,
                   const CostModel& model,
@@ -164,7 +164,7 @@ NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3) 
     const auto seconds = [&](const FrontRow& row) {
         return seconds_at(row, table, model, volume_mm3);
     };
-    // The row that the case was cooked with: of its voxel, and among several the cheapest.
+    // The row that the case was cooked with: the cheapest of those with its voxel.
     const FrontRow* now = nullptr;
     for (const FrontRow& row : table.rows) {
         const double off = std::abs(voxel_mm_of(row.settings) - voxel_mm);
@@ -175,7 +175,7 @@ NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3) 
     if (now == nullptr) return step;
     const FrontRow* next = nullptr;
     for (const FrontRow& row : table.rows) {
-        if (row.error_mm >= now->error_mm * 0.99) continue;  // a hundredth is no step
+        if (row.error_mm >= now->error_mm * 0.99) continue;  // less than a hundredth is not worth a step
         if (next == nullptr || seconds(row) < seconds(*next)) next = &row;
     }
     if (next == nullptr) return step;

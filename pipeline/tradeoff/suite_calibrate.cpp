@@ -101,7 +101,7 @@ Suite calibrate_suite() {
          "",
          "random starts of the robust fit",
          "the chance that outliers win",
-         "already certain with few starts at one outlier in ten"},
+         "with one outlier in ten, few starts are enough"},
     };
     suite.named = {
         {TrialRole::paper,

@@ -142,7 +142,7 @@ Suite render_suite() {
          "",
          "samples along a beam",
          "detail along the beam",
-         "the speckle's grain is met by about 512 samples"},
+         "about 512 samples resolve the speckle's grain"},
     };
     suite.pairs = {{"render.scanlines", "render.samples"}};
     suite.named = {{TrialRole::paper, "model paper", {{"render.model", "paper"}}},

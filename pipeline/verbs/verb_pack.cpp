@@ -28,7 +28,7 @@ struct PackFiles {
     std::uint64_t seed = 1;
 };
 
-// A .surface of ours, or any surface file.
+// A .surface file of ours, or any surface file that import reads.
 Result<Surface> load_any_surface(const std::string& path) {
     const auto bytes = sonocase::read_file(path);
     if (!bytes) return bytes.error();

@@ -51,7 +51,7 @@ std::string this_machine(int threads) {
            " threads";
 }
 
-// Whose seconds the measured front gives.
+// The body whose seconds the measured front holds.
 constexpr const char* kTimedBody = "demo-torso";
 
 struct NamedSuite {
@@ -59,7 +59,7 @@ struct NamedSuite {
     std::function<Suite()> make;
 };
 
-// A name may stand for several bodies.
+// Several bodies may share a name.
 std::vector<NamedSuite> suites() {
     return {
         {"register", register_suite},
@@ -182,7 +182,7 @@ int verb_tradeoff(int argc, char** argv) {
         ->required()
         ->type_name("DIR");
     app.add_option("--case", options.recipe,
-                   "Sweep a case of your own too, against its finest setting")
+                   "Also sweep a case of your own, against its finest setting")
         ->type_name("RECIPE");
     app.add_option("--data", options.data, "Folder that the recipe's input paths start from")
         ->type_name("DIR");

@@ -3,6 +3,7 @@
 #include "pipeline/verbs/stage/option_flags.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cctype>
 #include <string>
 #include <vector>
@@ -10,12 +11,14 @@
 namespace sonocase::pipeline {
 namespace {
 
-// "Edge of the cooked voxels, mm"
+// "Reach of the boundary records (voxels); 0: none"
 std::string description(const Option& option) {
     std::string text = option.meaning;
     if (!text.empty())
         text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
-    return option.unit.empty() ? text : text + ", " + option.unit;
+    if (!option.unit.empty())
+        text.insert(std::min(text.find(';'), text.size()), " (" + option.unit + ")");
+    return text;
 }
 
 void add(CLI::App& app, const Option& option, double* value) {

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 
+#include "formats/bundle/stage_files.h"
 #include "formats/exercise/exercise.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/export/export_files.h"

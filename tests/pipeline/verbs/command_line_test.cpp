@@ -179,6 +179,14 @@ TEST(CommandLine, StagesAloneMakeTheCaseThatBuildMakes) {
         EXPECT_EQ(read_text(folder / (std::string("parts/") + name)),
                   read_text(folder / (std::string("whole/") + name)))
             << name;
+    // Structure may also be baked by its own verb, before packing.
+    ASSERT_TRUE(ok("structure cooked.labels -o baked.labels"));
+    ASSERT_TRUE(
+        ok("pack --labels baked.labels --textures bank.textures --surface in/mannequin.ply "
+           "--no-structure -o baked.sonocase"));
+    ASSERT_TRUE(ok("export baked.sonocase -o baked"));
+    EXPECT_EQ(read_text(folder / "baked/echo-offset.nrrd"),
+              read_text(folder / "whole/echo-offset.nrrd"));
     // No seconds in the files between: made again they are the same.
     const std::string first = read_text(folder / "cooked.labels");
     ASSERT_TRUE(
