@@ -53,8 +53,7 @@ Result<GrowingSequence> GrowingSequence::create(const std::string& path, const S
     pad(text, 0);
     out.end_line_at_ = text.size();
     text += kEndLine;
-    // Under another name first, so that a full disk does not cost the session that was there
-    // before.
+    // Under another name first, so that a full disk does not destroy the previous session.
     const std::string temporary = path + ".part-" + std::to_string(::getpid());
     out.fd_ = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (out.fd_ < 0) {

@@ -113,14 +113,14 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
     const std::int64_t application = impl->pragma("PRAGMA application_id");
     const std::int64_t version = impl->pragma("PRAGMA user_version");
     const std::int64_t tables = impl->pragma("SELECT count(*) FROM sqlite_master");
-    if (tables < 0) return impl->fault("is no progress book");
+    if (tables < 0) return impl->fault("is not a progress book");
     if (tables == 0 && version == 0) {
         const std::string make = std::string("BEGIN IMMEDIATE;") + kSchema +
                                  "PRAGMA application_id=" + std::to_string(kApplication) +
                                  ";PRAGMA user_version=" + std::to_string(kVersion) + ";COMMIT;";
         if (!impl->run(make.c_str())) {
             impl->run("ROLLBACK");
-            // Another program may have made it in the same moment.
+            // Another program may have created it at the same moment.
             if (impl->pragma("PRAGMA user_version") != kVersion)
                 return impl->fault("cannot make the book");
         }

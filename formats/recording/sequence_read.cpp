@@ -87,7 +87,7 @@ std::string element_from_nrrd(std::string_view type) {
     return std::string(type);
 }
 
-// Lines that say nothing that a Sequence keeps.
+// Lines whose content a Sequence does not keep.
 bool is_skipped(std::string_view key, bool nrrd) {
     static constexpr std::string_view kSkipped[] = {"ObjectType",
                                                     "NDims",
@@ -241,7 +241,7 @@ Status Reader::read_number(const HeaderLine& line, double& to) const {
     return Done{};
 }
 
-// A status before its matrix is remembered in the corner that a matrix fills with 1.
+// A bad status that comes before its matrix is kept in the last entry, which is 1 in every matrix.
 constexpr double kRefused = 2;
 
 Status Reader::read_transform_status(const HeaderLine& line, SequencePose& pose) {

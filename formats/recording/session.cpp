@@ -32,8 +32,8 @@ bool has_word(const std::string& text, std::initializer_list<const char*> words)
                        [&](const char* word) { return text.find(word) != std::string::npos; });
 }
 
-// "name|detail"; several events of one frame are joined by ";". Neither sign is left in their
-// texts.
+// "name|detail"; several events of one frame are joined by ";". Both characters are removed from
+// the texts.
 std::string without(std::string text, const char* signs) {
     for (char& c : text) {
         if (std::string(signs).find(c) != std::string::npos) c = ',';

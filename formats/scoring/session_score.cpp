@@ -46,7 +46,7 @@ SessionCurves curves_of(const ScoreInput& input) {
         c.plane_distance_mm.push_back(r.plane_mm);
         c.in_beam_fraction.push_back(r.seen && r.depth_mm > 0 ? r.in_beam_mm / r.depth_mm : kNan);
         double nearest = kNan;
-        // Beyond a few targets the curve of the nearest says little and costs much.
+        // With many targets the curve of the nearest one says little and is expensive.
         if (input.exercise.targets.size() <= 64) {
             for (std::size_t t = 0; t < input.exercise.targets.size(); ++t) {
                 const double d = distance(input.target_at(t, input.time(i)), input.tip(i));
