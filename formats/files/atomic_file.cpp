@@ -71,7 +71,7 @@ Result<Bytes> read_whole(const std::string& path) {
         }
         bytes.resize(filled);
     } catch (const std::bad_alloc&) {
-        return Error{"is too large for the memory", path, ""};
+        return Error{"does not fit into memory", path, ""};
     }
     return bytes;
 }

@@ -38,7 +38,7 @@ void pad(std::string& text, std::uint64_t starts_at) {
 
 Error GrowingSequence::fault(const char* doing, int number) const {
     return {std::string(doing) + ": " + std::strerror(number), path_,
-            "what was recorded before is kept; make room on the disk"};
+            "earlier frames are kept; make room on the disk"};
 }
 
 Result<GrowingSequence> GrowingSequence::create(const std::string& path, const Sequence& head) {

@@ -124,7 +124,7 @@ Result<Session> session_from_sequence(const Sequence& sequence,
         std::string there;
         for (const std::string& t : sequence.transforms) there += (there.empty() ? "" : ", ") + t;
         return Error{"has no transform '" + name + "'", where,
-                     there.empty() ? "it has none at all" : "it has " + there};
+                     there.empty() ? "it has none" : "it has " + there};
     }
     const Rigid turn = z_along(names.needle_axis);
     for (const SequenceFrame& frame : sequence.frames) {

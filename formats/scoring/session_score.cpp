@@ -30,11 +30,12 @@ void score_times(const ScoreInput& input,
     if (!input.needle.points.empty()) values["tracking_gap_s"] = input.needle.longest_gap_s;
     const std::size_t back = input.probe.run_back + input.needle.run_back;
     if (back > 0) {
-        warnings.push_back(
-            std::to_string(back) +
-            " readings whose time ran back or whose pose was not finite were left out.");
+        warnings.push_back(std::to_string(back) +
+                           " readings were left out, because their time ran backwards or their "
+                           "pose was not finite.");
     }
-    if (!input.anatomy) warnings.push_back("No body was given: what needs one was not measured.");
+    if (!input.anatomy)
+        warnings.push_back("No body was given, so scores that need one are undefined.");
 }
 
 SessionCurves curves_of(const ScoreInput& input) {

@@ -90,9 +90,9 @@ std::int64_t JsonObject::integer(const char* key, std::int64_t low, std::int64_t
     const double value = number(key);
     if (value != std::floor(value) || value < static_cast<double>(low) ||
         value > static_cast<double>(high)) {
-        complain(key, "is out of range",
-                 "a whole number from " + std::to_string(low) + " to " + std::to_string(high) +
-                     " is expected");
+        complain(
+            key, "is out of range",
+            "expected a whole number from " + std::to_string(low) + " to " + std::to_string(high));
         return low;
     }
     return static_cast<std::int64_t>(value);
@@ -110,7 +110,7 @@ std::vector<double> JsonObject::numbers(const char* key, std::size_t count) {
     std::vector<double> values;
     if (found && (!found->is_array() || (count != 0 && found->size() != count))) {
         complain(key, "has the wrong shape",
-                 "a list of " + std::to_string(count) + " numbers is expected");
+                 "expected a list of " + std::to_string(count) + " numbers");
     } else if (found) {
         values.reserve(found->size());
         for (const Json& item : *found) {
@@ -217,7 +217,7 @@ Rigid rigid_from(JsonObject object) {
     // 1e-3: the rounding of nine entries printed with six decimals, with a margin.
     if (object.ok() && (orthonormality_error(t.rotation) > 1e-3 || determinant(t.rotation) < 0)) {
         object.complain("rotation", "is not a rotation",
-                        "nine numbers, row by row, of a right-handed rotation");
+                        "expected nine numbers, row by row, of a right-handed rotation");
     }
     return t;
 }
