@@ -4,14 +4,13 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "formats/base/jobs.h"
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
-#include "formats/bundle/voxel_blocks.h"
 #include "formats/volume/brick_volume.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/solid_texture.h"
@@ -55,11 +54,6 @@ struct CaseBundle {
     Surface patient_skin;                   // `mannequin` frame, after the warp
     Surface mannequin_skin;                 // `mannequin` frame, as digitised
     std::vector<std::uint8_t> preview_png;  // may be empty
-
-    // Null: all of the above is there. Else the pools of `boundary` and `echo_offset` count only
-    // where they were asked for; such a bundle may be moved from, but neither copied nor assigned
-    // to.
-    std::shared_ptr<VoxelBlocks> blocks;
 };
 
 // Tissue table index of every palette entry; # labels.
@@ -67,18 +61,12 @@ std::vector<int> tissue_of_label(const CaseBundle& bundle);
 
 // Reads a bundle from bytes. Trusts nothing: every size is checked before allocation, every offset
 // against the file, every checksum before use; docs/format.md says what is done in each malformed
-// case. where: names the bytes in errors. threads: 0 takes as many as the machine has; 1 starts
-// none.
+// case. where: names the bytes in errors. No exception is needed to refuse bytes; running out of
+// memory throws std::bad_alloc.
 Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,
                                const std::string& where,
-                               int threads = 0);
-// Same bytes for the same bundle on any machine with any number of threads.
-std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle);
-
-// For players: everything but the pools of boundary records and echo offsets, which `blocks`
-// unpacks from `bytes` as a frame needs them. Cost at 1 mm: a tenth of read_bundle.
-Result<CaseBundle> stream_bundle(RawVector<std::uint8_t> bytes,
-                                 const std::string& where,
-                                 int threads = 0);
+                               JobRunner& jobs = serial_jobs());
+// The same bytes for the same bundle on any machine with any `jobs`.
+std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle, JobRunner& jobs = serial_jobs());
 
 }  // namespace sonocase

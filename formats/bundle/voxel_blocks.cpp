@@ -9,7 +9,6 @@
 #include <sys/mman.h>
 #endif
 
-#include "formats/base/jobs.h"
 #include "formats/bundle/codec/block_parts.h"
 
 namespace sonocase {
@@ -21,7 +20,7 @@ constexpr std::size_t kWorkers = 2;  // the frame's thread and one that reads ah
 
 struct VoxelBlocks::Worker {
     std::mutex mutex;
-    std::unique_ptr<detail::BlockWork> work;
+    std::unique_ptr<detail::BlockUnpacker> unpacker;
 };
 
 VoxelBlocks::VoxelBlocks(std::unique_ptr<detail::BlockParts> parts)
@@ -34,7 +33,7 @@ VoxelBlocks::VoxelBlocks(std::unique_ptr<detail::BlockParts> parts)
       state_(std::make_unique<std::atomic<State>[]>(count_)),
       left_(count_) {
     for (std::size_t n = 0; n < kWorkers; ++n)
-        workers_[n].work = std::make_unique<detail::BlockWork>(*parts_);
+        workers_[n].unpacker = std::make_unique<detail::BlockUnpacker>(*parts_);
     for (std::size_t block = 0; block < count_; ++block) {
         const Int3 brick = parts_->grid.first_brick(block);
         lower_[block] = {kBrickEdge * brick.x, kBrickEdge * brick.y, kBrickEdge * brick.z};
@@ -77,18 +76,18 @@ void VoxelBlocks::unpack(std::size_t block) noexcept {
         } else if (!lock.try_lock()) {
             continue;
         }
-        finish(block, workers_[n].work->unpack(*parts_, block));
+        finish(block, workers_[n].unpacker->unpack(*parts_, block));
         return;
     }
 }
 
-void VoxelBlocks::load_all(int threads) {
+void VoxelBlocks::load_all(JobRunner& jobs) {
     // A row of blocks a job, so that few have to find memory to work in.
     const auto row = static_cast<std::size_t>(std::max(blocks_.x, 1));
-    detail::run_jobs((count_ + row - 1) / row, threads, [&](std::size_t job) {
-        detail::BlockWork work(*parts_);
+    jobs.run((count_ + row - 1) / row, [&](std::size_t job) {
+        detail::BlockUnpacker unpacker(*parts_);
         for (std::size_t block = job * row; block < std::min((job + 1) * row, count_); ++block) {
-            if (take(block)) finish(block, work.unpack(*parts_, block));
+            if (take(block)) finish(block, unpacker.unpack(*parts_, block));
         }
     });
     for (std::size_t block = 0; block < count_; ++block)  // what other threads had begun

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "formats/base/geometry.h"
-#include "formats/base/raw_vector.h"
+#include "formats/base/jobs.h"
 #include "formats/base/result.h"
 
 namespace sonocase {
@@ -41,7 +41,7 @@ class VoxelBlocks {
         }
     }
     void ensure_voxel_loaded(int i, int j, int k) noexcept;
-    void load_all(int threads);  // 0: as many as the machine has
+    void load_all(JobRunner& jobs);
 
     int edge() const noexcept { return edge_; }  // of a block, voxels
     bool whole() const noexcept { return left_.load(std::memory_order_acquire) == 0; }
@@ -52,9 +52,6 @@ class VoxelBlocks {
     // Keeps the system from finding a page of 2 MB for a block of a tenth of it, where the pools
     // are large enough for such pages. Before anything is asked for.
     void use_small_pages() noexcept;
-
-    // The bytes that the blocks are read from, for a bundle that outlives them elsewhere.
-    void keep(RawVector<std::uint8_t> file) { file_ = std::move(file); }
 
   private:
     enum State : std::uint8_t { kPacked, kBeingUnpacked, kThere };
@@ -69,7 +66,6 @@ class VoxelBlocks {
 
     std::unique_ptr<detail::BlockParts> parts_;
     std::unique_ptr<Worker[]> workers_;  // as many threads unpack at a time
-    RawVector<std::uint8_t> file_;
     Int3 blocks_{0, 0, 0};
     int edge_ = 0;
     std::size_t count_ = 0;

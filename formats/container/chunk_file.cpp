@@ -12,7 +12,7 @@
 #include <cassert>
 #include <cstring>
 
-#include "formats/base/jobs.h"
+#include "formats/base/memory.h"
 
 namespace sonocase {
 namespace {
@@ -28,8 +28,6 @@ constexpr std::size_t kEntryBytes = 64;
 constexpr std::uint32_t kRequired = 1;
 constexpr std::uint32_t kZstd = 2;
 constexpr int kZstdLevel = 6;
-
-using detail::run_jobs;
 
 template <class T>
 T get(std::span<const std::uint8_t> bytes, std::size_t offset) {
@@ -48,11 +46,11 @@ std::size_t aligned(std::size_t offset) {
 
 // Independent zstd frames of kFrameBytes each, so that they pack and unpack side by side. Empty
 // when compression saves less than an eighth.
-std::vector<std::uint8_t> compressed(std::span<const std::uint8_t> raw, int threads) {
+std::vector<std::uint8_t> compressed(std::span<const std::uint8_t> raw, JobRunner& jobs) {
     if (raw.size() < 64) return {};
     const std::size_t frames = (raw.size() + kFrameBytes - 1) / kFrameBytes;
     std::vector<std::vector<std::uint8_t>> parts(frames);
-    run_jobs(frames, threads, [&](std::size_t i) {
+    jobs.run(frames, [&](std::size_t i) {
         const auto from =
             raw.subspan(i * kFrameBytes, std::min(kFrameBytes, raw.size() - i * kFrameBytes));
         parts[i].resize(ZSTD_compressBound(from.size()));
@@ -108,13 +106,13 @@ void ChunkWriter::add_packed(std::string type, bool required, std::vector<std::u
     chunks_.back().packed = true;
 }
 
-std::vector<std::uint8_t> ChunkWriter::write(int threads) const {
+std::vector<std::uint8_t> ChunkWriter::write(JobRunner& jobs) const {
     const std::size_t table_bytes = kEntryBytes * chunks_.size();
     std::vector<std::uint8_t> out(kHeaderBytes + table_bytes);
     for (std::size_t i = 0; i < chunks_.size(); ++i) {
         const Chunk& chunk = chunks_[i];
         const std::vector<std::uint8_t> packed =
-            chunk.packed ? std::vector<std::uint8_t>() : compressed(chunk.view, threads);
+            chunk.packed ? std::vector<std::uint8_t>() : compressed(chunk.view, jobs);
         const std::span<const std::uint8_t> stored =
             packed.empty() ? chunk.view : std::span(packed);
         const std::size_t offset = aligned(out.size());
@@ -266,18 +264,20 @@ Status ChunkReader::check_size(std::string_view type,
         return fault("chunk '" + std::string(type) + "' claims more than it can hold",
                      "make the file again");
     }
+    if (!can_allocate(entry->raw))
+        return fault("chunk '" + entry->type + "' needs more memory than is available");
     return Done{};
 }
 
 Result<std::vector<std::uint8_t>> ChunkReader::read(std::string_view type,
                                                     std::size_t max_bytes,
-                                                    int threads) const {
+                                                    JobRunner& jobs) const {
     if (raw_bytes(type) > max_bytes) {
         return fault(
             "chunk '" + std::string(type) + "' holds " + std::to_string(raw_bytes(type)) + " bytes",
             "at most " + std::to_string(max_bytes) + " make sense");
     }
-    return read_array<std::uint8_t>(type, raw_bytes(type), threads);
+    return read_array<std::uint8_t>(type, raw_bytes(type), jobs);
 }
 
 Status ChunkReader::check_sum(const Entry& entry) const {
@@ -295,7 +295,9 @@ Result<std::span<const std::uint8_t>> ChunkReader::packed(std::string_view type)
     return bytes_.subspan(entry->offset, entry->stored);
 }
 
-Status ChunkReader::unpack(std::string_view type, std::span<std::uint8_t> to, int threads) const {
+Status ChunkReader::unpack(std::string_view type,
+                           std::span<std::uint8_t> to,
+                           JobRunner& jobs) const {
     const Entry& entry = *find(type);
     const auto stored = bytes_.subspan(entry.offset, entry.stored);
     const std::string name = "chunk '" + std::string(type) + "'";
@@ -321,7 +323,7 @@ Status ChunkReader::unpack(std::string_view type, std::span<std::uint8_t> to, in
         filled += expected;
     }
     std::atomic<bool> good{true};
-    run_jobs(frames.size(), threads, [&](std::size_t i) {
+    jobs.run(frames.size(), [&](std::size_t i) {
         const Frame& f = frames[i];
         const std::size_t n =
             ZSTD_decompress(to.data() + f.to, f.to_bytes, stored.data() + f.from, f.from_bytes);

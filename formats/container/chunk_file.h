@@ -15,6 +15,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "formats/base/jobs.h"
 #include "formats/base/result.h"
 
 namespace sonocase {
@@ -41,9 +42,8 @@ class ChunkWriter {
         add_view(std::move(type), required,
                  {reinterpret_cast<const std::uint8_t*>(values.data()), values.size() * sizeof(T)});
     }
-    // Chunks in the order added. threads: 0 takes as many as the machine has. The bytes do not
-    // depend on it.
-    std::vector<std::uint8_t> write(int threads = 0) const;
+    // Chunks in the order added. The bytes do not depend on `jobs`.
+    std::vector<std::uint8_t> write(JobRunner& jobs = serial_jobs()) const;
 
   private:
     struct Chunk {
@@ -72,19 +72,21 @@ class ChunkReader {
     // allocated.
     Result<std::vector<std::uint8_t>> read(std::string_view type,
                                            std::size_t max_bytes,
-                                           int threads = 0) const;
+                                           JobRunner& jobs = serial_jobs()) const;
     // The bytes of a chunk of add_packed() as they lie in the file, their checksum checked.
     Result<std::span<const std::uint8_t>> packed(std::string_view type) const;
     // count: how many values the chunk must hold exactly.
     template <class T, class Values = std::vector<T>>
-    Result<Values> read_array(std::string_view type, std::size_t count, int threads = 0) const {
+    Result<Values> read_array(std::string_view type,
+                              std::size_t count,
+                              JobRunner& jobs = serial_jobs()) const {
         static_assert(std::is_trivially_copyable_v<T>);
         Values values;
         if (Status size = check_size(type, count, sizeof(T)); !size) return size.error();
-        if (Status room = reserve([&] { values.resize(count); }, type); !room) return room.error();
+        values.resize(count);
         const std::span<std::uint8_t> to(reinterpret_cast<std::uint8_t*>(values.data()),
                                          count * sizeof(T));
-        if (Status done = unpack(type, to, threads); !done) return done.error();
+        if (Status done = unpack(type, to, jobs); !done) return done.error();
         return values;
     }
     const std::string& where() const { return where_; }
@@ -103,16 +105,7 @@ class ChunkReader {
     const Entry* find(std::string_view type) const;
     Status check_size(std::string_view type, std::size_t count, std::size_t bytes_each) const;
     Status check_sum(const Entry& entry) const;
-    Status unpack(std::string_view type, std::span<std::uint8_t> to, int threads) const;
-    template <class Allocate>
-    Status reserve(Allocate allocate, std::string_view type) const {
-        try {
-            allocate();
-        } catch (...) {
-            return fault("chunk '" + std::string(type) + "' needs more memory than there is");
-        }
-        return Done{};
-    }
+    Status unpack(std::string_view type, std::span<std::uint8_t> to, JobRunner& jobs) const;
 
     std::span<const std::uint8_t> bytes_;
     std::vector<Entry> entries_;

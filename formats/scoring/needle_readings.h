@@ -24,7 +24,7 @@ struct NeedleReading {
 };
 
 // # needle.points. anatomy may be null: then nothing is inside. Readings are independent and are
-// shared among threads.
+// distributed by options.jobs.
 std::vector<NeedleReading> look_up_readings(const Session& session,
                                             const ToolTrack& needle,
                                             const Exercise& exercise,

@@ -62,7 +62,7 @@ bool probe_in_contact(const Skin& skin, const Probe& probe, const Rigid& mannequ
     return false;
 }
 
-Result<ScanEngine> ScanEngine::create(const CaseBundle& bundle,
+Result<ScanEngine> ScanEngine::create(CaseView bundle,
                                       const Exercise& exercise,
                                       const EngineOptions& options) {
     Exercise adjusted = exercise;

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/streamed_bundle.h"
 #include "formats/calibration/calibration.h"
 #include "formats/exercise/exercise.h"
 #include "formats/scoring/anatomy.h"
@@ -71,7 +71,7 @@ bool probe_in_contact(const Skin& skin, const Probe& probe, const Rigid& mannequ
 class ScanEngine {
   public:
     // The bundle must outlive the engine.
-    static Result<ScanEngine> create(const CaseBundle& bundle,
+    static Result<ScanEngine> create(CaseView bundle,
                                      const Exercise& exercise,
                                      const EngineOptions& options);
 
@@ -102,11 +102,8 @@ class ScanEngine {
     const RenderOptions& render_options() const { return options_.render; }
 
   private:
-    ScanEngine(const CaseBundle& bundle,
-               Exercise exercise,
-               EngineOptions options,
-               Renderer renderer)
-        : skin_(bundle),
+    ScanEngine(CaseView bundle, Exercise exercise, EngineOptions options, Renderer renderer)
+        : skin_(*bundle),
           anatomy_(std::make_shared<CaseAnatomy>(
               bundle,
               breathing_shown(

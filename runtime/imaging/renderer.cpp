@@ -74,7 +74,7 @@ struct Renderer::Impl {
     Governor governor;
     Level& now() { return *levels[static_cast<std::size_t>(governor.level())]; }
 
-    const CaseBundle& bundle;
+    CaseView bundle;
     Exercise exercise;
     RenderOptions options;
     WorkerPool workers;
@@ -88,7 +88,7 @@ struct Renderer::Impl {
     BreathingField breathing;
     std::optional<ReadAhead> ahead;  // ends before what it looks at
 
-    Impl(const CaseBundle& b, const Exercise& e, const RenderOptions& o)
+    Impl(CaseView b, const Exercise& e, const RenderOptions& o)
         : bundle(b), exercise(e), options(o), workers(o.threads) {}
 
     void set_gain(const ImageSettings& settings);
@@ -138,14 +138,15 @@ Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
-Result<Renderer> Renderer::create(const CaseBundle& bundle,
+Result<Renderer> Renderer::create(CaseView bundle,
                                   const Exercise& exercise,
                                   const RenderOptions& options) {
     if (const Status fits = check_options(exercise, options); !fits) return fits.error();
     choose_simd_target();
     auto impl = std::make_unique<Impl>(bundle, exercise, options);
     Impl& m = *impl;
-    if (bundle.blocks && options.kind == RendererKind::reference) bundle.blocks->load_all(0);
+    VoxelBlocks* const blocks = bundle.blocks();
+    if (blocks && options.kind == RendererKind::reference) blocks->load_all(serial_jobs());
     Result<EffectChoice> effects = choose_effects(options.model, options.effects);
     if (!effects) return effects.error();
     m.effects = *effects;
@@ -153,7 +154,7 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
     const int lines = options.scanlines > 0 ? options.scanlines : is_paper ? 512 : 192;
     const int samples = options.samples > 0 ? options.samples : 512;
     if (is_paper) {
-        Result<PaperScene> scene = make_paper_scene(bundle);
+        Result<PaperScene> scene = make_paper_scene(*bundle);
         if (!scene) return scene.error();
         m.paper_scene = std::move(*scene);
     } else {
@@ -167,7 +168,7 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
         });
         if (!*scene) return scene->error();
         m.physical_scene = std::move(**scene);
-        if (exercise.breathing.amplitude_mm != 0) m.breathing = BreathingField(bundle);
+        if (exercise.breathing.amplitude_mm != 0) m.breathing = BreathingField(*bundle);
     }
     const bool governed = options.frame_budget_ms > 0 && options.kind == RendererKind::fast;
     m.governor = Governor(governed ? options.frame_budget_ms : 0);
@@ -191,8 +192,8 @@ Result<Renderer> Renderer::create(const CaseBundle& bundle,
         m.levels.push_back(std::move(level));
         if (!governed) break;
     }
-    if (options.read_ahead && bundle.blocks && m.levels.front()->physical)
-        m.ahead.emplace(*bundle.blocks, bundle.grid);
+    if (options.read_ahead && blocks && m.levels.front()->physical)
+        m.ahead.emplace(*blocks, bundle->grid);
     for (const EffectEntry& e : effect_table(options.model))
         m.costs.push_back({e.name, 0, false, ""});
     return Renderer(std::move(impl));
@@ -292,11 +293,11 @@ FrameStatus Renderer::Impl::render_physical(const FrameInput& input,
                 return e.physical == nullptr || effects.physical.*e.physical;
             });
     }
-    if (bundle.blocks) {
+    if (VoxelBlocks* blocks = bundle.blocks()) {
         const double shift_mm = norm(frame.motion.breathing_mm);
         if (ahead) ahead->frame(at.reach, frame.volume_from_probe, shift_mm);
-        at.reach.ensure_loaded(*bundle.blocks, bundle.grid, frame.volume_from_probe, shift_mm);
-        at.reach.ensure_loaded(physical_scene.words, bundle.grid, frame.volume_from_probe,
+        at.reach.ensure_loaded(*blocks, bundle->grid, frame.volume_from_probe, shift_mm);
+        at.reach.ensure_loaded(physical_scene.words, bundle->grid, frame.volume_from_probe,
                                shift_mm);
     }
     physical->render(frame, breathing, input.settings.flip_left_right, effects.keep_all, pixels);

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/streamed_bundle.h"
 #include "formats/exercise/exercise.h"
 
 namespace sonocase::runtime {
@@ -80,12 +80,9 @@ struct EffectCost {
 class Renderer {
   public:
     // Compiles the plan for this bundle and exercise. The bundle must outlive the renderer.
-    static Result<Renderer> create(const CaseBundle& bundle,
+    static Result<Renderer> create(CaseView bundle,
                                    const Exercise& exercise,
                                    const RenderOptions& options);
-    static Result<Renderer> create(CaseBundle&& bundle,
-                                   const Exercise& exercise,
-                                   const RenderOptions& options) = delete;  // it would not outlive
     ~Renderer();
     Renderer(Renderer&&) noexcept;
     Renderer& operator=(Renderer&&) noexcept;

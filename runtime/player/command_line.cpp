@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "formats/base/build_facts.h"
+#include "runtime/tracking/factory/make_tracker.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -31,9 +32,7 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     app.add_option("bundle", arguments.bundle,
                    "Case bundle (*.sonocase); none: choose from a list");
     app.add_option("--exercise", arguments.exercise, "Exercise of the bundle; default: its first");
-    app.add_option("--tracker", arguments.tracker,
-                   "mouse | sweep:NAME | replay:FILE[,NEEDLE_FILE] | igtl:HOST:PORT | "
-                   "igtl:listen:PORT | viper | 3dg | liberty | null");
+    app.add_option("--tracker", arguments.tracker, tracker_help());
     app.add_option("--calibration", arguments.calibrations,
                    "Calibration file, also of a lag; may be repeated")
         ->allow_extra_args(false);

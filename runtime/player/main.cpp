@@ -3,9 +3,10 @@
 #include <cstdio>
 #include <exception>
 
-#include "runtime/player/app.h"
 #include "runtime/player/command_line.h"
-#include "runtime/player/headless.h"
+#include "runtime/player/headless/run_headless.h"
+#include "runtime/player/session/clock.h"
+#include "runtime/player/ui/run_window.h"
 
 using namespace sonocase;
 using namespace sonocase::runtime;

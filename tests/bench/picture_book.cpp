@@ -13,7 +13,7 @@
 #include "formats/bundle/case_bundle.h"
 #include "formats/files/bundle_file.h"
 #include "runtime/imaging/effects.h"
-#include "runtime/player/png_file.h"
+#include "runtime/player/session/png_file.h"
 
 namespace sonocase {
 namespace {

@@ -26,22 +26,22 @@ using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
 // Recorded at commit aa0be5b.
-constexpr const char* kDraft = "@draft@";
-constexpr const char* kBalanced = "@balanced@";
-constexpr const char* kSlender = "@slender@";
-constexpr const char* kReal = "@real@";
-constexpr const char* kDraftPhysical = "@draft_physical@";
-constexpr const char* kDraftPaper = "@draft_paper@";
-constexpr const char* kRealPhysical = "@real_physical@";
-constexpr const char* kRealPaper = "@real_paper@";
+constexpr const char* kDraft = "ebea602c5d21bfd284c881fad28fd68c";
+constexpr const char* kBalanced = "e2d74bb720fb202823065be030fcc66c";
+constexpr const char* kSlender = "b2d650a02feb71987f8bad13eaec9d3d";
+constexpr const char* kReal = "36223f17a1ce0b24ff365e3b5b55e7f5";
+constexpr const char* kDraftPhysical = "499f1c59572465b049a7452d0ea24ca1";
+constexpr const char* kDraftPaper = "1628db3a0fe630d2e2b3a86b0621208a";
+constexpr const char* kRealPhysical = "fc1889f0cbfbd0356dec98ed2b480630";
+constexpr const char* kRealPaper = "83a09d20a889780ad24fa8f66478cdef";
 
 class SameBytes : public ::testing::Test {
   protected:
     std::string cook(const std::string& arguments, int threads) {
         const std::string bundle = folder_ / "case.sonocase";
-        const auto built = run_command(SONOCASE_BIN "/sonocase build " + arguments +
-                                       " --quiet --threads " + std::to_string(threads) + " -o " +
-                                       bundle);
+        const auto built =
+            run_command(SONOCASE_BIN "/sonocase build " + arguments + " --quiet --threads " +
+                        std::to_string(threads) + " -o " + bundle);
         EXPECT_EQ(built.status, 0) << built.error;
         return bundle;
     }

@@ -46,14 +46,14 @@ struct BlockParts {
     std::optional<BlockFrames> corrections, offsets;
 };
 
-// Memory to unpack one block in.
-class BlockWork {
+// Unpacks blocks, one at a time. Where zstd finds no memory for its context, every block fails.
+class BlockUnpacker {
   public:
-    explicit BlockWork(const BlockParts& parts);
-    ~BlockWork();
-    BlockWork(const BlockWork&) = delete;
-    BlockWork& operator=(const BlockWork&) = delete;
-    // False where the block's bytes make no sense; it is then empty.
+    explicit BlockUnpacker(const BlockParts& parts);
+    ~BlockUnpacker();
+    BlockUnpacker(const BlockUnpacker&) = delete;
+    BlockUnpacker& operator=(const BlockUnpacker&) = delete;
+    // False where the block's bytes are not valid; the block is then empty.
     bool unpack(const BlockParts& parts, std::size_t block) noexcept;
 
   private:

@@ -13,6 +13,6 @@ Result<VoxelVolumes> read_first_layout(const ChunkReader& reader,
                                        bool with_offsets,
                                        Int3 size,
                                        std::size_t palette,
-                                       int threads);
+                                       JobRunner& jobs);
 
 }  // namespace sonocase::detail

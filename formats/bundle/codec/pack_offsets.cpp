@@ -80,9 +80,10 @@ void add_values(const BlockGrid& grid,
 
 void add_offsets(ChunkWriter& writer,
                  const BlockGrid& grid,
-                 const BrickVolume<std::int8_t>& volume) {
+                 const BrickVolume<std::int8_t>& volume,
+                 JobRunner& jobs) {
     std::vector<Kinds> layers(static_cast<std::size_t>(grid.bricks.z));
-    run_jobs(layers.size(), 0,
+    jobs.run(layers.size(),
              [&](std::size_t k) { layers[k] = kinds_of_layer(volume, static_cast<int>(k)); });
     std::vector<std::uint8_t> kind, one;
     for (const Kinds& layer : layers) {
@@ -91,10 +92,11 @@ void add_offsets(ChunkWriter& writer,
     }
     writer.add("ofs.kind", false, std::move(kind));
     writer.add("ofs.one", false, std::move(one));
-    writer.add_packed("ofs.val", false,
-                      pack_blocks(grid, [&](std::size_t block, std::vector<std::uint8_t>* out) {
-                          add_values(grid, block, volume, out);
-                      }));
+    writer.add_packed(
+        "ofs.val", false,
+        pack_blocks(grid, jobs, [&](std::size_t block, std::vector<std::uint8_t>* out) {
+            add_values(grid, block, volume, out);
+        }));
 }
 
 }  // namespace sonocase::detail

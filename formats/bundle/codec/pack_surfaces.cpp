@@ -148,9 +148,10 @@ void add_surfaces(ChunkWriter& writer,
                   const BlockGrid& grid,
                   const BrickVolume<std::uint8_t>& labels,
                   const BoundaryBricks& boundary,
-                  int reach_steps) {
+                  int reach_steps,
+                  JobRunner& jobs) {
     std::vector<Streams> layers(labels.table.empty() ? 0 : static_cast<std::size_t>(grid.bricks.z));
-    run_jobs(layers.size(), 0, [&](std::size_t k) {
+    jobs.run(layers.size(), [&](std::size_t k) {
         layers[k] = packed_layer(labels, boundary, reach_steps, static_cast<int>(k));
     });
     std::vector<std::uint8_t> kind, one, mix, pair, low, high;
@@ -176,10 +177,11 @@ void add_surfaces(ChunkWriter& writer,
     writer.add("vox.low", true, std::move(low));
     writer.add("vox.high", true, std::move(high));
     if (boundary.table.empty()) return;
-    writer.add_packed("vox.fix", true,
-                      pack_blocks(grid, [&](std::size_t block, std::vector<std::uint8_t>* out) {
-                          add_corrections(grid, block, labels, boundary, layers, reach_steps, out);
-                      }));
+    writer.add_packed(
+        "vox.fix", true,
+        pack_blocks(grid, jobs, [&](std::size_t block, std::vector<std::uint8_t>* out) {
+            add_corrections(grid, block, labels, boundary, layers, reach_steps, out);
+        }));
 }
 
 }  // namespace sonocase::detail

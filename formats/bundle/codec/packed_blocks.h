@@ -62,9 +62,10 @@ struct BlockGrid {
     }
 };
 
-// content: appends what a block holds to an empty vector. Same bytes for any number of threads.
+// content: appends what a block holds to an empty vector.
 std::vector<std::uint8_t> pack_blocks(
     const BlockGrid& grid,
+    JobRunner& jobs,
     const std::function<void(std::size_t block, std::vector<std::uint8_t>*)>& content);
 
 // Where the frames of such a chunk lie. Refers to the bytes of the reader's file.

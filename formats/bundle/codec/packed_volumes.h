@@ -28,12 +28,16 @@ void add_volumes(ChunkWriter& writer,
                  Json& manifest,
                  const BrickVolume<std::uint8_t>& labels,
                  const BoundaryBricks& boundary,
-                 const BrickVolume<std::int8_t>& echo_offset);
+                 const BrickVolume<std::int8_t>& echo_offset,
+                 JobRunner& jobs);
 
 // size: of the grid. palette: number of labels; no label at or beyond it comes back. The blocks
 // refer to the reader's bytes. Files of the first layout (chunks lab.t and so on) are read too.
-Result<VoxelVolumes> read_volumes(
-    const ChunkReader& reader, JsonObject& manifest, Int3 size, std::size_t palette, int threads);
+Result<VoxelVolumes> read_volumes(const ChunkReader& reader,
+                                  JsonObject& manifest,
+                                  Int3 size,
+                                  std::size_t palette,
+                                  JobRunner& jobs);
 
 // The chunks that either layout may hold; for ChunkReader::open.
 #define SONOCASE_VOLUME_CHUNKS                                                                     \

@@ -11,15 +11,15 @@
 namespace sonocase::detail {
 
 Status read_offsets(const ChunkReader& reader,
-                    int threads,
+                    JobRunner& jobs,
                     BlockParts* parts,
                     BrickVolume<std::int8_t>* out) {
     using Bytes = RawVector<std::uint8_t>;
     const std::size_t layer = layer_bricks(parts->grid.bricks),
                       layers = static_cast<std::size_t>(parts->grid.bricks.z);
-    const auto kind = reader.read_array<std::uint8_t, Bytes>("ofs.kind", layer * layers, threads);
+    const auto kind = reader.read_array<std::uint8_t, Bytes>("ofs.kind", layer * layers, jobs);
     if (!kind) return kind.error();
-    const LayerKinds kinds(*kind, layer, threads);
+    const LayerKinds kinds(*kind, layer, jobs);
     std::vector<std::size_t> first_one(layers + 1);
     std::size_t known = 0;
     for (std::size_t k = 0; k < layers; ++k) {
@@ -28,7 +28,7 @@ Status read_offsets(const ChunkReader& reader,
     }
     if (known != kind->size())
         return reader.fault("a brick of 'ofs.kind' is of no known kind", "make it again");
-    const auto one = reader.read_array<std::uint8_t, Bytes>("ofs.one", first_one[layers], threads);
+    const auto one = reader.read_array<std::uint8_t, Bytes>("ofs.one", first_one[layers], jobs);
     if (!one) return one.error();
     auto frames = BlockFrames::open(reader, "ofs.val", parts->grid.count(),
                                     parts->grid.block_bricks() * kBrickVoxels);
@@ -42,11 +42,11 @@ Status read_offsets(const ChunkReader& reader,
     }
     for (const std::uint8_t v : order.values()) out->uniform.push_back(static_cast<std::int8_t>(v));
     out->table.resize(kind->size());
-    PoolOrder places(*kind, parts->grid, threads, [](unsigned v) { return v >= kMixedOffsets; });
+    PoolOrder places(*kind, parts->grid, jobs, [](unsigned v) { return v >= kMixedOffsets; });
     out->pool.resize(places.total() * kBrickVoxels);
     if (!out->pool.empty()) out->pool[0] = 0;  // read where there is no use for one
     parts->in_cells.resize(places.total());
-    run_jobs(layers, threads, [&](std::size_t k) {
+    jobs.run(layers, [&](std::size_t k) {
         std::size_t next_one = first_one[k];
         std::uint32_t before = kUniformBrick | order.index()[0];
         std::size_t b = k * layer;

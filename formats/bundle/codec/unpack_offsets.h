@@ -11,7 +11,7 @@ namespace sonocase::detail {
 
 // Fills the table of `out` and makes room for its pool, which `parts` will fill.
 Status read_offsets(const ChunkReader& reader,
-                    int threads,
+                    JobRunner& jobs,
                     BlockParts* parts,
                     BrickVolume<std::int8_t>* out);
 

@@ -133,20 +133,20 @@ bool below(const Bytes& values, std::size_t limit) {
 
 Status read_surfaces(const ChunkReader& reader,
                      bool with_records,
-                     int threads,
+                     JobRunner& jobs,
                      BlockParts* parts,
                      VoxelVolumes* out) {
     const Int3 bricks = parts->grid.bricks;
     const std::size_t layer = layer_bricks(bricks), layers = static_cast<std::size_t>(bricks.z);
     Packed in;
     const auto get = [&](const char* type, std::size_t size, Bytes* to) {
-        auto bytes = reader.read_array<std::uint8_t, Bytes>(type, size, threads);
+        auto bytes = reader.read_array<std::uint8_t, Bytes>(type, size, jobs);
         if (!bytes) return Status(bytes.error());
         *to = std::move(*bytes);
         return Status(Done{});
     };
     if (Status s = get("vox.kind", layer * layers, &in.kind); !s) return s;
-    const LayerKinds kinds(in.kind, layer, threads);
+    const LayerKinds kinds(in.kind, layer, jobs);
     std::vector<Starts> starts(layers + 1);
     bool good = true;
     for (std::size_t k = 0; k < layers; ++k) {
@@ -194,7 +194,7 @@ Status read_surfaces(const ChunkReader& reader,
     out->labels.table.resize(in.kind.size());
     out->labels.pool.resize(total.label_pool * kBrickVoxels);
     out->boundary.patches.patches.resize(total.patch);
-    PoolOrder places(in.kind, parts->grid, threads, has_records);
+    PoolOrder places(in.kind, parts->grid, jobs, has_records);
     if (with_records) {
         out->boundary.table.resize(in.kind.size());
         out->boundary.pool.resize(places.total() * kBrickVoxels);
@@ -205,7 +205,7 @@ Status read_surfaces(const ChunkReader& reader,
         parts->corrected.resize(places.total());
         if (total.without_records > 0) out->boundary.uniform = {kNoBoundary};
     }
-    run_jobs(layers, threads, [&](std::size_t k) {
+    jobs.run(layers, [&](std::size_t k) {
         unpack_layer(in, starts[k], total.patch, order.index(), k, &places, parts, out);
     });
     parts->labels = BrickSpans(out->labels);

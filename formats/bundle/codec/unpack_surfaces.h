@@ -14,7 +14,7 @@ namespace sonocase::detail {
 // its grid, palette and reach are there, and what records need is added.
 Status read_surfaces(const ChunkReader& reader,
                      bool with_records,
-                     int threads,
+                     JobRunner& jobs,
                      BlockParts* parts,
                      VoxelVolumes* out);
 

@@ -18,9 +18,9 @@ namespace sonocase::detail {
 // How many bricks of each kind a layer has.
 class LayerKinds {
   public:
-    LayerKinds(std::span<const std::uint8_t> kinds, std::size_t layer_bricks, int threads)
+    LayerKinds(std::span<const std::uint8_t> kinds, std::size_t layer_bricks, JobRunner& jobs)
         : kinds_(kinds), layer_(layer_bricks), counts_(layer_ ? kinds.size() / layer_ : 0) {
-        run_jobs(counts_.size(), threads, [&](std::size_t k) {
+        jobs.run(counts_.size(), [&](std::size_t k) {
             // Four counts in turn: most bricks are as their neighbour, and one would wait for
             // itself.
             std::array<std::array<std::uint32_t, 256>, 4> parts{};
@@ -55,10 +55,10 @@ class PoolOrder {
     template <class Stored>
     PoolOrder(std::span<const std::uint8_t> kinds,
               const BlockGrid& grid,
-              int threads,
+              JobRunner& jobs,
               Stored stored)
         : grid_(grid), columns_(columns_of(grid)), at_(layers() * columns_) {
-        run_jobs(layers(), threads, [&](std::size_t k) {
+        jobs.run(layers(), [&](std::size_t k) {
             const std::uint8_t* kind = kinds.data() + k * layer_bricks(grid_.bricks);
             for (int j = 0; j < grid_.bricks.y; ++j, kind += grid_.bricks.x) {
                 for (int first = 0; first < grid_.bricks.x; first += grid_.edge) {

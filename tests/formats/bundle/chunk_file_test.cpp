@@ -6,6 +6,8 @@
 
 #include <numeric>
 
+#include "formats/threads/thread_jobs.h"
+
 namespace sonocase {
 namespace {
 
@@ -51,13 +53,15 @@ TEST(ChunkFile, LongChunksAreCompressedAlikeOnAnyNumberOfThreads) {
     const Bytes long_chunk = pattern(3 * kFrameBytes + 12345);
     ChunkWriter writer("TEST");
     writer.add_view("alpha", true, long_chunk);
-    const Bytes one = writer.write(1), four = writer.write(4);
+    ThreadJobs four_threads(4);
+    const Bytes one = writer.write(), four = writer.write(four_threads);
     EXPECT_EQ(one, four);
     EXPECT_LT(one.size(), long_chunk.size() / 2);
     const auto reader = ChunkReader::open(one, "TEST", kKnown, "file");
     ASSERT_TRUE(reader);
     for (const int threads : {1, 4}) {
-        const auto back = reader->read("alpha", long_chunk.size(), threads);
+        ThreadJobs jobs(threads);
+        const auto back = reader->read("alpha", long_chunk.size(), jobs);
         ASSERT_TRUE(back) << back.error().message();
         EXPECT_EQ(*back, long_chunk);
     }

@@ -87,9 +87,9 @@ const std::vector<std::uint32_t>& rough_surfaces() {
     return rough;
 }
 
-Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
-                                          const std::vector<Target>& targets) {
+Result<PhysicalScene> make_physical_scene(CaseView view, const std::vector<Target>& targets) {
     PhysicalScene s;
+    const CaseBundle& bundle = *view;
     s.bundle = &bundle;
     s.grid = bundle.grid;
     s.voxel_mm = bundle.grid.spacing_mm.x;
@@ -176,7 +176,7 @@ Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
     }
 
     s.words = BrickTable(bundle);
-    if (!bundle.blocks) s.words.load_all();
+    if (!view.blocks()) s.words.load_all();
     s.rough = rough_surfaces();
     s.fine = make_fine_structure(bundle);
     return s;

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/streamed_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "runtime/imaging/physical/model/brick_table.h"
 #include "runtime/imaging/physical/model/fine_structure.h"
@@ -68,7 +68,6 @@ struct PhysicalScene {
 const std::vector<std::uint32_t>& rough_surfaces();
 
 // targets: of the exercise; those that only mark a place leave no trace in the tissue.
-Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
-                                          const std::vector<Target>& targets = {});
+Result<PhysicalScene> make_physical_scene(CaseView view, const std::vector<Target>& targets = {});
 
 }  // namespace sonocase::runtime

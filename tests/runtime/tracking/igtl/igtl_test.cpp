@@ -26,33 +26,33 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Looks until it is so, at most for so long: whenever the tracker has something new, and now and
-// then, since its health has no bell.
+// Checks the predicate whenever the tracker notifies and every 5 ms, because changes of its health
+// are not notified; false if it has not come true within `seconds`.
 template <class Predicate>
-bool eventually(Event& bell, Predicate predicate, double seconds = 15) {
+bool eventually(Event& event, Predicate predicate, double seconds = 15) {
     const auto start = Clock::now();
     while (!predicate()) {
         if (seconds_since(start) > seconds) return false;
-        bell.wait(0.005);
+        event.wait(0.005);
     }
     return true;
 }
 
-// A tracker that rings; silent again before the bell is gone.
-struct RingingTracker {
-    explicit RingingTracker(std::unique_ptr<Tracker> made) : tracker(std::move(made)) {
-        tracker->set_wake([this] { bell.ring(); });
+// A tracker that notifies `event`, and stops doing so before the event is destroyed.
+struct NotifyingTracker {
+    explicit NotifyingTracker(std::unique_ptr<Tracker> made) : tracker(std::move(made)) {
+        tracker->set_wake([this] { event.notify(); });
     }
-    ~RingingTracker() { tracker->set_wake({}); }
-    RingingTracker(const RingingTracker&) = delete;
-    RingingTracker& operator=(const RingingTracker&) = delete;
+    ~NotifyingTracker() { tracker->set_wake({}); }
+    NotifyingTracker(const NotifyingTracker&) = delete;
+    NotifyingTracker& operator=(const NotifyingTracker&) = delete;
     Tracker* operator->() const { return tracker.get(); }
     Tracker& operator*() const { return *tracker; }
     template <class Predicate>
     bool eventually(Predicate predicate) {
-        return runtime::eventually(bell, predicate);
+        return runtime::eventually(event, predicate);
     }
-    Event bell;
+    Event event;
     std::unique_ptr<Tracker> tracker;
 };
 
@@ -160,14 +160,14 @@ int free_port() {
     return socket ? socket->port() : 0;
 }
 
-RingingTracker start_tracker(int port, bool listening) {
+NotifyingTracker start_tracker(int port, bool listening) {
     IgtlTrackerOptions options;
     options.port = port;
     options.listening = listening;
     options.retry_s = 0.05;
     Result<std::unique_ptr<Tracker>> tracker = IgtlTracker::start(options, clock_from_now());
     EXPECT_TRUE(tracker);
-    return RingingTracker(std::move(*tracker));
+    return NotifyingTracker(std::move(*tracker));
 }
 
 void expect_pose(const SensorReading& sensor, double x) {
@@ -242,7 +242,7 @@ TEST(IgtlServer, IsFollowedByAClientOfTheLibrary) {
     const auto seen = nlohmann::json::parse(peer.line(), nullptr, false);
     EXPECT_EQ(peer.close(), 0);
     stop = true;
-    pace.ring();
+    pace.notify();
     sender.join();
     ASSERT_TRUE(seen.is_object());
     EXPECT_EQ(seen["bad"], 0);

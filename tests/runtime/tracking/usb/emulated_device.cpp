@@ -332,11 +332,11 @@ ClientResult run_with_device(const DeviceSpec& spec,
     }
     ::close(pipe_ends[1]);
     std::atomic<bool> stop{false};
-    runtime::Event bell;
+    runtime::Event event;
     std::thread player([&] {
         Clock::time_point replug_at = Clock::time_point::max();
         while (!stop) {
-            bell.wait(kTickS);
+            event.wait(kTickS);
             for (std::size_t i = 0; i < devices.size(); ++i) {
                 if (devices[i]->tick() && spec.replug_after_s >= 0) {
                     replug_at = Clock::now() + std::chrono::microseconds(
@@ -360,7 +360,7 @@ ClientResult run_with_device(const DeviceSpec& spec,
     ::waitpid(child, &status, 0);
     result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     stop = true;
-    bell.ring();
+    event.notify();
     player.join();
     g_object_unref(testbed);
     return result;

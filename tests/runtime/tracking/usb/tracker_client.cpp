@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/base/event.h"
-#include "runtime/player/frame_stats.h"
+#include "runtime/player/session/frame_stats.h"
 #include "runtime/tracking/factory/make_tracker.h"
 
 using namespace sonocase;
@@ -37,8 +37,8 @@ int main(int argc, char** argv) {
     TrackerReading reading, last;
     std::uint64_t gaps = 0, lost = 0;
     TimeHistogram delivery;
-    Event bell;
-    tracker.set_wake([&bell] { bell.ring(); });
+    Event event;
+    tracker.set_wake([&event] { event.notify(); });
     while (clock() < seconds) {
         const double now_s = clock();
         if (tracker.poll(now_s, reading)) {
@@ -56,7 +56,7 @@ int main(int argc, char** argv) {
             messages.push_back(health.message);
         }
         if (health.readings >= enough) break;
-        bell.wait(0.005);  // the health has no bell
+        event.wait(0.005);  // changes of the health are not notified
     }
     tracker.set_wake({});
     const TrackerHealth health = tracker.health();

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Steps of scanning: freezing and the cine loop, attempts at the exercise, the frames that go to
+// the OpenIGTLink server.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "runtime/player/app/states.h"
+
+namespace sonocase::runtime {
+
+void set_frozen(ScanState& scan, bool frozen);
+// Freezes the picture and goes `frames` of the kept frames back, < 0 forward. kept: how many are.
+void step_cine(ScanState& scan, int frames, int kept);
+// Once per picture: the next frame of a cine loop that plays.
+void advance_cine(ScanState& scan, int kept, double now_s);
+
+// path: of the recording; empty: a new file in the user's sessions folder. Does nothing while an
+// attempt runs or no case is open.
+void start_attempt(App& app, const std::string& path);
+// Ends the recording and shows the scores. Does nothing unless an attempt runs.
+void finish_attempt(App& app);
+void toggle_attempt(App& app);
+// Sends each live frame to the attempt and to the server, as far as they exist. When it returns,
+// the scan thread no longer uses an attempt that ended.
+void observe_frames(const ScanState& scan, ScanThread& thread);
+
+// Marks the targets that the drawn needle's tip has reached.
+// record          the frame shown
+// centres         # targets, `mannequin` frame, in that frame
+// reached         # targets; marks stay
+void mark_targets_reached(const Exercise& exercise,
+                          const FrameRecord& record,
+                          std::span<const Point3> centres,
+                          std::vector<bool>& reached);
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/player/app/case_steps.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "formats/files/calibration_file.h"
+#include "runtime/player/app/attempt_steps.h"
+#include "runtime/player/app/tracker_steps.h"
+#include "runtime/player/app/user_folders.h"
+#include "runtime/player/session/calibration_set.h"
+#include "runtime/player/session/clock.h"
+
+namespace sonocase::runtime {
+
+std::vector<Point3> CaseState::target_centres() const {
+    const double time_s = frame().record.input.time_s;
+    std::vector<Point3> centres;
+    for (const Target& target : exercise().targets)
+        centres.push_back(anatomy ? anatomy->moved(target.centre, time_s) : target.centre);
+    return centres;
+}
+
+void rebuild_engine(App& app, bool keep_session) {
+    CaseState& loaded = app.loaded;
+    ImageChoice image = loaded.image;
+    // A recording is replayed to the same pixels, which reduced accuracy would not allow.
+    image.frame_budget_ms = loaded.exact ? 0 : app.player.arguments.frame_budget_ms;
+    const auto make = [&] {
+        return make_engine(*loaded.open, loaded.exercise(), app.player.arguments, image);
+    };
+    Result<ScanEngine> engine = make();
+    if (!engine && image.effects != std::vector<std::string>{"auto"}) {
+        // The effects named may be those of the other model.
+        image.effects = {"auto"};
+        engine = make();
+    }
+    if (!engine) {
+        app.view.notices.error(engine.error().message());
+        return;
+    }
+    app.scan.controls.frozen = false;
+    app.scan.controls.cine_back = 0;
+    loaded.scan->set_controls(app.scan.controls);
+    loaded.anatomy = engine->anatomy();
+    loaded.scan->set_engine(std::make_unique<ScanEngine>(std::move(*engine)), keep_session);
+}
+
+void close_bundle(App& app) {
+    CaseState& loaded = app.loaded;
+    if (loaded.scan) {
+        finish_attempt(app);
+        loaded.scan->set_tracker(nullptr);
+        loaded.scan->set_engine(nullptr);
+    }
+    loaded.guide.reset();
+    forget_tracker(app.scan.tracker);
+    loaded.anatomy.reset();
+    loaded.skin.reset();
+    loaded.open.reset();
+}
+
+bool open_bundle(App& app, const std::string& path, const std::string& exercise) {
+    Notices& notices = app.view.notices;
+    Result<std::unique_ptr<OpenCase>> opened = open_case_to_render(path);
+    if (!opened) {
+        notices.error(opened.error().message());
+        return false;
+    }
+    Result<int> index = find_exercise(**opened, exercise);
+    if (!index) {
+        notices.error(index.error().message());
+        index = 0;
+    }
+    close_bundle(app);
+    CaseState& loaded = app.loaded;
+    loaded.open = std::move(*opened);
+    loaded.damage_reported = false;
+    for (const std::string& warning : loaded.open->warnings) notices.warning(warning);
+    loaded.skin = std::make_unique<Skin>(*loaded.open->bundle);
+    app.view.small_view.view->set_case(*loaded.open->bundle);
+    app.view.page = Page::scan;
+    choose_exercise(app, *index);
+    app.view.window->set_title(loaded.open->bundle->manifest.case_name + " - sonocase");
+    remember_bundle(path, app.player.settings.recent);
+    return true;
+}
+
+void show_bundles(const PlayerState& player, ViewState& view) {
+    view.chooser.bundles = find_bundles(player.settings.recent);
+    view.page = Page::bundles;
+}
+
+void choose_exercise(App& app, int index) {
+    finish_attempt(app);
+    app.scan.score.reset();
+    CaseState& loaded = app.loaded;
+    const int count = static_cast<int>(loaded.open->exercises.size());
+    loaded.exercise_index = (index % count + count) % count;
+    const Exercise& exercise = loaded.exercise();
+    const int side_px = loaded.image.width_px;
+    loaded.image = initial_image(app.player.arguments, exercise);
+    loaded.image.width_px = loaded.image.height_px = side_px;
+    loaded.image.depth_mm = exercise.probe.depth_mm;
+    loaded.image.focus_mm = exercise.probe.focus_mm;
+    app.scan.targets_reached.assign(exercise.targets.size(), false);
+    app.view.measurements.clear();
+    app.view.small_view.view->set_exercise(exercise);
+    loaded.scan->set_tracker(nullptr);
+    rebuild_engine(app, false);
+    choose_tracker(app, app.scan.tracker.spec);
+}
+
+void choose_model(App& app, const std::string& model) {
+    app.loaded.image.model = model;
+    rebuild_engine(app);
+}
+
+void change_depth(App& app, double by_mm) {
+    ImageChoice& image = app.loaded.image;
+    const double depth = std::clamp(std::round((image.depth_mm + by_mm) / 10) * 10, 30.0, 300.0);
+    if (depth == image.depth_mm) return;
+    image.depth_mm = depth;
+    image.focus_mm = std::min(image.focus_mm, depth);
+    rebuild_engine(app);
+}
+
+void change_focus(App& app, double by_mm) {
+    ImageChoice& image = app.loaded.image;
+    const double focus =
+        std::clamp(std::round((image.focus_mm + by_mm) / 5) * 5, 10.0, image.depth_mm);
+    if (focus == image.focus_mm) return;
+    image.focus_mm = focus;
+    rebuild_engine(app);
+}
+
+void fit_image(App& app, int side_px) {
+    ImageChoice& image = app.loaded.image;
+    if (side_px == image.width_px || app.player.arguments.width_px != 0) return;
+    image.width_px = image.height_px = side_px;
+    rebuild_engine(app);
+}
+
+void check_bundle(CaseState& loaded, Notices& notices) {
+    if (!loaded.open || loaded.damage_reported) return;
+    const Status health = bundle_health(*loaded.open);
+    if (health) return;
+    notices.error(health.error().message());
+    loaded.damage_reported = true;
+}
+
+Status load_initial_calibrations(const PlayerState& player, CaseState& loaded, Notices& notices) {
+    Calibrations& in_use = loaded.calibrations;
+    if (player.arguments.calibrations.empty()) {
+        for (const std::string& file : player.settings.calibrations) {
+            const Result<Calibrations> saved = load_calibrations({file});
+            if (!saved) {
+                notices.warning(saved.error().message());
+                continue;
+            }
+            merge_calibrations(*saved, in_use);
+        }
+    } else {
+        const Result<Calibrations> given = load_calibrations(player.arguments.calibrations);
+        if (!given) return given.error();
+        in_use = *given;
+    }
+    for (const std::string& warning : calibration_warnings(in_use, "", utc_now()))
+        notices.warning(warning);
+    return Done{};
+}
+
+void follow_setup(CaseState& loaded, const SensorAssignment& assignment, double now_s) {
+    if (!loaded.guide) loaded.guide = std::make_unique<SetupGuide>(*loaded.open->bundle);
+    SetupGuide& guide = *loaded.guide;
+    guide.observe(loaded.frame().reading, assignment, now_s);
+    const Calibrations found = guide.calibrations(loaded.scan->tracker_health().device, utc_now());
+    if (guide.recording() || !(found.probe || found.needle || found.mannequin)) return;
+    merge_calibrations(found, loaded.calibrations);
+    loaded.scan->set_calibrations(loaded.calibrations);
+}
+
+bool save_calibrations(const Calibrations& calibrations, Settings& settings, Notices& notices) {
+    std::string folder = data_folder();
+    if (folder.empty()) {
+        notices.error("There is no folder to save to: set HOME or XDG_DATA_HOME.");
+        return false;
+    }
+    folder += "/calibrations";
+    std::error_code failed;  // a file that cannot be written says so below
+    std::filesystem::create_directories(folder, failed);
+    settings.calibrations.clear();
+    for (const auto* calibration :
+         {&calibrations.probe, &calibrations.needle, &calibrations.mannequin}) {
+        if (!*calibration) continue;
+        const std::string path = folder + "/" + (*calibration)->kind + ".json";
+        if (const Status saved = save_calibration(**calibration, path); !saved) {
+            notices.error(saved.error().message());
+            return false;
+        }
+        settings.calibrations.push_back(path);
+    }
+    notices.news("Saved in " + folder + ".");
+    return true;
+}
+
+}  // namespace sonocase::runtime

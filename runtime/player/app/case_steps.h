@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Steps that change the open case or its engine. A failure becomes a notice, and what worked before
+// still works.
+#pragma once
+
+#include <string>
+
+#include "runtime/player/app/states.h"
+
+namespace sonocase::runtime {
+
+// Opens a bundle in place of the open one and shows it. exercise: a name; empty: the first.
+// False, and the open case stays, if the bundle cannot be opened.
+bool open_bundle(App& app, const std::string& path, const std::string& exercise);
+// Ends an attempt and lets go of tracker and engine.
+void close_bundle(App& app);
+// Shows the bundles that can be opened.
+void show_bundles(const PlayerState& player, ViewState& view);
+
+// index: taken modulo the number of exercises, so that one may step on from the last.
+void choose_exercise(App& app, int index);
+// "paper" or "physical".
+void choose_model(App& app, const std::string& model);
+// Steps of the console: the depth moves in steps of 10 mm, the focus of 5 mm.
+void change_depth(App& app, double by_mm);
+void change_focus(App& app, double by_mm);
+// The side of the square picture, where the command line gives none.
+void fit_image(App& app, int side_px);
+
+// Makes the engine of loaded.image anew. keep_session: session clock and frame numbers go on.
+void rebuild_engine(App& app, bool keep_session = true);
+
+// Once per picture: reports a part of the bundle that turned out to be damaged.
+void check_bundle(CaseState& loaded, Notices& notices);
+
+// Calibrations of the command line or, without any, of the settings. An Error only for the former:
+// saved ones that cannot be read any more become notices.
+Status load_initial_calibrations(const PlayerState& player, CaseState& loaded, Notices& notices);
+// While set-up is shown, once per picture: hands a reading to the guide and uses what it has found
+// at once, so that the picture shows it.
+void follow_setup(CaseState& loaded, const SensorAssignment& assignment, double now_s);
+// Saves the calibrations in use for later runs; false, with a notice, if that fails.
+bool save_calibrations(const Calibrations& calibrations, Settings& settings, Notices& notices);
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What the player has to report: sentences that stand at the foot of the window for some seconds.
+// Warnings and errors also go to standard error, for users who started the player from a terminal.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace sonocase::runtime {
+
+struct Notice {
+    enum class Kind { news, warning, error } kind = Kind::news;
+    std::string text;
+    double since_s = 0;
+};
+
+class Notices {
+  public:
+    // Once per picture, before anything is reported: its time. Drops notices that have stood long
+    // enough.
+    void set_now_s(double now_s);
+
+    // A whole sentence. One that stands already is not repeated, but stands for its full time again.
+    void news(const std::string& sentence) { add(Notice::Kind::news, sentence); }
+    void warning(const std::string& sentence) { add(Notice::Kind::warning, sentence); }
+    void error(const std::string& sentence) { add(Notice::Kind::error, sentence); }
+
+    // At most four, oldest first.
+    const std::vector<Notice>& standing() const { return standing_; }
+    void dismiss(std::size_t i);
+
+  private:
+    void add(Notice::Kind kind, const std::string& sentence);
+
+    double now_s_ = 0;
+    std::vector<Notice> standing_;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/player/app/scan_thread.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace sonocase::runtime {
+
+ScanThread::ScanThread(SessionClock clock) : clock_(std::move(clock)) {
+    cine_.resize(static_cast<std::size_t>(kCineSeconds * kCineRate));
+    thread_ = std::thread([this] { run(); });
+}
+
+ScanThread::~ScanThread() {
+    {
+        const std::lock_guard lock(mutex_);
+        if (tracker_) tracker_->set_wake({});
+    }
+    {
+        const std::lock_guard lock(wake_mutex_);
+        stop_ = true;
+    }
+    wake_condition_.notify_one();
+    thread_.join();
+}
+
+void ScanThread::wake() {
+    {
+        const std::lock_guard lock(wake_mutex_);
+        work_ = true;
+    }
+    wake_condition_.notify_one();
+}
+
+bool ScanThread::with_engine(const std::function<void(ScanEngine&)>& use) {
+    const std::lock_guard lock(mutex_);
+    if (engine_) use(*engine_);
+    return engine_ != nullptr;
+}
+
+void ScanThread::set_engine(std::unique_ptr<ScanEngine> engine, bool keep_session) {
+    {
+        const std::lock_guard lock(mutex_);
+        if (engine && engine_ && keep_session) engine->take_over(*engine_);
+        std::swap(engine_, engine);
+        if (engine_) {
+            engine_->set_calibrations(calibrations_);
+            engine_->set_assignment(controls_.assignment);
+            if (reading_.sequence > 0) {
+                engine_->observe(reading_, tracker_ && tracker_->is_device());
+            }
+            stats_.set_effects(engine_->renderer().costs());
+        }
+        cine_count_ = 0;
+        redraw_ = true;
+    }
+    wake();
+}
+
+void ScanThread::set_tracker(std::shared_ptr<Tracker> tracker) {
+    {
+        const std::lock_guard lock(mutex_);
+        if (tracker_) tracker_->set_wake({});
+        tracker_ = std::move(tracker);
+        if (tracker_) tracker_->set_wake([this] { wake(); });
+    }
+    wake();
+}
+
+void ScanThread::set_calibrations(const Calibrations& calibrations) {
+    const std::lock_guard lock(mutex_);
+    calibrations_ = calibrations;
+    if (engine_) engine_->set_calibrations(calibrations);
+}
+
+void ScanThread::set_observer(FrameObserver observer) {
+    const std::lock_guard lock(mutex_);
+    observer_ = std::move(observer);
+}
+
+void ScanThread::set_controls(const ScanControls& controls) {
+    controls_box_.publish(controls);
+    wake();
+}
+
+TrackerHealth ScanThread::tracker_health() const {
+    std::shared_ptr<Tracker> tracker;
+    {
+        const std::lock_guard lock(mutex_);
+        tracker = tracker_;
+    }
+    return tracker ? tracker->health() : TrackerHealth{};
+}
+
+std::string ScanThread::stats_json(const std::string& score_json,
+                                   const std::string& window_json) const {
+    const std::lock_guard lock(mutex_);
+    return stats_.json(score_json, &pose_to_pixel_, window_json);
+}
+
+void ScanThread::run() {
+    using namespace std::chrono;
+    for (;;) {
+        const bool rendered = step();
+        std::unique_lock lock(wake_mutex_);
+        if (stop_) return;
+        // A script is a function of time and always has a new pose: it is polled at the idle rate,
+        // like breathing and noise.
+        double wait_s = rendered ? 1 / kIdleRate
+                                 : std::clamp(last_frame_s_ + 1 / kIdleRate - clock_(), 5e-4, 0.1);
+        // A recording is polled when its next reading is due.
+        if (next_reading_s_ >= 0) wait_s = std::clamp(next_reading_s_ - clock_(), 0.0, wait_s);
+        wake_condition_.wait_for(lock, duration<double>(wait_s), [this] { return work_ || stop_; });
+        work_ = false;
+        if (stop_) return;
+    }
+}
+
+bool ScanThread::step() {
+    const std::lock_guard lock(mutex_);
+    if (controls_box_.refresh()) {
+        const ScanControls& wanted = controls_box_.value();
+        redraw_ = redraw_ || wanted.frozen != controls_.frozen ||
+                  (wanted.frozen && wanted.cine_back != controls_.cine_back);
+        if (engine_ && !(wanted.assignment == controls_.assignment)) {
+            engine_->set_assignment(wanted.assignment);
+        }
+        controls_ = wanted;
+    }
+    if (!engine_) return false;
+    double now_s = clock_();
+    TrackerReading reading;
+    bool arrived = false, is_device = false;
+    next_reading_s_ = -1;
+    if (tracker_) {
+        is_device = tracker_->is_device();
+        arrived = tracker_->poll(now_s, reading);
+        next_reading_s_ = tracker_->next_s();
+        if (arrived) {
+            reading_ = reading;
+            engine_->observe(reading_, is_device);
+        }
+    }
+    if (controls_.frozen && !redraw_) return false;
+    if (!controls_.frozen && !arrived && !redraw_ && now_s - last_frame_s_ < 0.98 / kIdleRate) {
+        return false;
+    }
+    const bool first = number_ == 0;
+    redraw_ = false;
+
+    ScanFrame& out = frames_.slot();
+    const RenderOptions& options = engine_->render_options();
+    out.width_px = options.width_px;
+    out.height_px = options.height_px;
+    out.pixels.resize(static_cast<std::size_t>(options.width_px) * options.height_px);
+    const double before_s = clock_();
+    out.cine_age_s = 0;
+    const bool again = controls_.frozen && cine_count_ > 0;
+    if (again) {
+        const std::size_t back = std::min<std::size_t>(
+            static_cast<std::size_t>(std::max(controls_.cine_back, 0)), cine_count_ - 1);
+        const std::size_t size = cine_.size();
+        const FrameRecord& newest = cine_[(cine_next_ + size - 1) % size];
+        FrameRecord shown = cine_[(cine_next_ + 2 * size - 1 - back) % size];
+        out.cine_age_s = newest.input.time_s - shown.input.time_s;
+        shown.input.settings = controls_.settings;  // gain and TGC stay live on a frozen picture
+        out.record = shown;
+        out.status = engine_->frame_again(shown, out.pixels);
+    } else {
+        out.status = engine_->frame(now_s, controls_.settings, out.pixels);
+        out.record = engine_->last();
+    }
+    const double after_s = clock_();
+    out.rendered_s = after_s;
+    out.frame_ms = (after_s - before_s) * 1e3;
+    out.frozen = controls_.frozen;
+    out.reading = reading_;
+    out.layout = engine_->renderer().layout();
+    out.depth_mm = engine_->exercise().probe.depth_mm;
+    out.focus_mm = engine_->exercise().probe.focus_mm;
+    out.accuracy = engine_->renderer().accuracy();
+    const auto costs = engine_->renderer().costs();
+    out.cost_count = static_cast<int>(std::min<std::size_t>(costs.size(), kMaxEffects));
+    std::copy_n(costs.begin(), out.cost_count, out.costs.begin());
+    out.probe_verdict = engine_->probe_verdict(now_s);
+    out.needle_verdict = engine_->needle_verdict(now_s);
+    if (!again) {
+        stats_.add(out.frame_ms, costs);
+        stats_.set_accuracy(out.accuracy);
+        if (arrived) pose_to_pixel_.add((after_s - reading_.time_s) * 1e3);
+        if (last_frame_s_ >= 0 && now_s > last_frame_s_) {
+            rate_ += 0.1 * (1 / (now_s - last_frame_s_) - rate_);
+        }
+        if (now_s - cine_last_s_ >= 0.98 / kCineRate) {
+            cine_[cine_next_] = out.record;
+            cine_next_ = (cine_next_ + 1) % cine_.size();
+            cine_count_ = std::min(cine_count_ + 1, cine_.size());
+            cine_last_s_ = now_s;
+        }
+        last_frame_s_ = now_s;
+    }
+    out.cine_frames = static_cast<int>(cine_count_);
+    out.frames_per_s = rate_;
+    // Quantiles walk through a histogram: once every ten frames is enough for a display.
+    if (number_ % 10 == 0) {
+        out.pose_to_pixel_median_ms = pose_to_pixel_.quantile(0.5);
+        out.pose_to_pixel_p99_ms = pose_to_pixel_.quantile(0.99);
+    } else {
+        out.pose_to_pixel_median_ms = last_median_ms_;
+        out.pose_to_pixel_p99_ms = last_p99_ms_;
+    }
+    last_median_ms_ = out.pose_to_pixel_median_ms;
+    last_p99_ms_ = out.pose_to_pixel_p99_ms;
+    out.number = ++number_;
+    if (first && start_s_ >= 0) {
+        stats_.set_first_frame_ms((after_s - start_s_) * 1e3);
+    }
+    if (observer_ && !again) observer_(out);
+    frames_.publish();
+    return true;
+}
+
+}  // namespace sonocase::runtime

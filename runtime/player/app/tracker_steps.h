@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Steps that choose and drive the tracker.
+#pragma once
+
+#include <string>
+
+#include "runtime/player/app/states.h"
+
+namespace sonocase::runtime {
+
+// spec: as --tracker takes it. One that cannot be made becomes a notice, and the mouse is used.
+void choose_tracker(App& app, const std::string& spec);
+// The next tracker of those that F7 steps through, or the one before.
+void step_tracker(App& app, bool back);
+// Lets go of what the window's thread holds of the tracker.
+void forget_tracker(TrackerInUse& tracker);
+
+// steps: how many speeds faster, < 0 slower. Does nothing unless a recording or script is in use.
+void change_pace(TrackerInUse& tracker, int steps);
+// Takes the mouse's needle, in the scan plane or across it, or withdraws it. Does nothing unless
+// the mouse is in use.
+void toggle_needle(TrackerInUse& tracker, const Probe& probe, bool in_plane, Notices& notices);
+
+// Once per picture: hands the mouse's poses to the scan thread. now_s: session clock.
+void feed_mouse(TrackerInUse& tracker, double now_s);
+// Once per picture: prints the device's messages, each once, and warns of calibrations that were
+// made with another device. health: of the tracker now.
+void check_device(TrackerInUse& tracker,
+                  const TrackerHealth& health,
+                  const CaseState& loaded,
+                  Notices& notices);
+
+}  // namespace sonocase::runtime

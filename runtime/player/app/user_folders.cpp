@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/player/app/user_folders.h"
+
+#include <cstdlib>
+
+namespace sonocase::runtime {
+namespace {
+
+std::string folder_of(const char* variable, const char* below_home) {
+    const char* set = std::getenv(variable);
+    if (set && set[0] == '/') return std::string(set) + "/sonocase";
+    const char* home = std::getenv("HOME");
+    if (!home || !*home) return {};
+    return std::string(home) + below_home;
+}
+
+}  // namespace
+
+std::string config_folder() {
+    return folder_of("XDG_CONFIG_HOME", "/.config/sonocase");
+}
+std::string data_folder() {
+    return folder_of("XDG_DATA_HOME", "/.local/share/sonocase");
+}
+
+}  // namespace sonocase::runtime

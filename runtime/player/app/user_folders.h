@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The user's XDG folders for this program.
+#pragma once
+
+#include <string>
+
+namespace sonocase::runtime {
+
+// $XDG_CONFIG_HOME/sonocase, else ~/.config/sonocase; empty without a home folder.
+std::string config_folder();
+// $XDG_DATA_HOME/sonocase, else ~/.local/share/sonocase: cases/, calibrations/, sessions/; empty
+// without a home folder.
+std::string data_folder();
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What the user asked for on the command line of sonoplay. A value; the program's command_line.h
+// fills it in.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace sonocase::runtime {
+
+struct PlayerArguments {
+    std::string bundle;    // empty: the list of bundles
+    std::string exercise;  // empty: the first of the bundle
+    std::string tracker;   // empty: mouse in a window, the first sweep when headless
+    bool headless = false;
+    int frames = 0;                   // 0: all of the sweep or recording
+    int width_px = 0, height_px = 0;  // 0: 512 x 512 when headless, the window's default otherwise
+    std::string out;                  // folder for frames; empty: none are written
+    std::string stats;                // JSON file, "-" for standard output; empty: none
+    std::string record;               // recording to write; empty: none
+    std::string trainee;  // a chosen name for the progress book; empty: no progress is kept
+    std::string model;    // "paper", "physical"; empty: the exercise's
+    std::vector<std::string> effects;  // empty: the exercise's
+    std::string renderer = "fast";     // "fast", "reference"
+    int threads = 1;
+    int scanlines = 0, samples = 0;         // 0: the model's own
+    double frame_budget_ms = 15;            // window: time per frame; 0: full accuracy always
+    std::vector<std::string> calibrations;  // files
+    std::string serve;                      // [ADDRESS:]PORT of the OpenIGTLink server; empty: none
+    double ui_scale = 0;                    // 0: from the settings, else from the monitor
+    std::string screenshot;                 // window: file for its last picture; empty: none
+    std::string script;                     // window: input events to play, for tests
+};
+
+}  // namespace sonocase::runtime

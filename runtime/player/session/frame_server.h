@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Hands rendered frames to the OpenIGTLink server.
+#pragma once
+
+#include <span>
+
+#include "runtime/engine/scan_engine.h"
+#include "runtime/tracking/igtl/igtl_server.h"
+
+namespace sonocase::runtime {
+
+// Called by the thread that renders; never waits, and does nothing while no client is connected.
+// unix_time_s: of the frame.
+void serve_frame(IgtlServer& server,
+                 const FrameRecord& record,
+                 const Renderer::Layout& layout,
+                 int width_px,
+                 int height_px,
+                 double unix_time_s,
+                 std::span<const std::uint8_t> pixels);
+
+}  // namespace sonocase::runtime

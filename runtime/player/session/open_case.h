@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// A bundle opened for playing, with its exercises parsed.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "formats/bundle/streamed_bundle.h"
+#include "formats/exercise/exercise.h"
+
+namespace sonocase::runtime {
+
+struct OpenCase {
+    std::string path;
+    StreamedBundle bundle;
+    std::vector<Exercise> exercises;    // at least one: without any, a free scan
+    std::vector<std::string> warnings;  // whole sentences
+};
+
+// Exercises that do not parse are left out and named in `warnings`. On the heap, because renderer
+// and skin point into it. Errors: a file that cannot be read or is no bundle.
+Result<std::unique_ptr<OpenCase>> open_case(const std::string& path);
+
+// An Error once a part of the bundle that was unpacked for a frame made no sense. Constant time, no
+// allocation while all is well; for the frame loop.
+Status bundle_health(const OpenCase& open);
+
+// Index of the exercise of that name, or an Error that lists the names; "" means the first.
+Result<int> find_exercise(const OpenCase& open, const std::string& name);
+
+// A free scan of any bundle: the probe starts above the middle of its volume.
+Exercise free_scan(const CaseBundle& bundle);
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/player/session/session_run.h"
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+
+#include "formats/base/digest.h"
+#include "formats/files/recording_file.h"
+#include "formats/progress_book/progress_book.h"
+#include "formats/threads/thread_jobs.h"
+#include "runtime/recording/settings_text.h"
+
+namespace sonocase::runtime {
+namespace {
+
+// Why a frame with these events is kept as a picture; null: it is not.
+const char* picture_reason(std::span<const LiveEvent> events) {
+    for (const LiveEvent& event : events) {
+        switch (event.kind) {
+            case LiveEventKind::target_hit:
+                return "target_hit";
+            case LiveEventKind::no_go_contact:
+                return "no_go_contact";
+            case LiveEventKind::needle_entry:
+                return "needle_entry";
+            case LiveEventKind::target_scanned:
+                return "target_scanned";
+            case LiveEventKind::needle_exit:
+                return "needle_exit";
+            default:
+                break;
+        }
+    }
+    return nullptr;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+    std::string out;
+    for (const std::string& word : words) out += (out.empty() ? "" : ",") + word;
+    return out;
+}
+
+}  // namespace
+
+SessionRun::SessionRun(const OpenCase& open, const ScanEngine& engine, std::string path)
+    : open_(open),
+      anatomy_(engine.anatomy()),
+      width_px_(engine.render_options().width_px),
+      height_px_(engine.render_options().height_px),
+      exercise_(engine.exercise()),
+      path_(std::move(path)),
+      monitor_(exercise_, anatomy_.get(), open.bundle->labels) {}
+
+Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
+                                                      const OpenCase& open,
+                                                      ScanEngine& engine,
+                                                      const std::string& trainee,
+                                                      const std::string& started,
+                                                      double now_s) {
+    std::unique_ptr<SessionRun> run(new SessionRun(open, engine, path));
+    SessionHeader header;
+    header.case_name = open.bundle->manifest.case_name;
+    header.exercise = run->exercise_.name;
+    for (const EmbeddedExercise& embedded : open.bundle->exercises) {
+        if (embedded.name == header.exercise) header.exercise_digest = digest_of(embedded.toml);
+    }
+    header.trainee = trainee;
+    header.started = started;
+    header.program = "sonoplay";
+    const RenderOptions& render = engine.render_options();
+    header.render =
+        std::string("model=") + (render.model == ImageModel::paper ? "paper" : "physical") +
+        " effects=" + joined(render.effects) + " size=" + std::to_string(render.width_px) + "x" +
+        std::to_string(render.height_px) + " seed=" + std::to_string(render.seed);
+    auto recorder = SessionRecorder::start(path, header, run->exercise_, open.bundle->labels);
+    if (!recorder) return recorder.error();
+    run->recorder_ = std::move(*recorder);
+    engine.begin_session(now_s);
+    return run;
+}
+
+std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
+                                               std::span<const std::uint8_t> pixels,
+                                               bool may_wait) {
+    if (may_wait) recorder_->wait_for_room();
+    const FrameInput& input = record.input;
+    RecordedFrame frame;
+    frame.time_s = input.time_s;
+    frame.frame = input.frame;
+    frame.probe_ok = record.tools.has_probe;
+    frame.needle_ok = record.tools.has_needle;
+    frame.mannequin_from_probe = record.tools.mannequin_from_probe;
+    frame.mannequin_from_needle = record.tools.mannequin_from_needle;
+    frame.mannequin_from_drawn = record.needle.mannequin_from_drawn;
+    const ImageSettings& s = input.settings;
+    const bool changed = first_ || s.gain_db != settings_.gain_db ||
+                         s.dynamic_range_db != settings_.dynamic_range_db ||
+                         s.tgc_db != settings_.tgc_db ||
+                         s.flip_left_right != settings_.flip_left_right;
+    if (changed) {
+        const std::string text = settings_text(s);  // short, and only while a slider moves
+        std::strncpy(frame.settings.data(), text.c_str(), frame.settings.size() - 1);
+        settings_ = s;
+    }
+    first_ = false;
+    const auto events =
+        monitor_.update(frame.time_s, frame.frame, frame.probe_ok, frame.mannequin_from_probe,
+                        frame.needle_ok, frame.mannequin_from_drawn);
+    recorder_->push(frame, events);
+    if (const char* why = picture_reason(events)) {
+        recorder_->push_picture(frame.frame, frame.time_s, why, width_px_, height_px_, pixels);
+    }
+    last_ = record;
+    return events;
+}
+
+Result<SessionScore> SessionRun::finish() {
+    if (Status written = recorder_->finish(); !written) return written.error();
+    const auto sequence = load_sequence(path_);
+    if (!sequence) return sequence.error();
+    const auto session = session_from_sequence(*sequence, guess_names(*sequence), path_);
+    if (!session) return session.error();
+    ThreadJobs jobs;
+    ScoreOptions options;
+    options.jobs = &jobs;
+    SessionScore score =
+        score_session(*session, exercise_, anatomy_.get(), open_.bundle->labels, options);
+    if (!session->header.trainee.empty()) {
+        // A session that cannot be kept is still a session: the trainee sees its scores, and why.
+        std::error_code failed;
+        const std::string recording = std::filesystem::absolute(path_, failed).string();
+        auto book = ProgressBook::open(default_progress_path());
+        Status kept = Done{};
+        if (book)
+            kept = book->add(progress_entry(session->header, score, failed ? path_ : recording));
+        if (!book || !kept) {
+            score.warnings.push_back("The session was not put into the progress book: " +
+                                     (book ? kept.error() : book.error()).message() + ".");
+        }
+    }
+    return score;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// A session of the player from its first frame to its scores: events, the recording, and pictures of
+// the moments that matter. The window and the headless run use the same one.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "formats/scoring/session_monitor.h"
+#include "formats/scoring/session_score.h"
+#include "runtime/engine/scan_engine.h"
+#include "runtime/player/session/open_case.h"
+#include "runtime/recording/session_recorder.h"
+
+namespace sonocase::runtime {
+
+class SessionRun {
+  public:
+    // Begins the engine's session clock at now_s. `open` must outlive the run; the engine may be
+    // replaced meanwhile (ScanEngine::take_over). `started`: ISO 8601, UTC. Errors: a recording
+    // that cannot be created.
+    static Result<std::unique_ptr<SessionRun>> start(const std::string& path,
+                                                     const OpenCase& open,
+                                                     ScanEngine& engine,
+                                                     const std::string& trainee,
+                                                     const std::string& started,
+                                                     double now_s);
+
+    // Takes the frame that the engine just rendered. Allocates nothing and waits for nothing, unless
+    // `may_wait` (for runs faster than real time). Returns what happened, valid until the next
+    // call.
+    std::span<const LiveEvent> observe(const FrameRecord& record,
+                                       std::span<const std::uint8_t> pixels,
+                                       bool may_wait = false);
+    // To be called when the size of the pictures changes.
+    void set_picture_size(int width_px, int height_px) {
+        width_px_ = width_px;
+        height_px_ = height_px;
+    }
+
+    // Live values for the screen.
+    const SessionMonitor& monitor() const { return monitor_; }
+    RecorderStatus recorder_status() const { return recorder_->status(); }
+    const std::string& path() const { return path_; }
+
+    // Ends the recording, scores it and, if the trainee gave a name, adds it to the progress book of
+    // this machine. The recording is complete even if scoring fails.
+    Result<SessionScore> finish();
+
+  private:
+    SessionRun(const OpenCase& open, const ScanEngine& engine, std::string path);
+
+    const OpenCase& open_;
+    std::shared_ptr<const Anatomy> anatomy_;
+    int width_px_, height_px_;
+    Exercise exercise_;
+    std::string path_;
+    SessionMonitor monitor_;
+    std::unique_ptr<SessionRecorder> recorder_;
+    ImageSettings settings_;
+    bool first_ = true;
+    FrameRecord last_;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/player/ui/run_window.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "runtime/display/input_script.h"
+#include "runtime/player/app/attempt_steps.h"
+#include "runtime/player/app/case_steps.h"
+#include "runtime/player/app/tracker_steps.h"
+#include "runtime/player/app/user_folders.h"
+#include "runtime/player/session/clock.h"
+#include "runtime/player/session/png_file.h"
+#include "runtime/player/session/text_output.h"
+#include "runtime/player/ui/pages.h"
+
+namespace sonocase::runtime {
+namespace {
+
+constexpr double kPictureTime = 1 / 60.0;  // seconds from one picture to the next
+
+void apply_settings(const Settings& settings, ScanControls& controls) {
+    controls.settings.gain_db = settings.gain_db;
+    controls.settings.dynamic_range_db = settings.dynamic_range_db;
+    for (std::size_t i = 0; i < 8; ++i) controls.settings.tgc_db[i] = settings.tgc_db[i];
+    controls.assignment = {settings.probe_sensor, settings.needle_sensor};
+}
+
+void report(const Status& done) {
+    if (!done) std::fprintf(stderr, "sonoplay: %s\n", done.error().message().c_str());
+}
+
+Status save_screenshot(const Window& window, const std::string& path) {
+    const Window::Capture& picture = window.captured();
+    if (picture.pixels.empty()) return Done{};
+    return write_png(path, picture.width_px, picture.height_px, 3, picture.pixels);
+}
+
+// When pictures begin, and how fast they follow each other.
+class PictureClock {
+  public:
+    // Waits until the next picture is due, or input comes and it is nearly due. 60 pictures per
+    // second; a display that paces itself through the swap is not slowed further.
+    void wait(Window& window) {
+        due_s_ = last_s_ + kPictureTime;
+        do {
+            window.wait_events(std::max(0.0, due_s_ - steady_seconds()));
+        } while (steady_seconds() < due_s_ - 5e-4 && !window.should_close());
+        now_s_ = steady_seconds();
+        seconds_ = std::min(now_s_ - last_s_, 0.1);
+        last_s_ = std::max(due_s_, now_s_ - kPictureTime);
+        between_s_ = now_s_ - last_shown_s_;
+        if (between_s_ > 0) rate_ += 0.08 * (1 / between_s_ - rate_);
+        last_shown_s_ = now_s_;
+    }
+    double now_s() const { return now_s_; }          // start of this picture, steady_seconds()
+    double seconds() const { return seconds_; }      // that input acts for, at most 0.1
+    double between_s() const { return between_s_; }  // since the start of the picture before
+    double rate() const { return rate_; }            // per second, smoothed
+
+  private:
+    double last_s_ = steady_seconds(), last_shown_s_ = last_s_, due_s_ = 0, now_s_ = 0;
+    double seconds_ = 0, between_s_ = 0, rate_ = 0;
+};
+
+class WindowRun {
+  public:
+    WindowRun(const PlayerArguments& arguments, double start_s) : start_s_(start_s) {
+        app_.player.arguments = arguments;
+        app_.player.clock_start_s = steady_seconds();
+    }
+
+    Status set_up();
+    void show_pictures();
+    void finish();
+
+  private:
+    Status open_window();
+    void start_scanning();
+    void show_picture(const PictureClock& clock);
+    void keep_settings();
+
+    double start_s_;  // of the process
+    App app_;
+    InputScript script_;
+    WindowStats stats_;
+    int shown_ = 0;  // pictures
+};
+
+Status WindowRun::set_up() {
+    PlayerState& player = app_.player;
+    const PlayerArguments& arguments = player.arguments;
+    if (!config_folder().empty()) player.settings_file = config_folder() + "/player.json";
+    std::string warning;
+    player.settings = load_settings(player.settings_file, warning);
+    if (!arguments.script.empty()) {
+        Result<InputScript> script = InputScript::load(arguments.script);
+        if (!script) return script.error();
+        script_ = std::move(*script);
+    }
+    const Status calibrated = load_initial_calibrations(player, app_.loaded, app_.view.notices);
+    if (!calibrated) return calibrated;
+    apply_settings(player.settings, app_.scan.controls);
+    if (Status opened = open_window(); !opened) return opened;
+    start_scanning();
+    if (!warning.empty()) app_.view.notices.warning(warning);
+    app_.view.chooser.bundles = find_bundles(player.settings.recent);
+    if (!arguments.bundle.empty() && open_bundle(app_, arguments.bundle, arguments.exercise) &&
+        !arguments.record.empty()) {
+        start_attempt(app_, arguments.record);
+    }
+    return Done{};
+}
+
+Status WindowRun::open_window() {
+    const PlayerArguments& arguments = app_.player.arguments;
+    const Settings& settings = app_.player.settings;
+    WindowOptions options;
+    options.width_px = arguments.width_px > 0 ? arguments.width_px : settings.window_width_px;
+    options.height_px = arguments.height_px > 0 ? arguments.height_px : settings.window_height_px;
+    options.ui_scale = arguments.ui_scale > 0 ? arguments.ui_scale : settings.ui_scale;
+    Result<std::unique_ptr<Window>> window = Window::open(options);
+    if (!window) return window.error();
+    app_.view.window = std::move(*window);
+    app_.view.texture = std::make_unique<ImageTexture>();
+    app_.view.small_view.view = std::make_unique<View3d>();
+    return Done{};
+}
+
+void WindowRun::start_scanning() {
+    const PlayerArguments& arguments = app_.player.arguments;
+    const double clock_start_s = app_.player.clock_start_s;
+    CaseState& loaded = app_.loaded;
+    loaded.scan = std::make_unique<ScanThread>(session_clock(clock_start_s));
+    loaded.scan->set_first_frame_origin_s(start_s_ - clock_start_s);
+    loaded.scan->set_calibrations(loaded.calibrations);
+    app_.scan.tracker.spec = arguments.tracker.empty() ? "mouse" : arguments.tracker;
+    if (arguments.serve.empty()) return;
+    Result<std::unique_ptr<IgtlServer>> server = IgtlServer::start(arguments.serve);
+    if (!server) {
+        app_.view.notices.error(server.error().message());
+        return;
+    }
+    app_.scan.server = std::move(*server);
+    observe_frames(app_.scan, *loaded.scan);
+}
+
+void WindowRun::show_pictures() {
+    PictureClock clock;
+    while (!app_.view.window->should_close()) {
+        clock.wait(*app_.view.window);
+        app_.player.now_s = clock.now_s() - app_.player.clock_start_s;
+        app_.view.pictures_per_s = clock.rate();
+        show_picture(clock);
+    }
+}
+
+void WindowRun::show_picture(const PictureClock& clock) {
+    const PlayerArguments& arguments = app_.player.arguments;
+    ViewState& view = app_.view;
+    CaseState& loaded = app_.loaded;
+    Window& window = *view.window;
+    const double now_s = app_.player.now_s;
+    view.notices.set_now_s(now_s);
+    check_bundle(loaded, view.notices);
+
+    std::string shot;
+    bool quit = false;
+    InjectedInput input;
+    if (script_.active()) input = script_.next(now_s, shot, quit);
+    window.begin_frame(input);
+    if (loaded.scan->refresh() && loaded.frame().width_px > 0) {
+        const ScanFrame& frame = loaded.frame();
+        view.texture->upload(frame.pixels, frame.width_px, frame.height_px);
+    }
+    handle_keys(app_, clock.seconds());
+    advance_cine(app_.scan, loaded.frame().cine_frames, now_s);
+    const TrackerHealth tracker = loaded.scan->tracker_health();
+    check_device(app_.scan.tracker, tracker, loaded, view.notices);
+    draw_page(app_, tracker);
+    feed_mouse(app_.scan.tracker, steady_seconds() - app_.player.clock_start_s);
+    if (loaded.open) loaded.scan->set_controls(app_.scan.controls);
+
+    ++shown_;
+    if (arguments.frames > 0 && shown_ >= arguments.frames) quit = true;
+    const bool last = quit || window.should_close();
+    const double drawn_s = steady_seconds();
+    window.end_frame(!shot.empty() || (last && !arguments.screenshot.empty()));
+    if (shown_ > 1) {
+        stats_.add(clock.between_s(), 1e3 * (drawn_s - clock.now_s()),
+                   1e3 * (steady_seconds() - drawn_s));
+    }
+    if (!shot.empty()) {
+        const Status saved = save_screenshot(window, shot);
+        if (!saved) view.notices.error(saved.error().message());
+    }
+    if (quit) window.request_close();
+}
+
+void WindowRun::keep_settings() {
+    const ScanControls& controls = app_.scan.controls;
+    Settings& s = app_.player.settings;
+    s.gain_db = controls.settings.gain_db;
+    s.dynamic_range_db = controls.settings.dynamic_range_db;
+    for (std::size_t i = 0; i < 8; ++i) s.tgc_db[i] = controls.settings.tgc_db[i];
+    s.probe_sensor = controls.assignment.probe;
+    s.needle_sensor = controls.assignment.needle;
+    if (app_.player.arguments.tracker.empty()) s.tracker = app_.scan.tracker.spec;
+    if (!app_.player.settings_file.empty()) report(save_settings(s, app_.player.settings_file));
+}
+
+void WindowRun::finish() {
+    const PlayerArguments& arguments = app_.player.arguments;
+    if (!arguments.screenshot.empty())
+        report(save_screenshot(*app_.view.window, arguments.screenshot));
+    finish_attempt(app_);
+    if (!arguments.stats.empty()) {
+        const bool scored = app_.scan.score && app_.loaded.open;
+        const std::string score =
+            scored ? score_json(*app_.scan.score, app_.loaded.exercise()) : "";
+        report(
+            write_text_output(arguments.stats, app_.loaded.scan->stats_json(score, stats_.json())));
+    }
+    keep_settings();
+    close_bundle(app_);
+    app_.loaded.scan.reset();
+}
+
+}  // namespace
+
+Status run_window(const PlayerArguments& arguments, double start_s) {
+    WindowRun run(arguments, start_s);
+    if (Status done = run.set_up(); !done) return done;
+    run.show_pictures();
+    run.finish();
+    return Done{};
+}
+
+}  // namespace sonocase::runtime
