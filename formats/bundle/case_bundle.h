@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A case bundle in memory: everything that the player needs, and how it was made.
+// A case bundle in memory: everything that the player needs, and how it was made. A plain value.
 #pragma once
 
 #include <cstdint>
@@ -32,9 +32,9 @@ struct EmbeddedExercise {
 
 struct CaseManifest {
     std::string case_name;
-    std::string producer;  // program and version
-    std::string recipe;    // the TOML text as given
-    std::vector<InputHash> inputs;
+    std::string producer;           // program and version
+    std::string recipe;             // the TOML text as given
+    std::vector<InputHash> inputs;  // files that the case was made from
     std::vector<StageReport> stages;
 };
 
@@ -60,7 +60,7 @@ struct CaseBundle {
 std::vector<int> tissue_of_label(const CaseBundle& bundle);
 
 // Reads a bundle from bytes. Trusts nothing: every size is checked before allocation, every offset
-// against the file, every checksum before use; docs/format.md says what is done in each malformed
+// against the file, every checksum before use; docs/format.md says what happens in each malformed
 // case. where: names the bytes in errors. No exception is needed to refuse bytes; running out of
 // memory throws std::bad_alloc.
 Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,

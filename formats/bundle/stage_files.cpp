@@ -19,7 +19,8 @@ constexpr std::string_view kLabelChunks[] = {"manifest", SONOCASE_VOLUME_CHUNKS}
 constexpr std::string_view kTextureChunks[] = {"manifest", "textures", "speckle"};
 constexpr std::string_view kSurfaceChunks[] = {"manifest", "surface"};
 
-// Opens, reads the manifest and hands both to `fill`; what is wrong with the manifest wins.
+// Opens the container, reads its manifest and passes both to `fill`. An error in the manifest takes
+// precedence over one in the chunks.
 template <class File, class Fill>
 Result<File> read_container(std::span<const std::uint8_t> bytes,
                             std::string_view kind,

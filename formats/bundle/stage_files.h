@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The files between stages, so that any stage can run alone. docs/format.md, part 3.
+// The files that stages exchange, so that any stage can run alone. docs/format.md, part 3.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@
 
 namespace sonocase {
 
-// Labels with what the stages after resampling add to them (kind LABL, suffix .labels).
+// Labels, with what the stages after resampling add to them (kind LABL, suffix .labels).
 struct LabelFile {
     std::string frame;  // "ct" or "mannequin"
     LabelVolume volume;
@@ -55,7 +55,7 @@ std::vector<std::uint8_t> write_surface_file(const SurfaceFile& file,
 Result<SurfaceFile> read_surface_file(std::span<const std::uint8_t> bytes,
                                       const std::string& where);
 
-// What the bytes are by their first 16: "CASE", "LABL", "TXTR", "SURF", or "" for anything else.
+// What the bytes are, by their first 16: "CASE", "LABL", "TXTR", "SURF", or "" for anything else.
 std::string container_kind(std::span<const std::uint8_t> bytes);
 
 }  // namespace sonocase

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A case bundle for players: labels, tables, textures and surfaces are ready at once, while boundary
-// records and echo offsets, four fifths of the bytes, are unpacked block by block on demand.
+// A case bundle for players: labels, tables, textures and surfaces are ready at once, while
+// boundary records and echo offsets, four fifths of the bytes, are unpacked block by block on
+// demand.
 //
 //     StreamedBundle   owns such a bundle, the bytes of its file and what unpacks them
 //     CaseView         what renderers and scores take: any bundle, whole or streamed
@@ -60,7 +61,8 @@ class CaseView {
 };
 
 // Reads a bundle as read_bundle() does, but unpacks no block yet. A block whose contents are wrong
-// shows in VoxelBlocks::status() once it has been asked for. Cost at 1 mm: a tenth of read_bundle().
+// shows in VoxelBlocks::status() once it has been asked for. Cost at 1 mm: a tenth of
+// read_bundle().
 Result<StreamedBundle> stream_bundle(RawVector<std::uint8_t> bytes,
                                      const std::string& where,
                                      JobRunner& jobs = serial_jobs());

@@ -57,9 +57,9 @@ bool VoxelBlocks::take(std::size_t block) noexcept {
     return state_[block].compare_exchange_strong(packed, kBeingUnpacked);
 }
 
-void VoxelBlocks::finish(std::size_t block, bool makes_sense) noexcept {
-    if (!makes_sense) damaged_ = true;
-    state_[block].store(kThere, std::memory_order_release);
+void VoxelBlocks::finish(std::size_t block, bool valid) noexcept {
+    if (!valid) damaged_ = true;
+    state_[block].store(kLoaded, std::memory_order_release);
     state_[block].notify_all();
     left_.fetch_sub(1, std::memory_order_release);
 }
@@ -82,7 +82,7 @@ void VoxelBlocks::unpack(std::size_t block) noexcept {
 }
 
 void VoxelBlocks::load_all(JobRunner& jobs) {
-    // A row of blocks a job, so that few have to find memory to work in.
+    // A row of blocks per job, so that few jobs allocate an unpacker.
     const auto row = static_cast<std::size_t>(std::max(blocks_.x, 1));
     jobs.run((count_ + row - 1) / row, [&](std::size_t job) {
         detail::BlockUnpacker unpacker(*parts_);
@@ -90,7 +90,7 @@ void VoxelBlocks::load_all(JobRunner& jobs) {
             if (take(block)) finish(block, unpacker.unpack(*parts_, block));
         }
     });
-    for (std::size_t block = 0; block < count_; ++block)  // what other threads had begun
+    for (std::size_t block = 0; block < count_; ++block)  // that other threads have begun
         state_[block].wait(kBeingUnpacked, std::memory_order_acquire);
 }
 
@@ -101,7 +101,7 @@ void VoxelBlocks::use_small_pages() noexcept {
         const std::size_t skip = (0 - reinterpret_cast<std::uintptr_t>(pool.data())) % kPage;
         const std::size_t bytes = pool.size_bytes();
         if (bytes < skip + kPage) return;
-        // A system without such pages says no, and nothing is lost.
+        // Fails on a system without such pages, which is harmless.
         (void)madvise(reinterpret_cast<std::uint8_t*>(pool.data()) + skip,
                       (bytes - skip) / kPage * kPage, MADV_NOHUGEPAGE);
     };
@@ -116,7 +116,7 @@ std::size_t VoxelBlocks::pool_bytes() const noexcept {
 
 Status VoxelBlocks::status() const {
     if (!damaged()) return Done{};
-    return Error{"a block of boundary records or echo offsets makes no sense", parts_->where,
+    return Error{"a block of boundary records or echo offsets is invalid", parts_->where,
                  "make the file again"};
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The container of every binary file of ours: a header, a table and chunks. docs/format.md, part 1.
+// The container of all our binary files: a header, a table and chunks. docs/format.md, part 1.
 //
 // Case bundles and the files between stages share it. Little-endian. Every byte of a file is
-// accounted for: header, table and chunks carry checksums and what pads them is zero, so that any
-// change of a file is seen (a change inside a skipped optional chunk is not looked for).
+// accounted for: header, table and chunks carry checksums, and padding is zero, so that any change
+// to a file is found (except inside an optional chunk that is skipped).
 #pragma once
 
 #include <cstdint>
@@ -32,9 +32,9 @@ class ChunkWriter {
   public:
     explicit ChunkWriter(std::string kind);
     void add(std::string type, bool required, std::vector<std::uint8_t> bytes);
-    // Borrows: the bytes must stay until write() returns.
+    // Borrows: the bytes must stay valid until write() returns.
     void add_view(std::string type, bool required, std::span<const std::uint8_t> bytes);
-    // Bytes that are packed already, and that readers take as they lie.
+    // Bytes that are compressed already; readers take them as they are (ChunkReader::packed()).
     void add_packed(std::string type, bool required, std::vector<std::uint8_t> bytes);
     template <class T, class A>
     void add_array(std::string type, bool required, const std::vector<T, A>& values) {
@@ -68,14 +68,13 @@ class ChunkReader {
 
     bool has(std::string_view type) const;
     std::size_t raw_bytes(std::string_view type) const;  // 0 if absent
-    // max_bytes: the most that the caller has a use for; more is an error before anything is
-    // allocated.
+    // max_bytes: the most that the caller can use; more is an error before anything is allocated.
     Result<std::vector<std::uint8_t>> read(std::string_view type,
                                            std::size_t max_bytes,
                                            JobRunner& jobs = serial_jobs()) const;
-    // The bytes of a chunk of add_packed() as they lie in the file, their checksum checked.
+    // The bytes of a chunk of add_packed() as they are in the file; their checksum is checked.
     Result<std::span<const std::uint8_t>> packed(std::string_view type) const;
-    // count: how many values the chunk must hold exactly.
+    // count: the number of values, which the chunk must hold exactly.
     template <class T, class Values = std::vector<T>>
     Result<Values> read_array(std::string_view type,
                               std::size_t count,
@@ -102,6 +101,10 @@ class ChunkReader {
         std::size_t raw = 0;
         std::uint64_t checksum = 0;
     };
+    Status check_header(std::string_view kind) const;
+    Result<Entry> read_entry(std::span<const std::uint8_t> raw,
+                             std::size_t i,
+                             std::size_t end) const;
     const Entry* find(std::string_view type) const;
     Status check_size(std::string_view type, std::size_t count, std::size_t bytes_each) const;
     Status check_sum(const Entry& entry) const;

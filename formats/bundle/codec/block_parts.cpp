@@ -9,7 +9,7 @@
 #include <cstring>
 
 #include "formats/bundle/codec/brick_kinds.h"
-#include "formats/bundle/codec/offset_guess.h"
+#include "formats/bundle/codec/offset_prediction.h"
 #include "formats/volume/boundary_record.h"
 
 namespace sonocase::detail {
@@ -74,11 +74,11 @@ bool BlockUnpacker::records(const BlockParts& parts, std::size_t block) noexcept
     parts.grid.each_brick(block, [&](std::size_t brick, bool, bool) {
         const std::uint32_t entry = parts.boundary.table[brick];
         if (entry & kUniformBrick) return;
-        BrickLabels alike;
+        BrickLabels uniform;
         const std::uint32_t label_entry = parts.labels.table[brick];
-        const std::uint8_t* label = alike.data();
+        const std::uint8_t* label = uniform.data();
         if (label_entry & kUniformBrick) {
-            alike.fill(parts.labels.uniform[label_entry & ~kUniformBrick]);
+            uniform.fill(parts.labels.uniform[label_entry & ~kUniformBrick]);
         } else {
             label = parts.labels.pool.data() + static_cast<std::size_t>(label_entry) * kBrickVoxels;
         }
@@ -126,14 +126,14 @@ bool BlockUnpacker::offsets(const BlockParts& parts, std::size_t block) noexcept
         const std::int8_t* in_front = has_front ? front.data() : nullptr;
         std::int8_t* to = parts.echo.pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels;
         std::int8_t* values = in_cells ? cells.data() : to;
-        const auto told = [&](int v, std::uint8_t guess) {
-            return values[v] = static_cast<std::int8_t>(*from++ + guess);
+        const auto decode = [&](int v, std::uint8_t prediction) {
+            return values[v] = static_cast<std::int8_t>(*from++ + prediction);
         };
         if (!in_cells) {
-            walk_offsets<kBrickEdge>(at_left, in_front, told);
+            walk_offsets<kBrickEdge>(at_left, in_front, decode);
             return;
         }
-        walk_offsets<2>(at_left, in_front, told);
+        walk_offsets<2>(at_left, in_front, decode);
         for (std::size_t v = 0; v < kBrickVoxels; ++v)
             to[v] = cells[v % 4 / 2 + 2 * (v / 4 % 4 / 2) + 4 * (v / 32)];
     });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What VoxelBlocks unpacks from and into. For the .cpp files of formats/ only.
+// What VoxelBlocks unpacks from, and into what. For the .cpp files of formats/ only.
 #pragma once
 
 #include <optional>
@@ -14,8 +14,7 @@
 
 namespace sonocase::detail {
 
-// The vectors of the volumes stay where they are while a bundle is moved about: only they are
-// referred to.
+// Refers to the storage of a volume's vectors, which stays in place when a bundle is moved.
 template <class T>
 struct BrickSpans {
     std::span<const std::uint32_t> table;

@@ -61,7 +61,7 @@ Result<std::vector<SolidTexture>> read_textures(const ChunkReader& reader, JsonO
         SolidTexture texture;
         texture.name = item.text("name");
         texture.edge = static_cast<int>(item.integer("edge", 8, 128));
-        if (!is_power_of_two(texture.edge)) item.complain("edge", "is no power of two");
+        if (!is_power_of_two(texture.edge)) item.complain("edge", "is not a power of two");
         texture.voxel_mm = item.number("voxel_mm");
         if (!(texture.voxel_mm > 0)) item.complain("voxel_mm", "is not above zero");
         const auto edge = static_cast<std::size_t>(texture.edge);
@@ -85,7 +85,7 @@ Result<SpeckleVolume> read_speckle(const ChunkReader& reader, JsonObject& manife
     SpeckleVolume speckle;
     speckle.edge = static_cast<int>(manifest.integer_or("speckle_edge", 0, 0, 512));
     if (speckle.edge == 0) return speckle;
-    if (!is_power_of_two(speckle.edge)) manifest.complain("speckle_edge", "is no power of two");
+    if (!is_power_of_two(speckle.edge)) manifest.complain("speckle_edge", "is not a power of two");
     const auto edge = static_cast<std::size_t>(speckle.edge);
     auto voxels = reader.read_array<std::int8_t>("speckle", 2 * edge * edge * edge);
     if (!voxels) return voxels.error();
@@ -141,8 +141,9 @@ Result<Surface> read_surface(const ChunkReader& reader, const std::string& type)
     }
     for (const auto& t : surface.triangles) good &= t[0] < points && t[1] < points && t[2] < points;
     if (!good) {
-        return reader.fault("surface '" + type +
-                            "' has a triangle without its points or a point not finite");
+        return reader.fault(
+            "surface '" + type +
+            "' has a triangle whose points do not exist, or a point that is not finite");
     }
     return surface;
 }

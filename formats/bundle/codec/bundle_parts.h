@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Pieces that case bundles and the files between stages share. For the .cpp files of formats/ only.
+// Pieces that case bundles and the files between stages have in common. For the .cpp files of
+// formats/ only.
 #pragma once
 
 #include <algorithm>

@@ -11,7 +11,7 @@
 namespace sonocase::detail {
 namespace {
 
-constexpr int kZstdLevel = 12;  // blocks are small: higher levels find no more
+constexpr int kZstdLevel = 12;  // higher levels gain nothing on blocks this small
 
 }  // namespace
 

@@ -15,11 +15,11 @@
 namespace sonocase::detail {
 namespace {
 
-constexpr int kLeastBlock = 8, kLargestBlock = 32;  // bricks an edge
+constexpr int kLeastBlock = 8, kLargestBlock = 32;  // bricks per edge
 constexpr std::size_t kMostBlocks = 4096;
 constexpr int kMostPatchStep = 16;
 
-// Blocks small enough that a frame needs few, large enough that each packs well.
+// Blocks small enough that a frame needs few, large enough that each compresses well.
 BlockGrid block_grid(Int3 size) {
     BlockGrid grid{brick_count(size), kLeastBlock};
     while (grid.count() > kMostBlocks && grid.edge < kLargestBlock) grid.edge *= 2;
@@ -29,14 +29,14 @@ BlockGrid block_grid(Int3 size) {
 // The largest distance of any record, in 1/48 voxel.
 int reach_of(const BrickVolume<std::uint32_t>& boundary) {
     std::uint32_t most = 0;
-    const auto look = [&](std::span<const std::uint32_t> values) {
+    const auto search = [&](std::span<const std::uint32_t> values) {
         for (const std::uint32_t v : values) {
             const std::uint32_t steps = v >> 8 & 0xFFu;
             if (steps < 128) most = std::max(most, steps);
         }
     };
-    look(boundary.uniform);
-    look(boundary.pool);
+    search(boundary.uniform);
+    search(boundary.pool);
     return static_cast<int>(most);
 }
 
@@ -70,8 +70,7 @@ Result<VoxelVolumes> read_volumes(const ChunkReader& reader,
     if (!reader.has("vox.kind"))
         return read_first_layout(reader, with_records, with_offsets, size, palette, jobs);
     if (reader.has("vox.rec")) {
-        return reader.fault("is of a layout that was in use for a few days only",
-                            "make the file again");
+        return reader.fault("is of an early layout that is no longer read", "make the file again");
     }
     auto parts = std::make_unique<BlockParts>();
     parts->reach_steps = static_cast<int>(manifest.integer("record_reach", 0, 127));

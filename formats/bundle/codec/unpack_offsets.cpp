@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "formats/base/jobs.h"
+#include "formats/base/memory.h"
 #include "formats/bundle/codec/brick_kinds.h"
 #include "formats/bundle/codec/value_order.h"
 
@@ -27,7 +27,7 @@ Status read_offsets(const ChunkReader& reader,
         for (unsigned v = 0; v < kOffsetKinds; ++v) known += kinds.count(k, v);
     }
     if (known != kind->size())
-        return reader.fault("a brick of 'ofs.kind' is of no known kind", "make it again");
+        return reader.fault("a brick of 'ofs.kind' is of an unknown kind", "make it again");
     const auto one = reader.read_array<std::uint8_t, Bytes>("ofs.one", first_one[layers], jobs);
     if (!one) return one.error();
     auto frames = BlockFrames::open(reader, "ofs.val", parts->grid.count(),
@@ -41,10 +41,12 @@ Status read_offsets(const ChunkReader& reader,
         for (std::size_t n = first_one[k]; n < first_one[k + 1]; ++n) order.met((*one)[n]);
     }
     for (const std::uint8_t v : order.values()) out->uniform.push_back(static_cast<std::int8_t>(v));
-    out->table.resize(kind->size());
     PoolOrder places(*kind, parts->grid, jobs, [](unsigned v) { return v >= kMixedOffsets; });
+    if (!can_allocate(places.total() * kBrickVoxels))
+        return reader.fault("needs more memory than is available", "use larger voxels");
+    out->table.resize(kind->size());
     out->pool.resize(places.total() * kBrickVoxels);
-    if (!out->pool.empty()) out->pool[0] = 0;  // read where there is no use for one
+    if (!out->pool.empty()) out->pool[0] = 0;  // renderers read it where they do not use it
     parts->in_cells.resize(places.total());
     jobs.run(layers, [&](std::size_t k) {
         std::size_t next_one = first_one[k];

@@ -6,6 +6,7 @@
 
 #include <cstdlib>
 #include <cstring>
+#include <type_traits>
 
 #include "formats/bundle/stage_files.h"
 #include "formats/container/chunk_file.h"
@@ -87,6 +88,17 @@ void expect_same(const CaseBundle& a, const CaseBundle& b) {
     expect_same(a.mannequin_skin, b.mannequin_skin);
     EXPECT_EQ(a.preview_png, b.preview_png);
 }
+
+// What the types promise: a bundle is a value, a streamed one has one owner, and a view refers to
+// something that outlives it.
+static_assert(std::is_copy_constructible_v<CaseBundle> && std::is_copy_assignable_v<CaseBundle>);
+static_assert(std::is_move_constructible_v<StreamedBundle> &&
+              !std::is_copy_constructible_v<StreamedBundle> &&
+              !std::is_copy_assignable_v<StreamedBundle>);
+static_assert(std::is_constructible_v<CaseView, const CaseBundle&> &&
+              std::is_constructible_v<CaseView, const StreamedBundle&> &&
+              !std::is_constructible_v<CaseView, CaseBundle> &&
+              !std::is_constructible_v<CaseView, StreamedBundle>);
 
 TEST(CaseBundle, ComesBackAsItWas) {
     const CaseBundle bundle = tiny_case();
@@ -236,8 +248,8 @@ TEST(CaseBundle, OpenedIsAsLoadedBlockByBlock) {
     EXPECT_TRUE(moved.blocks()->status());
 }
 
-// A block with right checksums that makes no sense: seen when it is asked for, and empty.
-TEST(CaseBundle, ABlockThatMakesNoSenseSaysSoAndHoldsNothing) {
+// A block with right checksums and invalid contents: found when it is asked for, and empty.
+TEST(CaseBundle, AnInvalidBlockSaysSoAndHoldsNothing) {
     const testing::TemporaryFolder folder;
     const std::string path = folder / "forged.sonocase";
     const Bytes good = write_bundle(testing::curved_case());

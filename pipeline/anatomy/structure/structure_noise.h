@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Smooth noise in space that repeats far away: a cube of Gaussian values that wraps, read through a
-// generic rotation so that its period lies along no axis of the body.
+// Smooth noise in space with a long period: a cube of Gaussian values that wraps, sampled through a
+// generic rotation such that its period is along no axis of the body.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ class StructureNoise {
     float at(float x_mm, float y_mm, float z_mm) const;
 
   private:
-    float scale_;  // cells a millimetre
+    float scale_;  // cells per mm
     std::vector<float> cells_;
 };
 

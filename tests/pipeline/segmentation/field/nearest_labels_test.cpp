@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/segmentation/resample_labels.h"
+// The grid of cooked labels, and nearest-neighbour resampling into it.
+#include "pipeline/segmentation/field/nearest_labels.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "pipeline/segmentation/field/cooked_grid.h"
-#include "pipeline/segmentation/field/nearest_labels.h"
+#include "pipeline/segmentation/known_maps.h"
 #include "support/random.h"
 #include "support/shapes.h"
 
@@ -18,16 +19,8 @@ using sonocase::testing::count_label;
 using sonocase::testing::cubic_grid;
 using sonocase::testing::norm_of;
 using sonocase::testing::Random;
+using sonocase::testing::rigid_registration;
 using sonocase::testing::sample_labels;
-
-Registration rigid_registration(const Rigid& motion, const Grid& grid) {
-    Registration registration;
-    registration.mannequin_from_ct = motion;
-    registration.quadratic = QuadraticMap::from_rigid(motion, {0, 0, 0}, 100);
-    registration.ct_box = grid.bounds();
-    registration.min_det_jacobian = 1;
-    return registration;
-}
 
 TEST(CookedGrid, HoldsTheWarpedBodyAndNotMuchMore) {
     const std::uint64_t seed = 3;

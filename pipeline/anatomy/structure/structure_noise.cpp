@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/anatomy/structure_noise.h"
+#include "pipeline/anatomy/structure/structure_noise.h"
 
 #include <cmath>
 

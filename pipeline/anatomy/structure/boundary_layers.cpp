@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/anatomy/boundary_layers.h"
+#include "pipeline/anatomy/structure/boundary_layers.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,9 @@ namespace {
 
 constexpr float kFasciaEchoDb = 9;  // re liver; tissue table: fascia +10 (a)
 
-// Signed distance in voxels from a boundary of which a share p in (0, 1) lies on this side, after
-// smoothing with deviation sigma: the normal quantile (rational form, error 4e-4).
+// Signed distance, in voxels, from a boundary with the share p in (0, 1) of the neighbourhood on
+// this side, after smoothing with standard deviation sigma: the normal quantile (rational form,
+// error 4e-4).
 float distance_from_share(float p, float sigma) {
     const float q = std::min(p, 1 - p);
     if (q < 1e-3f) return p < 0.5f ? -3.1f * sigma : 3.1f * sigma;
@@ -24,8 +25,8 @@ float distance_from_share(float p, float sigma) {
 }  // namespace
 
 void BoundaryLayers::smooth(std::vector<std::uint16_t>& volume) {
-    // Once 1 4 6 4 1 along each axis, kept to 16 bits: 16^3 = 4096 at most. The outermost two
-    // samples of the rim are left as they are; no one reads them.
+    // 1 4 6 4 1 along each axis, which fits into 16 bits: 16^3 = 4096 at most. The outermost two
+    // samples of the rim stay unfiltered; they are not used.
     scratch_.resize(volume.size());
     for (int axis = 0; axis < 3; ++axis) {
         const std::size_t stride = axis == 0 ? 1 : axis == 1 ? kSide : kSide * kSide;
@@ -48,7 +49,7 @@ void BoundaryLayers::prepare(const LabelVolume& labels,
     rules_ = &rules;
     lower_ = lower;
     fascia_ = wall_ = false;
-    // a quick look first: most blocks hold one label, or none of interest
+    // Most blocks hold a single label, or none that has layers.
     std::array<bool, 256> seen{};
     const Int3 size = labels.grid.size;
     for (int k = std::max(lower.z - 2, 0); k < std::min(upper.z + 2, size.z); ++k) {
@@ -71,8 +72,7 @@ void BoundaryLayers::prepare(const LabelVolume& labels,
         soft += rules.role[l] == StructureRole::muscle || rules.role[l] == StructureRole::fat;
     }
     const bool want_fascia = rules.fascia && muscle && soft >= 2;
-    // a block deep in one bowel loop may still be within reach of its wall, but then the rim says
-    // so
+    // A block deep in one bowel loop may still be within reach of its wall; find_walls sees that.
     const bool want_wall = rules.bowel_wall && bowel;
     if (!want_fascia && !(want_wall && kinds >= 1)) return;
     labels_.resize(static_cast<std::size_t>(kSide) * kSide * kSide);
@@ -114,8 +114,8 @@ void BoundaryLayers::find_fascia(const std::vector<std::uint8_t>& present) {
             for (int j = 2; j < kSide - 2; ++j) {
                 for (int i = 2; i < kSide - 2; ++i) {
                     const std::size_t at = index(i, j, k);
-                    // only where muscle and fat fill the neighbourhood: bone, skin and organs have
-                    // surfaces of their own
+                    // Only where muscle and fat fill the neighbourhood: bone, skin and organs have
+                    // surfaces of their own.
                     if (share_[at] == 0 || share_[at] == all_[at] || all_[at] < 2900) continue;
                     const float p = static_cast<float>(share_[at]) / static_cast<float>(all_[at]);
                     const float d = std::abs(distance_from_share(p, 1.0f));
@@ -136,6 +136,33 @@ float BoundaryLayers::fascia_db(
     return db + cover * (target - db);
 }
 
+// Distances to the samples that are 0, in voxels, in two sweeps over the block; the outermost
+// samples stay as they are.
+void BoundaryLayers::chamfer(std::vector<float>* distance) {
+    std::vector<float>& d = *distance;
+    constexpr float kSteps[4] = {0, 1, 1.41f, 1.73f};
+    constexpr int kInner = kSide - 2;
+    for (const int sign : {1, -1}) {
+        for (int n = 0; n < kInner * kInner * kInner; ++n) {
+            const int m = sign > 0 ? n : kInner * kInner * kInner - 1 - n;
+            const int i = 1 + m % kInner, j = 1 + m / kInner % kInner, k = 1 + m / kInner / kInner;
+            const std::size_t at = index(i, j, k);
+            float best = d[at];
+            if (best == 0) continue;
+            for (int c = -1; c <= 0; ++c) {
+                for (int b = -1; b <= (c < 0 ? 1 : 0); ++b) {
+                    for (int a = -1; a <= (c < 0 || b < 0 ? 1 : -1); ++a) {
+                        const float step = kSteps[std::abs(a) + std::abs(b) + std::abs(c)];
+                        best = std::min(best,
+                                        d[index(i + sign * a, j + sign * b, k + sign * c)] + step);
+                    }
+                }
+            }
+            d[at] = best;
+        }
+    }
+}
+
 void BoundaryLayers::find_walls(const std::vector<std::uint8_t>& present) {
     const std::size_t count = labels_.size();
     wall_depth_.assign(count, 9.f);
@@ -143,7 +170,7 @@ void BoundaryLayers::find_walls(const std::vector<std::uint8_t>& present) {
     constexpr float kFar = 1e3f;
     for (const std::uint8_t label : present) {
         if (rules_->role[label] != StructureRole::bowel) continue;
-        // chamfer distance to what is neither this bowel nor gas, two sweeps over the block
+        // Chamfer distance to voxels that are neither this bowel nor gas, in two sweeps.
         std::vector<float> d(count);
         bool outside = false;
         for (std::size_t i = 0; i < count; ++i) {
@@ -153,38 +180,18 @@ void BoundaryLayers::find_walls(const std::vector<std::uint8_t>& present) {
         }
         if (!outside) continue;
         wall_ = true;
-        constexpr float kSteps[4] = {0, 1, 1.41f, 1.73f};
-        for (const int sign : {1, -1}) {
-            for (int n = 0; n < (kSide - 2) * (kSide - 2) * (kSide - 2); ++n) {
-                const int m = sign > 0 ? n : (kSide - 2) * (kSide - 2) * (kSide - 2) - 1 - n;
-                const int i = 1 + m % (kSide - 2), j = 1 + m / (kSide - 2) % (kSide - 2),
-                          k = 1 + m / (kSide - 2) / (kSide - 2);
-                const std::size_t at = index(i, j, k);
-                float best = d[at];
-                if (best == 0) continue;
-                for (int c = -1; c <= 0; ++c) {
-                    for (int b = -1; b <= (c < 0 ? 1 : 0); ++b) {
-                        for (int a = -1; a <= (c < 0 || b < 0 ? 1 : -1); ++a) {
-                            const float step = kSteps[std::abs(a) + std::abs(b) + std::abs(c)];
-                            best = std::min(
-                                best, d[index(i + sign * a, j + sign * b, k + sign * c)] + step);
-                        }
-                    }
-                }
-                d[at] = best;
-            }
-        }
+        chamfer(&d);
         for (std::size_t i = 0; i < count; ++i) {
             if (labels_[i] == label) wall_depth_[i] = (d[i] - 0.5f) * voxel;
         }
     }
 }
 
-// Serosa and fat interface bright, muscularis dark, submucosa bright, mucosa dark, then contents:
-// about 1 mm each, 4 mm in all, as endosonography shows.
+// From outside in: the interface of serosa and fat is bright, muscularis dark, submucosa bright,
+// mucosa dark, each about 1 mm thick as in endosonography; then the contents.
 float BoundaryLayers::wall_db(float contents, float depth_mm) const {
     constexpr float kLevels[4] = {4, -8, 6, -7};
-    const float s = std::max(depth_mm - 0.5f, 0.f);  // 0 in the middle of the first layer
+    const float s = std::max(depth_mm - 0.5f, 0.f);  // 0 at the centre of the first layer
     const int layer = static_cast<int>(s);
     if (layer >= 4) return contents;
     const float t = s - static_cast<float>(layer);

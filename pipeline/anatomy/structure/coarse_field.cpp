@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/anatomy/coarse_field.h"
+#include "pipeline/anatomy/structure/coarse_field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -136,7 +136,7 @@ CoarseField distance_inside(Int3 fine_size,
                  });
     squared_distance_transform(field.value, field.size);
     const auto scale = static_cast<float>(step);
-    // No outside anywhere leaves the far value: everything is equally deep.
+    // Without any voxel outside, the large value remains: every voxel is equally deep.
     for (float& v : field.value) v = scale * std::sqrt(std::min(v, 1e8f));
     for (int axis = 0; axis < 3; ++axis) {
         along_axis(field.value, field.size, axis, [](const float* in, float* out, int n) {

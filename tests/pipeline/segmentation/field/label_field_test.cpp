@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Short cuts of the label field: they may not change what it says.
+// Short cuts of the label field, which must not change its answers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "pipeline/segmentation/field/label_field.h"
+#include "pipeline/segmentation/known_maps.h"
 #include "support/random.h"
 #include "support/shapes.h"
 
@@ -18,15 +19,12 @@ using sonocase::testing::cubic_grid;
 using sonocase::testing::norm_of;
 using sonocase::testing::Random;
 using sonocase::testing::sample_labels;
+using sonocase::testing::thick_grid;
 
-// Balls in a ball, one of them in two layers, and a rod of a voxel: three to five labels at many
-// places.
+// Balls in a ball, one of them in two layers, and a rod one voxel thick: three to five labels at
+// many places.
 LabelVolume crowded(double slice_mm) {
-    Grid grid = cubic_grid(56);
-    grid.spacing_mm.z = slice_mm;
-    grid.size.z = static_cast<int>(56 / slice_mm);
-    grid.origin_mm.z = -0.5 * slice_mm * (grid.size.z - 1);
-    return sample_labels(grid, 8, [](Point3 p) {
+    return sample_labels(thick_grid(56, slice_mm), 8, [](Point3 p) {
         if (std::hypot(p.x + 3, p.y - 0.4 * p.z) < 1) return 7;
         if (norm(p - Point3{8, 2, 3}) < 4) return 3;
         if (norm(p - Point3{8, 2, 3}) < 7) return 2;
@@ -42,10 +40,10 @@ struct TopTwo {
     double apart_mm = 0;
 };
 
-TopTwo standing(const LabelField& field, LabelField::Position at) {
+TopTwo top_two(const LabelField& field, LabelField::Position at) {
     std::array<float, 256> score;
     field.scores(at, score.data());
-    const auto& labels = at.contest->labels;
+    const auto& labels = at.candidates->labels;
     std::vector<std::size_t> order(labels.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
     std::sort(order.begin(), order.end(),
@@ -58,14 +56,15 @@ TopTwo standing(const LabelField& field, LabelField::Position at) {
 
 class LabelFieldOf : public ::testing::TestWithParam<double> {};
 
-TEST_P(LabelFieldOf, ContestsSayWhatAllCandidatesSay) {
+TEST_P(LabelFieldOf, CandidatesOfACellAnswerLikeAllCandidates) {
     constexpr float kReach = 2;
     LabelField field(crowded(GetParam()), {});
     Random random(5);
-    for (float& price : field.prices()) price = static_cast<float>(random.uniform(-0.4, 0.4));
-    field.find_contests(kReach);
+    for (float& offset : field.volume_offsets_mm())
+        offset = static_cast<float>(random.uniform(-0.4, 0.4));
+    field.find_candidates(kReach);
     const Vector3 h = field.nodes().spacing_mm;
-    std::size_t contested = 0, fewer = 0, sure = 0;
+    std::size_t with_candidates = 0, fewer = 0, sure = 0;
     for (int n = 0; n < 40000; ++n) {
         float v[3];
         Vector3 off;
@@ -78,38 +77,38 @@ TEST_P(LabelFieldOf, ContestsSayWhatAllCandidatesSay) {
         }
         const LabelField::Position at = field.locate(v[0], v[1], v[2]);
         const std::size_t node = field.nodes().index(near.x, near.y, near.z);
-        if (at.contest == nullptr) {
+        if (at.candidates == nullptr) {
             ASSERT_EQ(field.node_label(node), at.block->labels[0]);
             continue;
         }
         LabelField::Position all = at;
-        all.contest = &at.block->contests[0];
-        const TopTwo short_cut = standing(field, at), whole = standing(field, all);
-        ++contested;
-        fewer += at.contest->labels.size() < all.contest->labels.size();
+        all.candidates = &at.block->candidate_sets[0];
+        const TopTwo short_cut = top_two(field, at), whole = top_two(field, all);
+        ++with_candidates;
+        fewer += at.candidates->labels.size() < all.candidates->labels.size();
         ASSERT_EQ(short_cut.first, whole.first);
         if (whole.apart_mm < kReach) {
             ASSERT_EQ(short_cut.second, whole.second);
-            // Sums of fewer terms of up to 50 mm round otherwise.
+            // Sums of fewer terms of up to 50 mm are rounded differently.
             ASSERT_NEAR(short_cut.apart_mm, whole.apart_mm, 1e-4);
         }
-        // A margin that reaches from the node to the point and further by `rest`.
+        // The node's margin reaches beyond the point, by `rest`.
         const double rest = static_cast<double>(field.node_margin_mm(node)) - norm(off);
         if (rest <= 0) continue;
         ++sure;
         ASSERT_EQ(field.node_label(node), whole.first);
     }
-    EXPECT_GT(contested, 10000u);
-    EXPECT_GT(fewer, contested / 2);
+    EXPECT_GT(with_candidates, 10000u);
+    EXPECT_GT(fewer, with_candidates / 2);
     EXPECT_GT(sure, 10000u);
 }
 
-// Larger blocks weigh the same labels by the same distances; only small ones may miss a label that
-// is a voxel further than a label can win from.
-TEST_P(LabelFieldOf, BlocksOfAnyEdgeSayTheSame) {
+// Larger blocks compare the same labels by the same distances; only small ones may miss a label
+// that is one voxel beyond the reach from which a label can win.
+TEST_P(LabelFieldOf, AnswersDoNotDependOnTheEdgeOfBlocks) {
     const LabelVolume ct = crowded(GetParam());
     LabelField eight(ct, {{}, 8}), sixteen(ct, {{}, 16}), four(ct, {{}, 4});
-    for (LabelField* field : {&eight, &sixteen, &four}) field->find_contests(2);
+    for (LabelField* field : {&eight, &sixteen, &four}) field->find_candidates(2);
     Random random(6);
     int others = 0;
     for (int n = 0; n < 20000; ++n) {
@@ -118,22 +117,23 @@ TEST_P(LabelFieldOf, BlocksOfAnyEdgeSayTheSame) {
             v[a] = static_cast<float>(random.uniform(0, eight.nodes().size[a] - 1));
         const auto winner = [&](const LabelField& field) {
             const LabelField::Position at = field.locate(v[0], v[1], v[2]);
-            return at.contest == nullptr ? at.block->labels[0] : standing(field, at).first;
+            return at.candidates == nullptr ? at.block->labels[0] : top_two(field, at).first;
         };
         others += winner(eight) != winner(sixteen) || winner(eight) != winner(four);
     }
     EXPECT_LE(others, 20);
 }
 
-// Prices move surfaces by the same way on either side of a block's face. What is left is a label
-// that is a candidate on one side alone: too far off to win, but within the reach of the smoothing
-// of its neighbour's own distance. Prices that counted once here and twice there made
-// steps of 0.3 mm.
+// Volume offsets move surfaces by the same amount on either side of a block's face. What remains is
+// a label that is a candidate on one side only: too far away to win, but within the reach of the
+// smoothing of its neighbour's own distance. Offsets that counted once on one side and twice on the
+// other made steps of 0.3 mm.
 TEST_P(LabelFieldOf, NothingJumpsFromBlockToBlock) {
     LabelField field(crowded(GetParam()), {});
     Random random(7);
-    for (float& price : field.prices()) price = static_cast<float>(random.uniform(-0.4, 0.4));
-    field.find_contests(2);
+    for (float& offset : field.volume_offsets_mm())
+        offset = static_cast<float>(random.uniform(-0.4, 0.4));
+    field.find_candidates(2);
     constexpr float kStep = 1e-3f;  // nodes
     std::vector<double> changes;
     for (int n = 0; n < 40000; ++n) {
@@ -147,8 +147,8 @@ TEST_P(LabelFieldOf, NothingJumpsFromBlockToBlock) {
         const LabelField::Position before = field.locate(v[0], v[1], v[2]);
         v[axis] += 2 * kStep;
         const LabelField::Position after = field.locate(v[0], v[1], v[2]);
-        if (before.contest == nullptr || after.contest == nullptr) continue;
-        const TopTwo a = standing(field, before), b = standing(field, after);
+        if (before.candidates == nullptr || after.candidates == nullptr) continue;
+        const TopTwo a = top_two(field, before), b = top_two(field, after);
         if (std::min(a.apart_mm, b.apart_mm) > 1) continue;
         changes.push_back(a.first == b.first ? std::abs(a.apart_mm - b.apart_mm)
                                              : a.apart_mm + b.apart_mm);
@@ -159,7 +159,7 @@ TEST_P(LabelFieldOf, NothingJumpsFromBlockToBlock) {
     EXPECT_LT(changes[changes.size() * 95 / 100], 0.1);
 }
 
-// More candidates than a contest can be told from: all of them are weighed.
+// With more candidates than the sets of cells can hold, all of them are compared.
 TEST(LabelField, CubesOfTwoHundredLabelsKeepTheirMiddles) {
     constexpr int kEdge = 3, kCubes = 6;  // 216 in the reach of one block of 16
     LabelVolume ct;
@@ -177,14 +177,14 @@ TEST(LabelField, CubesOfTwoHundredLabelsKeepTheirMiddles) {
         }
     }
     LabelField field(ct, {{}, 16});
-    field.find_contests(2);
+    field.find_candidates(2);
     ASSERT_GT(field.blocks()[0].labels.size(), 64u);
     for (int k = 1; k < edge; k += kEdge) {
         for (int j = 1; j < edge; j += kEdge) {
             for (int i = 1; i < edge; i += kEdge) {
                 const LabelField::Position at = field.locate(
                     static_cast<float>(i), static_cast<float>(j), static_cast<float>(k));
-                ASSERT_EQ(standing(field, at).first, cube(i, j, k)) << i << " " << j << " " << k;
+                ASSERT_EQ(top_two(field, at).first, cube(i, j, k)) << i << " " << j << " " << k;
             }
         }
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// How echo offsets of a brick are told: each by its difference from a guess by its neighbours to
-// the left, in front and below. For the .cpp files of formats/.
+// How the echo offsets of a brick are coded: each as its difference from a prediction by its
+// neighbours to the left, in front and below. For the .cpp files of formats/.
 #pragma once
 
 #include <algorithm>
@@ -12,13 +12,13 @@
 
 namespace sonocase::detail {
 
-// A brick is Edge values an edge here: 4 voxels, or 2 cells of 2 x 2 x 2 alike voxels. left, front:
-// the 64 values of the bricks there, or null at the border of the block. value(v, guess) hands over
-// the value of number v, an std::int8_t, x fastest.
+// A brick has Edge values per edge here: 4 voxels, or 2 cells of 2 x 2 x 2 equal voxels. left,
+// front: the 64 values of the bricks there, or null at the border of the block. value(v,
+// prediction) hands over the value of number v, an std::int8_t, x fastest.
 template <int Edge, class Value>
 void walk_offsets(const std::int8_t* left, const std::int8_t* front, Value value) {
     constexpr int kStep = kBrickEdge / Edge, kRow = Edge + 1;
-    // A plane of the brick with the faces of its neighbours round it, and the plane below.
+    // A plane of the brick with the faces of its neighbours around it, and the plane below.
     int planes[2][kRow * kRow] = {};
     int v = 0;
     for (int k = 0; k < Edge; ++k) {
@@ -36,9 +36,10 @@ void walk_offsets(const std::int8_t* left, const std::int8_t* front, Value value
                 const int a = plane[at - 1], b = plane[at - kRow], ab = plane[at - kRow - 1];
                 // Of three values the middle one: a, b, and the plane through them.
                 const int flat = std::max(std::min(a, b), std::min(std::max(a, b), a + b - ab));
-                const int guess = k == 0 ? flat : (flat + below[at]) >> 1;
+                const int prediction = k == 0 ? flat : (flat + below[at]) >> 1;
                 // Values of one label are whole dB apart.
-                plane[at] = value(v, static_cast<std::uint8_t>(a + 4 * ((guess - a + 2) >> 2)));
+                plane[at] =
+                    value(v, static_cast<std::uint8_t>(a + 4 * ((prediction - a + 2) >> 2)));
             }
         }
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Layers that follow a boundary between labels: fascia between muscle and its surroundings, and the
-// wall of the bowel. Internal to bake_structure; works block by block on labels with a rim around.
+// Layers along boundaries between labels: fascia between muscle and its surroundings, and the wall
+// of the bowel. Internal to bake_structure; works on a block of voxels with a rim around it.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "formats/volume/label_volume.h"
-#include "pipeline/anatomy/structure_scene.h"
+#include "pipeline/anatomy/structure/label_facts.h"
 
 namespace sonocase::pipeline {
 
@@ -17,22 +17,23 @@ struct BoundaryLayerRules {
     double voxel_mm = 1;
     bool fascia = true;
     bool bowel_wall = true;
-    std::vector<StructureRole> role;  // by palette index
+    std::vector<StructureRole> role;  // # palette, like the two below
     std::vector<bool> gas;
-    std::vector<float> echo_db;
+    std::vector<float> echo_db;  // re liver
 };
 
 class BoundaryLayers {
   public:
-    // Voxels lower <= (i, j, k) < upper, at most 32 a side. Cheap where no boundary of interest is
-    // near.
+    // Voxels lower <= (i, j, k) < upper, at most 32 per side. Cheap where no relevant boundary is
+    // near. `rules` must outlive the use of the block.
     void prepare(const LabelVolume& labels,
                  Int3 lower,
                  Int3 upper,
                  const BoundaryLayerRules& rules);
     bool any() const { return fascia_ || wall_; }
 
-    // db with the layers laid over it. noise() gives two unit values: coarse and fine.
+    // The offset of a voxel, `db` without layers, with the layers drawn over it. noise() returns two
+    // values of unit variance: coarse and fine.
     template <class Noise>
     float apply(float db, std::uint8_t label, int i, int j, int k, const Noise& noise) const {
         const std::size_t at = index(i - lower_.x + kRim, j - lower_.y + kRim, k - lower_.z + kRim);
@@ -59,6 +60,7 @@ class BoundaryLayers {
     void find_fascia(const std::vector<std::uint8_t>& present);
     void find_walls(const std::vector<std::uint8_t>& present);
     void smooth(std::vector<std::uint16_t>& volume);
+    static void chamfer(std::vector<float>* distance);
 
     const BoundaryLayerRules* rules_ = nullptr;
     Int3 lower_;
@@ -66,7 +68,7 @@ class BoundaryLayers {
     std::vector<std::uint8_t> labels_;
     std::vector<std::uint16_t> share_, all_, scratch_;
     std::vector<float> fascia_distance_;  // voxels to the nearest muscle boundary
-    std::vector<float> wall_depth_;       // mm under the bowel's outside
+    std::vector<float> wall_depth_;       // below the outside of the bowel, mm
 };
 
 }  // namespace sonocase::pipeline
