@@ -14,8 +14,9 @@
 //  - Joint or conditional: the joint histogram is divided by the parent's marginal. Without that,
 //    both terms follow the same marginal, and the parent has little effect.
 //  - Decimation: the paper's words ("iteratively applying a low pass filter and subtracting") do
-//    not mention any, and without it the correlation widths come nearest to those of the example. The
-//    filters are 1 4 6 4 1 with gaps of 2^l. `decimate` gives the other reading, for comparison.
+//    not mention any, and without it the correlation widths come nearest to those of the example.
+//    The filters are 1 4 6 4 1 with gaps of 2^l. `decimate` gives the other reading, for
+//    comparison.
 //  - Range of the signed bands: from the smallest to the largest value in the example.
 //  - Empty parent rows of the joint histogram: the marginal is used, and the rows are counted.
 //  - "A low-pass filter that assumes 3D wrapping": the drawn band is passed through the filter that
