@@ -66,7 +66,7 @@ void read_target(const TomlTable& table, std::vector<Target>& targets) {
     table.text("name", target.name);
     if (!table.point("centre", target.centre) && !table.has("centre")) {
         table.complain("centre", "is missing",
-                       "the middle of the target in mm, as in [10, 20, 30]");
+                       "expected the centre of the target in mm, as in [10, 20, 30]");
     }
     const bool radius = table.number("radius_mm", target.radius_mm, 0.1, 200);
     if (!table.number("hit_radius_mm", target.hit_radius_mm, 0.1, 200) && radius) {
@@ -89,7 +89,7 @@ void read_sweep(const TomlTable& table, std::vector<Sweep>& sweeps) {
         SweepKey key;
         if (!item.has("time_s")) item.complain("time_s", "is missing", "");
         if (!item.has("probe"))
-            item.complain("probe", "is missing", "the middle of the probe face in mm");
+            item.complain("probe", "is missing", "expected the middle of the probe face in mm");
         item.number("time_s", key.time_s, 0, 1e6);
         item.point("probe", key.probe);
         item.direction("beam", key.beam);
@@ -98,7 +98,8 @@ void read_sweep(const TomlTable& table, std::vector<Sweep>& sweeps) {
         const bool direction = item.direction("needle_direction", key.needle_direction);
         key.has_needle = tip;
         if (direction && !tip)
-            item.complain("needle_tip", "is missing beside needle_direction", "");
+            item.complain("needle_tip", "is missing beside needle_direction",
+                          "expected both or neither");
         if (norm(cross(key.beam, key.lateral)) < 1e-6) {
             item.complain("lateral", "is parallel to the beam", "expected a direction across it");
         }
@@ -108,7 +109,8 @@ void read_sweep(const TomlTable& table, std::vector<Sweep>& sweeps) {
         item.finish();
         sweep.keys.push_back(key);
     }
-    if (sweep.keys.empty()) table.complain("keys", "is empty", "at least one [[sweeps.keys]]");
+    if (sweep.keys.empty())
+        table.complain("keys", "is empty", "expected at least one [[sweeps.keys]]");
     table.finish();
     for (const Sweep& other : sweeps) {
         if (other.name == sweep.name)
@@ -121,7 +123,7 @@ void read_pass_mark(const TomlTable& table, std::vector<Exercise::PassMark>& mar
     Exercise::PassMark mark;
     table.text("metric", mark.metric);
     if (mark.metric.empty())
-        table.complain("metric", "is missing or empty", "a name of docs/metrics.md");
+        table.complain("metric", "is missing or empty", "expected a name from docs/metrics.md");
     if (!mark.metric.empty() && !find_metric(mark.metric)) {
         // All fifty names would bury the fault.
         const std::string nearest = nearest_name(mark.metric, metric_names());
@@ -132,7 +134,7 @@ void read_pass_mark(const TomlTable& table, std::vector<Exercise::PassMark>& mar
     const bool most = table.number("at_most", mark.at_most, -1e12, 1e12);
     const bool least = table.number("at_least", mark.at_least, -1e12, 1e12);
     if (!most && !least && !table.has("at_most") && !table.has("at_least")) {
-        table.complain("metric", "has no limit", "at_most or at_least beside it");
+        table.complain("metric", "has no limit", "expected at_most or at_least beside it");
     }
     table.finish();
     marks.push_back(std::move(mark));
@@ -161,7 +163,8 @@ Exercise read_exercise(const TomlTable& root) {
     Exercise e;
     root.text("name", e.name);
     if (e.name.empty())
-        root.complain("name", "is missing or empty", "a short name, as in \"liver-biopsy\"");
+        root.complain("name", "is missing or empty",
+                      "expected a short name, as in \"liver-biopsy\"");
     e.title = e.name;
     root.text("title", e.title);
     root.text("description", e.description);

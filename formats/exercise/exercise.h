@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// An exercise: the probe, the needle, what to hit, how the scene moves and what it calls for. Read
-// from TOML (scenarios/<name>/<exercise>.toml). A typo names file, line, key and nearest valid key.
+// An exercise: probe, needle, targets, motion of the anatomy, effects and pass marks. Read from
+// TOML (scenarios/<name>/<exercise>.toml). The error for an unknown key names the file, the line
+// and the nearest valid key.
 #pragma once
 
 #include <cmath>
@@ -47,14 +48,14 @@ enum class TargetLook { none, marker, lesion, cyst, abscess, calyx };
 struct Target {
     std::string name;
     Point3 centre;             // `mannequin` frame
-    double radius_mm = 5;      // of the thing
-    double hit_radius_mm = 5;  // tip within this of the centre is a hit
+    double radius_mm = 5;      // of the target itself
+    double hit_radius_mm = 5;  // a tip this near the centre is a hit
     TargetLook look = TargetLook::marker;
     std::string inside;  // label that it must lie in; empty: anywhere
 };
 
-// One pose of a scripted path, reached at a time; between key poses positions and directions are
-// interpolated smoothly.
+// One pose of a scripted path, to be reached at a given time; positions and directions are
+// interpolated smoothly between key poses.
 struct SweepKey {
     double time_s = 0;
     Point3 probe;              // probe face middle, `mannequin` frame

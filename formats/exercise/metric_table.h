@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Every score by name: its meaning in a line, and whether more of it is better. docs/metrics.md
-// defines each; the unit is the name's ending.
+// Every score by name: its meaning in one line, and whether more or less of it is better.
+// docs/metrics.md defines each; the name ends in the unit.
 #pragma once
 
 #include <span>

@@ -46,7 +46,7 @@ void box(std::vector<float>& cells, Int3 size, int axis, int reach) {
 }  // namespace
 
 double pulse_wave(double phase) {
-    // A raised cosine over the first fifth, then an exponential-like fall that ends at zero.
+    // A raised cosine over the first fifth, then a nearly exponential fall that ends at zero.
     constexpr double kRise = 0.2;
     if (phase < kRise) return 0.5 - 0.5 * std::cos(0.5 * kTwoPi * phase / kRise);
     const double t = (phase - kRise) / (1 - kRise);
@@ -88,7 +88,7 @@ BreathingField::BreathingField(const CaseBundle& bundle) {
     for (int k = 0; k < n.z; ++k) {
         for (int j = 0; j < n.y; ++j) {
             for (int i = 0; i < n.x; ++i) {
-                // One voxel of the brick speaks for it.
+                // One voxel represents its brick.
                 const int x = std::min(4 * i + 2, labels.size.x - 1),
                           y = std::min(4 * j + 2, labels.size.y - 1),
                           z = std::min(4 * k + 2, labels.size.z - 1);

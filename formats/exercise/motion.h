@@ -3,8 +3,9 @@
 // How the anatomy moves: breathing and the arterial pulse, as functions of time.
 //
 // Breathing shifts a point by amplitude * (1 - cos(2 pi t / period)) / 2 along the direction of
-// inspiration, times a weight in [0, 1] of the place: 1 in the organs that ride on the diaphragm,
-// 0 at skin, bone and beyond, smooth in between. The image looks tissue up where it came from.
+// inspiration, times a weight in [0, 1] that depends on the place: 1 in the organs that move with
+// the diaphragm, 0 at skin, bone and outside, smooth in between. The image samples tissue at its
+// place at rest.
 // The pulse widens arteries: their wall moves out by amplitude * pulse(t).
 #pragma once
 

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Closes on destruction, which gives back a lock on it.
+// Closes on destruction, which releases its lock.
 class Descriptor {
   public:
     explicit Descriptor(int fd) : fd_(fd) {}
@@ -71,7 +71,7 @@ Result<Bytes> read_whole(const std::string& path) {
         }
         bytes.resize(filled);
     } catch (const std::bad_alloc&) {
-        return Error{"is too large for the memory", path, ""};
+        return Error{"does not fit into memory", path, ""};
     }
     return bytes;
 }
@@ -95,8 +95,8 @@ bool is_special(const std::string& path) {
            path.starts_with("/proc/");
 }
 
-// Unlike any other name in use: by this process (counter), on this machine (process number), and,
-// with a folder shared by machines, anywhere (host name).
+// Unique: within this process (counter), on this machine (process number), and in a folder shared
+// by machines (host name).
 std::string temporary_name(const std::string& path) {
     static std::atomic<unsigned> counter{0};
     char host[64] = "host";
@@ -110,7 +110,7 @@ std::string temporary_name(const std::string& path) {
     return (whole.parent_path() / name).string();
 }
 
-// Whether temporary_name made it: ".NAME.HOST.PID.COUNT.tmp", an ending perhaps.
+// Whether the name is one of temporary_name: ".NAME.HOST.PID.COUNT.tmp", perhaps with an ending.
 bool is_temporary_name(const std::string& name) {
     const std::size_t tmp = name.rfind(".tmp");
     if (!name.starts_with('.') || tmp == std::string::npos || tmp < 2) return false;
@@ -121,8 +121,8 @@ bool is_temporary_name(const std::string& name) {
                        [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
-// Opens a temporary and locks it against remove_leftovers, which may have taken it in between: the
-// file then has no name any more, and another is made.
+// Opens a temporary and locks it against remove_leftovers, which may have removed it in between:
+// the file then has no name, and another is created.
 bool open_locked(const std::string& path, Descriptor* file) {
     for (;;) {
         file->open(path, O_WRONLY | O_CREAT | O_TRUNC);
@@ -134,7 +134,7 @@ bool open_locked(const std::string& path, Descriptor* file) {
     }
 }
 
-// The new name reaches the disk with its folder; failing to flush that is not a failed write.
+// The new name is on disk once its folder is flushed; if that fails, the write still succeeded.
 void flush_folder_of(const std::string& path) {
     const fs::path parent = fs::path(path).parent_path();
     const Descriptor folder(

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Whole files in and out. A file appears under its name complete or not at all.
-// Kept apart from the readers: these take bytes, so that they also run where there is no file
-// system.
+// Separate from the parsers, which take bytes and so also run without a file system.
 #pragma once
 
 #include <cstddef>
@@ -28,14 +27,14 @@ Result<std::string> read_text_file(const std::string& path);
 // library. /dev/stdin is accepted when the shell connects it to a file.
 Status expect_regular_file(const std::string& path);
 
-// Writes a temporary name in the same folder, flushes it to the disk and renames it over `path`;
-// makes missing folders. On failure nothing is left behind and what `path` held before stays.
-// Devices, pipes and what leads to them (/dev/stdout) are appended to instead.
+// Writes under a temporary name in the same folder, flushes to disk and renames over `path`;
+// creates missing folders. On failure nothing is left behind and `path` keeps its old content.
+// Devices, pipes and links to them (/dev/stdout) are appended to instead.
 Status write_file(const std::string& path, std::span<const std::uint8_t> bytes);
 Status write_file(const std::string& path, std::string_view text);
 
-// For libraries that write files themselves: they write temporary(), which lies in the same folder
-// with the same ending, and commit() renames it. Without commit() the temporary is removed.
+// For libraries that write files themselves: they write temporary(), which is in the same folder
+// and has the same ending, and commit() renames it. Without commit() the temporary is removed.
 class OutputFile {
   public:
     explicit OutputFile(std::string path);  // makes missing folders
@@ -52,9 +51,9 @@ class OutputFile {
     bool committed_ = false;
 };
 
-// Removes the temporaries of write_file that killed programs left in `folder` and below; their
-// number. One in use holds a lock (flock), on whatever machine, and stays; where the file system
-// knows no locks, one that was touched in the last hour counts as in use.
+// Removes the temporary files of write_file that killed programs left in `folder` and below;
+// returns their number. One in use holds a lock (flock), on any machine, and stays; on a file
+// system without locks, one that was modified within the last hour counts as in use.
 std::size_t remove_leftovers(const std::string& folder);
 
 }  // namespace sonocase

@@ -38,7 +38,7 @@ void pad(std::string& text, std::uint64_t starts_at) {
 
 Error GrowingSequence::fault(const char* doing, int number) const {
     return {std::string(doing) + ": " + std::strerror(number), path_,
-            "what was recorded before is kept; make room on the disk"};
+            "earlier frames are kept; make room on the disk"};
 }
 
 Result<GrowingSequence> GrowingSequence::create(const std::string& path, const Sequence& head) {
@@ -53,8 +53,7 @@ Result<GrowingSequence> GrowingSequence::create(const std::string& path, const S
     pad(text, 0);
     out.end_line_at_ = text.size();
     text += kEndLine;
-    // Under another name first, so that a full disk does not cost the session that was there
-    // before.
+    // Under another name first, so that a full disk does not destroy the previous session.
     const std::string temporary = path + ".part-" + std::to_string(::getpid());
     out.fd_ = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (out.fd_ < 0) {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// An IGSIO sequence that is whole at every moment while it grows.
+// An IGSIO sequence that is valid at every moment while it grows.
 //
 // A recorder cannot write the file at the end: a power cut would lose the session. Nor can it
-// append, since the pixels follow the header and the header grows. The way here: what a reader of
-// the old state takes for pixels may be anything, so that the next part of the header is written
-// over and behind them, with its own end line; then one write of 24 bytes turns the old end line
-// into a comment, and one of ten digits raises the number of frames. Each of the two lies in one
-// sector; before each the data is flushed. Whatever is cut off, the file opens with all frames up
-// to the last commit.
+// append, since the pixels follow the header and the header grows. The method: the pixels may have
+// any value, so the next part of the header, with its own end line, is written over and behind
+// them; then one write of 24 bytes turns the old end line into a comment, and one write of ten
+// digits raises the number of frames. Each of these two lies within one sector, and the data is
+// flushed before each. Wherever the file is cut off, it opens with all frames up to the last
+// commit.
 //
 // Poses only: frames have an image of 1 x 1 that stays zero. Used from one thread.
 #pragma once
@@ -32,8 +32,8 @@ class GrowingSequence {
     GrowingSequence(GrowingSequence&& other) noexcept;
     GrowingSequence& operator=(GrowingSequence&& other) noexcept;
 
-    // Adds frames and commits them. On an error (a full disk) the file holds what it held; the
-    // frames may be given again.
+    // Adds frames and commits them. On an error (a full disk) the file keeps its content, and the
+    // same frames may be appended again.
     Status append(std::span<const SequenceFrame> frames);
     std::size_t frames() const { return frames_; }
 

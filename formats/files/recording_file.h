@@ -16,7 +16,7 @@ namespace sonocase {
 Result<std::vector<Pose>> load_poses(const std::string& path);
 
 Result<Sequence> load_sequence(const std::string& path);
-// The form follows the ending of `path` (.nrrd or anything else).
+// NRRD if `path` ends in .nrrd, MetaImage otherwise.
 Status save_sequence(const Sequence& sequence, const std::string& path, bool compress = false);
 
 // IGSIO sequences, and PerkTutor's transform logs (XML).

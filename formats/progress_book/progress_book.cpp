@@ -78,7 +78,7 @@ struct ProgressBook::Impl {
     ~Impl() { sqlite3_close(db); }
     Error fault(const char* doing) const {
         return {std::string(doing) + ": " + sqlite3_errmsg(db), path,
-                "what was kept before is still there"};
+                "earlier sessions are unchanged"};
     }
     bool run(const char* sql) {
         return sqlite3_exec(db, sql, nullptr, nullptr, nullptr) == SQLITE_OK;
@@ -98,7 +98,7 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
     std::error_code failed;
     const auto folder = std::filesystem::path(path).parent_path();
     if (!folder.empty()) std::filesystem::create_directories(folder, failed);
-    if (failed) return Error{"cannot make its folder: " + failed.message(), path, ""};
+    if (failed) return Error{"cannot create its folder: " + failed.message(), path, ""};
     auto impl = std::make_unique<Impl>();
     impl->path = path;
     if (sqlite3_open_v2(path.c_str(), &impl->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE,
@@ -113,16 +113,16 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
     const std::int64_t application = impl->pragma("PRAGMA application_id");
     const std::int64_t version = impl->pragma("PRAGMA user_version");
     const std::int64_t tables = impl->pragma("SELECT count(*) FROM sqlite_master");
-    if (tables < 0) return impl->fault("is no progress book");
+    if (tables < 0) return impl->fault("is not a progress book");
     if (tables == 0 && version == 0) {
         const std::string make = std::string("BEGIN IMMEDIATE;") + kSchema +
                                  "PRAGMA application_id=" + std::to_string(kApplication) +
                                  ";PRAGMA user_version=" + std::to_string(kVersion) + ";COMMIT;";
         if (!impl->run(make.c_str())) {
             impl->run("ROLLBACK");
-            // Another program may have made it in the same moment.
+            // Another program may have created it at the same moment.
             if (impl->pragma("PRAGMA user_version") != kVersion)
-                return impl->fault("cannot make the book");
+                return impl->fault("cannot create the book");
         }
     } else if (application != kApplication) {
         return Error{"is a database of another program", path, "name another file"};
@@ -135,9 +135,9 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
 
 Status ProgressBook::add(const ProgressEntry& entry) {
     Impl& impl = *impl_;
-    if (!impl.run("BEGIN IMMEDIATE")) return impl.fault("cannot keep the session");
+    if (!impl.run("BEGIN IMMEDIATE")) return impl.fault("cannot store the session");
     const auto give_up = [&]() -> Status {
-        const Error error = impl.fault("cannot keep the session");
+        const Error error = impl.fault("cannot store the session");
         impl.run("ROLLBACK");
         return error;
     };

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What a trainee has done so far: one row a session in an SQLite file of this machine. Nothing is
-// sent anywhere; a trainee is a name that somebody chose, and can be removed with all that is kept
-// of it.
+// The history of all trainees: one row per session in an SQLite file on this machine. Nothing is
+// sent anywhere. A trainee is a freely chosen name, and can be removed with everything stored about
+// it.
 //
-// A library of its own (sonocase_progress), so that the portable core does not carry a database.
+// A room of its own, so that nothing else depends on a database.
 #pragma once
 
 #include <memory>
@@ -26,24 +26,25 @@ struct ProgressEntry {
 
 class ProgressBook {
   public:
-    // Makes the file and its folder where they are missing. An Error for a file that is no progress
-    // book or comes from a newer program.
+    // Creates the file and its folder if they are missing. An Error for a file that is not a
+    // progress book or was written by a newer program.
     static Result<ProgressBook> open(const std::string& path);
     ~ProgressBook();
     ProgressBook(ProgressBook&&) noexcept;
     ProgressBook& operator=(ProgressBook&&) noexcept;
 
-    // One transaction: after a crash the session is there with all its scores or not at all. A
-    // session whose trainee, exercise and start are there already takes its place.
+    // One transaction: after a crash the session is stored with all its scores or not at all. A
+    // session with the same trainee, exercise and start is replaced.
     Status add(const ProgressEntry& entry);
     // Oldest first. Empty names match all.
     Result<std::vector<ProgressEntry>> sessions(const std::string& trainee,
                                                 const std::string& exercise) const;
     Result<std::vector<std::string>> trainees() const;
-    // Rows, and the files of the recordings; `removed` names files that could not be deleted.
+    // Removes the rows and the files of the recordings; `not_deleted` lists files that could not be
+    // deleted.
     Status remove_trainee(const std::string& trainee,
                           std::vector<std::string>* not_deleted = nullptr);
-    // One row a session, one column a score: RFC 4180, the scores in the order of metric_table().
+    // One row per session, one column per score in the order of metric_table(); RFC 4180.
     Result<std::string> csv(const std::string& trainee, const std::string& exercise) const;
 
   private:

@@ -58,7 +58,7 @@ Result<std::vector<Pose>> parse_poses(std::string_view csv, const std::string& w
         for (std::size_t c = 0; c < kColumns.size(); ++c) {
             if (column[c] >= cells.size()) {
                 return Error{"holds " + std::to_string(cells.size()) + " cells", at,
-                             "as many as columns are needed"};
+                             "expected one per column"};
             }
             const std::string_view cell = cells[column[c]];
             if (c == 2) {
@@ -69,7 +69,7 @@ Result<std::vector<Pose>> parse_poses(std::string_view csv, const std::string& w
                 c == 0 ? parse_number(cell, pose.frame) : parse_number(cell, values[c]);
             if (!read) {
                 return Error{"'" + std::string(cell.substr(0, 40)) + "' is not a number", at,
-                             "column '" + std::string(kColumns[c]) + "' holds numbers"};
+                             "column '" + std::string(kColumns[c]) + "' must hold numbers"};
             }
         }
         pose.timestamp_s = values[1];
@@ -77,7 +77,7 @@ Result<std::vector<Pose>> parse_poses(std::string_view csv, const std::string& w
         for (std::size_t i = 0; i < 9; ++i) pose.tracker_from_tool.rotation.m[i] = values[6 + i];
         poses.push_back(pose);
     }
-    if (!have_header) return Error{"is empty", where, "poses as CSV are expected"};
+    if (!have_header) return Error{"is empty", where, "expected poses as CSV"};
     return poses;
 }
 

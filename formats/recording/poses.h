@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Tracked poses: one row a reading, `frame,timestamp_s,status,tx,ty,tz,r00 ... r22`, mm, row-major.
-// The pose maps points of the named tool to the tracker: p_tracker = R p_tool + t.
+// Tracked poses: one row per reading, `frame,timestamp_s,status,tx,ty,tz,r00 ... r22`, mm,
+// row-major. The pose maps points of the named tool to the tracker: p_tracker = R p_tool + t.
 #pragma once
 
 #include <string>
@@ -20,7 +20,7 @@ struct Pose {
     Rigid tracker_from_tool;
 };
 
-// Rows are kept as read, NaN and poor rotations included: what to make of them is the caller's.
+// Rows are kept as read, NaN and poor rotations included: the caller decides what to do with them.
 Result<std::vector<Pose>> parse_poses(std::string_view csv, const std::string& where);
 std::string format_poses(const std::vector<Pose>& poses);
 

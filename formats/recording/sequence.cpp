@@ -17,7 +17,7 @@ std::string frame_prefix(std::size_t index) {
     return std::string("Seq_Frame") + digits + "_";
 }
 
-// One line, and no key could be read into it.
+// On one line, so that no reader can find another key in it.
 std::string one_line(std::string_view value) {
     std::string out(value);
     for (char& c : out) {
@@ -71,7 +71,8 @@ std::optional<Rigid> rigid_from_matrix(const std::array<double, 16>& m) {
     }
     const bool last_row = m[12] == 0 && m[13] == 0 && m[14] == 0 && m[15] == 1;
     if (!last_row || !is_finite(t)) return {};
-    // 1e-3: six printed decimals and single-precision drivers stay well below, scales do not.
+    // 1e-3: errors of six printed decimals and of single-precision drivers stay well below, scales
+    // do not.
     if (!(orthonormality_error(t.rotation) < 1e-3) || !(determinant(t.rotation) > 0)) return {};
     return t;
 }

@@ -4,7 +4,7 @@
 // PLUS read and write them. docs/format.md, part 6.
 //
 // Numbers in the file are millimetres and seconds, matrices row by row. A transform named
-// "ProbeToTracker" maps points of the probe to the tracker: it is tracker_from_probe in our words.
+// "ProbeToTracker" maps points of the probe to the tracker: it is tracker_from_probe in our naming.
 #pragma once
 
 #include <array>
@@ -41,10 +41,10 @@ struct SequenceFrame {
 };
 
 struct Sequence {
-    std::vector<std::string> transforms;  // "ProbeToTracker", without the ending "Transform"
+    std::vector<std::string> transforms;  // "ProbeToTracker", without the suffix "Transform"
     std::vector<SequenceFrame> frames;
     std::vector<SequenceField> fields;  // of the whole sequence
-    // Image of a frame; recordings of poses alone have 1 x 1.
+    // Image of a frame; a recording without images has one of 1 x 1.
     int width = 1, height = 1, depth = 1, channels = 1;
     std::string element =
         "MET_UCHAR";  // MET_CHAR, _UCHAR, _SHORT, _USHORT, _INT, _UINT, _FLOAT, _DOUBLE
@@ -54,13 +54,13 @@ struct Sequence {
     int transform_index(std::string_view name) const;  // -1: none
 };
 
-// Rotation and translation where the matrix holds one (within 1e-3); nothing for scales, mirrors,
-// NaN.
+// Rotation and translation if the matrix is rigid (within 1e-3); empty for scales, mirrors and NaN.
 std::optional<Rigid> rigid_from_matrix(const std::array<double, 16>& to_from);
 std::array<double, 16> matrix_from_rigid(const Rigid& to_from);
 
-// Either form, told apart by the first bytes; zlib-compressed pixels are unpacked. Frames that the
-// header describes beyond its size are dropped: a recording cut off while it grew has them.
+// Reads either form, recognised by its first bytes; zlib-compressed pixels are unpacked. Frames
+// that the header describes beyond its stated size are dropped: a recording that was cut off while
+// it grew has some.
 Result<Sequence> read_sequence(std::span<const std::uint8_t> bytes, const std::string& where);
 
 enum class SequenceForm { mha, nrrd };
@@ -68,7 +68,7 @@ std::vector<std::uint8_t> write_sequence(const Sequence& sequence,
                                          SequenceForm form,
                                          bool compress = false);
 
-// The pieces of the MetaImage form, for a recorder that writes as it goes.
+// The parts of the MetaImage form, for a recorder that writes while it records.
 std::string sequence_head_text(const Sequence& sequence, std::string_view size_text);
 void append_sequence_frame_text(std::string& out,
                                 const std::vector<std::string>& transforms,

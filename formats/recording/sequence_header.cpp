@@ -53,14 +53,14 @@ Result<SequenceHeader> split_mha(LineReader lines, const std::string& where) {
         if (entry.key == "ElementDataFile") {
             if (entry.value != "LOCAL") {
                 return sequence_fault(where, "keeps its pixels in another file",
-                                      "ElementDataFile = LOCAL is expected", lines.number());
+                                      "expected ElementDataFile = LOCAL", lines.number());
             }
             header.data = lines.rest();
             return header;
         }
     }
     return sequence_fault(where, "ends inside its header",
-                          "the last header line is ElementDataFile = LOCAL");
+                          "expected ElementDataFile = LOCAL as the last header line");
 }
 
 Result<SequenceHeader> split_nrrd(LineReader lines, const std::string& where) {
@@ -84,7 +84,8 @@ Result<SequenceHeader> split_nrrd(LineReader lines, const std::string& where) {
         header.lines.push_back(
             {trimmed(line.substr(0, colon)), trimmed(line.substr(colon + 2)), lines.number()});
     }
-    return sequence_fault(where, "ends inside its header", "an empty line ends the header");
+    return sequence_fault(where, "ends inside its header",
+                          "expected an empty line after the header");
 }
 
 }  // namespace

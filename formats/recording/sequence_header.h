@@ -25,16 +25,16 @@ struct SequenceHeader {
     std::span<const std::uint8_t> data;  // after the header
 };
 
-// An error names the file, the line where one is at fault, what was found and what is expected.
+// An error names the file, the faulty line if it is one line, what was found and what is expected.
 // `line` 0: the file as a whole.
 Error sequence_fault(const std::string& where,
                      const std::string& what,
                      const std::string& expected = "",
                      int line = 0);
 
-// The form is told by the first bytes. An error where a line is neither a comment nor a key with a
-// value, where a key is longer than 512 bytes, where the header does not end, and where a MetaImage
-// keeps its pixels in another file.
+// The form is recognised by the first bytes. An error when a line is neither a comment nor a key
+// with a value, when a key is longer than 512 bytes, when the header does not end, and when a
+// MetaImage keeps its pixels in another file.
 Result<SequenceHeader> split_sequence_header(std::span<const std::uint8_t> bytes,
                                              const std::string& where);
 

@@ -18,8 +18,8 @@ struct PixelCoding {
     double compressed_bytes = -1;  // length of the stream; negative: to the end of the file
 };
 
-// Fills sequence.pixels for its frames, which have their shape and number, in little-endian order.
-// An error where the bytes are too few, or do not unpack to as many as the shape asks for.
+// Fills sequence.pixels, little-endian, for the number and shape of frames that `sequence` already
+// has. An error when the bytes are too few, or do not unpack to exactly that size.
 Status read_sequence_pixels(std::span<const std::uint8_t> data,
                             const PixelCoding& coding,
                             const std::string& where,

@@ -86,7 +86,7 @@ std::string element_from_nrrd(std::string_view type) {
     return std::string(type);
 }
 
-// Lines that say nothing that a Sequence keeps.
+// Lines whose content a Sequence does not keep.
 bool is_skipped(std::string_view key, bool nrrd) {
     static constexpr std::string_view kSkipped[] = {"ObjectType",
                                                     "NDims",
@@ -117,7 +117,8 @@ Status Reader::read_sizes(const HeaderLine& line) {
                          line.number);
         }
         sizes_.push_back(n);
-        if (sizes_.size() > 5) return fault("has too many dimensions", "3 or 4", line.number);
+        if (sizes_.size() > 5)
+            return fault("has too many dimensions", "expected 3 or 4", line.number);
     }
     return Done{};
 }
@@ -150,7 +151,7 @@ Status Reader::read_structure_line(const HeaderLine& line) {
     } else if (line.key == "ElementNumberOfChannels") {
         double n = 0;
         if (!parse_number(line.value, n) || !(n >= 1 && n <= 16)) {
-            return fault("has an impossible number of channels", "1 to 16", line.number);
+            return fault("has an impossible number of channels", "expected 1 to 16", line.number);
         }
         out_.channels = static_cast<int>(n);
     } else if (line.key == "CompressedData") {
@@ -195,19 +196,19 @@ Status Reader::read_structure() {
 Status Reader::check_shape() {
     if (header_.nrrd && channels_first_ && sizes_.size() > 3) {
         if (sizes_[0] < 1 || sizes_[0] > 16)
-            return fault("has an impossible number of channels", "1 to 16");
+            return fault("has an impossible number of channels", "expected 1 to 16");
         out_.channels = static_cast<int>(sizes_[0]);
         sizes_.erase(sizes_.begin());
     }
     if (sizes_.size() != 3 && sizes_.size() != 4) {
         return fault("has " + std::to_string(sizes_.size()) + " dimensions",
-                     "images and a list: 3, or 4 for volumes");
+                     "expected images and a list: 3, or 4 for volumes");
     }
-    if (!binary_) return fault("keeps its pixels as text", "binary data is expected");
+    if (!binary_) return fault("keeps its pixels as text", "expected binary data");
     const bool volume = sizes_.size() == 4;
     for (std::size_t i = 0; i + 1 < sizes_.size(); ++i) {
         if (sizes_[i] < 1 || sizes_[i] > 65536)
-            return fault("has an impossible image size", "1 to 65536");
+            return fault("has an impossible image size", "expected 1 to 65536");
     }
     out_.width = static_cast<int>(sizes_[0]);
     out_.height = static_cast<int>(sizes_[1]);
@@ -240,7 +241,7 @@ Status Reader::read_number(const HeaderLine& line, double& to) const {
     return Done{};
 }
 
-// A status before its matrix is remembered in the corner that a matrix fills with 1.
+// A bad status that comes before its matrix is kept in the last entry, which is 1 in every matrix.
 constexpr double kRefused = 2;
 
 Status Reader::read_transform_status(const HeaderLine& line, SequencePose& pose) {
@@ -323,7 +324,7 @@ Status Reader::read_frames() {
         if (underscore == std::string_view::npos ||
             !parse_number(line.key.substr(9, underscore - 9), index) || index < 0) {
             return fault("'" + std::string(line.key.substr(0, 40)) + "' does not name a frame",
-                         "Seq_Frame0000_Timestamp is expected", line.number);
+                         "expected Seq_Frame0000_Timestamp or the like", line.number);
         }
         if (static_cast<std::size_t>(index) >= frame_count) continue;  // cut off while it grew
         const auto i = static_cast<std::size_t>(index);

@@ -32,8 +32,8 @@ bool has_word(const std::string& text, std::initializer_list<const char*> words)
                        [&](const char* word) { return text.find(word) != std::string::npos; });
 }
 
-// "name|detail"; several events of one frame are joined by ";". Neither sign is left in their
-// texts.
+// "name|detail"; several events of one frame are joined by ";". Both characters are removed from
+// the texts.
 std::string without(std::string text, const char* signs) {
     for (char& c : text) {
         if (std::string(signs).find(c) != std::string::npos) c = ',';
@@ -124,7 +124,7 @@ Result<Session> session_from_sequence(const Sequence& sequence,
         std::string there;
         for (const std::string& t : sequence.transforms) there += (there.empty() ? "" : ", ") + t;
         return Error{"has no transform '" + name + "'", where,
-                     there.empty() ? "it has none at all" : "it has " + there};
+                     there.empty() ? "it has none" : "it has " + there};
     }
     const Rigid turn = z_along(names.needle_axis);
     for (const SequenceFrame& frame : sequence.frames) {

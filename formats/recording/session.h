@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A training session: what was held where and when, and what happened. On disk it is an IGSIO
-// sequence (docs/format.md, part 7), so that 3D Slicer and PLUS open it.
+// A training session: poses of probe and needle over time, console settings, and events. On disk it
+// is an IGSIO sequence (docs/format.md, part 7), which 3D Slicer and PLUS can open.
 //
 // Everything is in the `mannequin` frame. Times are seconds on the session's clock, first sample
 // first.
@@ -25,8 +25,8 @@ struct SessionHeader {
     std::string trainee;          // a chosen name; empty: nobody's
     std::string started;          // ISO 8601, UTC
     std::string program;          // "sonoplay 0.1.0"
-    // What replay needs beyond poses, as "key=value" words: model, effects, seed, size. The
-    // player's.
+    // What replay needs besides poses, as "key=value" words: model, effects, seed, size. Written by
+    // the player.
     std::string render;
 };
 
@@ -38,7 +38,7 @@ struct SessionSample {
     bool needle_ok = false;
     Rigid mannequin_from_needle;  // as measured: origin at the tip, z from hub to tip
     Rigid mannequin_from_drawn;   // as shown, after the bend constraint
-    // Console settings that changed at this frame, as "key=value" words; empty: as before.
+    // Console settings that changed at this frame, as "key=value" words; empty: unchanged.
     std::string settings;
 };
 
@@ -61,8 +61,8 @@ inline constexpr const char* kProbeTransform = "ProbeToMannequin";
 inline constexpr const char* kNeedleTransform = "NeedleToMannequin";
 inline constexpr const char* kDrawnTransform = "DrawnNeedleToMannequin";
 
-// Which transforms of a recording are the probe and the needle; other people's recordings name them
-// otherwise. Empty: none. `drawn` falls back to `needle`.
+// Which transforms of a recording are the probe and the needle; other programs name them
+// differently. Empty: none. `drawn` falls back to `needle`.
 struct SessionNames {
     std::string probe = kProbeTransform;
     std::string needle = kNeedleTransform;
@@ -71,11 +71,11 @@ struct SessionNames {
     Vector3 needle_axis{0, 0, 1};
 };
 
-// The names that a recording most likely means: ours if it has them, else the first transform whose
-// name has "Needle" or "Stylus" in it, and the first with "Probe" or "Image".
+// The most likely names in a recording: ours if it has them, else the first transform whose name
+// contains "Needle" or "Stylus", and the first with "Probe" or "Image".
 SessionNames guess_names(const Sequence& sequence);
 
-// Poses that hold no rotation count as not tracked. An Error where a named transform is not there.
+// Poses that are not rigid count as not tracked. An Error when a named transform is missing.
 Result<Session> session_from_sequence(const Sequence& sequence,
                                       const SessionNames& names,
                                       const std::string& where);
@@ -86,7 +86,7 @@ SequenceFrame frame_from_sample(const SessionSample& sample,
                                 const std::vector<SessionEvent>& events);
 std::vector<SequenceField> fields_from_header(const SessionHeader& header);
 
-// Value of a key in "key=value key=value"; empty if it is not there.
+// Value of a key in "key=value key=value"; empty if the key is missing.
 std::string detail_value(const std::string& detail, const std::string& key);
 
 }  // namespace sonocase

@@ -56,7 +56,7 @@ Result<Sequence> parse_transform_log(std::string_view xml, const std::string& wh
         double seconds = 0, nanoseconds = 0;
         if (!parse_number(attribute(element, "TimeStampSec"), seconds) ||
             !parse_number(attribute(element, "TimeStampNSec"), nanoseconds)) {
-            return Error{"has no time", here, "TimeStampSec and TimeStampNSec are expected"};
+            return Error{"has no time", here, "expected TimeStampSec and TimeStampNSec"};
         }
         if (attribute(element, "type") == "message") {
             if (!sequence.frames.empty()) {
@@ -67,14 +67,14 @@ Result<Sequence> parse_transform_log(std::string_view xml, const std::string& wh
         }
         SequencePose pose;
         if (!parse_matrix(attribute(element, "transform"), pose.to_from)) {
-            return Error{"has no matrix", here, "16 numbers are expected"};
+            return Error{"has no matrix", here, "expected 16 numbers"};
         }
         pose.ok = true;
         const std::string tool(attribute(element, "DeviceName"));
         int index = sequence.transform_index(tool);
         if (index < 0) {
             if (sequence.transforms.size() >= 64)
-                return Error{"has too many tools", here, "64 at most"};
+                return Error{"has too many tools", here, "expected at most 64"};
             index = static_cast<int>(sequence.transforms.size());
             sequence.transforms.push_back(tool);
         }
@@ -88,7 +88,7 @@ Result<Sequence> parse_transform_log(std::string_view xml, const std::string& wh
     }
     for (SequenceFrame& frame : sequence.frames) frame.poses.resize(sequence.transforms.size());
     if (sequence.frames.empty())
-        return Error{"holds no readings", where, "a transform log is expected"};
+        return Error{"holds no readings", where, "expected a transform log"};
     return sequence;
 }
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The fitted map from the patient (`ct` frame) to the mannequin, as one file carries it.
+// The fitted map from the patient (`ct` frame) to the mannequin, as stored in one file.
 //
 //     y = q(x) + d(x)
+//
 // q  quadratic, eq. (3), of centred and scaled coordinates u = (x - centre) / scale:
 //        q_r = sum_c coefficients[r][c] * b_c(u),  b = (1, u, v, w, uu, vv, ww, uv, uw, vw)
-//    It contains the rigid alignment, so that mannequin_from_ct is kept for the report only. d
-//    residual displacement, a uniform cubic B-spline over `ct`, added and not composed: the sum
-//    stays
-//    in one spline space, which is what makes the proof of det J > 0 exact. Absent: d = 0.
+//    It contains the rigid alignment; mannequin_from_ct is kept for the report only.
+// d  residual displacement, a uniform cubic B-spline over `ct`, added and not composed: the sum
+//    stays in one spline space, which makes the proof of det J > 0 exact. Absent: d = 0.
 #pragma once
 
 #include <array>

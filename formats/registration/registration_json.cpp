@@ -24,13 +24,14 @@ DisplacementGrid residual_from(JsonObject object) {
         const double n = size[static_cast<std::size_t>(a)];
         // Fewer than four control points hold no cell.
         if (n != std::floor(n) || n < 4 || n > 4096) {
-            object.complain("size", "is out of range", "whole numbers from 4 to 4096");
+            object.complain("size", "is out of range", "expected whole numbers from 4 to 4096");
             return grid;
         }
         grid.size[a] = static_cast<std::int32_t>(n);
         count *= n;
     }
-    if (count > kMaxControls) object.complain("size", "is too large", "at most 1e7 control points");
+    if (count > kMaxControls)
+        object.complain("size", "is too large", "expected at most 1e7 control points");
     grid.origin_mm = object.point("origin_mm");
     grid.spacing_mm = object.number("spacing_mm");
     if (!(grid.spacing_mm > 0)) object.complain("spacing_mm", "is not above zero");
@@ -116,7 +117,8 @@ Result<Registration> parse_registration(std::string_view json, const std::string
             }
         }
         if (!good)
-            quadratic.complain("coefficients_mm", "has the wrong shape", "3 lists of 10 numbers");
+            quadratic.complain("coefficients_mm", "has the wrong shape",
+                               "expected 3 lists of 10 numbers");
     }
     if (object.has("residual")) registration.residual = residual_from(object.object("residual"));
     if (object.has("ct_box")) {

@@ -21,8 +21,8 @@ Point3 CaseAnatomy::at_rest(Point3 p, double time_s) const {
 
 Point3 CaseAnatomy::moved(Point3 rest, double time_s) const {
     if (field_.empty()) return rest;
-    // p = rest + weight(p) shift, by repeated insertion: the weight rises over some centimetres and
-    // the shift is less, so that each step comes nearer.
+    // p = rest + weight(p) shift, by fixed-point iteration: the weight rises over several
+    // centimetres and the shift is smaller, so it converges.
     const Vector3 shift = motion_at(breathing_, {}, time_s).breathing_mm;
     constexpr double kEnoughMm = 1e-9;
     constexpr int kMost = 64;
@@ -82,8 +82,8 @@ double CaseAnatomy::exit_distance(Point3 from, Vector3 direction, double reach) 
 
 namespace {
 
-// Parameter t >= 0 at which from + t direction meets the triangle; negative: not at all. slack, in
-// parts of an edge, widens the triangle.
+// Parameter t >= 0 at which from + t direction meets the triangle; negative: it misses. `slack`, as
+// a fraction of an edge, widens the triangle.
 // Moeller and Trumbore, Journal of Graphics Tools 2:21 (1997).
 double ray_triangle(
     Point3 from, Vector3 direction, Point3 a, Point3 b, Point3 c, double slack = 0) {
@@ -110,7 +110,7 @@ MeshAnatomy::MeshAnatomy(Surface mesh) : mesh_(std::move(mesh)) {
     }
     const Vector3 extent = box_.extent();
     const double area = std::max(extent.x * extent.y, 1e-12);
-    // About four triangles a column.
+    // About four triangles per column.
     column_mm_ = std::max(std::sqrt(4 * area / static_cast<double>(mesh_.triangles.size())),
                           1e-3 * std::max({extent.x, extent.y, 1e-9}));
     columns_x_ = static_cast<int>(extent.x / column_mm_) + 1;
@@ -123,7 +123,7 @@ MeshAnatomy::MeshAnatomy(Surface mesh) : mesh_(std::move(mesh)) {
         const auto cell = [&](double value, double low, int count) {
             return std::clamp(static_cast<int>((value - low) / column_mm_), 0, count - 1);
         };
-        // A hair wider, for the nudge of inside().
+        // Slightly wider, for the offset in inside().
         const double hair = 1e-6 * column_mm_;
         for (int y = cell(box.lower.y - hair, box_.lower.y, columns_y_);
              y <= cell(box.upper.y + hair, box_.lower.y, columns_y_); ++y) {
@@ -147,8 +147,8 @@ const std::vector<std::uint32_t>& MeshAnatomy::column(double x, double y) const 
 
 bool MeshAnatomy::inside(Point3 p) const {
     if (!box_.contains(p)) return false;
-    // Edges and vertices of meshes lie on round coordinates; a line beside them counts each
-    // crossing once.
+    // Edges and vertices of meshes often have round coordinates; a line slightly beside them counts
+    // each crossing once.
     const Point3 q{p.x + 2.3e-7 * column_mm_, p.y + 3.1e-7 * column_mm_, p.z};
     bool odd = false;
     for (const std::uint32_t t : column(q.x, q.y)) {
@@ -175,7 +175,7 @@ double MeshAnatomy::exit_distance(Point3 from, Vector3 direction, double reach) 
             on_surface = true;
         }
     }
-    // From a point of the surface the way out is either none or right through.
+    // From a point on the surface the exit is either at once or on the far side.
     if (on_surface && !inside(from + 2 * kOnSurfaceMm * direction)) return 0;
     return nearest;
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What a point of the body is, for scores and events: inside or out, and which structure; and where
-// breathing moves the structures. Skin, and so the inserted length, stay where they are at rest:
-// the mannequin that the needle goes into does not breathe.
+// Anatomy for scores and events: whether a point is inside the body, in which structure, and where
+// breathing moves it. Skin, and therefore the inserted length, stays at rest, because the mannequin
+// does not breathe.
 #pragma once
 
 #include <array>
@@ -23,8 +23,7 @@ class Anatomy {
   public:
     virtual ~Anatomy() = default;
     virtual bool inside(Point3 p) const = 0;
-    // Palette index at a point; 0 outside. Where structures are not known, 1 for all that is
-    // inside.
+    // Palette index at a point; 0 outside. If structures are unknown, 1 everywhere inside.
     virtual int label(Point3 p) const { return inside(p) ? 1 : 0; }
     // Distance from `from` (inside) along the unit vector `direction` to where the body ends;
     // `reach` if it does not end before. Runs of outside shorter than `gap_mm` do not end it.
@@ -36,12 +35,12 @@ class Anatomy {
     virtual double greatest_shift_mm() const { return 0; }
 };
 
-// The cooked labels: a voxel's own label, or the second one beyond its boundary plane, which is the
-// rule that the picture follows. The bundle must outlive it. inside() and label() are constant time
+// The cooked labels: a voxel's own label, or the second one beyond its boundary plane; the renderer
+// uses the same rule. The bundle must outlive this object. inside() and label() are constant time
 // and allocate nothing; exit_distance() costs reach / (half a voxel) of them.
 class CaseAnatomy final : public Anatomy {
   public:
-    // breathing: as the picture shows it; by default none. Its field costs a look-up a brick.
+    // breathing: as the picture shows it; none by default. Its field costs one look-up per brick.
     explicit CaseAnatomy(CaseView bundle, const BreathingMotion& breathing = {});
     bool inside(Point3 p) const override { return label(p) != 0; }
     int label(Point3 p) const override;
@@ -56,8 +55,8 @@ class CaseAnatomy final : public Anatomy {
     BreathingField field_;  // empty: at rest
 };
 
-// A closed triangle mesh, as trainers built on mesh anatomy use. Parity of crossings along +z,
-// nudged so that no vertex or edge is hit; inside() costs the triangles of one column of a grid.
+// A closed triangle mesh, as in trainers with mesh anatomy. Parity of crossings along +z, offset
+// slightly so that no vertex or edge is hit; inside() tests the triangles of one grid column.
 class MeshAnatomy final : public Anatomy {
   public:
     explicit MeshAnatomy(Surface mesh);

@@ -10,7 +10,7 @@ namespace sonocase {
 BreathingMotion breathing_shown(const Exercise& exercise,
                                 bool physical_model,
                                 const std::vector<std::string>& effects) {
-    // A list that only takes away starts from everything, any other from nothing.
+    // A list of removals only starts from all effects, any other list from none.
     bool on = std::all_of(effects.begin(), effects.end(),
                           [](const std::string& e) { return !e.empty() && e[0] == '-'; });
     for (const std::string& e : effects) on = on || e == "auto" || e == "all";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The part of the scan plane that a probe shows, and what a straight needle has in it.
+// The part of the scan plane that a probe shows, and how much of a straight needle lies in it.
 #pragma once
 
 #include "formats/base/geometry.h"
@@ -8,9 +8,12 @@
 
 namespace sonocase {
 
-// Scan plane: x lateral, z depth, mm, origin at the middle of the probe face (the `probe` frame's
-// x, z). linear       |x| <= width / 2, 0 <= z <= depth curvilinear  polar about (0, -radius):
-// radius <= r <= radius + depth, |angle| <= field of view / 2 phased       the same with radius 0
+// Scan plane: x lateral, z depth, mm, origin at the middle of the probe face (x and z of the
+// `probe` frame).
+//     linear       |x| <= width / 2, 0 <= z <= depth
+//     curvilinear  polar about (0, -radius): radius <= r <= radius + depth, |angle| <= field of
+//                  view / 2
+//     phased       the same with radius 0
 bool in_image(const Probe& probe, double x, double z);
 
 // Distance from (x, z) to that region; 0 inside.
@@ -18,7 +21,7 @@ double distance_to_image(const Probe& probe, double x, double z);
 
 // Length of the segment a-b (`probe` frame) that lies in the image: within half_slab_mm of the scan
 // plane and inside the region; the hollow between a curved face and its chord counts as inside.
-// Exact: planes and a circle cut the segment to one interval.
+// Exact: clipping by planes and a circle leaves one interval of the segment.
 double length_in_image(const Probe& probe, Point3 a, Point3 b, double half_slab_mm);
 
 }  // namespace sonocase

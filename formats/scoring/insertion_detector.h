@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// When the needle goes through the skin and when it comes out, steady against jitter.
+// When the needle passes through the skin and when it comes out, insensitive to jitter.
 //
 // Fed with the inserted length of each reading. An insertion begins when the length passes
 // enter_mm; it is dated back to the moment at which the tip went under the skin, and the direction
 // held there is the direction of entry (d_e of eq. (16)). It ends when the tip has been out for
 // exit_s, or is out by more than exit_mm at once; the end is dated back likewise. A tip that
-// trembles on the skin by less than enter_mm starts nothing; a needle drawn back to the skin and
-// pushed on within exit_s is one insertion. Constant time, no allocation; for the frame loop.
+// trembles at the skin by less than enter_mm does not start an insertion; a needle drawn back to
+// the skin and pushed on within exit_s is one insertion. Constant time, no allocation; for the
+// frame loop.
 #pragma once
 
 #include "formats/base/geometry.h"
@@ -26,9 +27,9 @@ class InsertionDetector {
   public:
     explicit InsertionDetector(const InsertionOptions& options = {}) : options_(options) {}
 
-    // depth_mm: inserted length, > 0 inside; outside any value <= 0, its size being how far out the
-    // tip is known to be (0: not known). direction: unit, hub to tip. A needle that is not tracked
-    // is not fed.
+    // depth_mm: inserted length, > 0 inside; outside any value <= 0, whose magnitude is the known
+    // distance to the skin (0: unknown). direction: unit, hub to tip. Leave out readings of an
+    // untracked needle.
     InsertionChange update(double time_s, double depth_mm, Vector3 direction, Point3 skin);
 
     bool inserted() const { return inserted_; }

@@ -14,7 +14,7 @@ struct NeedleReading {
     // The tip, and the points ScoreOptions::puncture_mm before and behind it.
     bool inside = false, ahead = false, behind = false;
     bool touches = false;  // the tip is inside or nearer to the skin than contact_mm
-    bool no_go = false;    // any point of the inserted shaft lies in a structure to be spared
+    bool no_go = false;    // any point of the inserted shaft is in a structure to be spared
     double depth_mm = 0;   // > 0 inside
     Point3 skin;           // where the shaft passes it
     bool seen = false;     // the probe is tracked in the same sample
@@ -23,8 +23,8 @@ struct NeedleReading {
     double in_beam_mm = 0;
 };
 
-// # needle.points. anatomy may be null: then nothing is inside. Readings do not depend on each
-// other and are shared out among options.jobs.
+// # needle.points. anatomy may be null: then nothing is inside. Readings are independent and are
+// distributed by options.jobs.
 std::vector<NeedleReading> look_up_readings(const Session& session,
                                             const ToolTrack& needle,
                                             const Exercise& exercise,

@@ -16,7 +16,7 @@ constexpr const char* kNames[] = {
     "no_go_left",   "probe_contact", "probe_lifted", "needle_lost",    "needle_found",
     "probe_lost",   "probe_found",   "deepest",      "key_frame",      "session_end"};
 
-// Words are parted by blanks, so that a name keeps none.
+// Words are separated by blanks, so names must not contain any.
 std::string word(std::string text) {
     for (char& c : text) {
         if (c == ' ' || c == '=') c = '_';

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What happens in a session as it happens: entries, hits, contacts. For the frame loop of the
-// player; allocates nothing after construction.
+// Events of a session while it runs: entries, hits, contacts. For the frame loop of the player;
+// allocates nothing after construction.
 #pragma once
 
 #include <cstdint>
@@ -24,14 +24,14 @@ enum class LiveEventKind : std::uint8_t {
     target_scanned,  // index: target
     no_go_contact,   // index: label
     no_go_left,      // index: label
-    probe_contact,   // the probe comes onto the skin
+    probe_contact,   // the probe touches the skin
     probe_lifted,
     needle_lost,  // tracking
     needle_found,
     probe_lost,
     probe_found,
     deepest,    // index: insertion; given with needle_exit, at the time of the deepest point
-    key_frame,  // the player kept a picture
+    key_frame,  // the player stored a picture
     session_end,
 };
 
@@ -39,11 +39,11 @@ struct LiveEvent {
     LiveEventKind kind = LiveEventKind::needle_entry;
     int index = -1;
     double value = 0;
-    double time_s = 0;  // may lie before the frame that tells it: entries are dated back
+    double time_s = 0;  // may be before the frame that reports it: entries are dated back
     std::int64_t frame = 0;
 };
 
-// Name and detail as a recording holds them: "target_hit", "target=2 name=lesion distance_mm=1.5".
+// Name and detail as in a recording: "target_hit", "target=2 name=lesion distance_mm=1.5".
 SessionEvent session_event(const LiveEvent& event,
                            const Exercise& exercise,
                            const std::vector<Label>& labels);
@@ -99,7 +99,7 @@ class SessionMonitor {
     double depth_mm_ = 0, to_target_mm_ = 0, time_in_tissue_s_ = 0, deepest_s_ = 0, deepest_mm_ = 0;
 };
 
-// True where any of five points across the face, pressed 2 mm in, lies in the body.
+// True if any of five points across the face, pressed 2 mm in, is in the body.
 bool probe_on_skin(const Anatomy& anatomy, const Probe& probe, const Rigid& mannequin_from_probe);
 
 }  // namespace sonocase

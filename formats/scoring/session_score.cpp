@@ -30,11 +30,12 @@ void score_times(const ScoreInput& input,
     if (!input.needle.points.empty()) values["tracking_gap_s"] = input.needle.longest_gap_s;
     const std::size_t back = input.probe.run_back + input.needle.run_back;
     if (back > 0) {
-        warnings.push_back(
-            std::to_string(back) +
-            " readings whose time ran back or whose pose was not finite were left out.");
+        warnings.push_back(std::to_string(back) +
+                           " readings were left out, because their time ran backwards or their "
+                           "pose was not finite.");
     }
-    if (!input.anatomy) warnings.push_back("No body was given: what needs one was not measured.");
+    if (!input.anatomy)
+        warnings.push_back("No body was given, so scores that need one are undefined.");
 }
 
 SessionCurves curves_of(const ScoreInput& input) {
@@ -46,7 +47,7 @@ SessionCurves curves_of(const ScoreInput& input) {
         c.plane_distance_mm.push_back(r.plane_mm);
         c.in_beam_fraction.push_back(r.seen && r.depth_mm > 0 ? r.in_beam_mm / r.depth_mm : kNan);
         double nearest = kNan;
-        // Beyond a few targets the curve of the nearest says little and costs much.
+        // With many targets the curve of the nearest one says little and is expensive.
         if (input.exercise.targets.size() <= 64) {
             for (std::size_t t = 0; t < input.exercise.targets.size(); ++t) {
                 const double d = distance(input.target_at(t, input.time(i)), input.tip(i));

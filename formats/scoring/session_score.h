@@ -22,7 +22,7 @@ struct ScoreOptions {
     double target_slab_mm = 5;  // a target is scanned when its centre is within this of the plane
     double puncture_mm = 5;     // half length of the tip zone
     double contact_mm = 1;      // the tip touches the skin when it is nearer than this
-    double contact_pause_s = 0.25;  // shorter breaks do not part two contacts
+    double contact_pause_s = 0.25;  // shorter breaks do not separate two contacts
     double shaft_step_mm = 1;       // spacing of the points of the shaft that are looked up
     JobRunner* jobs = nullptr;      // null: serial_jobs(); the scores do not depend on it
 };
@@ -56,7 +56,7 @@ struct PassResult {
     bool passed = false;
 };
 
-// Curves over the session, one value a sample, for plots; NaN where not defined.
+// Curves over the session, one value per sample, for plots; NaN where undefined.
 struct SessionCurves {
     std::vector<double> time_s, depth_mm, plane_distance_mm, in_beam_fraction, tip_to_target_mm;
 };
@@ -72,7 +72,7 @@ struct SessionScore {
     double value(std::string_view name) const;  // NaN if absent
 };
 
-// anatomy may be null: what needs a body is then not defined. labels: palette of the anatomy's
+// anatomy may be null: scores that need a body are then undefined. labels: palette of the anatomy's
 // labels, for the exercise's no-go names; may be empty.
 SessionScore score_session(const Session& session,
                            const Exercise& exercise,
@@ -80,9 +80,9 @@ SessionScore score_session(const Session& session,
                            const std::vector<Label>& labels,
                            const ScoreOptions& options = {});
 
-// The breathing of a picture of that exercise: none in model paper, nor where the list of effects
-// leaves it out (docs/effects.md). Scores of a session take that of the words it was recorded with;
-// recordings of other trainers show none.
+// The breathing that pictures of the exercise show: none in model paper, nor when the list of
+// effects leaves it out (docs/effects.md). The second form takes model and effects from the
+// session's header; recordings of other trainers have none.
 BreathingMotion breathing_shown(const Exercise& exercise,
                                 bool physical_model,
                                 const std::vector<std::string>& effects);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Many targets, few of them near: a tree of boxes whose branches are skipped as a whole.
+// A tree of boxes over targets: when few of many are near, whole branches are skipped.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +16,8 @@ class TargetTree {
     // The targets must outlive the tree.
     explicit TargetTree(std::span<const Target> targets);
 
-    // keep(centre, radius) tells whether a ball can hold something of interest; visit(index) gets
-    // the targets of all balls that may. A visited target is offered again until visit returns
-    // true.
+    // keep(centre, radius) returns whether a ball may contain a match; visit(index) is called for
+    // each target in such balls. A target is offered in later searches until visit returns true.
     template <class Keep, class Visit>
     void search(Keep keep, Visit visit) {
         if (!nodes_.empty()) search(0, keep, visit);

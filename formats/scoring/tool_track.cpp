@@ -71,7 +71,7 @@ std::vector<Knot> knots_of(std::span<const TrackPoint> points) {
 }
 
 // Value at the knot of the quadratic in time fitted to its neighbours, by normal equations in s =
-// dt / filter: at most 3 x 3 and well scaled. Fewer than four neighbours leave the knot as it is.
+// dt / filter: 3 x 3 and well scaled. With fewer than four neighbours the knot is unchanged.
 Point3 smoothed(const std::vector<Knot>& knots, std::size_t at, double filter_s) {
     const double reach_s = 3 * filter_s;
     std::size_t first = at, last = at;
@@ -98,8 +98,8 @@ Point3 smoothed(const std::vector<Knot>& knots, std::size_t at, double filter_s)
     return knots[at].p + (c0 * b[0] + c1 * b[1] + c2 * b[2]) / det;
 }
 
-// Length of the natural cubic spline through the knots; Simpson's rule on speed, eight parts a
-// piece.
+// Length of the natural cubic spline through the knots; Simpson's rule on speed, eight intervals
+// per piece.
 double spline_length(const std::vector<double>& t, const std::vector<Point3>& p) {
     const std::size_t n = p.size();
     if (n < 2) return 0;
@@ -190,7 +190,7 @@ MotionMetrics motion_metrics(std::span<const TrackPoint> points, const MotionOpt
         m.path_length_mm += distance(p, position(points[i - 1]));
         m.rotation_total_deg += turn_deg(points[i - 1], points[i]);
         box.include(p);
-        // Rates have no meaning between readings of one time: the later is left out of them.
+        // A rate between two readings at the same time is undefined: the later one is left out.
         const double dt = points[i].time_s - points[rated].time_s;
         if (!(dt > 0)) continue;
         const Vector3 v = (p - position(points[rated])) / dt;

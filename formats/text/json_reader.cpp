@@ -47,7 +47,7 @@ std::string parse_error_of(std::string_view text) {
 JsonObject::JsonObject(const Json& value, std::string path, JsonFault& fault)
     : value_(&value), path_(std::move(path)), fault_(&fault) {
     if (!value.is_object()) {
-        if (!fault.error) fault.error = Error{path_ + " is no object", fault.where, ""};
+        if (!fault.error) fault.error = Error{path_ + " is not an object", fault.where, ""};
         value_ = &nothing();
     }
 }
@@ -82,7 +82,7 @@ std::string JsonObject::text(const char* key) {
     const Json* found = member(key);
     if (!found) return {};
     if (!found->is_string()) {
-        complain(key, "is no text");
+        complain(key, "is not text");
         return {};
     }
     return found->get<std::string>();
@@ -106,7 +106,7 @@ double JsonObject::number(const char* key) {
     const Json* found = member(key);
     if (!found) return 0;
     if (!found->is_number() || !std::isfinite(found->get<double>())) {
-        complain(key, "is no number");
+        complain(key, "is not a number");
         return 0;
     }
     return found->get<double>();
@@ -120,9 +120,9 @@ std::int64_t JsonObject::integer(const char* key, std::int64_t low, std::int64_t
     const double value = number(key);
     if (value != std::floor(value) || value < static_cast<double>(low) ||
         value > static_cast<double>(high)) {
-        complain(key, "is out of range",
-                 "a whole number from " + std::to_string(low) + " to " + std::to_string(high) +
-                     " is expected");
+        complain(
+            key, "is out of range",
+            "expected a whole number from " + std::to_string(low) + " to " + std::to_string(high));
         return low;
     }
     return static_cast<std::int64_t>(value);
@@ -140,12 +140,12 @@ std::vector<double> JsonObject::numbers(const char* key, std::size_t count) {
     std::vector<double> values;
     if (found && (!found->is_array() || (count != 0 && found->size() != count))) {
         complain(key, "has the wrong shape",
-                 "a list of " + std::to_string(count) + " numbers is expected");
+                 "expected a list of " + std::to_string(count) + " numbers");
     } else if (found) {
         values.reserve(found->size());
         for (const Json& item : *found) {
             if (!item.is_number() || !std::isfinite(item.get<double>())) {
-                complain(key, "holds something that is no number");
+                complain(key, "holds something that is not a number");
                 break;
             }
             values.push_back(item.get<double>());
@@ -159,11 +159,11 @@ std::vector<std::string> JsonObject::texts_or_none(const char* key) {
     std::vector<std::string> out;
     if (!has(key)) return out;
     const Json* found = member(key);
-    if (!found->is_array()) complain(key, "is no list");
+    if (!found->is_array()) complain(key, "is not a list");
     if (!ok()) return out;
     for (const Json& item : *found) {
         if (!item.is_string()) {
-            complain(key, "holds something that is no text");
+            complain(key, "holds something that is not text");
             return out;
         }
         out.push_back(item.get<std::string>());
@@ -190,7 +190,7 @@ JsonObject JsonObject::object(const char* key) {
 std::vector<JsonObject> JsonObject::objects(const char* key) {
     std::vector<JsonObject> out;
     const Json* found = member(key);
-    if (found && !found->is_array()) complain(key, "is no list");
+    if (found && !found->is_array()) complain(key, "is not a list");
     if (!found || !ok()) return out;
     const std::string base = (path_.empty() ? "" : path_ + ".") + key;
     for (std::size_t i = 0; i < found->size(); ++i) {
@@ -210,7 +210,7 @@ bool parse_json(std::string_view text, Json& out, JsonFault& fault) {
         return false;
     }
     if (!out.is_object()) {
-        fault.error = Error{"is no JSON object", fault.where, ""};
+        fault.error = Error{"is not a JSON object", fault.where, ""};
         return false;
     }
     return true;
@@ -243,10 +243,10 @@ Rigid rigid_from(JsonObject object) {
     const std::vector<double> m = object.numbers("rotation", 9);
     std::copy(m.begin(), m.end(), t.rotation.m.begin());
     t.translation = object.vector("translation");
-    // 1e-3: what six printed decimals of nine entries leave, with room.
+    // 1e-3: the rounding of nine entries printed with six decimals, with a margin.
     if (object.ok() && (orthonormality_error(t.rotation) > 1e-3 || determinant(t.rotation) < 0)) {
-        object.complain("rotation", "is no rotation",
-                        "nine numbers, row by row, of a right-handed rotation");
+        object.complain("rotation", "is not a rotation",
+                        "expected nine numbers, row by row, of a right-handed rotation");
     }
     return t;
 }

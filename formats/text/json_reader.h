@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Checked reading of JSON objects. For the .cpp files of formats/ only: it shows a third party's
-// type.
+// Checked reading of JSON objects. Include it in .cpp files only, because it exposes a third
+// party's type.
 //
 // The first fault is kept, with the path of keys that leads to it ("labels[3].name"), and
 // everything read after it is a default: a parser reads straight through and looks at the fault
@@ -50,7 +50,7 @@ class JsonObject {
                             std::int64_t otherwise,
                             std::int64_t low,
                             std::int64_t high);
-    // count 0: any.
+    // `count` 0: any number of them.
     std::vector<double> numbers(const char* key, std::size_t count);
     std::vector<std::string> texts_or_none(const char* key);
     Vector3 vector(const char* key);
@@ -68,11 +68,11 @@ class JsonObject {
     JsonFault* fault_;
 };
 
-// Parses text into `out`; false and a fault when it is no JSON object.
+// Parses text into `out`; false, with a fault, when it is not a JSON object.
 bool parse_json(std::string_view text, Json& out, JsonFault& fault);
-// Two-space indented, or on one line; bytes that are no UTF-8 are replaced.
+// Two-space indented, or on one line; bytes that are not UTF-8 are replaced.
 std::string json_text(const Json& value, bool indented);
-Json json_number(double value);  // null where not finite: JSON has no other word for it
+Json json_number(double value);  // null where not finite: JSON has no NaN or infinity
 
 Json json_of(Vector3 v);
 Json json_of(Point3 p);

@@ -14,7 +14,7 @@
 namespace sonocase {
 namespace {
 
-// Made once and kept: strtod follows the process locale, where 1.5 may be written 1,5.
+// Created once and kept: strtod follows the process locale, where 1.5 may be written 1,5.
 locale_t plain_locale() {
     static const locale_t plain = newlocale(LC_ALL_MASK, "C", nullptr);
     return plain;
@@ -51,7 +51,7 @@ bool parse_number(std::string_view text, double& value) {
         if (c == 'x' || c == 'X' || c == '(' || c == '\0') return false;  // hexadecimal, nan(...)
     }
 #ifdef __cpp_lib_to_chars
-    // The same number as strtod's, in a quarter of the time; what it does not take is left to that.
+    // The same number as strtod's, in a quarter of the time; strtod reads what this cannot.
     double number = 0;
     const auto [rest, fault] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (fault == std::errc() && rest == text.data() + text.size()) {

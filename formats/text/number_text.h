@@ -10,7 +10,7 @@
 namespace sonocase {
 
 // The whole of `text` must be the number; blanks at either end are allowed. "nan", "inf" and "-inf"
-// are numbers here: what to make of them is the caller's.
+// are accepted: the caller decides whether they are allowed.
 bool parse_number(std::string_view text, double& value);
 bool parse_number(std::string_view text, std::int64_t& value);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Stage reports as JSON: a list of them stands in manifests and registrations, one in --report.
+// Stage reports as JSON: manifests and registrations hold a list of them, a --report file holds
+// one.
 #pragma once
 
 #include <string>

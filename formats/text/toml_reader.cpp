@@ -187,7 +187,8 @@ bool TomlTable::triple(std::string_view key, V& to) const {
         if (good) read[axis] = *value;
     }
     if (!good) {
-        complain(key, "is not a list of 3 numbers", "as in [10, 20.5, 30], each at most 1e5");
+        complain(key, "is not a list of 3 numbers",
+                 "expected numbers up to 1e5, as in [10, 20.5, 30]");
         return false;
     }
     to = read;
@@ -206,7 +207,7 @@ bool TomlTable::direction(std::string_view key, Vector3& to) const {
     Vector3 v;
     if (!triple(key, v)) return false;
     if (!(norm(v) > 1e-9)) {
-        complain(key, "is a direction of length zero", "");
+        complain(key, "is a direction of length zero", "expected a direction, as in [0, 0, 1]");
         return false;
     }
     to = normalized(v);
@@ -248,7 +249,7 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key) const {
     }
     for (const toml::node& item : *list) {
         if (!item.is_table()) {
-            complain(key, "holds " + plain_text_of(item), "expected tables alone");
+            complain(key, "holds " + plain_text_of(item), "expected only tables");
             return out;
         }
         const std::string index = "[" + std::to_string(out.size()) + "].";

@@ -5,8 +5,8 @@
 //
 // bake_structure.h draws no detail below a millimetre that would remain visible under speckle, and
 // smaller voxels can therefore share a value: with an eighth of the values, in an eighth of the
-// time. A cell takes the label at its centre; at a surface, the offset of one side may extend half a
-// cell into the other.
+// time. A cell takes the label at its centre; at a surface, the offset of one side may extend half
+// a cell into the other.
 #pragma once
 
 #include "pipeline/anatomy/bake_structure.h"

@@ -55,7 +55,8 @@ float curvature(const float* p, const Stencil& s, float h) {
     const float dyz =
         0.25f * (*(p + s.yp + s.zp) - *(p - s.ym + s.zp) - *(p + s.yp - s.zm) + *(p - s.ym - s.zm));
     const float g2 = dx * dx + dy * dy + dz * dz;
-    // On a medial axis the gradient is zero and the quotient is 0 / 0; nothing needs smoothing there.
+    // On a medial axis the gradient is zero and the quotient is 0 / 0; nothing needs smoothing
+    // there.
     if (g2 < 1e-4f * h * h) return 0;
     const float top = dxx * (dy * dy + dz * dz) + dyy * (dx * dx + dz * dz) +
                       dzz * (dx * dx + dy * dy) -

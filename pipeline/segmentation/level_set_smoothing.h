@@ -11,8 +11,8 @@
 //
 // Source: [Magee] eq. (10). Departures: the printed equation lacks `phi_t +` and prints the time
 // step as a gradient; layers are recomposed by the argmin of phi, because independent thresholds at
-// 0 leave gaps and overlaps. Known damage: at convergence a tube of radius R survives only if
-// R >= 2 / sqrt(K0), and a sphere only if R >= sqrt(8 / K0). smooth_labels.h preserves both; this is
+// 0 leave gaps and overlaps. Known damage: at convergence a tube of radius R survives only if R >=
+// 2 / sqrt(K0), and a sphere only if R >= sqrt(8 / K0). smooth_labels.h preserves both; this is
 // kept for comparison.
 //
 // Cost: 10 to 30 ns per voxel of the band, label and iteration; memory: 3 floats per voxel of the
@@ -37,8 +37,8 @@ struct LevelSetOptions {
     double band_vx = 4;         // half-width of the band that moves, voxels, >= 3
 };
 
-// Largest stable time step, mm^2. Above it the iteration oscillates, and its result is wrong without
-// any NaN.
+// Largest stable time step, mm^2. Above it the iteration oscillates, and its result is wrong
+// without any NaN.
 double greatest_stable_step(double k0, double voxel_mm);
 
 struct LevelSetResult {
@@ -48,8 +48,8 @@ struct LevelSetResult {
     StageReport report;
 };
 
-// Error: voxels that are not cubic (spacings equal to within 1e-6), as the paper requires, or a time
-// step above the limit. Same bytes for any number of threads.
+// Error: voxels that are not cubic (spacings equal to within 1e-6), as the paper requires, or a
+// time step above the limit. Same bytes for any number of threads.
 Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
                                            const LevelSetOptions& options = {},
                                            const Progress& progress = {});

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Moves the surfaces inside bricks onto quadrics (formats/volume/surface_patch.h) wherever a quadric
-// fits to within a few hundredths of a voxel: a bundle can then store a few coefficients instead of
-// 64 labels and records. Voxels that no quadric fits (edges, thin structures, noise) are unchanged.
+// Moves the surfaces inside bricks onto quadrics (formats/volume/surface_patch.h) wherever a
+// quadric fits to within a few hundredths of a voxel: a bundle can then store a few coefficients
+// instead of 64 labels and records. Voxels that no quadric fits (edges, thin structures, noise) are
+// unchanged.
 #pragma once
 
 #include <cstddef>
@@ -32,8 +33,8 @@ struct SnapReport {
     double normal_rms_deg = 0;
 };
 
-// In place; sets boundary->patches. boundary: of the volume's size, as from sample_label_field. Same
-// bytes for any number of threads. Cost: 5 us per brick with records.
+// In place; sets boundary->patches. boundary: of the volume's size, as from sample_label_field.
+// Same bytes for any number of threads. Cost: 5 us per brick with records.
 SnapReport snap_surfaces(LabelVolume* volume,
                          BoundaryBricks* boundary,
                          const SnapOptions& options = {});

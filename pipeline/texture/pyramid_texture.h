@@ -6,16 +6,17 @@
 //
 // Bands of the example: G_0 = image, G_{l+1} = lowpass_l(G_l), band l = G_l - G_{l+1}, and the
 // coarsest band is G_{L-1}. Each band has a marginal histogram of 256 bins, and each but the
-// coarsest a joint histogram of 256 x 256 bins with the coarser band at the same place. The bands of
-// the volume are drawn from coarse to fine, voxel by voxel, each given its parent at the same place,
-// and added.
+// coarsest a joint histogram of 256 x 256 bins with the coarser band at the same place. The bands
+// of the volume are drawn from coarse to fine, voxel by voxel, each given its parent at the same
+// place, and added.
 //
 // What the paper leaves open, and what is done here:
 //  - Joint or conditional: the joint histogram is divided by the parent's marginal. Without that,
 //    both terms follow the same marginal, and the parent has little effect.
-//  - Decimation: the paper's words ("iteratively applying a low pass filter and subtracting") do not
-//    mention any, and without it the correlation widths come nearest to those of the example. The
-//    filters are 1 4 6 4 1 with gaps of 2^l. `decimate` gives the other reading, for comparison.
+//  - Decimation: the paper's words ("iteratively applying a low pass filter and subtracting") do
+//    not mention any, and without it the correlation widths come nearest to those of the example.
+//    The filters are 1 4 6 4 1 with gaps of 2^l. `decimate` gives the other reading, for
+//    comparison.
 //  - Range of the signed bands: from the smallest to the largest value in the example.
 //  - Empty parent rows of the joint histogram: the marginal is used, and the rows are counted.
 //  - "A low-pass filter that assumes 3D wrapping": the drawn band is passed through the filter that

@@ -78,8 +78,8 @@ struct TextureBankResult {
 };
 
 // What the bank will be made from: every texture that `tissues` name, once each, with its examples
-// read. Adds a sentence to `notes` (may be null) for each irregularity of a file. Error: a file that
-// cannot be read.
+// read. Adds a sentence to `notes` (may be null) for each irregularity of a file. Error: a file
+// that cannot be read.
 Result<std::vector<TextureSpec>> plan_texture_bank(std::span<const Tissue> tissues,
                                                    const TextureBankOptions& options,
                                                    std::vector<std::string>* notes);

@@ -15,7 +15,7 @@ add_link_options(-Wl,--as-needed)
 set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
 set(CMAKE_CXX_FLAGS_DEBUG "-O1 -g1")
 
-# Interface target that our own code links, and nothing of a third party's.
+# Interface target for our own code only, never for third-party code.
 add_library(sonocase_options INTERFACE)
 target_compile_options(sonocase_options INTERFACE
   -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
@@ -26,7 +26,7 @@ if(SONOCASE_SANITIZE)
                       -fno-sanitize-recover=undefined)
   add_link_options(-fsanitize=${SONOCASE_SANITIZE})
 endif()
-# Gives a program scripts/cmake/keep_modules.c, which says what for.
+# Adds scripts/cmake/keep_modules.c to a program; that file says why.
 function(sonocase_keep_modules program)
   target_sources(${program} PRIVATE "${CMAKE_SOURCE_DIR}/scripts/cmake/keep_modules.c")
   target_link_options(${program} PRIVATE -Wl,--export-dynamic-symbol=dlclose)
@@ -52,10 +52,10 @@ function(sonocase_doors variable folder)
   set(${variable} "${doors}" PARENT_SCOPE)
 endfunction()
 
-# sonocase_room(FOLDER [SOURCES ...] [PUBLIC ...] [PRIVATE ...]): the library of one folder; a/b makes the
-# target a_b. PUBLIC and PRIVATE name what it links: other rooms by their folder, libraries of others by target.
-# A room sees the headers of the rooms that it links and no others: the dependency law, and every arrow below it, is
-# kept by the compiler.
+# sonocase_room(FOLDER [SOURCES ...] [PUBLIC ...] [PRIVATE ...]): the library of one folder; folder a/b becomes
+# target a_b. PUBLIC and PRIVATE name what it links: other rooms by their folder, third-party libraries by target. A
+# room sees only the headers of the rooms that it links, so the compiler enforces the dependency law and every arrow
+# below it.
 function(sonocase_room folder)
   cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   string(REPLACE "/" "_" name "${folder}")
@@ -129,8 +129,8 @@ function(sonocase_build_facts program)
   endif()
 endfunction()
 
-# sonocase_header_version(VARIABLE HEADER MACRO...): numbers that a header defines, joined by dots, of a library
-# whose package file Debian ships broken.
+# sonocase_header_version(VARIABLE HEADER MACRO...): numbers that a header defines, joined by dots, for a library
+# whose package file is broken in Debian.
 function(sonocase_header_version variable header)
   set(numbers "")
   foreach(macro IN LISTS ARGN)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Every kept input of every reader, and cheap damage to each: cut short, one byte changed.
+// Every stored input of every reader, and simple damage to each: truncated, one byte changed.
 #include <gtest/gtest.h>
 
 #include <filesystem>

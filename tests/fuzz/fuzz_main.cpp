@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// libFuzzer's entry: which reader is named by the environment, so that one program serves all.
+// libFuzzer's entry: an environment variable names the reader, so one program serves all.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

@@ -40,7 +40,7 @@ void demand(bool truth) {
     if (!truth) std::abort();
 }
 
-// An error must be one line that says something.
+// An error must be one line and not empty.
 template <class T>
 void check_error(const Result<T>& result) {
     if (result) return;
@@ -49,7 +49,7 @@ void check_error(const Result<T>& result) {
     demand(message.find('\n') == std::string::npos);
 }
 
-// For readers that take a path: the bytes as a file that is on no disk.
+// For readers that take a path: the bytes as a file in memory.
 class MemoryFile {
   public:
     explicit MemoryFile(Bytes bytes) : descriptor_(memfd_create("fuzz", 0)) {
@@ -64,8 +64,8 @@ class MemoryFile {
     int descriptor_;
 };
 
-// Damage mostly stops at the first checksum. Here sizes and checksums are made to match, so that
-// what lies behind them is reached: header 64 bytes, table entries of 64 bytes (docs/format.md).
+// Most damage is found at the first checksum. Here sizes and checksums are corrected, so that the
+// code behind them is reached: header 64 bytes, table entries of 64 bytes (docs/format.md).
 std::vector<std::uint8_t> resealed(Bytes bytes) {
     std::vector<std::uint8_t> out(bytes.begin(), bytes.end());
     if (out.size() < 128) return out;
@@ -133,7 +133,7 @@ void poses(Bytes bytes) {
     const std::string text = format_poses(*read);
     const auto again = parse_poses(text, "fuzz");
     demand(again.has_value() && again->size() == read->size());
-    // What a file can hold, the fit must survive, and never with a quiet NaN.
+    // The fit must survive any file content and never return NaN silently.
     if (read->size() > 300) return;
     const PointFit fit = fit_point(*read, {.trials = 20});
     demand(std::isfinite(fit.tip_mm.x) && std::isfinite(fit.tip_mm.y) &&

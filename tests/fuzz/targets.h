@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// One function a reader: takes any bytes, must come back. Coverage-guided fuzzing (scripts/fuzz)
-// and the test of the kept corpora call the same.
+// One function per reader: it takes any bytes and must return. Coverage-guided fuzzing
+// (scripts/fuzz) and the test of the stored corpora call the same functions.
 #pragma once
 
 #include <cstdint>

@@ -81,7 +81,8 @@ RC_GTEST_PROP(ScanGeometryNumerics, PointAndLocateAreInverse, ()) {
             double l = -1, s = -1;
             RC_ASSERT(g.locate(g.point(line, sample), l, s));
             RC_ASSERT(std::abs(s - sample) < 1e-9);
-            // At a sector's tip all beams meet: the beam is known as well as the arc is long.
+            // All beams meet at the apex of a sector: the beam is determined only as well as the
+            // arc is long.
             const double arc = std::max(1e-3, (sample + 0.5) * g.step_mm + g.radius_mm);
             RC_ASSERT(std::abs(l - line) < 1e-9 * (1 + 256 / arc));
         }

@@ -70,7 +70,7 @@ System random_system(testing::Random& random, int unknowns, double decades, doub
         double right = residual * random.gaussian();
         const double shared = random.gaussian();
         for (int k = 0; k < unknowns; ++k) {
-            // Columns that lean on one another: ill-conditioned whatever their scale.
+            // Nearly dependent columns: ill-conditioned at any scale.
             const auto c = static_cast<std::size_t>(k);
             row[c] = shared + std::pow(10.0, -decades * (k > 0)) * random.gaussian();
             right += row[c] * truth[c];

@@ -19,8 +19,8 @@ using testing::PivotMotion;
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Exact data: what is left is rounding of the stored poses, eps times the largest coordinate, times
-// the amplification of the centred system, 1 / swing.
+// Exact data: the remaining error is the rounding of the stored poses, eps times the largest
+// coordinate, times the amplification of the centred system, 1 / swing.
 double rounding_bound(const PointFit& fit, double largest_mm) {
     return 100 * kEpsilon * largest_mm / fit.swing.z;
 }
@@ -115,7 +115,8 @@ TEST(PivotNumerics, HalfTurnsBetweenPosesAreNoSpecialCase) {
     }
     const PointFit fit = fit_point(poses);
     EXPECT_TRUE(fit.determined);
-    // The mean rotation is zero: as good as it gets, to the root of the rounding.
+    // The mean rotation is zero: the best possible excitation, up to the square root of the
+    // rounding.
     EXPECT_NEAR(fit.condition, 1, 1e-7);
     EXPECT_LT(norm(fit.tip_mm - motion.tip_mm), 1e-11);
 }

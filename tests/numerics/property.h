@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Property tests: rapidcheck chooses and shrinks a seed and prints it on failure; the shapes are
-// made from it, so that a failing case is run again with RC_PARAMS="seed=...".
+// Property tests: rapidcheck chooses and shrinks a seed and prints it on failure. All shapes are
+// made from it, so a failing case can be repeated with RC_PARAMS="seed=...".
 #pragma once
 
 #include <rapidcheck.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The quadratic fit of eqs. (3)-(6): exact data, poor samples, the constraint's pull.
+// The quadratic fit of eqs. (3)-(6): exact data, poor samples, the effect of the constraint.
 #include <gtest/gtest.h>
 
 #include <cmath>

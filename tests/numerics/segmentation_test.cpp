@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Distance transform against brute force, the level set's guard and its harm, the joint smoothing's
-// volumes.
+// Distance transform against brute force, limits and damage of the level set, volumes kept by the
+// joint smoothing.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -175,7 +175,7 @@ TEST(JointSmoothingNumerics, MirroredInputGivesTheMirroredAnswer) {
             }
         }
     }
-    // Blocks are laid from one corner: ties between labels may fall the other way.
+    // Blocks start at one corner, so ties between labels may be decided differently.
     EXPECT_LE(differ, 40);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Time: pairing of recordings and lags at awkward clocks.
+// Time: pairing of recordings, and lags, with unusual clocks.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -112,7 +112,7 @@ TEST(WarpNumerics, IdentityIsExact) {
     map.ct_box.include({-100, -100, -100});
     map.ct_box.include({100, 100, 100});
     EXPECT_EQ(mannequin_from_ct(map, {12.25, -3.5, 99}), (Point3{12.25, -3.5, 99}));
-    // Less what the proof takes off for rounding.
+    // Minus the margin that the proof subtracts for rounding.
     EXPECT_NEAR(pipeline::prove_no_fold(map).least_bound, 1, 1e-11);
     EXPECT_LE(pipeline::prove_no_fold(map).least_bound, 1);
 }

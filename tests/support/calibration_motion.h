@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Recordings of calibration motions, made with known answers.
+// Synthetic recordings of calibration motions with known answers.
 #pragma once
 
 #include <vector>

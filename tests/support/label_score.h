@@ -45,7 +45,7 @@ inline std::vector<std::uint8_t> truth_on(const Grid& grid,
     return truth;
 }
 
-// Over the labels that the truth has, outside (0) left out; shares are of 1.
+// Over the labels of the truth except outside (0); shares are fractions of 1.
 struct LabelScore {
     double dice = 0;           // mean over labels
     double wrong = 0;          // voxels, of all that have a truth

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Grey pictures of a test run, kept beside the build for the eye.
+// Grey pictures of a test run, stored beside the build for inspection.
 #pragma once
 
 #include <cstdint>

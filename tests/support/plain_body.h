@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A second known body, plainer than the analytic torso and not made like it: an elliptic trunk with
-// one layer of muscle, eight ellipsoidal organs, eight ribs that close round the front, and vessels
-// of 1.5 to 10 mm radius as chains of two or three straight pieces. 25 labels; later solids win.
+// A second known body, simpler than the analytic torso and independent of it: an elliptic trunk
+// with one layer of muscle, eight ellipsoidal organs, eight ribs that close round the front, and
+// vessels of 1.5 to 10 mm radius as chains of two or three straight pieces. 25 labels; later solids
+// win.
 #pragma once
 
 #include <algorithm>
@@ -60,8 +61,8 @@ class PlainBody {
         return r > 0.75 && r <= 0.9 ? 2 : 1;
     }
 
-    // Cut at the top and bottom as a CT is, with air on the other sides; slices along the grid's z.
-    // `direction` turns the grid about the body's middle.
+    // Cut off at top and bottom like a CT, with air on the other sides; slices along the grid's z.
+    // `direction` rotates the grid about the body's middle.
     static Grid grid(Vector3 spacing_mm, const Matrix3& direction = {}) {
         constexpr Vector3 kExtent{320, 240, 300};
         Grid grid;

@@ -3,7 +3,7 @@
 // Recordings of ../shared/data/tracking for tests; empty where the data is absent:
 //
 //     const std::vector<Pose> poses = read_recording("pivot_optical_yaniv/poses.csv");
-//     if (poses.empty()) GTEST_SKIP() << kNoRecordings;
+//     if (poses.empty()) GTEST_SKIP() << "shared/data/tracking is absent";
 #pragma once
 
 #include <fstream>
@@ -15,8 +15,6 @@
 #include "support/paths.h"
 
 namespace sonocase::testing {
-
-inline constexpr const char* kNoRecordings = "no " SONOCASE_DATA "/tracking";
 
 inline std::vector<Pose> read_recording(const std::string& name) {
     std::vector<Pose> poses;

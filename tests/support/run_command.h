@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Runs a program as a user would, and keeps what it says.
+// Runs a program as a user would, and captures its output.
 #pragma once
 
 #include <sys/wait.h>

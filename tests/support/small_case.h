@@ -11,7 +11,7 @@
 
 namespace sonocase::testing {
 
-// An exercise on the body below, as a bundle carries it.
+// An exercise on the body below, in the form stored in a bundle.
 inline const char* small_exercise_toml() {
     return R"(name = "scan"
 title = "Find the vessel"

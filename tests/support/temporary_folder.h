@@ -16,8 +16,8 @@ namespace sonocase::testing {
 
 class TemporaryFolder {
   public:
-    // in_memory: where flushing costs nothing, for tests that write a great many files and are not
-    // about disks.
+    // in_memory: where flushing is free, for tests that write very many files and do not test
+    // disks.
     explicit TemporaryFolder(bool in_memory = false) {
         namespace fs = std::filesystem;
         const fs::path base =
@@ -42,7 +42,7 @@ class TemporaryFolder {
         std::ofstream(path, std::ios::binary) << bytes;
         return path;
     }
-    // Names of everything below it, sorted.
+    // Relative paths of everything below it, sorted.
     std::vector<std::string> names() const {
         std::vector<std::string> all;
         for (const auto& entry : std::filesystem::recursive_directory_iterator(path_))
@@ -55,7 +55,7 @@ class TemporaryFolder {
     std::string path_;
 };
 
-// The bytes of a file; nothing where there is none.
+// The bytes of a file; empty if there is none.
 inline std::string read_text(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};

@@ -64,7 +64,7 @@ inline CaseBundle tiny_case() {
     return bundle;
 }
 
-// Surfaces as cooked cases have them: a ball in a body, a layer and a corner of three labels, with
+// Surfaces as in cooked cases: a ball in a body, a layer and a corner of three labels, with
 // records that are quadrics in most bricks; echo offsets in cells of 2 x 2 x 2 and finer.
 inline CaseBundle curved_case() {
     CaseBundle bundle = tiny_case();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A block of the analytic torso cooked through its known warp, and how true its surfaces are
+// A block of the analytic torso cooked through its known warp, and the errors of its surfaces
 // against the closed forms.
 #pragma once
 
@@ -29,12 +29,12 @@ inline Grid grid_between(Point3 lower, Point3 upper, Vector3 spacing_mm) {
         grid.size[a] = static_cast<int>((upper[a] - lower[a]) / spacing_mm[a]) + 1;
     return grid;
 }
-// Holds whole: liver, both kidneys, spleen, stomach, gall bladder, pancreas, and the four vessels
-// of 1.5 to 5 mm radius in the liver.
+// Contains entirely: liver, both kidneys, spleen, stomach, gall bladder, pancreas, and the four
+// vessels of 1.5 to 5 mm radius in the liver.
 inline Grid upper_abdomen(Vector3 spacing_mm) {
     return grid_between({-142, -75, -62}, {142, 91, 143}, spacing_mm);
 }
-// Holds whole: liver with its vessels, gall bladder.
+// Contains entirely: liver with its vessels, gall bladder.
 inline Grid round_the_liver(Vector3 spacing_mm) {
     return grid_between({-38, -75, -17}, {142, 91, 143}, spacing_mm);
 }
@@ -58,7 +58,7 @@ class TorsoBlock {
         }
         return -1;
     }
-    // Change of volume, 0.01 is a percent; NaN for an unknown name.
+    // Relative change of volume, 0.01 is one percent; NaN for an unknown name.
     double change(const std::string& name) const {
         for (const LabelChange& c : result_.changes) {
             if (c.name == name) return c.change();
@@ -66,7 +66,7 @@ class TorsoBlock {
         return NAN;
     }
 
-    // Preimage of a point; empty near the block's own faces, which are no anatomy.
+    // Preimage of a point; empty near the block's own faces, which are not anatomy.
     std::optional<Point3> inner_ct_point(Point3 mannequin) const {
         float x, y, z;
         MapStatus status;
@@ -101,7 +101,7 @@ class TorsoBlock {
         // and beside an edge the nearest face may be another than the record's.
         bool at_edge;
     };
-    // Of every `stride`-th record that a voxel of `label` holds, in the middle of the block.
+    // Of every `stride`-th record of a voxel of `label`, in the middle of the block.
     std::vector<PlaneError> plane_errors(int label, std::size_t stride = 1) const {
         std::vector<PlaneError> errors;
         std::vector<Vector3> normals;

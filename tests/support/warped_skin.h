@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Known truths for registration: a skin carried by a known map, and readings of it.
+// Ground truth for registration: a skin moved by a known map, and readings of it.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ inline Registration random_quadratic_map(const Box3& box,
         row[0] = 0;
         for (std::size_t c = 1; c < 10; ++c) row[c] = random.gaussian() * (c < 4 ? 1 : 0.7);
     }
-    // No turn of the whole: that is the pose's.
+    // No rotation of the whole: the pose contains that.
     for (std::size_t a = 0; a < 3; ++a) {
         for (std::size_t b = 0; b < a; ++b) {
             const double mean = 0.5 * (bend.coefficients[a][b + 1] + bend.coefficients[b][a + 1]);
@@ -60,7 +60,7 @@ struct SweepPlan {
     double lift_off_share = 0;  // of readings 10 to 60 mm off the skin
 };
 
-// Readings spread evenly over the skin's area and carried by the map.
+// Readings spread evenly over the skin's area and moved by the map.
 inline Surface sweep_of(const Surface& skin,
                         const Registration& map,
                         Random& random,

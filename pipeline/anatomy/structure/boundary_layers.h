@@ -32,8 +32,8 @@ class BoundaryLayers {
                  const BoundaryLayerRules& rules);
     bool any() const { return fascia_ || wall_; }
 
-    // The offset of a voxel, `db` without layers, with the layers drawn over it. noise() returns two
-    // values of unit variance: coarse and fine.
+    // The offset of a voxel, `db` without layers, with the layers drawn over it. noise() returns
+    // two values of unit variance: coarse and fine.
     template <class Noise>
     float apply(float db, std::uint8_t label, int i, int j, int k, const Noise& noise) const {
         const std::size_t at = index(i - lower_.x + kRim, j - lower_.y + kRim, k - lower_.z + kRim);

@@ -28,8 +28,8 @@ namespace sonocase::pipeline {
 struct LabelDistanceOptions {
     double sigma_vx = 1.7;   // smoothing, in-plane voxels of the map; 0: none
     double detail_vx = 0.5;  // smoothing of structures too fine for any other width
-    // How far on the wrong side of the surface a voxel of the map may end; 0 applies where the label
-    // is one voxel thick.
+    // How far on the wrong side of the surface a voxel of the map may end; 0 applies where the
+    // label is one voxel thick.
     double tolerance_vx = 0.25;
     double wide_tolerance_vx = 0.15;  // of the widest smoothing
     // Smoothing across thick slices, in slices; 0: as in the plane, in mm, but at most 0.3 slices
@@ -51,8 +51,8 @@ class LabelDistance {
     const SliceGroups& groups() const { return groups_; }
     double limit_mm() const { return limit_mm_; }
 
-    // Scratch space of one thread. Kept from call to call: the system clears newly allocated memory,
-    // which takes as long as the smoothing does.
+    // Scratch space of one thread. Kept from call to call: the system clears newly allocated
+    // memory, which takes as long as the smoothing does.
     struct Scratch {
         std::vector<float> smooth, wide, other, weight;
         std::array<std::vector<float>, 3> raw, fine;  // per level

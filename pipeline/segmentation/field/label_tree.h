@@ -12,7 +12,8 @@
 //     score_l(x) = sum of phi_e over the edges from the root to l
 //
 // is smallest for the true label, whatever the tree: each phi_e that only one of two labels has in
-// its sum is negative exactly on that label's side. The tree decides only which unions are smoothed.
+// its sum is negative exactly on that label's side. The tree decides only which unions are
+// smoothed.
 #pragma once
 
 #include <cstdint>

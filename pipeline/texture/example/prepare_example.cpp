@@ -296,8 +296,8 @@ Result<PreparedExample> prepare_example(const ExampleImage& example) {
         out.warnings.push_back(example.name + ": only " + std::to_string(distinct) +
                                " grey levels; the texture will have no more.");
     }
-    // Subtracting a ramp would turn a few levels into many, and separate values that were clipped to
-    // the same one.
+    // Subtracting a ramp would turn a few levels into many, and separate values that were clipped
+    // to the same one.
     if (distinct >= 8 && out.saturated <= 0.05) {
         remove_trend(out);
         for (float& grey : image.grey) grey = std::clamp(grey, 0.f, 255.f);

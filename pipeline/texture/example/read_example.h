@@ -25,7 +25,8 @@ struct ReadExampleOptions {
 // Grey in [0, 255] from 8 or 16 bits, or from floating point in [0, 1] or [0, 255]. 16-bit files
 // with only 8, 10 or 12 significant bits are scaled by those bits. Colour becomes luminance (0.299,
 // 0.587, 0.114). Not used are pixels of strong colour, which do not occur in a grey image,
-// transparent pixels and non-finite ones. Adds a sentence to `notes` (may be null) on each of these.
+// transparent pixels and non-finite ones. Adds a sentence to `notes` (may be null) on each of
+// these.
 //
 // Error: a missing or unreadable file, a rectangle outside the image, a mask of another size.
 Result<ExampleImage> read_example(const std::string& path,

@@ -127,7 +127,8 @@ ExampleImage synthetic_example(std::string_view texture,
     image.grey.resize(image.count());
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
-            // Logarithm of a Rayleigh envelope, standardised: mean -2.51 dB, sd 5.57 dB re its power.
+            // Logarithm of a Rayleigh envelope, standardised: mean -2.51 dB, sd 5.57 dB re its
+            // power.
             const double db = 10 * std::log10(0.5 * std::norm(speckle[image.index(x, y)]) + 1e-4);
             double value = std::max((db + 2.51) / 5.57, -3.0);
             if (look.fibre > 0) {

@@ -41,10 +41,10 @@ Autocorrelation autocorrelation(std::span<const ExampleImage> examples, int reac
 // Of the planes z = const of a cube that wraps, averaged over all of them; reach <= edge / 2.
 Autocorrelation plane_autocorrelation(std::span<const float> cube, int edge, int reach);
 
-// The correlation weighted like an estimate from an image of the size of `window`'s example: each lag
-// times its share of pixel pairs. Long lags of a small patch are mostly chance, and so would be a
-// half-height among them. Widths of an example and of a texture are therefore compared through the
-// example's window. window.overlap must not be empty.
+// The correlation weighted like an estimate from an image of the size of `window`'s example: each
+// lag times its share of pixel pairs. Long lags of a small patch are mostly chance, and so would be
+// a half-height among them. Widths of an example and of a texture are therefore compared through
+// the example's window. window.overlap must not be empty.
 Autocorrelation through_window(const Autocorrelation& autocorrelation,
                                const Autocorrelation& window);
 

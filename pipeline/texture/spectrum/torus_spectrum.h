@@ -9,9 +9,9 @@
 
 namespace sonocase::pipeline {
 
-// An autocorrelation estimated from a finite patch is in general not that of any texture that wraps:
-// cut off at half the period, its spectrum has negative values. This finds the nearest spectrum
-// S >= 0:
+// An autocorrelation estimated from a finite patch is in general not that of any texture that
+// wraps: cut off at half the period, its spectrum has negative values. This finds the nearest
+// spectrum S >= 0:
 //
 //     minimise  0.3 |W (A S - whole)|^2 + 3 |W' (A G S - share * local)|^2,   S >= 0
 //

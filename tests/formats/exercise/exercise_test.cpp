@@ -176,7 +176,7 @@ TEST(Exercise, DescriptionsFlowWhateverTheLengthOfTheirLines) {
 }
 
 // What the text holds is quoted in the error: a line break or an escape sequence in it must not
-// come out of a terminal.
+// reach a terminal.
 TEST(Exercise, ErrorsAreOneLineWhateverTheTextHolds) {
     const auto exercise = parse_exercise("[[sweeps]]\nsnap_to_skin = t\nname = \"tour\"", "x.toml");
     ASSERT_FALSE(exercise);

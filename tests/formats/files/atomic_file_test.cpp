@@ -32,7 +32,7 @@ TEST(AtomicFile, WritesAndReadsBack) {
 TEST(AtomicFile, AFullDiskLeavesTheOldFileAndNothingElse) {
     const TemporaryFolder folder;
     ASSERT_TRUE(write_file(folder / "a", std::string_view("first")));
-    // A limit on file size fails a write in its middle as a full disk does.
+    // A limit on file size makes a write fail in its middle, as a full disk does.
     rlimit before{};
     ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
     const auto handler = std::signal(SIGXFSZ, SIG_IGN);
@@ -94,7 +94,7 @@ TEST(AtomicFile, ReadsNeitherDevicesNorPipesNorFolders) {
     expect_refused(folder / "", (folder / "") + ": is a folder; expected a file");
 }
 
-// What the kernel shows as files of size zero is read whole all the same.
+// Files of the kernel that claim a size of zero are read whole all the same.
 TEST(AtomicFile, ReadsFilesThatClaimToBeEmpty) {
     const auto text = read_text_file("/proc/self/status");
     ASSERT_TRUE(text);

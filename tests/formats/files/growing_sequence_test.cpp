@@ -72,7 +72,7 @@ TEST(GrowingSequence, IsWholeAfterEveryBatchAndEndsAsASequenceWrittenAtOnce) {
     }
 }
 
-// The process is killed without warning while it records; the pipe tells how far it had come.
+// The process is killed without warning while it records; the pipe reports how far it had come.
 TEST(GrowingSequence, KilledAt200RandomMomentsEveryFileOpensAndHoldsEveryCommittedBatch) {
     const TemporaryFolder folder(/*in_memory=*/true);
     testing::Random random(77);

@@ -65,7 +65,7 @@ TEST(Poses, FaultsNameTheLine) {
 
 TEST(Poses, RealRecordingsAreRead) {
     const std::string path = std::string(SONOCASE_DATA) + "/tracking/pivot_optical_yaniv/poses.csv";
-    if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is absent";
     const auto poses = load_poses(path);
     ASSERT_TRUE(poses) << poses.error().message();
     EXPECT_EQ(poses->size(), 481u);

@@ -111,7 +111,7 @@ TEST(CaseAnatomy, BreathingMovesOrgansAndComesBack) {
         const double t = random.uniform(0, 20);
         EXPECT_EQ(still.moved(p, t), p);
         EXPECT_EQ(still.at_rest(p, t), p);
-        // moved() stops at 1e-9 mm a step; the steps shrink by half or better.
+        // moved() stops at steps of 1e-9 mm; each step is at most half the one before.
         EXPECT_LT(distance(breathing.at_rest(breathing.moved(p, t), t), p), 1e-8);
         EXPECT_LE(distance(breathing.moved(p, t), p), 4 + 1e-9);
         EXPECT_EQ(breathing.moved(p, 4), p);              // the end of expiration

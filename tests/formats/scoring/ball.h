@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A ball as anatomy, exact, still or breathing, and needle poses to put into it.
+// A ball as exact anatomy, at rest or breathing, and needle poses for it.
 #pragma once
 
 #include <cmath>
@@ -29,8 +29,8 @@ class Ball final : public Anatomy {
     double radius_, vessel_radius_;
 };
 
-// The same ball, whose inside is shifted by weight(p) * swing(t): the weight is affine in the
-// place, so that both ways are closed forms.
+// The same ball, whose inside is shifted by weight(p) * swing(t): the weight is affine in p, so
+// both directions have closed forms.
 class BreathingBall final : public Anatomy {
   public:
     struct Motion {

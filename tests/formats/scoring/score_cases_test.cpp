@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Scores of sessions made by hand, and the hard cases.
+// Scores of sessions written by hand, and hard cases.
 #include <gtest/gtest.h>
 
 #include "ball.h"
