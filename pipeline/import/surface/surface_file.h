@@ -25,8 +25,8 @@ struct SurfaceFileOptions {
 // blanks. Readings that are not finite are left out and counted in `report` (stage "surface_file",
 // may be null).
 //
-// Errors: no such file, a pipe or a device, unreadable or truncated, fewer than 30 points, an
-// extent that cannot be a torso in mm.
+// Errors: no such file, a pipe or a device, unreadable or truncated, fewer than 30 points, an extent
+// that cannot be a torso in mm.
 Result<Surface> import_surface(const std::string& path,
                                const SurfaceFileOptions& options = {},
                                StageReport* report = nullptr);
