@@ -44,8 +44,8 @@ Made make_sweep(const std::string& name, const TrackerContext& context) {
 Made make_replay(const std::string& files, const TrackerContext& context) {
     Result<Recording> recording = load_recording(files);
     if (!recording) return recording.error();
-    // In a recording of this player both tools were seen at the same time; recordings of sensors may
-    // have a lag.
+    // In a recording of this player both tools were seen at the same time; recordings of sensors
+    // may have a lag.
     if (!recording->in_mannequin) {
         for (Pose& pose : recording->needle) pose.timestamp_s -= context.needle_lag_s;
     }
