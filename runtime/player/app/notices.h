@@ -21,7 +21,8 @@ class Notices {
     // enough.
     void set_now_s(double now_s);
 
-    // A whole sentence. One that stands already is not repeated, but stands for its full time again.
+    // A whole sentence. One that stands already is not repeated, but stands for its full time
+    // again.
     void news(const std::string& sentence) { add(Notice::Kind::news, sentence); }
     void warning(const std::string& sentence) { add(Notice::Kind::warning, sentence); }
     void error(const std::string& sentence) { add(Notice::Kind::error, sentence); }

@@ -11,8 +11,8 @@ namespace sonocase::runtime {
 namespace {
 
 constexpr double kFitEvery = 0.5;         // seconds
-constexpr std::size_t kMostPoses = 3000;  // a step's; older ones are thinned
-constexpr double kGoodSwing = 0.35;       // about 20 degrees of tilt every way
+constexpr std::size_t kMostPoses = 3000;  // of a step; then every second one is dropped
+constexpr double kGoodSwing = 0.35;       // rad, about 20 degrees of tilt in every direction
 
 std::string number(const char* format, double value) {
     char text[96];
@@ -44,7 +44,7 @@ void show_point(const PointFit& fit, SetupView& view) {
     view.good_enough = fit.inliers >= 30 && view.sigma_mm < 1 && view.coverage > 0.5;
     view.sentence = view.good_enough ? number("Good: the point is known to %.2f mm.", view.sigma_mm)
                     : view.coverage <= 0.5 ? "Tilt it further, in every direction."
-                                           : "Go on: more readings make it surer.";
+                                           : "Continue: more readings make it more certain.";
 }
 
 void show_direction(const DirectionFit& fit, SetupView& view) {
@@ -88,12 +88,11 @@ const char* setup_title(SetupStep step) {
 const char* setup_instruction(SetupStep step) {
     switch (step) {
         case SetupStep::trackers:
-            return "Move the probe, then the needle, and see that the right sensor follows. Choose "
-                   "another one where it does not.";
+            return "Move the probe, then the needle, and check that the right sensor follows. "
+                   "Choose another sensor if it does not.";
         case SetupStep::probe_tip:
             return "Rest the middle of the probe's face on a fixed point, such as a pin, and tilt "
-                   "the "
-                   "probe in every direction for about fifteen seconds.";
+                   "the probe in every direction for about fifteen seconds.";
         case SetupStep::probe_depth:
             return "Slide the probe along a ruler in the direction in which it looks, without "
                    "turning it.";
@@ -101,15 +100,12 @@ const char* setup_instruction(SetupStep step) {
             return "Slide the probe sideways, towards its orientation mark, without turning it.";
         case SetupStep::needle:
             return "Push the needle through a fixed pinhole and tilt it; record this at three "
-                   "depths or "
-                   "more, the last with the tip in the hole.";
+                   "or more depths, the last with the tip in the hole.";
         case SetupStep::mannequin:
             return "Sweep the middle of the probe's face over the mannequin: front, both sides, "
-                   "and as "
-                   "far up and down as it goes.";
+                   "and as far up and down as it goes.";
         case SetupStep::done:
-            return "Put the probe on the mannequin and look whether the picture follows. Then "
-                   "save.";
+            return "Put the probe on the mannequin and check that the picture follows. Then save.";
     }
     return "";
 }
@@ -157,7 +153,7 @@ void SetupGuide::observe(const TrackerReading& reading,
     pose.tracker_from_tool = sensor.world_from_sensor;
     std::vector<Pose>& poses = poses_of(step_);
     poses.push_back(pose);
-    if (poses.size() > kMostPoses) {  // every second one goes: the whole time stays covered
+    if (poses.size() > kMostPoses) {  // every second one is dropped: the whole time stays covered
         for (std::size_t i = 0; 2 * i < poses.size(); ++i) poses[i] = poses[2 * i];
         poses.resize((poses.size() + 1) / 2);
     }
@@ -215,7 +211,7 @@ void SetupGuide::fit() {
             return;
         }
         if (skin.points.empty()) {
-            view_.sentence = "This bundle carries no skin to lay the sweep on.";
+            view_.sentence = "This bundle has no skin to fit the sweep to.";
             return;
         }
         std::vector<Pose> usable;

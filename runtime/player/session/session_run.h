@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A session of the player from its first frame to its scores: events, the recording, and pictures of
-// the moments that matter. The window and the headless run use the same one.
+// A session of the player from its first frame to its scores: events, the recording, and pictures
+// of the moments that matter. The window and the headless run use the same one.
 #pragma once
 
 #include <memory>
@@ -28,9 +28,9 @@ class SessionRun {
                                                      const std::string& started,
                                                      double now_s);
 
-    // Takes the frame that the engine just rendered. Allocates nothing and waits for nothing, unless
-    // `may_wait` (for runs faster than real time). Returns what happened, valid until the next
-    // call.
+    // Takes the frame that the engine just rendered. Allocates nothing and waits for nothing,
+    // unless `may_wait` (for runs faster than real time). Returns what happened, valid until the
+    // next call.
     std::span<const LiveEvent> observe(const FrameRecord& record,
                                        std::span<const std::uint8_t> pixels,
                                        bool may_wait = false);
@@ -45,8 +45,8 @@ class SessionRun {
     RecorderStatus recorder_status() const { return recorder_->status(); }
     const std::string& path() const { return path_; }
 
-    // Ends the recording, scores it and, if the trainee gave a name, adds it to the progress book of
-    // this machine. The recording is complete even if scoring fails.
+    // Ends the recording, scores it and, if the trainee gave a name, adds it to the progress book
+    // of this machine. The recording is complete even if scoring fails.
     Result<SessionScore> finish();
 
   private:
