@@ -21,7 +21,7 @@ Model probe_model(const Probe& probe);
 // The orientation mark on the side of the probe.
 Model mark_model(const Probe& probe);
 
-// How the picture lies on the scan plane.
+// How the picture is placed on the scan plane.
 struct PlanePicture {
     Renderer::Layout layout;
     double depth_mm = 0;  // 0: the probe's

@@ -68,7 +68,7 @@ void View3d::set_exercise(const Exercise& exercise) {
     Impl& d = *impl_;
     d.exercise = exercise;
     // The probe looks down in the picture, whatever the mannequin's axes are called; the body's
-    // long axis runs across, as a patient lies before an operator.
+    // long axis runs across, as when a patient lies in front of an operator.
     const Vector3 up = normalized(-exercise.start_beam);
     const Vector3 extent = d.box.extent();
     Vector3 along{1, 0, 0};
@@ -88,7 +88,7 @@ void View3d::set_exercise(const Exercise& exercise) {
     d.hub.upload(hub_model(length_mm));
 }
 
-// The plane's mesh is made anew when the picture lies on it in another way.
+// Makes a new mesh of the plane when the picture is placed on it in another way.
 void View3d::Impl::update_plane(const View3dInput& input) {
     if (plane_flipped == input.flipped && plane_layout.mm_per_px == input.layout.mm_per_px &&
         plane_layout.origin_y_px == input.layout.origin_y_px && !plane.empty()) {
