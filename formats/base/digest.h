@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Content hash for cache keys and for the inputs that a manifest names: XXH3, 128 bits, as 32 hex
-// digits. Finds changes and accidents; not meant against someone who forges.
+// digits. Finds changes and accidents; it is no protection against deliberate forgery.
 #pragma once
 
 #include <cstdint>

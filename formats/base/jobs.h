@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Independent jobs, run by whatever the caller brings: threads (formats/threads/thread_jobs.h), a
-// host's own pool, or one after the other. What takes a JobRunner starts no thread itself.
+// Independent jobs, run by what the caller passes in: the caller's own thread (serial_jobs()),
+// threads of the standard library (formats/threads/thread_jobs.h) or a host's pool. Functions that
+// take a JobRunner start no thread themselves, and their results do not depend on the runner.
 #pragma once
 
 #include <cstddef>
@@ -12,21 +13,14 @@ namespace sonocase {
 class JobRunner {
   public:
     virtual ~JobRunner() = default;
-    virtual int threads() const = 0;  // >= 1, the caller's included
-    // Runs job(0) .. job(count - 1) in any order and returns when all are done. The first exception
-    // that a job throws (memory can run out) comes out here, and jobs not yet begun are left out.
+    virtual int threads() const = 0;  // >= 1, including the caller's
+    // Runs job(0) .. job(count - 1) in any order and returns when all are done. A job may call
+    // run() in turn. If a job throws (memory can run out), jobs that have not begun are left out
+    // and the first exception is rethrown here.
     virtual void run(std::size_t count, const std::function<void(std::size_t)>& job) = 0;
 };
 
-// One after the other on the caller's thread. Stateless, so that any number of callers may share it.
+// Runs jobs in order on the caller's thread. Has no state: any number of threads may share it.
 JobRunner& serial_jobs();
-
-namespace detail {
-
-// Runs job(0) .. job(count - 1), in any order, on up to `threads` threads, of which the caller's is
-// one; 0 takes as many as the machine has, 8 at most.
-void run_jobs(std::size_t count, int threads, const std::function<void(std::size_t)>& job);
-
-}  // namespace detail
 
 }  // namespace sonocase

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The latest value from one writer thread to one reader thread. Neither ever waits: three slots and
-// one atomic exchange a side. Values in between are overwritten, which is what a display wants of
-// poses and frames: the newest, never a queue.
+// one atomic exchange per side. Values in between are overwritten: a display wants the newest pose
+// or frame, never a queue.
 #pragma once
 
 #include <array>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A vector whose resize() leaves what it makes room for as it is: memory that is filled as it is
-// needed costs nothing before.
+// A vector whose resize() leaves new elements uninitialised: a large buffer that is filled on
+// demand costs nothing until then.
 #pragma once
 
 #include <memory>

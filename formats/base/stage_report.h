@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What a stage says of its own run: the part that a manifest, `inspect` and --report show.
+// What a stage reports about its own run: what a manifest, `inspect` and --report show.
 #pragma once
 
 #include <string>

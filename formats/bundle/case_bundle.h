@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A case bundle in memory: everything that the player needs, and how it was made.
+// A case bundle in memory: everything that the player needs, and how it was made. A plain value.
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "formats/base/jobs.h"
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
-#include "formats/bundle/voxel_blocks.h"
 #include "formats/volume/brick_volume.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/solid_texture.h"
@@ -33,9 +32,9 @@ struct EmbeddedExercise {
 
 struct CaseManifest {
     std::string case_name;
-    std::string producer;  // program and version
-    std::string recipe;    // the TOML text as given
-    std::vector<InputHash> inputs;
+    std::string producer;           // program and version
+    std::string recipe;             // the TOML text as given
+    std::vector<InputHash> inputs;  // files that the case was made from
     std::vector<StageReport> stages;
 };
 
@@ -55,30 +54,19 @@ struct CaseBundle {
     Surface patient_skin;                   // `mannequin` frame, after the warp
     Surface mannequin_skin;                 // `mannequin` frame, as digitised
     std::vector<std::uint8_t> preview_png;  // may be empty
-
-    // Null: all of the above is there. Else the pools of `boundary` and `echo_offset` count only
-    // where they were asked for; such a bundle may be moved from, but neither copied nor assigned
-    // to.
-    std::shared_ptr<VoxelBlocks> blocks;
 };
 
 // Tissue table index of every palette entry; # labels.
 std::vector<int> tissue_of_label(const CaseBundle& bundle);
 
 // Reads a bundle from bytes. Trusts nothing: every size is checked before allocation, every offset
-// against the file, every checksum before use; docs/format.md says what is done in each malformed
-// case. where: names the bytes in errors. threads: 0 takes as many as the machine has; 1 starts
-// none.
+// against the file, every checksum before use; docs/format.md says what happens in each malformed
+// case. where: names the bytes in errors. No exception is needed to refuse bytes; running out of
+// memory throws std::bad_alloc.
 Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,
                                const std::string& where,
-                               int threads = 0);
-// Same bytes for the same bundle on any machine with any number of threads.
-std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle);
-
-// For players: everything but the pools of boundary records and echo offsets, which `blocks`
-// unpacks from `bytes` as a frame needs them. Cost at 1 mm: a tenth of read_bundle.
-Result<CaseBundle> stream_bundle(RawVector<std::uint8_t> bytes,
-                                 const std::string& where,
-                                 int threads = 0);
+                               JobRunner& jobs = serial_jobs());
+// The same bytes for the same bundle on any machine with any `jobs`.
+std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle, JobRunner& jobs = serial_jobs());
 
 }  // namespace sonocase

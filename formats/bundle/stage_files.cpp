@@ -2,8 +2,6 @@
 
 #include "formats/bundle/stage_files.h"
 
-#include <new>
-
 #include "formats/bundle/codec/bundle_parts.h"
 #include "formats/bundle/codec/packed_volumes.h"
 #include "formats/bundle/codec/volume_json.h"
@@ -21,42 +19,42 @@ constexpr std::string_view kLabelChunks[] = {"manifest", SONOCASE_VOLUME_CHUNKS}
 constexpr std::string_view kTextureChunks[] = {"manifest", "textures", "speckle"};
 constexpr std::string_view kSurfaceChunks[] = {"manifest", "surface"};
 
-// Opens, reads the manifest and hands both to `fill`; what is wrong with the manifest wins.
+// Opens the container, reads its manifest and passes both to `fill`. An error in the manifest takes
+// precedence over one in the chunks.
 template <class File, class Fill>
 Result<File> read_container(std::span<const std::uint8_t> bytes,
                             std::string_view kind,
                             std::span<const std::string_view> known,
                             const std::string& where,
                             Fill fill) {
-    try {
-        const auto reader = ChunkReader::open(bytes, kind, known, where);
-        if (!reader) return reader.error();
-        const auto json = detail::read_manifest(*reader);
-        if (!json) return json.error();
-        JsonFault fault{where + ": manifest", {}};
-        JsonObject manifest(*json, "", fault);
-        File file;
-        const Status filled = fill(file, *reader, manifest);
-        if (fault.error) return *fault.error;
-        if (!filled) return filled.error();
-        return file;
-    } catch (const std::bad_alloc&) {
-        return Error{"needs more memory than there is", where, ""};
-    }
+    const auto reader = ChunkReader::open(bytes, kind, known, where);
+    if (!reader) return reader.error();
+    const auto json = detail::read_manifest(*reader);
+    if (!json) return json.error();
+    JsonFault fault{where + ": manifest", {}};
+    JsonObject manifest(*json, "", fault);
+    File file;
+    const Status filled = fill(file, *reader, manifest);
+    if (fault.error) return *fault.error;
+    if (!filled) return filled.error();
+    return file;
 }
 
-Status fill_labels(LabelFile& file, const ChunkReader& reader, JsonObject& manifest) {
+Status fill_labels(LabelFile& file,
+                   const ChunkReader& reader,
+                   JsonObject& manifest,
+                   JobRunner& jobs) {
     file.frame = manifest.text_or("frame", "");
     file.volume.grid = detail::grid_from(manifest.object("grid"));
     file.volume.labels = detail::labels_from(manifest, "labels");
     file.reports = detail::reports_from(manifest, "stages");
     if (!manifest.ok()) return Done{};
     const Int3 size = file.volume.grid.size;
-    auto volumes = detail::read_volumes(reader, manifest, size, file.volume.labels.size(), 0);
+    auto volumes = detail::read_volumes(reader, manifest, size, file.volume.labels.size(), jobs);
     if (!volumes) return volumes.error();
     if (volumes->packed) {
         VoxelBlocks blocks(std::move(volumes->packed));
-        blocks.load_all(0);
+        blocks.load_all(jobs);
         if (Status whole = blocks.status(); !whole) return whole;
     }
     file.volume.voxels = dense_from_bricks(volumes->labels);
@@ -68,10 +66,10 @@ Status fill_labels(LabelFile& file, const ChunkReader& reader, JsonObject& manif
 Status fill_textures(TextureFile& file, const ChunkReader& reader, JsonObject& manifest) {
     file.reports = detail::reports_from(manifest, "stages");
     file.tissues = detail::tissues_from(manifest, "tissues");
-    auto textures = detail::read_textures(reader, manifest, 0);
+    auto textures = detail::read_textures(reader, manifest);
     if (!textures) return textures.error();
     file.textures = std::move(*textures);
-    auto speckle = detail::read_speckle(reader, manifest, 0);
+    auto speckle = detail::read_speckle(reader, manifest);
     if (!speckle) return speckle.error();
     file.speckle = std::move(*speckle);
     return Done{};
@@ -80,7 +78,7 @@ Status fill_textures(TextureFile& file, const ChunkReader& reader, JsonObject& m
 Status fill_surface(SurfaceFile& file, const ChunkReader& reader, JsonObject& manifest) {
     file.frame = manifest.text_or("frame", "");
     file.reports = detail::reports_from(manifest, "stages");
-    auto surface = detail::read_surface(reader, "surface", 0);
+    auto surface = detail::read_surface(reader, "surface");
     if (!surface) return surface.error();
     file.surface = std::move(*surface);
     return Done{};
@@ -88,7 +86,7 @@ Status fill_surface(SurfaceFile& file, const ChunkReader& reader, JsonObject& ma
 
 }  // namespace
 
-std::vector<std::uint8_t> write_label_file(const LabelFile& file) {
+std::vector<std::uint8_t> write_label_file(const LabelFile& file, JobRunner& jobs) {
     Json manifest = Json::object();
     manifest["format"] = "sonocase labels";
     manifest["frame"] = file.frame;
@@ -98,15 +96,20 @@ std::vector<std::uint8_t> write_label_file(const LabelFile& file) {
     const BrickVolume<std::uint8_t> bricks =
         bricks_from_dense<std::uint8_t>(file.volume.voxels, file.volume.grid.size);
     ChunkWriter writer("LABL");
-    detail::add_volumes(writer, manifest, bricks, file.boundary, file.echo_offset);
-    return writer.write();
+    detail::add_volumes(writer, manifest, bricks, file.boundary, file.echo_offset, jobs);
+    return writer.write(jobs);
 }
 
-Result<LabelFile> read_label_file(std::span<const std::uint8_t> bytes, const std::string& where) {
-    return read_container<LabelFile>(bytes, "LABL", kLabelChunks, where, fill_labels);
+Result<LabelFile> read_label_file(std::span<const std::uint8_t> bytes,
+                                  const std::string& where,
+                                  JobRunner& jobs) {
+    const auto fill = [&](LabelFile& file, const ChunkReader& reader, JsonObject& manifest) {
+        return fill_labels(file, reader, manifest, jobs);
+    };
+    return read_container<LabelFile>(bytes, "LABL", kLabelChunks, where, fill);
 }
 
-std::vector<std::uint8_t> write_texture_file(const TextureFile& file) {
+std::vector<std::uint8_t> write_texture_file(const TextureFile& file, JobRunner& jobs) {
     Json manifest = Json::object();
     manifest["format"] = "sonocase textures";
     manifest["textures"] = detail::json_of_textures(file.textures);
@@ -117,7 +120,7 @@ std::vector<std::uint8_t> write_texture_file(const TextureFile& file) {
     detail::add_manifest(writer, manifest);
     if (!file.textures.empty()) detail::add_textures(writer, file.textures);
     if (file.speckle.edge != 0) writer.add_array("speckle", false, file.speckle.voxels);
-    return writer.write();
+    return writer.write(jobs);
 }
 
 Result<TextureFile> read_texture_file(std::span<const std::uint8_t> bytes,
@@ -125,7 +128,7 @@ Result<TextureFile> read_texture_file(std::span<const std::uint8_t> bytes,
     return read_container<TextureFile>(bytes, "TXTR", kTextureChunks, where, fill_textures);
 }
 
-std::vector<std::uint8_t> write_surface_file(const SurfaceFile& file) {
+std::vector<std::uint8_t> write_surface_file(const SurfaceFile& file, JobRunner& jobs) {
     Json manifest = Json::object();
     manifest["format"] = "sonocase surface";
     manifest["frame"] = file.frame;
@@ -133,7 +136,7 @@ std::vector<std::uint8_t> write_surface_file(const SurfaceFile& file) {
     ChunkWriter writer("SURF");
     detail::add_manifest(writer, manifest);
     detail::add_surface(writer, "surface", file.surface);
-    return writer.write();
+    return writer.write(jobs);
 }
 
 Result<SurfaceFile> read_surface_file(std::span<const std::uint8_t> bytes,

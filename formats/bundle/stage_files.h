@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The files between stages, so that any stage can run alone. docs/format.md, part 3.
+// The files that stages exchange, so that any stage can run alone. docs/format.md, part 3.
 #pragma once
 
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "formats/base/jobs.h"
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
 #include "formats/volume/brick_volume.h"
@@ -18,7 +19,7 @@
 
 namespace sonocase {
 
-// Labels with what the stages after resampling add to them (kind LABL, suffix .labels).
+// Labels, with what the stages after resampling add to them (kind LABL, suffix .labels).
 struct LabelFile {
     std::string frame;  // "ct" or "mannequin"
     LabelVolume volume;
@@ -26,8 +27,10 @@ struct LabelFile {
     BrickVolume<std::int8_t> echo_offset;  // quarter dB; may be empty
     std::vector<StageReport> reports;
 };
-std::vector<std::uint8_t> write_label_file(const LabelFile& file);
-Result<LabelFile> read_label_file(std::span<const std::uint8_t> bytes, const std::string& where);
+std::vector<std::uint8_t> write_label_file(const LabelFile& file, JobRunner& jobs = serial_jobs());
+Result<LabelFile> read_label_file(std::span<const std::uint8_t> bytes,
+                                  const std::string& where,
+                                  JobRunner& jobs = serial_jobs());
 
 // A texture bank (kind TXTR, suffix .textures).
 struct TextureFile {
@@ -36,7 +39,8 @@ struct TextureFile {
     std::vector<Tissue> tissues;  // may be empty
     std::vector<StageReport> reports;
 };
-std::vector<std::uint8_t> write_texture_file(const TextureFile& file);
+std::vector<std::uint8_t> write_texture_file(const TextureFile& file,
+                                             JobRunner& jobs = serial_jobs());
 Result<TextureFile> read_texture_file(std::span<const std::uint8_t> bytes,
                                       const std::string& where);
 
@@ -46,11 +50,12 @@ struct SurfaceFile {
     Surface surface;
     std::vector<StageReport> reports;
 };
-std::vector<std::uint8_t> write_surface_file(const SurfaceFile& file);
+std::vector<std::uint8_t> write_surface_file(const SurfaceFile& file,
+                                             JobRunner& jobs = serial_jobs());
 Result<SurfaceFile> read_surface_file(std::span<const std::uint8_t> bytes,
                                       const std::string& where);
 
-// What the bytes are by their first 16: "CASE", "LABL", "TXTR", "SURF", or "" for anything else.
+// What the bytes are, by their first 16: "CASE", "LABL", "TXTR", "SURF", or "" for anything else.
 std::string container_kind(std::span<const std::uint8_t> bytes);
 
 }  // namespace sonocase

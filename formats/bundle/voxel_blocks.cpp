@@ -9,7 +9,6 @@
 #include <sys/mman.h>
 #endif
 
-#include "formats/base/jobs.h"
 #include "formats/bundle/codec/block_parts.h"
 
 namespace sonocase {
@@ -21,7 +20,7 @@ constexpr std::size_t kWorkers = 2;  // the frame's thread and one that reads ah
 
 struct VoxelBlocks::Worker {
     std::mutex mutex;
-    std::unique_ptr<detail::BlockWork> work;
+    std::unique_ptr<detail::BlockUnpacker> unpacker;
 };
 
 VoxelBlocks::VoxelBlocks(std::unique_ptr<detail::BlockParts> parts)
@@ -34,7 +33,7 @@ VoxelBlocks::VoxelBlocks(std::unique_ptr<detail::BlockParts> parts)
       state_(std::make_unique<std::atomic<State>[]>(count_)),
       left_(count_) {
     for (std::size_t n = 0; n < kWorkers; ++n)
-        workers_[n].work = std::make_unique<detail::BlockWork>(*parts_);
+        workers_[n].unpacker = std::make_unique<detail::BlockUnpacker>(*parts_);
     for (std::size_t block = 0; block < count_; ++block) {
         const Int3 brick = parts_->grid.first_brick(block);
         lower_[block] = {kBrickEdge * brick.x, kBrickEdge * brick.y, kBrickEdge * brick.z};
@@ -58,9 +57,9 @@ bool VoxelBlocks::take(std::size_t block) noexcept {
     return state_[block].compare_exchange_strong(packed, kBeingUnpacked);
 }
 
-void VoxelBlocks::finish(std::size_t block, bool makes_sense) noexcept {
-    if (!makes_sense) damaged_ = true;
-    state_[block].store(kThere, std::memory_order_release);
+void VoxelBlocks::finish(std::size_t block, bool valid) noexcept {
+    if (!valid) damaged_ = true;
+    state_[block].store(kLoaded, std::memory_order_release);
     state_[block].notify_all();
     left_.fetch_sub(1, std::memory_order_release);
 }
@@ -77,21 +76,21 @@ void VoxelBlocks::unpack(std::size_t block) noexcept {
         } else if (!lock.try_lock()) {
             continue;
         }
-        finish(block, workers_[n].work->unpack(*parts_, block));
+        finish(block, workers_[n].unpacker->unpack(*parts_, block));
         return;
     }
 }
 
-void VoxelBlocks::load_all(int threads) {
-    // A row of blocks a job, so that few have to find memory to work in.
+void VoxelBlocks::load_all(JobRunner& jobs) {
+    // A row of blocks per job, so that few jobs allocate an unpacker.
     const auto row = static_cast<std::size_t>(std::max(blocks_.x, 1));
-    detail::run_jobs((count_ + row - 1) / row, threads, [&](std::size_t job) {
-        detail::BlockWork work(*parts_);
+    jobs.run((count_ + row - 1) / row, [&](std::size_t job) {
+        detail::BlockUnpacker unpacker(*parts_);
         for (std::size_t block = job * row; block < std::min((job + 1) * row, count_); ++block) {
-            if (take(block)) finish(block, work.unpack(*parts_, block));
+            if (take(block)) finish(block, unpacker.unpack(*parts_, block));
         }
     });
-    for (std::size_t block = 0; block < count_; ++block)  // what other threads had begun
+    for (std::size_t block = 0; block < count_; ++block)  // that other threads have begun
         state_[block].wait(kBeingUnpacked, std::memory_order_acquire);
 }
 
@@ -102,7 +101,7 @@ void VoxelBlocks::use_small_pages() noexcept {
         const std::size_t skip = (0 - reinterpret_cast<std::uintptr_t>(pool.data())) % kPage;
         const std::size_t bytes = pool.size_bytes();
         if (bytes < skip + kPage) return;
-        // A system without such pages says no, and nothing is lost.
+        // Fails on a system without such pages, which is harmless.
         (void)madvise(reinterpret_cast<std::uint8_t*>(pool.data()) + skip,
                       (bytes - skip) / kPage * kPage, MADV_NOHUGEPAGE);
     };
@@ -117,7 +116,7 @@ std::size_t VoxelBlocks::pool_bytes() const noexcept {
 
 Status VoxelBlocks::status() const {
     if (!damaged()) return Done{};
-    return Error{"a block of boundary records or echo offsets makes no sense", parts_->where,
+    return Error{"a block of boundary records or echo offsets is invalid", parts_->where,
                  "make the file again"};
 }
 

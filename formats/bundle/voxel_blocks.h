@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The part of a bundle's volumes that is unpacked as it is needed: boundary records and echo
-// offsets, in blocks of bricks. Labels and all tables are there from the start; what the pools of
-// the two hold in a block counts only once the block was asked for.
+// The part of a bundle's volumes that is unpacked on demand: boundary records and echo offsets, in
+// blocks of bricks. Labels and all tables are loaded from the start; the pools of the other two are
+// valid in a block only once the block has been asked for.
 //
 // Asking neither allocates nor throws, so that a frame may do it; any thread may. A block costs
-// about 0.1 ms the first time. A file whose bytes are whole but make no sense in some block shows
-// when that block is asked for: it then holds no surfaces and offsets of 0, and status() says so.
+// about 0.1 ms the first time. A block whose contents are invalid although their checksum is right
+// is found when it is asked for: it then holds no surfaces and offsets of 0, and status() says so.
 #pragma once
 
 #include <atomic>
@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "formats/base/geometry.h"
-#include "formats/base/raw_vector.h"
+#include "formats/base/jobs.h"
 #include "formats/base/result.h"
 
 namespace sonocase {
@@ -29,19 +29,19 @@ class VoxelBlocks {
     explicit VoxelBlocks(std::unique_ptr<detail::BlockParts> parts);
     ~VoxelBlocks();
 
-    // Unpacks every block for which wanted(lower) is true: its first voxel. Of two threads that
-    // want the same, one does well to begin from behind.
+    // Unpacks every block for which wanted(lower) is true; lower: the block's first voxel. Of two
+    // threads that want the same blocks, one should begin at the end.
     template <class Wanted>
-    void ensure_loaded(const Wanted& wanted, bool from_behind = false) noexcept {
+    void ensure_loaded(const Wanted& wanted, bool backwards = false) noexcept {
         if (whole()) return;
         for (std::size_t n = 0; n < count_; ++n) {
-            const std::size_t block = from_behind ? count_ - 1 - n : n;
+            const std::size_t block = backwards ? count_ - 1 - n : n;
             if (is_loaded(block)) continue;
             if (wanted(lower_[block])) unpack(block);
         }
     }
     void ensure_voxel_loaded(int i, int j, int k) noexcept;
-    void load_all(int threads);  // 0: as many as the machine has
+    void load_all(JobRunner& jobs);
 
     int edge() const noexcept { return edge_; }  // of a block, voxels
     bool whole() const noexcept { return left_.load(std::memory_order_acquire) == 0; }
@@ -49,27 +49,23 @@ class VoxelBlocks {
     bool damaged() const noexcept { return damaged_.load(std::memory_order_relaxed); }
     Status status() const;
 
-    // Keeps the system from finding a page of 2 MB for a block of a tenth of it, where the pools
-    // are large enough for such pages. Before anything is asked for.
+    // Keeps the system from providing a page of 2 MB for a block of a tenth of that, where the
+    // pools are large enough for such pages. To be called before any block is asked for.
     void use_small_pages() noexcept;
 
-    // The bytes that the blocks are read from, for a bundle that outlives them elsewhere.
-    void keep(RawVector<std::uint8_t> file) { file_ = std::move(file); }
-
   private:
-    enum State : std::uint8_t { kPacked, kBeingUnpacked, kThere };
+    enum State : std::uint8_t { kPacked, kBeingUnpacked, kLoaded };
     struct Worker;
 
     bool is_loaded(std::size_t block) const noexcept {
-        return state_[block].load(std::memory_order_acquire) == kThere;
+        return state_[block].load(std::memory_order_acquire) == kLoaded;
     }
-    bool take(std::size_t block) noexcept;  // to unpack it; false: another thread has
-    void finish(std::size_t block, bool makes_sense) noexcept;
+    bool take(std::size_t block) noexcept;  // claims it; false: another thread has
+    void finish(std::size_t block, bool valid) noexcept;
     void unpack(std::size_t block) noexcept;
 
     std::unique_ptr<detail::BlockParts> parts_;
-    std::unique_ptr<Worker[]> workers_;  // as many threads unpack at a time
-    RawVector<std::uint8_t> file_;
+    std::unique_ptr<Worker[]> workers_;  // threads that can unpack at the same time
     Int3 blocks_{0, 0, 0};
     int edge_ = 0;
     std::size_t count_ = 0;

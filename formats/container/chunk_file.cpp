@@ -12,7 +12,7 @@
 #include <cassert>
 #include <cstring>
 
-#include "formats/base/jobs.h"
+#include "formats/base/memory.h"
 
 namespace sonocase {
 namespace {
@@ -20,16 +20,15 @@ namespace {
 static_assert(std::endian::native == std::endian::little,
               "the formats are little-endian in memory");
 
-// A byte above 127, line ends of both kinds and an end-of-file mark show a file that was sent as
-// text.
+// A byte above 127, line ends of both kinds and an end-of-file mark: a file that was transferred as
+// text no longer begins like this.
 constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'S', 'O', 'N', 'O', 0x0D, 0x0A, 0x1A};
 constexpr std::size_t kHeaderBytes = 64;
 constexpr std::size_t kEntryBytes = 64;
 constexpr std::uint32_t kRequired = 1;
 constexpr std::uint32_t kZstd = 2;
 constexpr int kZstdLevel = 6;
-
-using detail::run_jobs;
+constexpr const char* kRemake = "the file is damaged; copy it again or make it again";
 
 template <class T>
 T get(std::span<const std::uint8_t> bytes, std::size_t offset) {
@@ -46,13 +45,13 @@ std::size_t aligned(std::size_t offset) {
     return (offset + kChunkAlignment - 1) / kChunkAlignment * kChunkAlignment;
 }
 
-// Independent zstd frames of kFrameBytes each, so that they pack and unpack side by side. Empty
-// when compression saves less than an eighth.
-std::vector<std::uint8_t> compressed(std::span<const std::uint8_t> raw, int threads) {
+// Independent zstd frames of kFrameBytes each, so that they can be compressed and decompressed in
+// parallel. Empty when compression saves less than an eighth.
+std::vector<std::uint8_t> compressed(std::span<const std::uint8_t> raw, JobRunner& jobs) {
     if (raw.size() < 64) return {};
     const std::size_t frames = (raw.size() + kFrameBytes - 1) / kFrameBytes;
     std::vector<std::vector<std::uint8_t>> parts(frames);
-    run_jobs(frames, threads, [&](std::size_t i) {
+    jobs.run(frames, [&](std::size_t i) {
         const auto from =
             raw.subspan(i * kFrameBytes, std::min(kFrameBytes, raw.size() - i * kFrameBytes));
         parts[i].resize(ZSTD_compressBound(from.size()));
@@ -79,6 +78,10 @@ std::string text_of(std::span<const std::uint8_t> bytes) {
         text += b >= 32 && b < 127 ? static_cast<char>(b) : '?';
     }
     return text;
+}
+
+std::string entry_name(std::size_t i, const std::string& type) {
+    return "chunk " + std::to_string(i) + " '" + type + "'";
 }
 
 bool all_zero(std::span<const std::uint8_t> bytes) {
@@ -108,13 +111,13 @@ void ChunkWriter::add_packed(std::string type, bool required, std::vector<std::u
     chunks_.back().packed = true;
 }
 
-std::vector<std::uint8_t> ChunkWriter::write(int threads) const {
+std::vector<std::uint8_t> ChunkWriter::write(JobRunner& jobs) const {
     const std::size_t table_bytes = kEntryBytes * chunks_.size();
     std::vector<std::uint8_t> out(kHeaderBytes + table_bytes);
     for (std::size_t i = 0; i < chunks_.size(); ++i) {
         const Chunk& chunk = chunks_[i];
         const std::vector<std::uint8_t> packed =
-            chunk.packed ? std::vector<std::uint8_t>() : compressed(chunk.view, threads);
+            chunk.packed ? std::vector<std::uint8_t>() : compressed(chunk.view, jobs);
         const std::span<const std::uint8_t> stored =
             packed.empty() ? chunk.view : std::span(packed);
         const std::size_t offset = aligned(out.size());
@@ -150,88 +153,103 @@ Result<ChunkReader> ChunkReader::open(std::span<const std::uint8_t> bytes,
     ChunkReader reader;
     reader.bytes_ = bytes;
     reader.where_ = where;
-    const char* const remake = "the file is damaged; copy it again or make it again";
-    if (bytes.size() < kMagic.size() || !std::equal(kMagic.begin(), kMagic.end(), bytes.begin())) {
-        return reader.fault("is no sonocase file (wrong first bytes)",
-                            "give a file made by sonocase");
+    if (Status header = reader.check_header(kind); !header) return header.error();
+    const std::size_t count = get<std::uint32_t>(bytes, 24);
+    const auto table = bytes.subspan(kHeaderBytes, count * kEntryBytes);
+    std::size_t end = kHeaderBytes + table.size();
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto raw = table.subspan(i * kEntryBytes, kEntryBytes);
+        auto entry = reader.read_entry(raw, i, end);
+        if (!entry) return entry.error();
+        const bool is_known = std::find(known.begin(), known.end(), entry->type) != known.end();
+        if (entry->required && !is_known) {
+            return reader.fault(
+                entry_name(i, entry->type) + " is required and not known to this program",
+                "update the program");
+        }
+        end = entry->offset + entry->stored;
+        if (is_known) reader.entries_.push_back(std::move(*entry));
     }
-    if (bytes.size() < kHeaderBytes) return reader.fault("ends inside its header", remake);
+    if (end != bytes.size()) return reader.fault("bytes follow the last chunk", kRemake);
+    return reader;
+}
+
+// Everything before the entries: the header, and the table's size and checksum.
+Status ChunkReader::check_header(std::string_view kind) const {
+    const auto bytes = bytes_;
+    if (bytes.size() < kMagic.size() || !std::equal(kMagic.begin(), kMagic.end(), bytes.begin())) {
+        return fault("is not a sonocase file (wrong first bytes)", "give a file made by sonocase");
+    }
+    if (bytes.size() < kHeaderBytes) return fault("ends inside its header", kRemake);
     const std::uint32_t version = get<std::uint32_t>(bytes, 8);
     const bool header_whole = get<std::uint64_t>(bytes, 56) == XXH3_64bits(bytes.data(), 56);
     if (header_whole && version > kContainerVersion) {
-        return reader.fault("has format version " + std::to_string(version),
-                            "this program reads up to version " +
-                                std::to_string(kContainerVersion) +
-                                "; update it or make the file again with it");
+        return fault("has format version " + std::to_string(version),
+                     "this program reads up to version " + std::to_string(kContainerVersion) +
+                         "; update it or make the file again with it");
     }
-    if (!header_whole) return reader.fault("header checksum does not match", remake);
-    if (version == 0) return reader.fault("has format version 0", remake);
+    if (!header_whole) return fault("header checksum does not match", kRemake);
+    if (version == 0) return fault("has format version 0", kRemake);
     const std::string found = text_of(bytes.subspan(12, 4));
     if (found != kind) {
-        return reader.fault("is a file of kind '" + found + "'",
-                            "a file of kind '" + std::string(kind) + "' is needed here");
+        return fault("is a file of kind '" + found + "'",
+                     "a file of kind '" + std::string(kind) + "' is needed here");
     }
     const std::uint64_t size = get<std::uint64_t>(bytes, 16);
     if (size > bytes.size()) {
-        return reader.fault(
+        return fault(
             "holds " + std::to_string(bytes.size()) + " of " + std::to_string(size) + " bytes",
             "the file was cut short; copy it again");
     }
     if (size < bytes.size()) {
-        return reader.fault(std::to_string(bytes.size() - size) + " bytes follow the end", remake);
+        return fault(std::to_string(bytes.size() - size) + " bytes follow the end", kRemake);
     }
     const std::size_t count = get<std::uint32_t>(bytes, 24);
     if (count == 0 || count > kMaxChunks || kHeaderBytes + count * kEntryBytes > bytes.size()) {
-        return reader.fault("table of " + std::to_string(count) + " chunks does not fit the file",
-                            remake);
+        return fault("table of " + std::to_string(count) + " chunks does not fit the file",
+                     kRemake);
     }
     if (!all_zero(bytes.subspan(28, 20)))
-        return reader.fault("reserved header bytes are not zero", remake);
+        return fault("reserved header bytes are not zero", kRemake);
     const auto table = bytes.subspan(kHeaderBytes, count * kEntryBytes);
     if (get<std::uint64_t>(bytes, 48) != XXH3_64bits(table.data(), table.size())) {
-        return reader.fault("table checksum does not match", remake);
+        return fault("table checksum does not match", kRemake);
     }
-    std::size_t end = kHeaderBytes + table.size();
-    for (std::size_t i = 0; i < count; ++i) {
-        const auto raw = table.subspan(i * kEntryBytes, kEntryBytes);
-        Entry entry;
-        entry.type = text_of(raw.subspan(0, 8));
-        const std::uint32_t flags = get<std::uint32_t>(raw, 8);
-        const std::uint64_t offset = get<std::uint64_t>(raw, 16);
-        const std::uint64_t stored = get<std::uint64_t>(raw, 24);
-        const std::uint64_t unpacked = get<std::uint64_t>(raw, 32);
-        const std::string name = "chunk " + std::to_string(i) + " '" + entry.type + "'";
-        if (offset != aligned(end) || offset > size || stored > size - offset) {
-            return reader.fault(
-                name + " at offset " + std::to_string(offset) + " is not where it belongs", remake);
-        }
-        if (!all_zero(bytes.subspan(end, static_cast<std::size_t>(offset) - end))) {
-            return reader.fault("bytes before " + name + " are not zero", remake);
-        }
-        if ((flags & ~(kRequired | kZstd)) != 0 || !all_zero(raw.subspan(12, 4)) ||
-            !all_zero(raw.subspan(48, 16))) {
-            return reader.fault(name + " has unknown flags", "update the program");
-        }
-        entry.required = (flags & kRequired) != 0;
-        entry.compressed = (flags & kZstd) != 0;
-        if ((!entry.compressed && unpacked != stored) || unpacked > SIZE_MAX / 2) {
-            return reader.fault(name + " has an impossible size", remake);
-        }
-        if (reader.find(entry.type)) return reader.fault(name + " is there twice", remake);
-        const bool is_known = std::find(known.begin(), known.end(), entry.type) != known.end();
-        if (entry.required && !is_known) {
-            return reader.fault(name + " is required and not known to this program",
-                                "update the program");
-        }
-        entry.offset = static_cast<std::size_t>(offset);
-        entry.stored = static_cast<std::size_t>(stored);
-        entry.raw = static_cast<std::size_t>(unpacked);
-        entry.checksum = get<std::uint64_t>(raw, 40);
-        end = entry.offset + entry.stored;
-        if (is_known) reader.entries_.push_back(std::move(entry));
+    return Done{};
+}
+
+// raw: entry i of the table. end: of the chunk before.
+Result<ChunkReader::Entry> ChunkReader::read_entry(std::span<const std::uint8_t> raw,
+                                                   std::size_t i,
+                                                   std::size_t end) const {
+    Entry entry;
+    entry.type = text_of(raw.subspan(0, 8));
+    const std::uint32_t flags = get<std::uint32_t>(raw, 8);
+    const std::uint64_t offset = get<std::uint64_t>(raw, 16);
+    const std::uint64_t stored = get<std::uint64_t>(raw, 24);
+    const std::uint64_t unpacked = get<std::uint64_t>(raw, 32);
+    const std::string name = entry_name(i, entry.type);
+    if (offset != aligned(end) || offset > bytes_.size() || stored > bytes_.size() - offset) {
+        return fault(name + " at offset " + std::to_string(offset) + " is out of place", kRemake);
     }
-    if (end != bytes.size()) return reader.fault("bytes follow the last chunk", remake);
-    return reader;
+    if (!all_zero(bytes_.subspan(end, static_cast<std::size_t>(offset) - end))) {
+        return fault("bytes before " + name + " are not zero", kRemake);
+    }
+    if ((flags & ~(kRequired | kZstd)) != 0 || !all_zero(raw.subspan(12, 4)) ||
+        !all_zero(raw.subspan(48, 16))) {
+        return fault(name + " has unknown flags", "update the program");
+    }
+    entry.required = (flags & kRequired) != 0;
+    entry.compressed = (flags & kZstd) != 0;
+    if ((!entry.compressed && unpacked != stored) || unpacked > SIZE_MAX / 2) {
+        return fault(name + " has an impossible size", kRemake);
+    }
+    if (find(entry.type)) return fault(name + " occurs twice", kRemake);
+    entry.offset = static_cast<std::size_t>(offset);
+    entry.stored = static_cast<std::size_t>(stored);
+    entry.raw = static_cast<std::size_t>(unpacked);
+    entry.checksum = get<std::uint64_t>(raw, 40);
+    return entry;
 }
 
 const ChunkReader::Entry* ChunkReader::find(std::string_view type) const {
@@ -261,41 +279,44 @@ Status ChunkReader::check_size(std::string_view type,
             "the manifest calls for " + std::to_string(count) + " values of " +
                 std::to_string(bytes_each) + " bytes");
     }
-    // A small file must not ask for a large memory: what zstd frames could hold at most bounds it.
+    // A small file must not ask for much memory: a zstd frame takes at least 9 bytes.
     if (entry->compressed && entry->raw / kFrameBytes > entry->stored / 9) {
         return fault("chunk '" + std::string(type) + "' claims more than it can hold",
                      "make the file again");
     }
+    if (!can_allocate(entry->raw))
+        return fault("chunk '" + entry->type + "' needs more memory than is available");
     return Done{};
 }
 
 Result<std::vector<std::uint8_t>> ChunkReader::read(std::string_view type,
                                                     std::size_t max_bytes,
-                                                    int threads) const {
+                                                    JobRunner& jobs) const {
     if (raw_bytes(type) > max_bytes) {
         return fault(
             "chunk '" + std::string(type) + "' holds " + std::to_string(raw_bytes(type)) + " bytes",
-            "at most " + std::to_string(max_bytes) + " make sense");
+            "at most " + std::to_string(max_bytes) + " are expected");
     }
-    return read_array<std::uint8_t>(type, raw_bytes(type), threads);
+    return read_array<std::uint8_t>(type, raw_bytes(type), jobs);
 }
 
 Status ChunkReader::check_sum(const Entry& entry) const {
     if (XXH3_64bits(bytes_.data() + entry.offset, entry.stored) == entry.checksum) return Done{};
-    return fault("chunk '" + entry.type + "' checksum does not match",
-                 "the file is damaged; copy it again or make it again");
+    return fault("chunk '" + entry.type + "' checksum does not match", kRemake);
 }
 
 Result<std::span<const std::uint8_t>> ChunkReader::packed(std::string_view type) const {
     const Entry* entry = find(type);
     if (!entry) return fault("chunk '" + std::string(type) + "' is missing", "make the file again");
     if (entry->compressed)
-        return fault("chunk '" + entry->type + "' is packed twice", "make the file again");
+        return fault("chunk '" + entry->type + "' is compressed twice", "make the file again");
     if (Status sum = check_sum(*entry); !sum) return sum.error();
     return bytes_.subspan(entry->offset, entry->stored);
 }
 
-Status ChunkReader::unpack(std::string_view type, std::span<std::uint8_t> to, int threads) const {
+Status ChunkReader::unpack(std::string_view type,
+                           std::span<std::uint8_t> to,
+                           JobRunner& jobs) const {
     const Entry& entry = *find(type);
     const auto stored = bytes_.subspan(entry.offset, entry.stored);
     const std::string name = "chunk '" + std::string(type) + "'";
@@ -321,13 +342,13 @@ Status ChunkReader::unpack(std::string_view type, std::span<std::uint8_t> to, in
         filled += expected;
     }
     std::atomic<bool> good{true};
-    run_jobs(frames.size(), threads, [&](std::size_t i) {
+    jobs.run(frames.size(), [&](std::size_t i) {
         const Frame& f = frames[i];
         const std::size_t n =
             ZSTD_decompress(to.data() + f.to, f.to_bytes, stored.data() + f.from, f.from_bytes);
         if (n != f.to_bytes) good = false;
     });
-    if (!good) return fault(name + " does not unpack", "make the file again");
+    if (!good) return fault(name + " cannot be decompressed", "make the file again");
     return Done{};
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The container of every binary file of ours: a header, a table and chunks. docs/format.md, part 1.
+// The container of all our binary files: a header, a table and chunks. docs/format.md, part 1.
 //
 // Case bundles and the files between stages share it. Little-endian. Every byte of a file is
-// accounted for: header, table and chunks carry checksums and what pads them is zero, so that any
-// change of a file is seen (a change inside a skipped optional chunk is not looked for).
+// accounted for: header, table and chunks carry checksums, and padding is zero, so that any change
+// to a file is found (except inside an optional chunk that is skipped).
 #pragma once
 
 #include <cstdint>
@@ -15,6 +15,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "formats/base/jobs.h"
 #include "formats/base/result.h"
 
 namespace sonocase {
@@ -31,9 +32,9 @@ class ChunkWriter {
   public:
     explicit ChunkWriter(std::string kind);
     void add(std::string type, bool required, std::vector<std::uint8_t> bytes);
-    // Borrows: the bytes must stay until write() returns.
+    // Borrows: the bytes must stay valid until write() returns.
     void add_view(std::string type, bool required, std::span<const std::uint8_t> bytes);
-    // Bytes that are packed already, and that readers take as they lie.
+    // Bytes that are compressed already; readers take them as they are (ChunkReader::packed()).
     void add_packed(std::string type, bool required, std::vector<std::uint8_t> bytes);
     template <class T, class A>
     void add_array(std::string type, bool required, const std::vector<T, A>& values) {
@@ -41,9 +42,8 @@ class ChunkWriter {
         add_view(std::move(type), required,
                  {reinterpret_cast<const std::uint8_t*>(values.data()), values.size() * sizeof(T)});
     }
-    // Chunks in the order added. threads: 0 takes as many as the machine has. The bytes do not
-    // depend on it.
-    std::vector<std::uint8_t> write(int threads = 0) const;
+    // Chunks in the order added. The bytes do not depend on `jobs`.
+    std::vector<std::uint8_t> write(JobRunner& jobs = serial_jobs()) const;
 
   private:
     struct Chunk {
@@ -68,23 +68,24 @@ class ChunkReader {
 
     bool has(std::string_view type) const;
     std::size_t raw_bytes(std::string_view type) const;  // 0 if absent
-    // max_bytes: the most that the caller has a use for; more is an error before anything is
-    // allocated.
+    // max_bytes: the most that the caller can use; more is an error before anything is allocated.
     Result<std::vector<std::uint8_t>> read(std::string_view type,
                                            std::size_t max_bytes,
-                                           int threads = 0) const;
-    // The bytes of a chunk of add_packed() as they lie in the file, their checksum checked.
+                                           JobRunner& jobs = serial_jobs()) const;
+    // The bytes of a chunk of add_packed() as they are in the file; their checksum is checked.
     Result<std::span<const std::uint8_t>> packed(std::string_view type) const;
-    // count: how many values the chunk must hold exactly.
+    // count: the number of values, which the chunk must hold exactly.
     template <class T, class Values = std::vector<T>>
-    Result<Values> read_array(std::string_view type, std::size_t count, int threads = 0) const {
+    Result<Values> read_array(std::string_view type,
+                              std::size_t count,
+                              JobRunner& jobs = serial_jobs()) const {
         static_assert(std::is_trivially_copyable_v<T>);
         Values values;
         if (Status size = check_size(type, count, sizeof(T)); !size) return size.error();
-        if (Status room = reserve([&] { values.resize(count); }, type); !room) return room.error();
+        values.resize(count);
         const std::span<std::uint8_t> to(reinterpret_cast<std::uint8_t*>(values.data()),
                                          count * sizeof(T));
-        if (Status done = unpack(type, to, threads); !done) return done.error();
+        if (Status done = unpack(type, to, jobs); !done) return done.error();
         return values;
     }
     const std::string& where() const { return where_; }
@@ -100,19 +101,14 @@ class ChunkReader {
         std::size_t raw = 0;
         std::uint64_t checksum = 0;
     };
+    Status check_header(std::string_view kind) const;
+    Result<Entry> read_entry(std::span<const std::uint8_t> raw,
+                             std::size_t i,
+                             std::size_t end) const;
     const Entry* find(std::string_view type) const;
     Status check_size(std::string_view type, std::size_t count, std::size_t bytes_each) const;
     Status check_sum(const Entry& entry) const;
-    Status unpack(std::string_view type, std::span<std::uint8_t> to, int threads) const;
-    template <class Allocate>
-    Status reserve(Allocate allocate, std::string_view type) const {
-        try {
-            allocate();
-        } catch (...) {
-            return fault("chunk '" + std::string(type) + "' needs more memory than there is");
-        }
-        return Done{};
-    }
+    Status unpack(std::string_view type, std::span<std::uint8_t> to, JobRunner& jobs) const;
 
     std::span<const std::uint8_t> bytes_;
     std::vector<Entry> entries_;

@@ -50,13 +50,13 @@ Error system_error(const char* doing, int fault, const std::string& path, const 
 
 template <class Bytes>
 Result<Bytes> read_whole(const std::string& path) {
+    if (const Status status = expect_regular_file(path); !status) return status.error();
     const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
     if (file.get() < 0)
         return system_error("cannot open", errno, path, "check that it may be read");
     struct stat status {};
     if (::fstat(file.get(), &status) != 0)
         return system_error("cannot read", errno, path, "check the disk");
-    if (S_ISDIR(status.st_mode)) return Error{"is a folder", path, "expected a file"};
     Bytes bytes;
     std::size_t filled = 0;
     try {
@@ -143,6 +143,19 @@ void flush_folder_of(const std::string& path) {
 }
 
 }  // namespace
+
+Status expect_regular_file(const std::string& path) {
+    struct stat status {};
+    if (::stat(path.c_str(), &status) != 0)
+        return system_error("cannot open", errno, path, "check that it may be read");
+    const char* what = S_ISREG(status.st_mode)    ? nullptr
+                       : S_ISDIR(status.st_mode)  ? "is a folder"
+                       : S_ISFIFO(status.st_mode) ? "is a pipe"
+                       : S_ISSOCK(status.st_mode) ? "is a socket"
+                                                  : "is a device";
+    if (what != nullptr) return Error{what, path, "expected a file"};
+    return Done{};
+}
 
 Result<std::vector<std::uint8_t>> read_file(const std::string& path) {
     return read_whole<std::vector<std::uint8_t>>(path);

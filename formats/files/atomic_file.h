@@ -17,9 +17,16 @@
 
 namespace sonocase {
 
+// Each reads a whole file. An error when it does not exist, may not be read, or is not a regular
+// file (see expect_regular_file).
 Result<std::vector<std::uint8_t>> read_file(const std::string& path);
 Result<RawVector<std::uint8_t>> read_large_file(const std::string& path);  // not cleared first
 Result<std::string> read_text_file(const std::string& path);
+
+// An error, in one line, unless `path` leads to a regular file: a folder, a device (/dev/zero never
+// ends), a pipe (opening one waits for its writer) or a socket. For readers that hand the path to a
+// library. /dev/stdin is accepted when the shell connects it to a file.
+Status expect_regular_file(const std::string& path);
 
 // Writes a temporary name in the same folder, flushes it to the disk and renames it over `path`;
 // makes missing folders. On failure nothing is left behind and what `path` held before stays.

@@ -2,24 +2,35 @@
 
 #include "formats/files/bundle_file.h"
 
-#include "formats/files/atomic_file.h"
+#include "formats/files/whole_file.h"
+#include "formats/threads/thread_jobs.h"
 
 namespace sonocase {
+namespace {
+
+constexpr const char* kRemedy = "use a case with larger voxels";
+
+}  // namespace
 
 Result<CaseBundle> load_bundle(const std::string& path) {
-    const auto bytes = read_large_file(path);
-    if (!bytes) return bytes.error();
-    return read_bundle(*bytes, path);
+    ThreadJobs jobs;
+    const auto read = [&](const RawVector<std::uint8_t>& bytes) {
+        return read_bundle(bytes, path, jobs);
+    };
+    return detail::read_whole(path, read, kRemedy);
 }
 
-Result<CaseBundle> open_bundle(const std::string& path) {
-    auto bytes = read_large_file(path);
-    if (!bytes) return bytes.error();
-    return stream_bundle(std::move(*bytes), path);
+Result<StreamedBundle> open_bundle(const std::string& path) {
+    ThreadJobs jobs;
+    const auto read = [&](RawVector<std::uint8_t> bytes) {
+        return stream_bundle(std::move(bytes), path, jobs);
+    };
+    return detail::read_whole(path, read, kRemedy);
 }
 
 Status save_bundle(const CaseBundle& bundle, const std::string& path) {
-    return write_file(path, write_bundle(bundle));
+    ThreadJobs jobs;
+    return write_file(path, write_bundle(bundle, jobs));
 }
 
 }  // namespace sonocase

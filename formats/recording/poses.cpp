@@ -38,7 +38,7 @@ Result<std::vector<Pose>> parse_poses(std::string_view csv, const std::string& w
         ++number;
         if (line.empty() || line.front() == '#') continue;
         const std::vector<std::string_view> cells = split(line);
-        const std::string at = where + ", line " + std::to_string(number);
+        const std::string at = where + ":" + std::to_string(number);
         if (!have_header) {
             for (std::size_t c = 0; c < kColumns.size(); ++c) {
                 std::size_t i = 0;
@@ -68,7 +68,7 @@ Result<std::vector<Pose>> parse_poses(std::string_view csv, const std::string& w
             const bool read =
                 c == 0 ? parse_number(cell, pose.frame) : parse_number(cell, values[c]);
             if (!read) {
-                return Error{"'" + std::string(cell.substr(0, 40)) + "' is no number", at,
+                return Error{"'" + std::string(cell.substr(0, 40)) + "' is not a number", at,
                              "column '" + std::string(kColumns[c]) + "' holds numbers"};
             }
         }

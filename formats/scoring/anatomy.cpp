@@ -9,9 +9,9 @@
 
 namespace sonocase {
 
-CaseAnatomy::CaseAnatomy(const CaseBundle& bundle, const BreathingMotion& breathing)
-    : bundle_(&bundle), breathing_(breathing) {
-    if (breathing.amplitude_mm != 0) field_ = BreathingField(bundle);
+CaseAnatomy::CaseAnatomy(CaseView bundle, const BreathingMotion& breathing)
+    : bundle_(bundle), breathing_(breathing) {
+    if (breathing.amplitude_mm != 0) field_ = BreathingField(*bundle);
 }
 
 Point3 CaseAnatomy::at_rest(Point3 p, double time_s) const {
@@ -50,7 +50,7 @@ int CaseAnatomy::label(Point3 p) const {
               k = static_cast<int>(v.z + 0.5);
     const int own = bundle_->label_bricks.at(i, j, k);
     if (bundle_->boundary.table.empty()) return own;
-    if (bundle_->blocks) bundle_->blocks->ensure_voxel_loaded(i, j, k);
+    if (VoxelBlocks* blocks = bundle_.blocks()) blocks->ensure_voxel_loaded(i, j, k);
     const std::uint32_t packed = bundle_->boundary.at(i, j, k);
     if (packed == kNoBoundary) return own;
     const BoundaryRecord record = unpack_boundary(packed);

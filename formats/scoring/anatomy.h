@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "formats/base/geometry.h"
-#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/streamed_bundle.h"
 #include "formats/exercise/motion.h"
 #include "formats/volume/surface.h"
 
@@ -42,7 +42,7 @@ class Anatomy {
 class CaseAnatomy final : public Anatomy {
   public:
     // breathing: as the picture shows it; by default none. Its field costs a look-up a brick.
-    explicit CaseAnatomy(const CaseBundle& bundle, const BreathingMotion& breathing = {});
+    explicit CaseAnatomy(CaseView bundle, const BreathingMotion& breathing = {});
     bool inside(Point3 p) const override { return label(p) != 0; }
     int label(Point3 p) const override;
     double exit_distance(Point3 from, Vector3 direction, double reach) const override;
@@ -51,7 +51,7 @@ class CaseAnatomy final : public Anatomy {
     double greatest_shift_mm() const override { return std::abs(breathing_.amplitude_mm); }
 
   private:
-    const CaseBundle* bundle_;
+    CaseView bundle_;
     BreathingMotion breathing_;
     BreathingField field_;  // empty: at rest
 };

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/base/jobs.h"
 #include "formats/scoring/image_region.h"
 
 namespace sonocase {
@@ -78,7 +77,8 @@ std::vector<NeedleReading> look_up_readings(const Session& session,
     }
     std::vector<NeedleReading> readings(needle.points.size());
     constexpr std::size_t kBlock = 1024;
-    detail::run_jobs((readings.size() + kBlock - 1) / kBlock, options.threads, [&](std::size_t b) {
+    JobRunner& jobs = options.jobs ? *options.jobs : serial_jobs();
+    jobs.run((readings.size() + kBlock - 1) / kBlock, [&](std::size_t b) {
         const std::size_t end = std::min(readings.size(), (b + 1) * kBlock);
         for (std::size_t i = b * kBlock; i < end; ++i) readings[i] = look_up(needle.points[i]);
     });

@@ -24,7 +24,7 @@ struct NeedleReading {
 };
 
 // # needle.points. anatomy may be null: then nothing is inside. Readings do not depend on each
-// other and are shared out among options.threads.
+// other and are shared out among options.jobs.
 std::vector<NeedleReading> look_up_readings(const Session& session,
                                             const ToolTrack& needle,
                                             const Exercise& exercise,

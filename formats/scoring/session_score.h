@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/jobs.h"
 #include "formats/exercise/exercise.h"
 #include "formats/recording/session.h"
 #include "formats/scoring/anatomy.h"
@@ -23,7 +24,7 @@ struct ScoreOptions {
     double contact_mm = 1;      // the tip touches the skin when it is nearer than this
     double contact_pause_s = 0.25;  // shorter breaks do not part two contacts
     double shaft_step_mm = 1;       // spacing of the points of the shaft that are looked up
-    int threads = 0;                // 0: as many as the machine has; the scores do not depend on it
+    JobRunner* jobs = nullptr;      // null: serial_jobs(); the scores do not depend on it
 };
 
 struct Metric {

@@ -12,6 +12,36 @@ const Json& nothing() {
     return none;
 }
 
+// Keeps nothing of a text but what is wrong with it.
+struct ErrorListener final : nlohmann::json_sax<Json> {
+    std::string what;
+
+    bool null() override { return true; }
+    bool boolean(bool) override { return true; }
+    bool number_integer(number_integer_t) override { return true; }
+    bool number_unsigned(number_unsigned_t) override { return true; }
+    bool number_float(number_float_t, const string_t&) override { return true; }
+    bool string(string_t&) override { return true; }
+    bool binary(binary_t&) override { return true; }
+    bool start_object(std::size_t) override { return true; }
+    bool key(string_t&) override { return true; }
+    bool end_object() override { return true; }
+    bool start_array(std::size_t) override { return true; }
+    bool end_array() override { return true; }
+    bool parse_error(std::size_t, const std::string&, const Json::exception& error) override {
+        what = error.what();
+        return false;
+    }
+};
+
+// The parser's message for a text that is not JSON. A second pass, and the parser's only way of
+// saying so without an exception.
+std::string parse_error_of(std::string_view text) {
+    ErrorListener listener;
+    Json::sax_parse(text.begin(), text.end(), &listener);
+    return listener.what;
+}
+
 }  // namespace
 
 JsonObject::JsonObject(const Json& value, std::string path, JsonFault& fault)
@@ -170,10 +200,9 @@ std::vector<JsonObject> JsonObject::objects(const char* key) {
 }
 
 bool parse_json(std::string_view text, Json& out, JsonFault& fault) {
-    try {
-        out = Json::parse(text.begin(), text.end());
-    } catch (const std::exception& failure) {
-        std::string what = failure.what();
+    out = Json::parse(text.begin(), text.end(), nullptr, false);
+    if (out.is_discarded()) {
+        std::string what = parse_error_of(text);
         const std::size_t start = what.find("parse error");
         what = start == std::string::npos ? "is no JSON" : what.substr(start);
         std::replace(what.begin(), what.end(), '\n', ' ');

@@ -11,10 +11,16 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
+
+// Errors of the parser come back as values here; the rest of its exceptions are our mistakes and
+// abort.
+#ifndef JSON_NOEXCEPTION
+#define JSON_NOEXCEPTION
+#endif
+#include <nlohmann/json.hpp>
 
 #include "formats/base/geometry.h"
 #include "formats/base/result.h"

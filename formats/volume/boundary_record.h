@@ -2,13 +2,14 @@
 
 // Where the surface between two labels runs through a voxel's neighbourhood, in four bytes.
 //
-//     d(x) = distance + normal . (x - x_voxel),   label at x = voxel's own label if d >= 0, else
-//     second
+//     d(x) = distance + normal . (x - x_voxel)
+//     label at x: the voxel's own label where d(x) >= 0, else the second label
 //
 // x in voxels of the cooked grid; the normal is a unit vector that points into the voxel's own
 // label. Packed: bits 0-7 second label, 8-15 distance (signed, 1/48 voxel, so +-2.6 voxels), 16-23
 // and 24-31 the normal in octahedral coordinates (signed, 1/127). Rounding: 0.01 voxel and 1 degree
-// at most. Voxels with no interface near hold kNoBoundary. Constant time; meant for the frame loop.
+// at most. Voxels with no interface nearby hold kNoBoundary. Constant time; meant for the frame
+// loop.
 #pragma once
 
 #include <cstdint>

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A volume kept in bricks of 4 x 4 x 4 voxels. A brick whose voxels are all alike costs only its
-// table entry, so that the air round a torso and the inside of an organ are nearly free.
+// A volume kept in bricks of 4 x 4 x 4 voxels. A brick whose voxels are all equal costs only its
+// table entry, so that the air around a torso and the inside of an organ are nearly free.
 //
-// table    one entry a brick, x fastest. Bit 31 clear: number of the brick in `pool`, whose 64
-// values
-//          start at 64 * entry, x fastest inside the brick. Bit 31 set: the brick is uniform and
-//          the
-//          other bits are an index into `uniform`.
+// table    one entry per brick, x fastest
+//          bit 31 clear: number of the brick in `pool`; its 64 values start at 64 * entry,
+//          x fastest
+//          bit 31 set: the brick is uniform, and the other bits are an index into `uniform`
 //
 // Voxels beyond `size` that pad the last bricks repeat their nearest neighbour inside. Reading a
 // voxel is two dependent loads; both may run in the frame loop.
@@ -36,7 +35,7 @@ struct BrickVolume {
     Int3 size{0, 0, 0};              // voxels
     RawVector<std::uint32_t> table;  // # product of brick_count(size)
     std::vector<T> uniform;          // distinct values of uniform bricks
-    RawVector<T> pool;               // 64 values a stored brick
+    RawVector<T> pool;               // 64 values per stored brick
 
     T at(int i, int j, int k) const {
         const Int3 n = brick_count(size);

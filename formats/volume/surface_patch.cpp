@@ -10,8 +10,8 @@
 namespace sonocase {
 namespace {
 
-// The loops over a brick's voxels, for the widest registers that the machine has; they are whole
-// numbers but for the direction's division and rounding, which are one operation each everywhere.
+// Compiles loops over a brick's voxels for the widest registers of the machine. They work on whole
+// numbers but for the division and rounding of the direction, which round alike on every machine.
 #if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define SONOCASE_WIDEST __attribute__((target_clones("avx2", "default")))
@@ -21,7 +21,7 @@ namespace {
 
 using Voxels = std::array<std::int32_t, kBrickVoxels>;
 
-// Twice the voxels' places from the brick's centre.
+// Twice each voxel's offset from the centre of its brick.
 struct Places {
     Voxels x, y, z;
 };
@@ -98,23 +98,23 @@ SONOCASE_WIDEST void records_from_one(const SurfacePatch& patch,
     }
 }
 
-// Of two patches' records the nearer, the earlier at equal distance.
+// The nearer of two patches' records; at equal distance the first.
 std::uint32_t nearer_of(std::uint32_t record, std::uint32_t other) {
     if (other == kNoBoundary) return record;
     const bool nearer = record == kNoBoundary || (other >> 8 & 0xFFu) < (record >> 8 & 0xFFu);
     return nearer ? other : record;
 }
 
-// The 10 monomials of q are fitted in voxels. Of the normal equations' matrix only the lower half
-// is kept, row by row; what a voxel's record adds to it depends on the voxel's place alone, and is
-// a multiple of 1/16, so that sums of it are exact in any order.
+// The 10 monomials of q are fitted in voxels. Only the lower half of the normal equations' matrix
+// is kept, row by row. What a voxel's record adds to it depends on the voxel's position alone, and
+// is a multiple of 1/16, so that its sums are exact in any order.
 constexpr int kMatrix = kPatchCoefficients * (kPatchCoefficients + 1) / 2;
 constexpr int entry(int i, int j) {
     return i * (i + 1) / 2 + j;
 }
 
-// Where each axis' derivative has its four terms, and what they are worth at u. That it should have
-// the length of 1 is what makes a distance of q, and the fit of few records firm.
+// The four terms of the derivative along each axis. That the gradient should have length 1 makes q
+// a distance, and keeps the fit stable where there are few records.
 constexpr int kSlopeAt[3][4] = {{1, 4, 7, 8}, {2, 5, 7, 9}, {3, 6, 8, 9}};
 
 struct Terms {
@@ -146,7 +146,7 @@ constexpr std::array<Terms, kBrickVoxels> terms_of_voxels() {
 }
 alignas(64) constexpr std::array<Terms, kBrickVoxels> kTerms = terms_of_voxels();
 
-// What a patch is fitted to: records of some voxels, turned to its own side.
+// What a patch is fitted to: records of some voxels, signed from the patch's side.
 struct Samples {
     std::size_t count = 0;
     std::array<std::uint8_t, kBrickVoxels> voxel;
@@ -172,29 +172,29 @@ struct Fit {
         }
     }
 
-    // Cholesky. A little weight on the curvatures decides what too few records leave open.
+    // Cholesky. A small penalty on the curvatures decides what too few records leave undetermined.
     void solve(double* c) {
-        constexpr double kFlat = 0.1, kAnything = 1e-9;
+        constexpr double kCurvaturePenalty = 0.1, kRegularisation = 1e-9;
         double l[kPatchCoefficients][kPatchCoefficients];
-        double part[kPatchCoefficients];  // 1 / l[i][i]
+        double inverse[kPatchCoefficients];  // 1 / l[i][i]
         for (int i = 0; i < kPatchCoefficients; ++i) {
             for (int j = 0; j <= i; ++j) {
                 double sum = matrix[entry(i, j)];
-                if (i == j) sum += i < 4 ? kAnything : kFlat;
+                if (i == j) sum += i < 4 ? kRegularisation : kCurvaturePenalty;
                 for (int k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
-                l[i][j] = i == j ? std::sqrt(sum) : sum * part[j];
+                l[i][j] = i == j ? std::sqrt(sum) : sum * inverse[j];
             }
-            part[i] = 1 / l[i][i];
+            inverse[i] = 1 / l[i][i];
         }
         for (int i = 0; i < kPatchCoefficients; ++i) {
             double sum = right[i];
             for (int k = 0; k < i; ++k) sum -= l[i][k] * c[k];
-            c[i] = sum * part[i];
+            c[i] = sum * inverse[i];
         }
         for (int i = kPatchCoefficients; i-- > 0;) {
             double sum = c[i];
             for (int k = i + 1; k < kPatchCoefficients; ++k) sum -= l[k][i] * c[k];
-            c[i] = sum * part[i];
+            c[i] = sum * inverse[i];
         }
     }
 };
@@ -222,13 +222,13 @@ void records_from_patches(std::span<const SurfacePatch> patches,
 }
 
 SurfacePatch continued(const SurfacePatch& patch, int axis) {
-    // u becomes u + 4 along the axis; in whole steps of the coefficients nothing is lost.
+    // u becomes u + 4 along the axis; exact in whole steps of the coefficients.
     const int square = 4 + axis;
     const int cross[3][2] = {{7, 8}, {7, 9}, {8, 9}};  // the products that the axis is part of
     const int other[3][2] = {{2, 3}, {1, 3}, {1, 2}};  // and the linear terms that they add to
     const auto at = [&](int i) { return static_cast<int>(patch.c[static_cast<std::size_t>(i)]); };
     SurfacePatch out = patch;
-    const auto put = [&](int i, int value) {  // wraps on nonsense, as the reader's does
+    const auto put = [&](int i, int value) {  // wraps around on invalid input, as the reader does
         out.c[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(value);
     };
     put(0, at(0) + 2 * at(1 + axis) + 4 * at(square));

@@ -3,8 +3,7 @@
 // A piece of the surface between two labels inside one brick, as a quadric: a few bytes that stand
 // for the labels and boundary records of 64 voxels.
 //
-//     q(u) = c0 + sum c_i u_i + sum_{i <= j} c_ij u_i u_j      u = voxel - centre of its brick,
-//     voxels
+//     q(u) = c0 + sum c_i u_i + sum_{i <= j} c_ij u_i u_j,   u = voxel - centre of brick, voxels
 //
 // q >= 0 on the side of label `low`. |q| is the distance to the surface and grad q its normal's
 // direction, so that q has to be close to a signed distance near its zero. Coefficients are whole
@@ -36,21 +35,21 @@ using BrickRecords = std::array<std::uint32_t, kBrickVoxels>;
 // The side of the patch that each voxel lies on.
 void labels_from_patch(const SurfacePatch& patch, std::uint8_t* labels);
 
-// Boundary records of a brick with these labels: of the patches that part a voxel's label from
-// another, the nearest; none if it is further than reach_steps of 1/48 voxel (1 to 127). A voxel on
-// the wrong side of its own patch has distance 0. Constant time; writes 64 records.
+// Boundary records of a brick with these labels: the nearest of the patches that separate a voxel's
+// label from another; none if that is further away than reach_steps of 1/48 voxel (1 to 127). A
+// voxel on the wrong side of its own patch has distance 0. Constant time; writes 64 records.
 void records_from_patches(std::span<const SurfacePatch> patches,
                           const std::uint8_t* labels,
                           int reach_steps,
                           std::uint32_t* records);
 
-// The same patch in the coordinates of the brick `axis` (0 to 2) one further, as a guess at its
-// own.
+// The same patch in the coordinates of the next brick along `axis` (0 to 2), to predict that
+// brick's patch.
 SurfacePatch continued(const SurfacePatch& patch, int axis);
 
 // Least squares through the records' distances and normals, one patch for each pair of labels that
-// they part, in the order of the pairs; coefficients are multiples of `step`. Empty: no records, or
-// more than kMaxPatches pairs. Cost: 2 us a patch.
+// they separate, in the order of the pairs; coefficients are multiples of `step`. Empty: no
+// records, or more than kMaxPatches pairs. Cost: 2 us per patch.
 std::vector<SurfacePatch> fit_patches(const BrickLabels& labels,
                                       const BrickRecords& records,
                                       int step = 1);
@@ -68,8 +67,8 @@ struct BrickPatches {
     }
 };
 
-// Boundary records, and the patches that most of them were made from. Patches are a hint to whoever
-// packs the volume: the records alone say where the boundaries are.
+// Boundary records, and the patches that most of them were made from. Patches are a hint for the
+// packer: the records alone say where the boundaries are.
 struct BoundaryBricks : BrickVolume<std::uint32_t> {
     BrickPatches patches;
 

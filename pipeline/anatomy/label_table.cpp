@@ -55,7 +55,7 @@ std::string decoded_entities(std::string_view text) {
     return result;
 }
 
-// Value of attribute `name` in the inside of a tag, or nothing.
+// Value of attribute `name` of a tag, given the text inside the tag; empty without it.
 std::optional<std::string> attribute(std::string_view tag, std::string_view name) {
     for (std::size_t at = tag.find(name); at != std::string_view::npos;
          at = tag.find(name, at + 1)) {
@@ -73,16 +73,10 @@ std::optional<std::string> attribute(std::string_view tag, std::string_view name
     return std::nullopt;
 }
 
-std::uint8_t colour_byte(double value, bool of_one) {
-    const double scaled = of_one ? value * 255 : value;
+// unit: the range of `value` is [0, 1] and not [0, 255].
+std::uint8_t colour_byte(double value, bool unit) {
+    const double scaled = unit ? value * 255 : value;
     return static_cast<std::uint8_t>(scaled <= 0 ? 0 : scaled >= 255 ? 255 : std::lround(scaled));
-}
-
-std::string trimmed(std::string text) {
-    while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
-    std::size_t start = 0;
-    while (start < text.size() && std::isspace(static_cast<unsigned char>(text[start]))) ++start;
-    return text.substr(start);
 }
 
 }  // namespace
@@ -122,7 +116,7 @@ Result<LabelTable> parse_label_csv(std::string_view csv, const std::string& wher
         const auto value = whole_in(cell_at(rows[r], value_column));
         entry.name = cell_at(rows[r], name_column);
         if (!value)
-            return Error{"'" + cell_at(rows[r], value_column) + "' is no label value", place,
+            return Error{"'" + cell_at(rows[r], value_column) + "' is not a label value", place,
                          "expected a whole number"};
         if (entry.name.empty())
             return Error{"value " + std::to_string(*value) + " has no name", place,
@@ -167,7 +161,7 @@ Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& wher
             name = decoded_entities(xml.substr(at, end - at));
             at = end;
         }
-        name = trimmed(name);
+        name = std::string(trimmed(name));
         const auto key = attribute(tag, "Key");
         const auto value = key ? whole_in(*key) : std::nullopt;
         if (!value || name.empty())
@@ -181,9 +175,9 @@ Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& wher
         if (red && green && blue) {
             const auto r = number_in(*red), g = number_in(*green), b = number_in(*blue);
             if (r && g && b) {
-                const bool of_one = *r <= 1 && *g <= 1 && *b <= 1;
-                entry.colour = {colour_byte(*r, of_one), colour_byte(*g, of_one),
-                                colour_byte(*b, of_one)};
+                const bool unit = *r <= 1 && *g <= 1 && *b <= 1;
+                entry.colour = {colour_byte(*r, unit), colour_byte(*g, unit),
+                                colour_byte(*b, unit)};
             }
         }
         table.push_back(std::move(entry));
@@ -206,8 +200,8 @@ Result<LabelTable> segments_of_fields(const std::map<std::string, std::string>& 
         LabelTableEntry entry;
         entry.name = trimmed(name ? *name : *field("ID"));
         const auto value = field("LabelValue");
-        // Files of Slicer before 4.11 have one layer a segment, each of 0 and 1, and no such
-        // fields.
+        // Files of Slicer before 4.11 have one layer per segment, with the values 0 and 1, and lack
+        // these fields.
         const auto whole = value ? whole_in(trimmed(*value)) : 1;
         const auto layer = field("Layer");
         const auto whole_layer = layer ? whole_in(trimmed(*layer)) : (value ? 0 : number);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Which name each value of a label map stands for.
+// The name of each value of a label map.
 //
-// Sources, the first that is there: a table given by the caller (CSV), the label table in the
-// header extension of a NIfTI file as TotalSegmentator writes it, the segments of a .seg.nrrd, a
-// CSV beside the map with the same stem (labels.nii.gz -> labels.csv), and the built-in classes of
-// TotalSegmentator's task "total" (version 2, 117 classes).
+// The first of these sources that exists is used: a table given by the caller (CSV), the label
+// table in the header extension of a NIfTI file as TotalSegmentator writes it, the segments of a
+// .seg.nrrd, a CSV beside the map with the same stem (labels.nii.gz -> labels.csv), and the
+// built-in classes of TotalSegmentator's task "total" (version 2, 117 classes).
 #pragma once
 
 #include <array>
@@ -24,29 +24,31 @@ namespace sonocase::pipeline {
 struct LabelTableEntry {
     int value = 0;
     std::string name;
-    std::string tissue_class;  // of the CSV column tissue_class or tissue; may be empty
+    std::string tissue_class;  // from the CSV column tissue_class or tissue; may be empty
     std::optional<std::array<std::uint8_t, 3>> colour;
-    int layer = 0;  // .seg.nrrd
+    int layer = 0;  // of a .seg.nrrd
 };
 using LabelTable = std::vector<LabelTableEntry>;
 
-// Name of a value of task "total", or empty.
+// Name of a value of task "total"; empty for any other value.
 std::string_view totalsegmentator_name(int value);
-// Value of a name of task "total", or 0.
+// Value of a name of task "total"; 0 for any other name.
 int totalsegmentator_value(std::string_view name);
 
 // Columns by header: value (or label, index, id), name, and optionally tissue_class (or tissue).
-// Without a header the first two columns are value and name.
+// Without a header, the first two columns are value and name. Error: an unreadable file, no rows, a
+// header without those columns, or a row without a whole number and a name; it names the line.
 Result<LabelTable> parse_label_csv(std::string_view csv, const std::string& where);
 Result<LabelTable> load_label_csv(const std::string& path);
 
 // The table in a NIfTI header extension: <Label Key=".." Red=".." ...>NAME</Label>, the name as
-// text or as CDATA. An empty table where the file has none; header damage is the volume reader's to
-// report.
+// text or as CDATA. Empty if the file has no table; a damaged header is reported by the reader of
+// the volume instead. Error: a damaged table.
 Result<LabelTable> load_nifti_label_table(const std::string& path);
 Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& where);
 
-// Slicer's Segment<N>_Name, _LabelValue, _Layer and _Color; empty where there are none.
+// Slicer's fields Segment<N>_Name, _LabelValue, _Layer and _Color; empty without any. Error: a
+// segment whose name, value or layer is unusable.
 Result<LabelTable> segments_of_fields(const std::map<std::string, std::string>& fields,
                                       const std::string& where);
 

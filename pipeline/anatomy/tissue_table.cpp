@@ -10,7 +10,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-// Where the figures come from. S-numbers as in the literature list of docs/textures.md.
+// Sources of the figures, as in docs/textures.md.
 #define S1 "PMC10001275 table 4"
 #define S2 "PMC10346919 table A2"
 #define S3 "PMC3233242 table 3"
@@ -28,8 +28,9 @@ constexpr auto kBone = TissueKind::bone;
 
 // Columns: name, kind, shadow | texture, grey mean, grey sd | echo dB, structure dB, attenuation
 // dB/cm/MHz, impedance MRayl, speed m/s | source.
-// Grey of the model "paper": liver at 105 and 4.25 grey a dB (255 over a 60 dB range) where only
-// the echogenicity is known; living muscle, fat, fascia and shadow as measured on example images.
+// Grey of the model "paper": 105 for liver and 4.25 levels per dB (255 over a range of 60 dB) where
+// only the echogenicity is known; muscle, fat, fascia and shadow as measured on images of living
+// tissue.
 const std::vector<Tissue>& table() {
     static const std::vector<Tissue> tissues = {
         {"outside", TissueKind::outside, false, "", 0, 0, -60, 0, 0, 0.0004, 343, "air; echo (a)"},
@@ -213,8 +214,8 @@ struct Rule {
     std::string_view tissue;
 };
 
-// First match wins, so that special cases stand before general ones. A word of the table matches
-// runs of words in the name: "adrenal_gland" is found in "adrenal_gland_left".
+// The first match counts: special cases come before general ones. A word of the table matches a run
+// of words in the name: "adrenal_gland" matches "adrenal_gland_left".
 constexpr Rule kRules[] = {
     {"outside_body", "outside"},
     {"outside", "outside"},
@@ -360,8 +361,7 @@ const Tissue* find_tissue(std::string_view name) {
 
 TissueChoice tissue_for_label(std::string_view label_name) {
     const std::string words = lower_words(label_name);
-    // "other_muscle_like" and the like are found by their words; a name that is a tissue's own
-    // wins.
+    // The name of a tissue is that tissue, whatever words it contains.
     const std::string bare = words.substr(1, words.size() - 2);
     if (const Tissue* tissue = find_tissue(bare)) return {tissue->name, true};
     for (const Rule& rule : kRules) {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The built-in tissue table, and which tissue a label of a segmentation is made of.
+// The built-in tissue table, and the tissue of each label of a segmentation.
 //
 // Covers every class of TotalSegmentator v2 "total", the derived classes of a completed label map
-// (other_soft_tissue .. other_dense_bone_or_metal) and the labels of the analytic torso. A label
-// that it does not know becomes "soft_tissue", and the answer says so.
+// (other_soft_tissue .. other_dense_bone_or_metal) and the labels of the analytic torso. An unknown
+// label becomes "soft_tissue", and the result says so.
 //
-// Echogenicity is in dB re liver. Figures carry their source in Tissue::source; "(a)" there marks
-// what is assumed or set by eye. A case author may override any entry in the recipe.
+// Echogenicity is in dB re liver. Tissue::source names the source of the figures; "(a)" in it marks
+// figures that are assumed or set by eye. A recipe may override any entry.
 #pragma once
 
 #include <span>
@@ -26,13 +26,13 @@ const Tissue* find_tissue(std::string_view name);
 
 struct TissueChoice {
     std::string_view tissue;  // name of a built-in tissue
-    bool known = false;       // false: no rule spoke, and the default was taken
+    bool known = false;       // false: no rule applies, and the default is used
 };
 
-// Case is ignored; side, level and number ("_left", "_L3", "_12") do not matter.
+// Ignores case, and side, level and number ("_left", "_L3", "_12").
 TissueChoice tissue_for_label(std::string_view label_name);
 
-// Names of TotalSegmentator v2 "total", source values 1..117 in order.
+// Names of TotalSegmentator v2 "total", in the order of their values 1..117.
 std::span<const std::string_view> total_segmentator_labels();
 
 }  // namespace sonocase::pipeline

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Random numbers by counter: the value depends on (seed, counter) alone, so that work may be split
-// over threads in any way and give the same bytes. Constant time, no state.
+// Counter-based random numbers: a value depends on (seed, counter) alone, and work split over
+// threads in any way gives the same bytes. Constant time, no state.
 //
 // Source: the mixing function of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
 #pragma once
@@ -18,7 +18,7 @@ inline std::uint64_t mix_bits(std::uint64_t x) {
     return x ^ (x >> 31);
 }
 
-// A seed of its own for each purpose, so that streams do not share values.
+// A separate seed per purpose, such that streams do not share values.
 inline std::uint64_t derive_seed(std::uint64_t seed, std::uint64_t purpose) {
     return mix_bits(seed ^ mix_bits(purpose));
 }

@@ -8,14 +8,6 @@
 namespace sonocase::pipeline {
 namespace {
 
-std::string_view trimmed(std::string_view text) {
-    while (!text.empty() && std::isspace(static_cast<unsigned char>(text.front())))
-        text.remove_prefix(1);
-    while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())))
-        text.remove_suffix(1);
-    return text;
-}
-
 std::vector<std::string> cells_of(std::string_view line, char separator) {
     std::vector<std::string> cells;
     std::string cell;
@@ -46,7 +38,7 @@ std::vector<std::string> cells_of(std::string_view line, char separator) {
 char separator_of(std::string_view line) {
     if (line.find(';') != std::string_view::npos) return ';';
     if (line.find('\t') != std::string_view::npos) {
-        // Numbers in columns may be set apart by blanks here and tabs there.
+        // Columns of numbers may be separated by blanks in some places and tabs in others.
         bool blanks_within = false;
         for (const std::string& cell : cells_of(line, '\t'))
             blanks_within = blanks_within || cell.find(' ') != std::string::npos;
@@ -99,6 +91,14 @@ std::optional<double> number_in(std::string_view cell) {
     const auto [end, code] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
     if (code != std::errc() || end != cell.data() + cell.size()) return std::nullopt;
     return value;
+}
+
+std::string_view trimmed(std::string_view text) {
+    while (!text.empty() && std::isspace(static_cast<unsigned char>(text.front())))
+        text.remove_prefix(1);
+    while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())))
+        text.remove_suffix(1);
+    return text;
 }
 
 std::string lower_case(std::string_view text) {

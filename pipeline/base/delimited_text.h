@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Rows of a CSV, TSV or blank-separated text. Internal to import.
+// Rows of a CSV, TSV or blank-separated text.
 #pragma once
 
 #include <optional>
@@ -15,14 +15,17 @@ struct TextRow {
     std::vector<std::string> cells;
 };
 
-// Splits at ';', tab or ',' (the first of these that the first row has; no tab where cells would
-// hold blanks), else at blanks and tabs. Quotes and
-// a byte order mark are taken off, empty lines and lines that start with '#' or "//" left out. With
-// ';' or a tab, a comma between digits is a decimal comma.
+// Splits at ';', tab or ',', the first of these that the first row has, but not at tabs if cells
+// would contain blanks; otherwise at blanks and tabs. Removes quotes and a byte order mark; leaves
+// out empty lines and lines that start with '#' or "//". With ';' or a tab as separator, a comma
+// between digits is a decimal comma.
 std::vector<TextRow> split_rows(std::string_view text);
 
-// The whole cell as a number; nothing where it is none. "nan" and "inf" are numbers.
+// The whole cell as a number; empty if it is not a number. "nan" and "inf" count as numbers.
 std::optional<double> number_in(std::string_view cell);
+
+// Without white space at either end; a view of `text`.
+std::string_view trimmed(std::string_view text);
 
 std::string lower_case(std::string_view text);
 

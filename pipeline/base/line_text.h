@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// One line of a report, as printf writes it.
+// One line of a report, formatted like printf; cut to 499 characters.
 #pragma once
 
 #include <cstdio>

@@ -15,7 +15,8 @@ void parallel_for(std::size_t count,
                   std::size_t grain,
                   const std::function<void(std::size_t begin, std::size_t end)>& body);
 
-// Limits every stage run while it lives; 0 means all cores.
+// Limits the threads of every parallel loop of the process during its lifetime; of several limits
+// the lowest counts. 0: all cores.
 class ThreadLimit {
   public:
     explicit ThreadLimit(int threads);

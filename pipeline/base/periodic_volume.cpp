@@ -14,7 +14,7 @@ std::size_t cube(int edge) {
            static_cast<std::size_t>(edge);
 }
 
-// Unsigned key whose order is the order of the floats.
+// Unsigned key with the same order as the floats.
 std::uint32_t order_key(float value) {
     std::uint32_t bits;
     std::memcpy(&bits, &value, sizeof bits);
@@ -26,8 +26,7 @@ std::uint32_t order_key(float value) {
 void lowpass_periodic(std::vector<float>& volume, int edge, int gap) {
     std::vector<float> out(cube(edge));
     const auto n = static_cast<std::size_t>(edge);
-    // Along each axis an output line is a sum of five lines; `line` is the stretch of memory that
-    // moves together.
+    // Along each axis an output line is the sum of five lines; `line` is its length in memory.
     for (int axis = 0; axis < 3; ++axis) {
         const std::size_t line = axis == 0 ? 1 : axis == 1 ? n : n * n;
         const std::size_t blocks = cube(edge) / (line * n);
@@ -76,7 +75,7 @@ std::vector<float> double_resolution(const std::vector<float>& volume, int edge)
 void match_distribution(std::span<float> values, std::span<const float> sorted) {
     const std::size_t n = values.size();
     if (n == 0 || sorted.empty()) return;
-    // Radix sort of (key, place) pairs: stable, so equal values keep their order.
+    // Radix sort of (key, position) pairs; it is stable, such that equal values keep their order.
     std::vector<std::uint64_t> items(n), other(n);
     for (std::size_t i = 0; i < n; ++i) {
         items[i] = static_cast<std::uint64_t>(order_key(values[i])) << 32 | i;

@@ -34,7 +34,7 @@ constexpr Unit kUnits[] = {{"metres", 1000},
 // The unit in which the extent comes nearest to `target_mm`, by ratio.
 const Unit* likely_unit(double extent, double target_mm) {
     const Unit* best = nullptr;
-    double best_ratio = 4;  // further off than this is no unit's doing
+    double best_ratio = 4;  // a larger ratio is not due to a unit
     for (const Unit& unit : kUnits) {
         const double ratio = extent * unit.factor / target_mm;
         const double off = std::max(ratio, 1 / ratio);

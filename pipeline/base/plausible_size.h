@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Guards against files in metres, centimetres or micrometres: nothing else in a volume or a mesh
-// tells its unit, and every later stage would run on plausible nonsense.
+// Detects files in metres, centimetres or micrometres by the size of the body. Nothing else in a
+// volume or a mesh shows its unit, and every later stage would accept the wrong one.
 #pragma once
 
 #include <optional>
@@ -12,19 +12,19 @@
 
 namespace sonocase::pipeline {
 
-// Bounds of the largest extent of a torso, of a part of one, or of a whole person, mm.
+// Bounds of the largest extent of a torso, a part of one, or a whole person, mm.
 inline constexpr double kSmallestTorso_mm = 20;
 inline constexpr double kLargestTorso_mm = 3000;
 
-// An Error that names the factor to give if no torso has this extent. `what` is "body" or
-// "surface", `option` where the factor goes: "--scale".
+// An Error that suggests a scale factor if no torso has this extent. `what`: "body" or "surface";
+// `option`: the option that takes the factor, such as "--scale".
 std::optional<Error> check_torso_extent(Vector3 extent_mm,
                                         const std::string& what,
                                         const std::string& where,
                                         const std::string& option);
 
-// Likewise where two extents of one person differ as no two units of the same kind do; empty where
-// they agree within a factor of six.
+// Likewise if two extents of one person differ by more than a factor of six, as they do if their
+// units differ.
 std::optional<Error> check_same_unit(Vector3 body_extent_mm,
                                      Vector3 surface_extent_mm,
                                      const std::string& where);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// How a stage tells that it is alive. Stages print nothing; the program decides what to show.
+// How a stage reports its progress. Stages print nothing; the program decides what to show.
 #pragma once
 
 #include <functional>
@@ -8,7 +8,8 @@
 
 namespace sonocase::pipeline {
 
-// fraction in [0, 1] of this stage, and what it is doing. Called from the calling thread only.
+// fraction: of this stage, [0, 1]; doing: what it does. Called only from the thread that called the
+// stage.
 using Progress = std::function<void(double fraction, std::string_view doing)>;
 
 inline void report_progress(const Progress& progress, double fraction, std::string_view doing) {

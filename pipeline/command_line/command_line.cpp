@@ -144,11 +144,4 @@ Status write_report(const CommonOptions& options, const StageReport& report) {
     return write_file(options.report_path, report_json(report));
 }
 
-Stopwatch::Stopwatch() : start_ns_(std::chrono::steady_clock::now().time_since_epoch().count()) {}
-
-double Stopwatch::seconds() const {
-    return 1e-9 * static_cast<double>(std::chrono::steady_clock::now().time_since_epoch().count() -
-                                      start_ns_);
-}
-
 }  // namespace sonocase::pipeline

@@ -11,6 +11,7 @@
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
 #include "pipeline/base/progress.h"
+#include "pipeline/base/stopwatch.h"
 
 namespace CLI {
 class App;
@@ -61,15 +62,5 @@ std::string report_json(const StageReport& report);
 std::string report_json(std::span<const StageReport> reports);
 // Writes the report where --report asks for it; does nothing otherwise.
 Status write_report(const CommonOptions& options, const StageReport& report);
-
-// Seconds on a steady clock since the object was made.
-class Stopwatch {
-  public:
-    Stopwatch();
-    double seconds() const;
-
-  private:
-    long long start_ns_;
-};
 
 }  // namespace sonocase::pipeline

@@ -9,6 +9,7 @@
 #include "formats/container/chunk_file.h"
 #include "formats/registration/registration_json.h"
 #include "formats/text/stage_report_json.h"
+#include "formats/threads/thread_jobs.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -28,11 +29,13 @@ constexpr std::array<std::string_view, 5> kEchoChunks{"size", "table", "uniform"
 Bytes LabelCodec::encode(const LabelFile& file) {
     LabelFile copy = file;
     copy.reports = without_seconds(copy.reports);
-    return write_label_file(copy);
+    ThreadJobs jobs;
+    return write_label_file(copy, jobs);
 }
 
 Result<LabelFile> LabelCodec::decode(const Bytes& bytes, const std::string& where) {
-    return read_label_file(bytes, where);
+    ThreadJobs jobs;
+    return read_label_file(bytes, where, jobs);
 }
 
 Bytes SkinCodec::encode(const SkinSurfaceResult& skin) {
@@ -72,7 +75,8 @@ Result<SkinSurfaceResult> SkinCodec::decode(const Bytes& bytes, const std::strin
 Bytes TextureCodec::encode(const TextureFile& file) {
     TextureFile copy = file;
     copy.reports = without_seconds(copy.reports);
-    return write_texture_file(copy);
+    ThreadJobs jobs;
+    return write_texture_file(copy, jobs);
 }
 
 Result<TextureFile> TextureCodec::decode(const Bytes& bytes, const std::string& where) {

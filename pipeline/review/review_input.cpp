@@ -9,6 +9,7 @@
 #include "formats/files/bundle_file.h"
 #include "formats/files/recording_file.h"
 #include "formats/text/nearest_name.h"
+#include "formats/threads/thread_jobs.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -89,7 +90,8 @@ Result<ReviewInput> load_review(const std::string& session_path,
     }
     const CaseAnatomy anatomy(input.bundle, breathing_shown(input.exercise, header));
     ScoreOptions score;
-    score.threads = options.threads;
+    ThreadJobs jobs(options.threads);
+    score.jobs = &jobs;
     input.score =
         score_session(input.session, input.exercise, &anatomy, input.bundle.labels, score);
     const std::string pictures = pictures_of(session_path);

@@ -3,17 +3,18 @@
 #include "pipeline/segmentation/level_set_smoothing.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
 #include "pipeline/base/parallel.h"
+#include "pipeline/base/stopwatch.h"
 #include "pipeline/segmentation/distance/signed_distance.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-// phi of one label in its box, with the voxels that move.
+// phi of one label in its box, and the voxels that move.
 struct Layer {
     VoxelBox box;
     float h = 1;
@@ -22,7 +23,8 @@ struct Layer {
     std::vector<float> start;         // phi_0 of each, # band
 };
 
-// Neighbours beyond the box repeat its border: a missing neighbour must not act as a surface.
+// Distances to a voxel's neighbours in memory, 0 at the border of the box: a missing neighbour
+// repeats the border and must not act as a surface.
 struct Stencil {
     std::size_t xm, xp, ym, yp, zm, zp;
 };
@@ -53,7 +55,7 @@ float curvature(const float* p, const Stencil& s, float h) {
     const float dyz =
         0.25f * (*(p + s.yp + s.zp) - *(p - s.ym + s.zp) - *(p + s.yp - s.zm) + *(p - s.ym - s.zm));
     const float g2 = dx * dx + dy * dy + dz * dz;
-    // On a medial axis the gradient is zero and the quotient 0/0: nothing to smooth there.
+    // On a medial axis the gradient is zero and the quotient is 0 / 0; nothing needs smoothing there.
     if (g2 < 1e-4f * h * h) return 0;
     const float top = dxx * (dy * dy + dz * dz) + dyy * (dx * dx + dz * dz) +
                       dzz * (dx * dx + dy * dy) -
@@ -70,7 +72,7 @@ Int3 unravel(const VoxelBox& box, std::size_t at) {
             static_cast<int>(at / nx / ny)};
 }
 
-// Trilinear value at voxel coordinates (clamped to the box) of a field kept for every voxel.
+// Trilinear interpolation at voxel coordinates, clamped to the box, of a field on the box.
 float sample(const VoxelBox& box, const std::vector<float>& field, float x, float y, float z) {
     const auto cell = [](float v, int n, int* i, float* t) {
         v = std::clamp(v, 0.0f, static_cast<float>(n - 1));
@@ -135,6 +137,62 @@ void evolve(Layer* layer, const LevelSetOptions& options, float dt) {
     }
 }
 
+std::optional<Error> check(const Grid& grid, const LevelSetOptions& options, double time_step) {
+    const char* const where = "level-set smoothing";
+    const Vector3 h = grid.spacing_mm;
+    if (std::abs(h.x - h.y) > 1e-6 * h.x || std::abs(h.x - h.z) > 1e-6 * h.x) {
+        char found[96];
+        std::snprintf(found, sizeof found, "voxels of %g x %g x %g mm", h.x, h.y, h.z);
+        return Error{found, where, "cubic voxels: resample first"};
+    }
+    const double limit = greatest_stable_step(options.k0, h.x);
+    if (!(options.k0 > 0) || options.iterations < 1 || !(time_step <= limit)) {
+        char found[128];
+        std::snprintf(found, sizeof found, "time step %g with K0 %g and %d iterations", time_step,
+                      options.k0, options.iterations);
+        char wanted[128];
+        std::snprintf(
+            wanted, sizeof wanted,
+            "K0 > 0, at least one iteration and a time step of at most %.4g, the limit of "
+            "stability",
+            limit);
+        return Error{found, where, wanted};
+    }
+    return std::nullopt;
+}
+
+Layer make_layer(const LabelVolume& volume, std::uint8_t label, const VoxelBox& box, double band) {
+    const double h = volume.grid.spacing_mm.x;
+    const int pad = static_cast<int>(std::ceil(band / h)) + 2;
+    Layer layer;
+    layer.box = grow(box, {pad, pad, pad}, volume.grid.size);
+    layer.h = static_cast<float>(h);
+    signed_distance(volume, label, layer.box, band + h, {true, true, true}, &layer.phi);
+    for (std::size_t at = 0; at < layer.phi.size(); ++at) {
+        if (std::abs(layer.phi[at]) > static_cast<float>(band)) continue;
+        layer.band.push_back(static_cast<std::uint32_t>(at));
+        layer.start.push_back(layer.phi[at]);
+    }
+    return layer;
+}
+
+// Gives the label the voxels where its phi is the smallest so far.
+void claim(const Layer& layer, std::uint8_t label, std::vector<float>* least, LabelVolume* volume) {
+    for (int k = 0; k < layer.box.size.z; ++k) {
+        for (int j = 0; j < layer.box.size.y; ++j) {
+            const float* phi = layer.phi.data() + layer.box.index(0, j, k);
+            const std::size_t to =
+                volume->grid.index(layer.box.first.x, layer.box.first.y + j, layer.box.first.z + k);
+            for (std::size_t i = 0; i < static_cast<std::size_t>(layer.box.size.x); ++i) {
+                if (phi[i] < (*least)[to + i]) {
+                    (*least)[to + i] = phi[i];
+                    volume->voxels[to + i] = label;
+                }
+            }
+        }
+    }
+}
+
 }  // namespace
 
 double greatest_stable_step(double k0, double voxel_mm) {
@@ -144,64 +202,24 @@ double greatest_stable_step(double k0, double voxel_mm) {
 Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
                                            const LevelSetOptions& options,
                                            const Progress& progress) {
-    const auto started = std::chrono::steady_clock::now();
-    const Vector3 h = volume.grid.spacing_mm;
-    if (std::abs(h.x - h.y) > 1e-6 * h.x || std::abs(h.x - h.z) > 1e-6 * h.x) {
-        char found[96];
-        std::snprintf(found, sizeof found, "voxels of %g x %g x %g mm", h.x, h.y, h.z);
-        return Error{found, "level-set smoothing", "cubic voxels: resample first"};
-    }
-    const double limit = greatest_stable_step(options.k0, h.x);
+    const Stopwatch watch;
+    const double h = volume.grid.spacing_mm.x;
+    const double limit = greatest_stable_step(options.k0, h);
     const double dt = options.time_step > 0 ? options.time_step : 0.8 * limit;
-    if (!(options.k0 > 0) || options.iterations < 1 || !(dt <= limit)) {
-        char found[128];
-        std::snprintf(found, sizeof found, "time step %g with K0 %g and %d iterations", dt,
-                      options.k0, options.iterations);
-        char wanted[128];
-        std::snprintf(
-            wanted, sizeof wanted,
-            "K0 > 0, at least one iteration and a time step of at most %.4g, the limit of "
-            "stability",
-            limit);
-        return Error{found, "level-set smoothing", wanted};
-    }
-
+    if (auto error = check(volume.grid, options, dt)) return *error;
     LevelSetResult result;
     result.time_step = dt;
     result.volume = volume;
-    const std::size_t count = volume.grid.voxel_count();
-    std::vector<float> best(count, INFINITY);
+    std::vector<float> least(volume.grid.voxel_count(), INFINITY);
     const std::vector<VoxelBox> boxes = label_boxes(volume);
-    const double band_mm = std::max(3.0, options.band_vx) * h.x;
-    const int pad = static_cast<int>(std::ceil(band_mm / h.x)) + 2;
     for (std::size_t l = 0; l < boxes.size(); ++l) {
         if (boxes[l].empty()) continue;
         report_progress(progress, static_cast<double>(l) / static_cast<double>(boxes.size()),
                         "level sets");
-        Layer layer;
-        layer.box = grow(boxes[l], {pad, pad, pad}, volume.grid.size);
-        layer.h = static_cast<float>(h.x);
-        signed_distance(volume, static_cast<std::uint8_t>(l), layer.box, band_mm + h.x,
-                        {true, true, true}, &layer.phi);
-        for (std::size_t at = 0; at < layer.phi.size(); ++at) {
-            if (std::abs(layer.phi[at]) > static_cast<float>(band_mm)) continue;
-            layer.band.push_back(static_cast<std::uint32_t>(at));
-            layer.start.push_back(layer.phi[at]);
-        }
+        const auto label = static_cast<std::uint8_t>(l);
+        Layer layer = make_layer(volume, label, boxes[l], std::max(3.0, options.band_vx) * h);
         evolve(&layer, options, static_cast<float>(dt));
-        for (int k = 0; k < layer.box.size.z; ++k) {
-            for (int j = 0; j < layer.box.size.y; ++j) {
-                const float* phi = layer.phi.data() + layer.box.index(0, j, k);
-                const std::size_t to = volume.grid.index(layer.box.first.x, layer.box.first.y + j,
-                                                         layer.box.first.z + k);
-                for (std::size_t i = 0; i < static_cast<std::size_t>(layer.box.size.x); ++i) {
-                    if (phi[i] < best[to + i]) {
-                        best[to + i] = phi[i];
-                        result.volume.voxels[to + i] = static_cast<std::uint8_t>(l);
-                    }
-                }
-            }
-        }
+        claim(layer, label, &least, &result.volume);
     }
     result.changes =
         compare_volumes(volume.labels, label_volumes_ml(volume), label_volumes_ml(result.volume));
@@ -214,9 +232,8 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
                               {"iterations", static_cast<double>(options.iterations)},
                               {"time_step", dt},
                               {"time_step_limit", limit}};
-    report_changes(result.changes, 0.2, &result.report);
-    result.report.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    report_changes(result.changes, kLargestExpectedChange, &result.report);
+    result.report.seconds = watch.seconds();
     report_progress(progress, 1, "level sets");
     return result;
 }

@@ -3,9 +3,9 @@
 #include "pipeline/segmentation/resample_labels.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
+#include "pipeline/base/stopwatch.h"
 #include "pipeline/segmentation/field/cooked_grid.h"
 #include "pipeline/segmentation/field/label_field.h"
 #include "pipeline/segmentation/field/nearest_labels.h"
@@ -16,22 +16,13 @@
 namespace sonocase::pipeline {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-SampledField through_field(const ResampleInput& input,
-                           const ResampleOptions& options,
-                           const Grid& grid,
-                           const Progress& progress,
-                           ResampleResult* result) {
-    auto start = Clock::now();
-    const auto lap = [&](double* seconds) {
-        *seconds = seconds_since(start);
-        start = Clock::now();
-    };
+// Method `shape`.
+SampledField resample_by_shape(const ResampleInput& input,
+                               const ResampleOptions& options,
+                               const Grid& grid,
+                               const Progress& progress,
+                               ResampleResult* result) {
+    Stopwatch watch;
     LabelFieldOptions field_options;
     field_options.distance = {.sigma_vx = options.sigma_vx,
                               .detail_vx = options.detail_vx,
@@ -39,13 +30,13 @@ SampledField through_field(const ResampleInput& input,
                               .follow_shift = options.follow_shift};
     field_options.block = options.block_vx;
     LabelField field(input.ct_labels, field_options, progress);
-    lap(&result->seconds.distances);
+    result->seconds.distances = watch.lap();
     const Registration registration = with_voxel_rim(input.registration, input.ct_labels.grid);
-    LabelPriceOptions price_options;
-    price_options.iterations = options.volume_iterations;
-    const LabelPriceReport prices = set_label_prices(
-        &field, [&](Point3 ct) { return determinant(jacobian(registration, ct)); }, price_options);
-    lap(&result->seconds.volumes);
+    VolumeCorrectionOptions correction;
+    correction.iterations = options.volume_iterations;
+    const VolumeCorrectionReport corrected = correct_volumes(
+        &field, [&](Point3 ct) { return determinant(jacobian(registration, ct)); }, correction);
+    result->seconds.volumes = watch.lap();
     const InverseMap inverse_map(registration);
     FieldMap map;
     map.row = [&](int j, int k, float* x, float* y, float* z, MapStatus* status) {
@@ -55,19 +46,35 @@ SampledField through_field(const ResampleInput& input,
     };
     map.jacobian = [&](Point3 ct) { return inverse(jacobian(registration, ct)); };
     map.forward = [&](Point3 ct) { return mannequin_from_ct(registration, ct); };
-    SampledField read = sample_label_field(&field, grid, map, {options.record_band_vx}, progress);
+    SampledField sampled =
+        sample_label_field(&field, grid, map, {options.record_band_vx}, progress);
     StageReport* report = &result->report;
-    if (options.snap_vx > 0 && !read.boundary.table.empty()) {
+    if (options.snap_vx > 0 && !sampled.boundary.table.empty()) {
         const SnapReport snapped =
-            snap_surfaces(&read.volume, &read.boundary,
+            snap_surfaces(&sampled.volume, &sampled.boundary,
                           {.band_vx = options.record_band_vx, .distance_vx = options.snap_vx});
         add_measures(snapped, report);
     }
-    lap(&result->seconds.voxels);
+    result->seconds.voxels = watch.lap();
     report->measures.push_back({"slice_factor", static_cast<double>(field.factor())});
-    report->measures.push_back({"volume_steps", static_cast<double>(prices.iterations)});
-    report->measures.push_back({"volume_miss", prices.largest_miss});
-    return read;
+    report->measures.push_back({"volume_steps", static_cast<double>(corrected.iterations)});
+    report->measures.push_back({"volume_miss", corrected.largest_error});
+    return sampled;
+}
+
+// Notes why labels were lost or kept as one voxel.
+void explain_changes(const std::string& method,
+                     const std::vector<int>& rescued,
+                     std::vector<LabelChange>* changes) {
+    for (LabelChange& c : *changes) {
+        if (std::find(rescued.begin(), rescued.end(), c.label) != rescued.end()) {
+            c.note = "smaller than a voxel, kept as one";
+        } else if (c.lost()) {
+            c.note = method == "shape"   ? "its location is outside the grid"
+                     : method == "paper" ? "thinner than 4 / sqrt(K0) or than a voxel"
+                                         : "no voxel centre falls on it";
+        }
+    }
 }
 
 }  // namespace
@@ -75,7 +82,7 @@ SampledField through_field(const ResampleInput& input,
 Result<ResampleResult> resample_labels(const ResampleInput& input,
                                        const ResampleOptions& options,
                                        const Progress& progress) {
-    const auto started = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     const bool shape = options.method == "shape", paper = options.method == "paper";
     if (!shape && !paper && options.method != "nearest") {
         return Error{"unknown method '" + options.method + "'", "resample",
@@ -105,29 +112,21 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
             result.report.measures.push_back({"time_step", level_set->time_step});
         }
     } else {
-        SampledField read = through_field(input, options, *grid, progress, &result);
-        result.volume = std::move(read.volume);
-        result.boundary = std::move(read.boundary);
-        counts = read.counts;
-        rescued = std::move(read.rescued);
+        SampledField sampled = resample_by_shape(input, options, *grid, progress, &result);
+        result.volume = std::move(sampled.volume);
+        result.boundary = std::move(sampled.boundary);
+        counts = sampled.counts;
+        rescued = std::move(sampled.rescued);
     }
     result.changes = compare_volumes(input.ct_labels.labels,
                                      mapped_volumes_ml(input.ct_labels, input.registration),
                                      label_volumes_ml(result.volume));
-    for (LabelChange& c : result.changes) {
-        if (std::find(rescued.begin(), rescued.end(), c.label) != rescued.end()) {
-            c.note = "smaller than a voxel, kept as one";
-        } else if (c.lost()) {
-            c.note = shape   ? "its place lies outside the grid"
-                     : paper ? "thinner than 4 / sqrt(K0) or than a voxel"
-                             : "no voxel centre falls on it";
-        }
-    }
+    explain_changes(options.method, rescued, &result.changes);
     result.report.measures.push_back({"outside_voxels", static_cast<double>(counts.outside)});
     result.report.measures.push_back(
         {"no_preimage_voxels", static_cast<double>(counts.no_preimage)});
-    report_changes(result.changes, 0.2, &result.report);
-    result.report.seconds = seconds_since(started);
+    report_changes(result.changes, kLargestExpectedChange, &result.report);
+    result.report.seconds = watch.seconds();
     return result;
 }
 

@@ -3,9 +3,9 @@
 #include "pipeline/segmentation/smooth_labels.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
+#include "pipeline/base/stopwatch.h"
 #include "pipeline/segmentation/field/label_field.h"
 #include "pipeline/segmentation/field/sampled_field.h"
 #include "pipeline/segmentation/field/volume_correction.h"
@@ -14,10 +14,10 @@
 namespace sonocase::pipeline {
 namespace {
 
-SampledField read_on_itself(LabelField* field,
-                            const Grid& grid,
-                            double band_vx,
-                            const Progress& progress) {
+SampledField sample_on_own_grid(LabelField* field,
+                                const Grid& grid,
+                                double band_vx,
+                                const Progress& progress) {
     FieldMap map;
     map.row = [&](int j, int k, float* x, float* y, float* z, MapStatus* status) {
         const Point3 start =
@@ -52,12 +52,12 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
     if (options.method != "joint") {
         return Error{"unknown method '" + options.method + "'", "smooth", "joint or level_set"};
     }
-    const auto started = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     const Vector3 h = volume.grid.spacing_mm;
     const bool cubic = std::max({h.x, h.y, h.z}) < 1.001 * std::min({h.x, h.y, h.z});
     result.volume = volume;
     std::vector<int> rescued;
-    LabelPriceReport prices;
+    VolumeCorrectionReport corrected;
     SnapReport snapped;
     bool last = false;
     for (int i = 0; i < std::max(1, options.iterations); ++i) {
@@ -65,19 +65,19 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
         field_options.distance = {
             .sigma_vx = options.sigma_vx, .detail_vx = options.detail_vx, .shape_slices = false};
         LabelField field(result.volume, field_options, progress);
-        prices = set_label_prices(&field, [](Point3) { return 1.0; },
-                                  {.iterations = options.volume_iterations});
+        corrected = correct_volumes(&field, [](Point3) { return 1.0; },
+                                    {.iterations = options.volume_iterations});
         last = i + 1 >= options.iterations;
-        SampledField read = read_on_itself(&field, volume.grid,
-                                           last && cubic ? options.record_band_vx : 0, progress);
-        result.volume.voxels = std::move(read.volume.voxels);
-        result.boundary = std::move(read.boundary);
+        SampledField sampled = sample_on_own_grid(
+            &field, volume.grid, last && cubic ? options.record_band_vx : 0, progress);
+        result.volume.voxels = std::move(sampled.volume.voxels);
+        result.boundary = std::move(sampled.boundary);
         if (options.snap_vx > 0 && !result.boundary.table.empty()) {
             snapped =
                 snap_surfaces(&result.volume, &result.boundary,
                               {.band_vx = options.record_band_vx, .distance_vx = options.snap_vx});
         }
-        rescued.insert(rescued.end(), read.rescued.begin(), read.rescued.end());
+        rescued.insert(rescued.end(), sampled.rescued.begin(), sampled.rescued.end());
     }
     result.changes =
         compare_volumes(volume.labels, label_volumes_ml(volume), label_volumes_ml(result.volume));
@@ -89,16 +89,15 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
     result.report.stage = "smooth";
     result.report.version = kSmoothVersion;
     result.report.measures = {{"sigma_vx", options.sigma_vx},
-                              {"volume_steps", static_cast<double>(prices.iterations)},
-                              {"volume_miss", prices.largest_miss}};
+                              {"volume_steps", static_cast<double>(corrected.iterations)},
+                              {"volume_miss", corrected.largest_error}};
     if (snapped.bricks > 0) add_measures(snapped, &result.report);
     if (!cubic && options.record_band_vx > 0) {
         result.report.warnings.emplace_back(
             "the voxels are not cubic, so that no boundary records were made; resample first");
     }
-    report_changes(result.changes, 0.2, &result.report);
-    result.report.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    report_changes(result.changes, kLargestExpectedChange, &result.report);
+    result.report.seconds = watch.seconds();
     return result;
 }
 

@@ -14,9 +14,11 @@
 namespace sonocase::pipeline {
 namespace {
 
+constexpr double kDegrees = 57.29577951308232;  // per radian
+
 struct Change {
     std::size_t bricks = 0, snapped = 0, missed = 0, labels = 0, records = 0;
-    double distance_sum = 0, normal_sum = 0;  // squares
+    double distance_sum = 0, normal_sum = 0;  // of squares: voxels, radians
     void operator+=(const Change& o) {
         bricks += o.bricks;
         snapped += o.snapped;
@@ -33,7 +35,8 @@ struct Brick {
     BrickRecords records;
 };
 
-// As seen from `side`: a record read by the voxel's other label is the same plane turned round.
+// The record as seen from label `side`: if the voxel has the other label, the same plane with the
+// opposite orientation.
 BoundaryRecord seen_from(std::uint8_t side, std::uint8_t own, std::uint32_t packed) {
     BoundaryRecord r = unpack_boundary(packed);
     if (own != side) {
@@ -43,27 +46,28 @@ BoundaryRecord seen_from(std::uint8_t side, std::uint8_t own, std::uint32_t pack
     return r;
 }
 
-// What patches make of a brick.
+// A brick as its patches reproduce it.
 struct Attempt {
     std::vector<SurfacePatch> patches;
     Brick made;
-    std::array<bool, kBrickVoxels> hit{};  // the voxel's record may be replaced
-    bool labels_hit = true;                // and so may all its labels
+    std::array<bool, kBrickVoxels> hit{};  // whether the voxel's record may be replaced
+    bool labels_hit = true;                // whether all labels may be replaced
     std::size_t missed = 0;
     Change change;
 };
 
 class Snapper {
   public:
-    // Fitted again to what the last fit hit: nearly all is gained at once.
+    // The patches are fitted again to the records that the last fit hit; most of the gain is in the
+    // first repetition.
     static constexpr int kTurns = 3;
 
     explicit Snapper(const SnapOptions& options)
         : options_(options),
           reach_(static_cast<int>(std::lround(options.band_vx * kBoundaryStepsPerVoxel))),
-          cosine_(std::cos(options.normal_deg / 57.29577951308232)) {}
+          cosine_(std::cos(options.normal_deg / kDegrees)) {}
 
-    // The patches that the brick now follows, where it does; empty: it is as it was.
+    // Returns the patches that the brick now follows; empty: the brick is unchanged.
     std::vector<SurfacePatch> operator()(Brick* brick, Change* change) const {
         Attempt best;
         best.missed = kBrickVoxels + 1;
@@ -93,7 +97,7 @@ class Snapper {
     }
 
   private:
-    // With the sides of the one patch for labels where all may be.
+    // Takes the labels from the sides of a single patch where all of them may be replaced.
     Attempt attempt(const Brick& brick, std::vector<SurfacePatch> patches) const {
         Attempt out;
         out.patches = std::move(patches);
@@ -121,7 +125,7 @@ class Snapper {
             out->hit[v] = close(before, out->made, v, &out->change);
             out->missed += !out->hit[v];
             if (before.labels[v] == out->made.labels[v]) continue;
-            // The last voxel of a label in its brick stays.
+            // The last voxel of a label in the brick is kept.
             const bool stays = std::find(out->made.labels.begin(), out->made.labels.end(),
                                          before.labels[v]) != out->made.labels.end();
             out->labels_hit = out->labels_hit && out->hit[v] && stays;
@@ -134,7 +138,7 @@ class Snapper {
         const bool was = a.records[v] != kNoBoundary, is = b.records[v] != kNoBoundary;
         if (!was || !is) {
             if (a.labels[v] != b.labels[v]) return false;
-            // A record may come or go at the rim of the band alone.
+            // A record may appear or disappear only at the rim of the band.
             if (was) return unpack_boundary(a.records[v]).distance_vx >= near_rim;
             return !is || unpack_boundary(b.records[v]).distance_vx >= near_rim;
         }
@@ -157,19 +161,19 @@ class Snapper {
     double cosine_;
 };
 
-// What one layer of bricks finds.
-struct Found {
+// Results of one layer of bricks.
+struct SnappedLayer {
     Change change;
     std::vector<std::uint32_t> entry;  // stored bricks that follow patches
-    std::vector<std::uint8_t> count;   // and how many each
+    std::vector<std::uint8_t> count;   // patches of each
     std::vector<SurfacePatch> patches;
 };
 
-BrickPatches by_stored_brick(const std::vector<Found>& layers, std::size_t stored) {
+BrickPatches by_stored_brick(const std::vector<SnappedLayer>& layers, std::size_t stored) {
     BrickPatches out;
     out.first.assign(stored, 0);
     out.count.assign(stored, 0);
-    for (const Found& layer : layers) {
+    for (const SnappedLayer& layer : layers) {
         auto first = static_cast<std::uint32_t>(out.patches.size());
         for (std::size_t n = 0; n < layer.entry.size(); ++n) {
             out.first[layer.entry[n]] = first;
@@ -181,68 +185,83 @@ BrickPatches by_stored_brick(const std::vector<Found>& layers, std::size_t store
     return out;
 }
 
+// Snaps one brick whose first voxel is (i, j, k).
+void snap_brick(const Snapper& snap,
+                Int3 first,
+                std::uint32_t entry,
+                LabelVolume* volume,
+                BoundaryBricks* boundary,
+                SnappedLayer* out) {
+    const auto voxels_of_row = [&](int r) {
+        return volume->voxels.data() +
+               volume->grid.index(first.x, first.y + r % 4, first.z + r / 4);
+    };
+    Brick brick;
+    std::uint32_t* records = boundary->pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels;
+    std::copy_n(records, kBrickVoxels, brick.records.begin());
+    for (int r = 0; r < 16; ++r) std::copy_n(voxels_of_row(r), 4, brick.labels.begin() + 4 * r);
+    const std::vector<SurfacePatch> patches = snap(&brick, &out->change);
+    if (patches.empty()) return;
+    out->entry.push_back(entry);
+    out->count.push_back(static_cast<std::uint8_t>(patches.size()));
+    out->patches.insert(out->patches.end(), patches.begin(), patches.end());
+    std::copy_n(brick.records.begin(), kBrickVoxels, records);
+    for (int r = 0; r < 16; ++r) std::copy_n(brick.labels.begin() + 4 * r, 4, voxels_of_row(r));
+}
+
+void snap_layer(
+    const Snapper& snap, int bz, LabelVolume* volume, BoundaryBricks* boundary, SnappedLayer* out) {
+    const Int3 size = volume->grid.size, bricks = brick_count(size);
+    for (int by = 0; by < bricks.y; ++by) {
+        for (int bx = 0; bx < bricks.x; ++bx) {
+            const std::size_t b =
+                static_cast<std::size_t>(bx) +
+                static_cast<std::size_t>(bricks.x) *
+                    (static_cast<std::size_t>(by) +
+                     static_cast<std::size_t>(bricks.y) * static_cast<std::size_t>(bz));
+            const std::uint32_t entry = boundary->table[b];
+            if (entry & kUniformBrick) continue;
+            ++out->change.bricks;
+            const Int3 first{bx * kBrickEdge, by * kBrickEdge, bz * kBrickEdge};
+            // The last bricks repeat the voxels at the border, which no quadric does.
+            if (first.x + kBrickEdge > size.x || first.y + kBrickEdge > size.y ||
+                first.z + kBrickEdge > size.z)
+                continue;
+            snap_brick(snap, first, entry, volume, boundary, out);
+        }
+    }
+}
+
+// The options for the volume's voxel size.
+SnapOptions scaled(const SnapOptions& options, double voxel_mm) {
+    SnapOptions out = options;
+    if (voxel_mm < 1) {
+        out.distance_vx =
+            std::max(options.distance_vx, std::min(0.2, options.distance_vx / voxel_mm));
+        if (voxel_mm <= 0.6) {
+            // Doubling the quantisation step moves surfaces by less than half of that; and a plane
+            // that is drawn half as large may be more oblique.
+            out.patch_step = 2 * options.patch_step;
+            out.normal_deg = 1.5 * options.normal_deg;
+        }
+    }
+    return out;
+}
+
 }  // namespace
 
 SnapReport snap_surfaces(LabelVolume* volume,
                          BoundaryBricks* boundary,
                          const SnapOptions& options) {
-    const Grid& g = volume->grid;
-    const Int3 bricks = brick_count(g.size);
-    SnapOptions allowed = options;
-    if (g.spacing_mm.x < 1) {
-        allowed.distance_vx =
-            std::max(options.distance_vx, std::min(0.2, options.distance_vx / g.spacing_mm.x));
-        if (g.spacing_mm.x <= 0.6) {
-            // What rounding twice as coarse moves is less than half of that; and a plane that is
-            // drawn half as far may lean more.
-            allowed.patch_step = 2 * options.patch_step;
-            allowed.normal_deg = 1.5 * options.normal_deg;
-        }
-    }
+    const SnapOptions allowed = scaled(options, volume->grid.spacing_mm.x);
     const Snapper snap(allowed);
-    std::vector<Found> layers(static_cast<std::size_t>(bricks.z));
+    std::vector<SnappedLayer> layers(static_cast<std::size_t>(brick_count(volume->grid.size).z));
     parallel_for(layers.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t bz = begin; bz < end; ++bz) {
-            Found& found = layers[bz];
-            const int k = static_cast<int>(bz) * kBrickEdge;
-            for (int by = 0; by < bricks.y; ++by) {
-                for (int bx = 0; bx < bricks.x; ++bx) {
-                    const std::size_t b = static_cast<std::size_t>(bx) +
-                                          static_cast<std::size_t>(bricks.x) *
-                                              (static_cast<std::size_t>(by) +
-                                               static_cast<std::size_t>(bricks.y) * bz);
-                    const std::uint32_t entry = boundary->table[b];
-                    if (entry & kUniformBrick) continue;
-                    ++found.change.bricks;
-                    const int i = bx * kBrickEdge, j = by * kBrickEdge;
-                    // The last bricks repeat what is inside; no quadric does.
-                    if (i + kBrickEdge > g.size.x || j + kBrickEdge > g.size.y ||
-                        k + kBrickEdge > g.size.z)
-                        continue;
-                    Brick brick;
-                    std::uint32_t* records =
-                        boundary->pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels;
-                    std::copy_n(records, kBrickVoxels, brick.records.begin());
-                    for (int r = 0; r < 16; ++r) {
-                        std::copy_n(volume->voxels.data() + g.index(i, j + r % 4, k + r / 4), 4,
-                                    brick.labels.begin() + 4 * r);
-                    }
-                    const std::vector<SurfacePatch> patches = snap(&brick, &found.change);
-                    if (patches.empty()) continue;
-                    found.entry.push_back(entry);
-                    found.count.push_back(static_cast<std::uint8_t>(patches.size()));
-                    found.patches.insert(found.patches.end(), patches.begin(), patches.end());
-                    std::copy_n(brick.records.begin(), kBrickVoxels, records);
-                    for (int r = 0; r < 16; ++r) {
-                        std::copy_n(brick.labels.begin() + 4 * r, 4,
-                                    volume->voxels.data() + g.index(i, j + r % 4, k + r / 4));
-                    }
-                }
-            }
-        }
+        for (std::size_t bz = begin; bz < end; ++bz)
+            snap_layer(snap, static_cast<int>(bz), volume, boundary, &layers[bz]);
     });
     Change sum;
-    for (const Found& layer : layers) sum += layer.change;
+    for (const SnappedLayer& layer : layers) sum += layer.change;
     boundary->patches = by_stored_brick(layers, boundary->pool.size() / kBrickVoxels);
     boundary->patches.step = allowed.patch_step;
     SnapReport report;
@@ -252,7 +271,7 @@ SnapReport snap_surfaces(LabelVolume* volume,
     report.labels = sum.labels;
     const double n = static_cast<double>(std::max<std::size_t>(sum.records, 1));
     report.distance_rms_vx = std::sqrt(sum.distance_sum / n);
-    report.normal_rms_deg = 57.29577951308232 * std::sqrt(sum.normal_sum / n);
+    report.normal_rms_deg = kDegrees * std::sqrt(sum.normal_sum / n);
     return report;
 }
 

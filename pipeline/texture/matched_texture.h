@@ -2,19 +2,20 @@
 
 // Solid texture with the histogram and the autocorrelation of its example.
 //
-// The grey of the example is seen as q(g), a rising function of a Gaussian field g: q carries the
-// histogram, the field's autocorrelation rho carries the grain. rho is what gives the grey values
-// their own autocorrelation R after q (Hermite expansion, R = sum c_k^2 k! rho^k). The power of
-// each wave of the picture is spread over waves out of it so that fibres are round and speckle is
-// as wide in elevation as sideways; planes parallel to the picture keep its autocorrelation
-// exactly. The field is white noise with every Fourier amplitude set to what rho wants: the cube's
-// own autocorrelation is then exact rather than right on average, and it wraps at its faces.
-// Direction survives: fibres stay fibres.
+// The grey of the example is regarded as q(g), an ascending function of a Gaussian field g: q holds
+// the histogram, and the field's autocorrelation rho holds the grain. rho is chosen such that grey
+// has the example's autocorrelation after q (grey_to_gaussian.h). The power of each wave of the
+// picture is spread over waves out of the picture such that fibres are round and speckle is as wide
+// in elevation as laterally; planes parallel to the picture keep its autocorrelation exactly
+// (spectrum/depth_spectrum.h). The field is white noise with every Fourier amplitude set to the
+// wanted value: the autocorrelation of the cube itself is then exact, not just its expectation, and
+// the cube wraps at its faces. Direction is preserved: fibres remain fibres.
 //
-// Correlation is followed to half an edge. Where the example's grain is too long for that, a voxel
-// takes the place of several pixels: the field is sampled more coarsely, not smoothed.
+// Correlation is followed up to half an edge. Where the grain of the example is too long for that,
+// a voxel stands for several pixels: the field is sampled more coarsely, not smoothed.
+//
 // Source: translation of Gaussian fields (M. Grigoriu, Applied Non-Gaussian Processes, 1995);
-// measured against the paper's pyramid in docs/textures.md.
+// compared with the paper's pyramid in docs/textures.md.
 #pragma once
 
 #include <cstdint>
@@ -30,17 +31,17 @@ namespace sonocase::pipeline {
 
 struct MatchedOptions {
     ThirdAxis third_axis = ThirdAxis::across;
-    int corrections = 3;  // rounds of measuring the cube's autocorrelation and mending the spectrum
+    int corrections =
+        3;  // rounds of measuring the cube's autocorrelation and correcting its spectrum
 };
 
 struct MatchedTexture {
-    std::vector<float> grey;   // # edge^3, x fastest, tessellating
-    int pixels_per_voxel = 1;  // 1 unless the grain is longer than half the edge
+    std::vector<float> grey;   // # edge^3, x fastest; wraps in x, y and z
+    int pixels_per_voxel = 1;  // more than 1 only if the grain is longer than half an edge
 };
 
 // examples: prepared (prepare_example.h), >= 1. edge: power of two in 8..128.
 // Same bytes for any number of threads. Cost: 64^3 0.1 s on one core.
-// core.
 MatchedTexture synthesise_matched(std::span<const ExampleImage> examples,
                                   int edge,
                                   std::uint64_t seed,

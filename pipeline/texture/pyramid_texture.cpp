@@ -22,8 +22,8 @@ int bin_of(const PyramidBand& band, float value) {
     return std::clamp(static_cast<int>(t), 0, kBins - 1);
 }
 
-// Low-pass of an image with taps `gap` apart. Pixels outside the image or the mask are left out and
-// the weights rescaled: nothing from beyond the example enters its statistics.
+// Low-pass filter of an image with taps `gap` apart. Pixels outside the image or the mask are left
+// out and the weights rescaled: nothing from outside the example enters its statistics.
 std::vector<float> lowpass_image(const ExampleImage& shape, const std::vector<float>& in, int gap) {
     std::vector<float> weight(in.size()), sum(in.size());
     for (std::size_t i = 0; i < in.size(); ++i) {
@@ -55,7 +55,7 @@ std::vector<float> lowpass_image(const ExampleImage& shape, const std::vector<fl
 }
 
 // Levels that an example supports: the filter must fit into the image, and the coarsest band must
-// still hold 16 values that are independent of each other.
+// hold at least 16 independent values.
 int supported_levels(const ExampleImage& example, int wanted) {
     std::size_t used = 0;
     for (std::size_t i = 0; i < example.count(); ++i) used += example.used(i) ? 1 : 0;
@@ -67,6 +67,52 @@ int supported_levels(const ExampleImage& example, int wanted) {
         ++levels;
     }
     return levels;
+}
+
+using ExampleBands = std::vector<std::vector<float>>;  // finest first, # pixels each
+
+ExampleBands split_bands(const ExampleImage& example, int levels) {
+    ExampleBands bands;
+    std::vector<float> low = example.grey;
+    for (int l = 0; l + 1 < levels; ++l) {
+        // With decimation the gap of the filter in pixels of the example is the same: a level of
+        // half the resolution is filtered with unit gaps. Statistics need no decimated copy.
+        std::vector<float> next = lowpass_image(example, low, 1 << l);
+        for (std::size_t i = 0; i < low.size(); ++i) low[i] -= next[i];
+        bands.push_back(std::move(low));
+        low = std::move(next);
+    }
+    bands.push_back(std::move(low));
+    return bands;
+}
+
+// Fills the joint histogram of band l with its parent. Returns the number of empty rows.
+int count_pairs(std::span<const ExampleImage> examples,
+                const std::vector<ExampleBands>& values,
+                std::size_t l,
+                const PyramidBand& parent,
+                PyramidBand* band) {
+    const auto each = [&](const auto& body) {
+        for (std::size_t e = 0; e < examples.size(); ++e) {
+            for (std::size_t i = 0; i < examples[e].count(); ++i) {
+                if (!examples[e].used(i)) continue;
+                body(static_cast<std::size_t>(bin_of(parent, values[e][l + 1][i])),
+                     static_cast<std::uint8_t>(bin_of(*band, values[e][l][i])));
+            }
+        }
+    };
+    std::array<std::uint32_t, kBins> count{};
+    each([&](std::size_t p, std::uint8_t) { ++count[p]; });
+    int empty_rows = 0;
+    for (std::size_t p = 0; p < kBins; ++p) {
+        band->row_begin[p + 1] = band->row_begin[p] + count[p];
+        if (count[p] == 0) ++empty_rows;
+    }
+    band->children.resize(band->row_begin[kBins]);
+    std::array<std::uint32_t, kBins> next{};
+    std::copy_n(band->row_begin.begin(), kBins, next.begin());
+    each([&](std::size_t p, std::uint8_t c) { band->children[next[p]++] = c; });
+    return empty_rows;
 }
 
 float draw_marginal(const PyramidBand& band, double u) {
@@ -107,20 +153,8 @@ PyramidStatistics learn_pyramid(std::span<const ExampleImage> examples,
     out.options.levels = levels;
     out.bands.resize(static_cast<std::size_t>(levels));
 
-    // bands of all examples, kept per example for the joint histograms
-    std::vector<std::vector<std::vector<float>>> values(examples.size());
-    for (std::size_t e = 0; e < examples.size(); ++e) {
-        std::vector<float> low = examples[e].grey;
-        for (int l = 0; l + 1 < levels; ++l) {
-            // With decimation the filter's gap in pixels of the example is the same: a level of
-            // half the resolution filtered with unit gaps. Band statistics need no decimated copy.
-            std::vector<float> next = lowpass_image(examples[e], low, 1 << l);
-            for (std::size_t i = 0; i < low.size(); ++i) low[i] -= next[i];
-            values[e].push_back(std::move(low));
-            low = std::move(next);
-        }
-        values[e].push_back(std::move(low));
-    }
+    std::vector<ExampleBands> values;
+    for (const ExampleImage& example : examples) values.push_back(split_bands(example, levels));
     for (std::size_t l = 0; l < out.bands.size(); ++l) {
         PyramidBand& band = out.bands[l];
         for (std::size_t e = 0; e < examples.size(); ++e) {
@@ -132,29 +166,8 @@ PyramidStatistics learn_pyramid(std::span<const ExampleImage> examples,
         band.low = band.sorted.front();
         band.high = band.sorted.back();
     }
-    for (std::size_t l = 0; l + 1 < out.bands.size(); ++l) {
-        PyramidBand& band = out.bands[l];
-        const PyramidBand& parent = out.bands[l + 1];
-        std::array<std::uint32_t, kBins> count{};
-        const auto each = [&](const auto& body) {
-            for (std::size_t e = 0; e < examples.size(); ++e) {
-                for (std::size_t i = 0; i < examples[e].count(); ++i) {
-                    if (!examples[e].used(i)) continue;
-                    body(static_cast<std::size_t>(bin_of(parent, values[e][l + 1][i])),
-                         static_cast<std::uint8_t>(bin_of(band, values[e][l][i])));
-                }
-            }
-        };
-        each([&](std::size_t p, std::uint8_t) { ++count[p]; });
-        for (std::size_t p = 0; p < kBins; ++p) {
-            band.row_begin[p + 1] = band.row_begin[p] + count[p];
-            if (count[p] == 0) ++out.empty_rows;
-        }
-        band.children.resize(band.row_begin[kBins]);
-        std::array<std::uint32_t, kBins> next{};
-        std::copy_n(band.row_begin.begin(), kBins, next.begin());
-        each([&](std::size_t p, std::uint8_t c) { band.children[next[p]++] = c; });
-    }
+    for (std::size_t l = 0; l + 1 < out.bands.size(); ++l)
+        out.empty_rows += count_pairs(examples, values, l, out.bands[l + 1], &out.bands[l]);
     return out;
 }
 
@@ -163,8 +176,8 @@ std::vector<float> synthesise_pyramid(const PyramidStatistics& statistics,
                                       std::uint64_t seed) {
     assert(edge >= 8 && edge <= 128 && (edge & (edge - 1)) == 0);
     const int levels = static_cast<int>(statistics.bands.size());
-    std::vector<float> sum;      // collapsed so far, at the resolution of the level in hand
-    std::vector<float> parents;  // values of the coarser band there
+    std::vector<float> sum;      // of the bands so far, at the resolution of the current level
+    std::vector<float> parents;  // values of the coarser band at that resolution
     for (int l = levels - 1; l >= 0; --l) {
         const PyramidBand& band = statistics.bands[static_cast<std::size_t>(l)];
         const bool coarsest = l == levels - 1;
@@ -192,8 +205,8 @@ std::vector<float> synthesise_pyramid(const PyramidStatistics& statistics,
             }
         });
         if (!statistics.options.decimate && l > 0) {
-            // The filters that made the band in the example: G_l by gaps 1, 2, ... 2^(l-1), less
-            // G_{l+1} but for the coarsest.
+            // The filters that made the band in the example: G_l with gaps 1, 2, ... 2^(l-1), minus
+            // G_{l+1} unless it is the coarsest.
             for (int k = 0; k < l; ++k) lowpass_periodic(drawn, n, 1 << k);
             if (!coarsest) {
                 std::vector<float> next = drawn;

@@ -5,16 +5,17 @@
 #include <algorithm>
 #include <atomic>
 #include <cassert>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <optional>
-#include <sstream>
 
 #include "pipeline/base/counter_random.h"
+#include "pipeline/base/delimited_text.h"
 #include "pipeline/base/parallel.h"
+#include "pipeline/base/stopwatch.h"
 #include "pipeline/texture/example/prepare_example.h"
 #include "pipeline/texture/example/read_example.h"
 #include "pipeline/texture/example/synthetic_examples.h"
@@ -24,8 +25,8 @@
 namespace sonocase::pipeline {
 namespace {
 
-// Which class of patches.csv stands in for a built-in texture, and which patch of the class
-// (counted round): organs share the phantom patches, so that neighbours do not look alike.
+// The class of patches.csv that is used for a built-in texture, and which patch of the class
+// (modulo their number): organs share the patches of phantoms such that neighbours differ.
 struct StandIn {
     const char* texture;
     const char* patch_class;
@@ -58,7 +59,7 @@ const StandIn* stand_in_for(const std::string& texture) {
     return nullptr;
 }
 
-// class -> files of patches.csv
+// Files of each class in patches.csv.
 Result<std::map<std::string, std::vector<std::string>>> read_patch_table(
     const std::string& folder) {
     const std::filesystem::path path = std::filesystem::path(folder) / "patches.csv";
@@ -67,31 +68,48 @@ Result<std::map<std::string, std::vector<std::string>>> read_patch_table(
         return Error{"no patches.csv", folder,
                      "expected a table with the columns file and class beside the patches"};
     }
-    const auto cells = [](std::string line) {
-        if (!line.empty() && line.back() == '\r') line.pop_back();
-        std::vector<std::string> out;
-        std::stringstream stream(line);
-        for (std::string cell; std::getline(stream, cell, ',');) out.push_back(cell);
-        return out;
-    };
-    std::string line;
-    std::getline(in, line);
-    const std::vector<std::string> header = cells(line);
-    const auto file = std::find(header.begin(), header.end(), "file") - header.begin();
-    const auto kind = std::find(header.begin(), header.end(), "class") - header.begin();
-    const auto columns = static_cast<std::ptrdiff_t>(header.size());
-    if (file >= columns || kind >= columns) {
+    const std::vector<TextRow> rows =
+        split_rows(std::string(std::istreambuf_iterator<char>(in), {}));
+    const std::vector<std::string> header =
+        rows.empty() ? std::vector<std::string>() : rows[0].cells;
+    const auto file =
+        static_cast<std::size_t>(std::find(header.begin(), header.end(), "file") - header.begin());
+    const auto kind =
+        static_cast<std::size_t>(std::find(header.begin(), header.end(), "class") - header.begin());
+    if (file >= header.size() || kind >= header.size()) {
         return Error{"no column named file and class", path.string(),
                      "expected both in its first line"};
     }
     std::map<std::string, std::vector<std::string>> out;
-    while (std::getline(in, line)) {
-        const std::vector<std::string> row = cells(line);
-        if (static_cast<std::ptrdiff_t>(row.size()) <= std::max(file, kind)) continue;
-        out[row[static_cast<std::size_t>(kind)]].push_back(
-            (std::filesystem::path(folder) / row[static_cast<std::size_t>(file)]).string());
+    for (std::size_t r = 1; r < rows.size(); ++r) {
+        const std::vector<std::string>& cells = rows[r].cells;
+        if (cells.size() <= std::max(file, kind)) continue;
+        out[cells[kind]].push_back((std::filesystem::path(folder) / cells[file]).string());
     }
     return out;
+}
+
+// Files of the examples of a texture: those given for it, else the patches of its own class, else
+// the patch of its stand-in.
+std::vector<std::string> example_files(
+    const std::string& texture,
+    const StandIn* stand_in,
+    const std::vector<TextureExample>& given,
+    const std::map<std::string, std::vector<std::string>>& patches) {
+    std::vector<std::string> files;
+    for (const TextureExample& example : given) {
+        if (example.texture == texture) files.push_back(example.path);
+    }
+    if (!files.empty()) return files;
+    const auto own = patches.find(texture);
+    if (own != patches.end() && !(stand_in && own->first == stand_in->patch_class))
+        return own->second;
+    if (stand_in) {
+        const auto shared = patches.find(stand_in->patch_class);
+        if (shared != patches.end())
+            files.push_back(shared->second[stand_in->which % shared->second.size()]);
+    }
+    return files;
 }
 
 std::uint64_t name_seed(const std::string& name, std::uint64_t seed) {
@@ -140,7 +158,8 @@ Result<SolidTextureResult> make_solid_texture(const TextureSpec& spec) {
     out.texture.voxels.resize(grey.size());
     for (std::size_t i = 0; i < grey.size(); ++i) {
         double v = std::round(128 + 32 * (grey[i] - out.grey_mean) / out.grey_sd);
-        // What is saturated in the example stays so: a step of the code may be two levels of grey.
+        // Values saturated in the example remain saturated, although a step of the code may be two
+        // levels of grey.
         if (grey[i] >= 255 && out.grey_mean + (v - 128) / 32 * out.grey_sd < 255) v += 1;
         if (grey[i] <= 0 && out.grey_mean + (v - 128) / 32 * out.grey_sd > 0) v -= 1;
         out.texture.voxels[i] = static_cast<std::uint8_t>(std::clamp(v, 0.0, 255.0));
@@ -174,23 +193,10 @@ Result<std::vector<TextureSpec>> plan_texture_bank(std::span<const Tissue> tissu
         spec.edge = options.edge;
         spec.pixel_mm = options.pixel_mm;
         spec.seed = name_seed(tissue.texture, options.seed);
-        std::vector<std::string> files;
-        for (const TextureExample& example : options.examples) {
-            if (example.texture == tissue.texture) files.push_back(example.path);
-        }
         const StandIn* stand_in = stand_in_for(tissue.texture);
         if (stand_in) spec.third_axis = stand_in->third_axis;
-        if (files.empty()) {
-            if (const auto own = patches.find(tissue.texture);
-                own != patches.end() && !(stand_in && own->first == stand_in->patch_class)) {
-                files = own->second;
-            } else if (stand_in) {
-                const auto shared = patches.find(stand_in->patch_class);
-                if (shared != patches.end()) {
-                    files.push_back(shared->second[stand_in->which % shared->second.size()]);
-                }
-            }
-        }
+        const std::vector<std::string> files =
+            example_files(tissue.texture, stand_in, options.examples, patches);
         for (const std::string& file : files) {
             auto example = read_example(file, {}, notes);
             if (!example) return example.error();
@@ -215,7 +221,7 @@ Result<std::vector<TextureSpec>> plan_texture_bank(std::span<const Tissue> tissu
 Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
                                              const TextureBankOptions& options,
                                              const Progress& progress) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     TextureBankResult out;
     out.report.stage = "texture";
     auto specs = plan_texture_bank(tissues, options, &out.report.warnings);
@@ -238,8 +244,7 @@ Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
     out.report.measures = {{"textures", static_cast<double>(made.size())},
                            {"synthetic_examples", synthetic},
                            {"edge_voxels", static_cast<double>(options.edge)}};
-    out.report.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    out.report.seconds = watch.seconds();
     return out;
 }
 

@@ -8,6 +8,7 @@
 #include "formats/base/geometry.h"
 #include "formats/text/number_text.h"
 #include "pipeline/pictures/chart.h"
+#include "pipeline/texture/spectrum/local_trend.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -33,8 +34,8 @@ Chart example_panel(const ExampleImage& example) {
     return panel;
 }
 
-// Cut through `origin` along two directions (voxels a step of one example pixel), nearest voxel:
-// what the look-up of the image model does.
+// Cut along two unit vectors, one step per pixel of the example, by the nearest voxel as in the
+// image model "paper".
 Chart cut_panel(const char* title, const SolidTextureResult& made, Vector3 right, Vector3 down) {
     const int n = made.texture.edge;
     Chart panel;
@@ -83,33 +84,12 @@ Series profile(const std::string& name, const Autocorrelation& a, double angle, 
     return series;
 }
 
-}  // namespace
-
-Status write_texture_page(const TextureAssessment& assessment, const std::string& path) {
+// Autocorrelation of example and texture along and across the main direction.
+void add_profiles(const TextureAssessment& assessment,
+                  const std::vector<float>& grey,
+                  ChartSheet* sheet) {
     const SolidTextureResult& made = assessment.made;
-    const ExampleImage& example = assessment.example;
-    const std::vector<float> grey = texture_grey(made.texture, made.grey_mean, made.grey_sd);
-    std::vector<float> example_grey;
-    for (std::size_t i = 0; i < example.count(); ++i) {
-        if (example.used(i)) example_grey.push_back(example.grey[i]);
-    }
-    ChartSheet sheet;
-    sheet.columns = 4;
-    sheet.width_px = 360;
-    sheet.height_px = 390;
-    sheet.charts = {example_panel(example), cut_panel("cut x-y", made, {1, 0, 0}, {0, 1, 0}),
-                    cut_panel("cut x-z", made, {1, 0, 0}, {0, 0, 1}),
-                    cut_panel("cut z-y", made, {0, 0, 1}, {0, 1, 0}),
-                    cut_panel("oblique cut", made, {0.80, 0.36, 0.48}, {-0.60, 0.48, 0.64})};
-    Chart greys;
-    greys.title = "grey: KS " + number_text(assessment.quality.distance.ks, 2) +
-                  ", between halves " + number_text(assessment.quality.floor.ks, 2);
-    greys.x_label = "grey";
-    greys.y_label = "percent a level";
-    greys.series = {histogram("example", example_grey), histogram("texture", grey)};
-    sheet.charts.push_back(greys);
-
-    const ExampleImage local = without_local_trend(example, kGrainTrendPx);
+    const ExampleImage local = without_local_trend(assessment.example, kGrainTrendPx);
     const Autocorrelation wanted = autocorrelation({&local, 1}, 48);
     const Autocorrelation got = plane_autocorrelation(
         without_local_trend(grey, made.texture.edge, kGrainTrendPx / made.pixels_per_voxel),
@@ -127,8 +107,33 @@ Status write_texture_page(const TextureAssessment& assessment, const std::string
         chart.y_label = "autocorrelation";
         chart.series = {profile("example", wanted, angle, 1),
                         profile("texture", got, angle, made.pixels_per_voxel)};
-        sheet.charts.push_back(chart);
+        sheet->charts.push_back(chart);
     }
+}
+
+}  // namespace
+
+Status write_texture_page(const TextureAssessment& assessment, const std::string& path) {
+    const SolidTextureResult& made = assessment.made;
+    const ExampleImage& example = assessment.example;
+    const std::vector<float> grey = texture_grey(made.texture, made.grey_mean, made.grey_sd);
+    ChartSheet sheet;
+    sheet.columns = 4;
+    sheet.width_px = 360;
+    sheet.height_px = 390;
+    sheet.charts = {example_panel(example), cut_panel("cut x-y", made, {1, 0, 0}, {0, 1, 0}),
+                    cut_panel("cut x-z", made, {1, 0, 0}, {0, 0, 1}),
+                    cut_panel("cut z-y", made, {0, 0, 1}, {0, 1, 0}),
+                    cut_panel("oblique cut", made, {0.80, 0.36, 0.48}, {-0.60, 0.48, 0.64})};
+    Chart greys;
+    greys.title = "grey: KS " + number_text(assessment.quality.distance.ks, 2) +
+                  ", between halves " + number_text(assessment.quality.floor.ks, 2);
+    greys.x_label = "grey";
+    greys.y_label = "per cent per level";
+    greys.series = {histogram("example", used_grey(example)), histogram("texture", grey)};
+    sheet.charts.push_back(greys);
+
+    add_profiles(assessment, grey, &sheet);
     return write_chart_png(sheet, path);
 }
 

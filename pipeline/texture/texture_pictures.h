@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A page that lets the eye judge a solid texture beside its example.
+// A page to compare a solid texture with its example by eye.
 #pragma once
 
 #include <string>
@@ -10,9 +10,9 @@
 
 namespace sonocase::pipeline {
 
-// Example, cuts x-y, x-z and y-z and an oblique cut at the example's scale and size, so that each
-// cut shows the texture wrapping round; histograms; autocorrelation along and across. PNG.
-// Errors: those of the chart writer.
+// Writes a PNG: the example; cuts x-y, x-z and z-y and an oblique cut at the scale of the example,
+// larger than the texture's period; histograms; autocorrelation along and across.
+// Error: those of the chart writer.
 Status write_texture_page(const TextureAssessment& assessment, const std::string& path);
 
 }  // namespace sonocase::pipeline

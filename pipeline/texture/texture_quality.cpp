@@ -4,23 +4,17 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 
+#include "pipeline/base/periodic_volume.h"
+#include "pipeline/base/stopwatch.h"
 #include "pipeline/texture/example/prepare_example.h"
+#include "pipeline/texture/spectrum/local_trend.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-std::vector<float> used_grey(const ExampleImage& image) {
-    std::vector<float> out;
-    for (std::size_t i = 0; i < image.count(); ++i) {
-        if (image.used(i)) out.push_back(image.grey[i]);
-    }
-    return out;
-}
-
-// rms difference over the lags within the wider of the two grains, at most the shared reach
+// RMS difference over the lags within the wider of the two grains, at most the common reach.
 double grain_distance(const Autocorrelation& a, const Autocorrelation& b) {
     const double radius = std::max(correlation_widths(through_window(a, b)).along,
                                    correlation_widths(through_window(b, b)).along);
@@ -36,6 +30,7 @@ double grain_distance(const Autocorrelation& a, const Autocorrelation& b) {
     return std::sqrt(sum / count);
 }
 
+constexpr TextureDistance kLargestDistance{1, 255, 1};
 constexpr int kReach = 32;       // px, of the grain distance
 constexpr int kWidthReach = 96;  // px, of the correlation widths
 
@@ -71,7 +66,7 @@ double earth_mover(std::span<const float> a, std::span<const float> b) {
     std::vector<float> x(a.begin(), a.end()), y(b.begin(), b.end());
     std::sort(x.begin(), x.end());
     std::sort(y.begin(), y.end());
-    // area between the two distribution functions
+    // The area between the two distribution functions.
     double area = 0, before = std::min(x[0], y[0]);
     std::size_t i = 0, j = 0;
     while (i < x.size() || j < y.size()) {
@@ -88,21 +83,17 @@ double earth_mover(std::span<const float> a, std::span<const float> b) {
 
 std::array<double, 3> seam_scores(const SolidTexture& texture) {
     const auto n = static_cast<std::size_t>(texture.edge);
-    const std::size_t stride[3] = {1, n, n * n};
     std::array<double, 3> scores{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        std::vector<double> step(n, 0);
-        for (std::size_t i = 0; i < texture.voxels.size(); ++i) {
-            const std::size_t p = i / stride[axis] % n;
-            const std::size_t next = p + 1 < n ? i + stride[axis] : i - p * stride[axis];
-            step[p] += std::abs(static_cast<int>(texture.voxels[i]) - texture.voxels[next]);
-        }
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::vector<double> step =
+            steps_between_planes<std::uint8_t>(texture.voxels, texture.edge, axis);
         double mean = 0, square = 0;
         const auto inner = static_cast<double>(n - 1);
         for (std::size_t p = 0; p + 1 < n; ++p) mean += step[p] / inner;
         for (std::size_t p = 0; p + 1 < n; ++p)
             square += (step[p] - mean) * (step[p] - mean) / inner;
-        scores[axis] = square > 0 ? (step[n - 1] - mean) / std::sqrt(square) : 0;
+        scores[static_cast<std::size_t>(axis)] =
+            square > 0 ? (step[n - 1] - mean) / std::sqrt(square) : 0;
     }
     return scores;
 }
@@ -140,7 +131,7 @@ std::array<ExampleImage, 2> split_example(const ExampleImage& example) {
 
 TextureDistance distance_between(const ExampleImage& a, const ExampleImage& b) {
     const std::vector<float> x = used_grey(a), y = used_grey(b);
-    if (x.empty() || y.empty()) return {1, 255, 1};
+    if (x.empty() || y.empty()) return kLargestDistance;
     return {kolmogorov_smirnov(x, y), earth_mover(x, y),
             grain_distance(grain_of(a, kReach), grain_of(b, kReach))};
 }
@@ -148,7 +139,7 @@ TextureDistance distance_between(const ExampleImage& a, const ExampleImage& b) {
 TextureDistance distance_between(const SolidTextureResult& made, const ExampleImage& example) {
     const std::vector<float> x = texture_grey(made.texture, made.grey_mean, made.grey_sd);
     const std::vector<float> y = used_grey(example);
-    if (y.empty()) return {1, 255, 1};
+    if (y.empty()) return kLargestDistance;
     return {kolmogorov_smirnov(x, y), earth_mover(x, y),
             grain_distance(grain_of(x, made),
                            at_stride(grain_of(example, kReach), made.pixels_per_voxel))};
@@ -161,7 +152,7 @@ TextureQuality measure_texture(const SolidTextureResult& made, const ExampleImag
     q.floor = distance_between(halves[0], halves[1]);
     const std::vector<float> grey = texture_grey(made.texture, made.grey_mean, made.grey_sd);
     const Autocorrelation grain = grain_of(example, kWidthReach);
-    // on the texture's own lattice, so that interpolation between lags does the same to both
+    // On the lattice of the texture, such that interpolation between lags affects both alike.
     const Autocorrelation seen = at_stride(grain, made.pixels_per_voxel);
     q.example = correlation_widths(through_window(seen, seen));
     q.texture = correlation_widths(through_window(grain_of(grey, made), seen));
@@ -210,10 +201,10 @@ std::vector<Measure> TextureAssessment::measures() const {
 
 Result<TextureAssessment> assess_texture(const TextureSpec& spec) {
     TextureAssessment out;
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     auto made = make_solid_texture(spec);
     if (!made) return made.error();
-    out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    out.seconds = watch.seconds();
     out.made = std::move(*made);
     const auto largest = std::max_element(
         spec.examples.begin(), spec.examples.end(),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// How near a solid texture comes to its example, beside how near two real patches come to each
-// other.
+// How near a solid texture comes to its example, compared with how near two halves of a real patch
+// come to each other.
 #pragma once
 
 #include <array>
@@ -19,22 +19,22 @@ namespace sonocase::pipeline {
 
 // Distance between two samples of grey and their grain.
 struct TextureDistance {
-    double ks = 0;  // Kolmogorov-Smirnov: greatest gap between the distributions, [0, 1]
+    double ks = 0;  // Kolmogorov-Smirnov: largest gap between the distribution functions, [0, 1]
     double earth_mover_grey = 0;  // mean shift of grey that turns one histogram into the other
-    double grain = 0;             // rms difference of the autocorrelations within the grain's width
+    double grain = 0;             // RMS difference of the autocorrelations within the grain's width
 };
 
 struct TextureQuality {
     TextureDistance distance;     // texture against example
-    TextureDistance floor;        // one half of the example against the other: no method goes below
+    TextureDistance floor;        // one half of the example against the other; a lower bound
     CorrelationWidths example;    // px
     CorrelationWidths texture;    // voxels, planes z = const
     double example_contrast = 0;  // sd / mean of grey
     double texture_contrast = 0;
-    double seam_score = 0;  // greatest |z| of the steps across the faces x, y, z among inner steps
+    double seam_score = 0;  // largest |z| of the seam_scores
 };
 
-// Kolmogorov-Smirnov and earth mover's distance of two sets of values; both not empty.
+// Kolmogorov-Smirnov and earth mover's distance between two sets of values, neither empty.
 double kolmogorov_smirnov(std::span<const float> a, std::span<const float> b);
 double earth_mover(std::span<const float> a, std::span<const float> b);
 
@@ -54,12 +54,13 @@ TextureDistance distance_between(const SolidTextureResult& made, const ExampleIm
 // the texture.
 TextureQuality measure_texture(const SolidTextureResult& made, const ExampleImage& example);
 
-// A texture, how good it is, and how well it would have foretold the half that it did not see.
+// A texture, its quality, and how well a texture learned from one half of the example predicts the
+// other half.
 struct TextureAssessment {
     SolidTextureResult made;
     ExampleImage example;        // the largest one, prepared
     TextureQuality quality;      // against that one
-    bool has_held_back = false;  // false: a half has too few pixels
+    bool has_held_back = false;  // false: half the example has too few pixels
     TextureDistance held_back;   // texture learned from the first half against the second half
     double seconds = 0;          // of make_solid_texture alone
     // Names start with "NAME.": ks, earth_mover_grey, grain and their *_floor, widths and contrast

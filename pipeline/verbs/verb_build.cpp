@@ -13,6 +13,7 @@
 #include "formats/base/build_facts.h"
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
+#include "formats/threads/thread_jobs.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
@@ -159,7 +160,8 @@ int build(const BuildOptions& options) {
     if (choice && recipe->inputs.analytic)
         achieved_error_mm =
             measure_boundary_error(cooked->bundle, recipe->inputs.torso).displaced_mm;
-    const std::vector<std::uint8_t> bytes = write_bundle(cooked->bundle);
+    ThreadJobs jobs;
+    const std::vector<std::uint8_t> bytes = write_bundle(cooked->bundle, jobs);
     if (auto status = write_file(out, bytes); !status) return fail("build", status.error());
     if (!options.preview.empty())
         if (auto status = write_file(options.preview, cooked->bundle.preview_png); !status)

@@ -8,6 +8,7 @@
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
 #include "formats/files/bundle_file.h"
+#include "formats/threads/thread_jobs.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
 #include "pipeline/export/inspect_case.h"
@@ -27,7 +28,8 @@ int verb_inspect(int argc, char** argv) {
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     auto bytes = read_file(path);
     if (!bytes) return fail("inspect", bytes.error());
-    auto bundle = read_bundle(*bytes, path, common.threads);
+    ThreadJobs jobs(common.threads);
+    auto bundle = read_bundle(*bytes, path, jobs);
     if (!bundle) return fail("inspect", bundle.error());
     Inspection inspection{path, digest_of(*bytes), bytes->size(), {}, {}};
     inspection.seconds = recorded_seconds(*bundle, path, inspection.digest);

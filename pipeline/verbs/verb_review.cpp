@@ -7,6 +7,7 @@
 #include "formats/files/atomic_file.h"
 #include "formats/files/bundle_file.h"
 #include "formats/files/recording_file.h"
+#include "formats/threads/thread_jobs.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
 #include "pipeline/import/surface/surface_file.h"
@@ -124,7 +125,7 @@ int verb_score(int argc, char** argv) {
     if (!exercise) return fail("score", exercise.error());
     std::unique_ptr<Anatomy> anatomy;
     if (!a.body.empty()) {
-        auto mesh = import_surface(a.body);
+        auto mesh = import_surface(a.body, {.torso = false});
         if (!mesh) return fail("score", mesh.error());
         if (mesh->triangles.empty()) {
             return fail("score", Error{"holds points and no triangles", a.body, "a closed mesh"});
@@ -135,7 +136,8 @@ int verb_score(int argc, char** argv) {
             std::make_unique<CaseAnatomy>(bundle, breathing_shown(*exercise, session->header));
     }
     ScoreOptions options;
-    options.threads = common.threads;
+    ThreadJobs jobs(common.threads);
+    options.jobs = &jobs;
     const SessionScore score =
         score_session(*session, *exercise, anatomy.get(), bundle.labels, options);
     const std::string json = score_json(score, *exercise);

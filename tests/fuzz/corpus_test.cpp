@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Every kept input of every reader, and cheap damage to each: cut short, one byte changed.
 #include <gtest/gtest.h>
 

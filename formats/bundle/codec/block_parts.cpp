@@ -7,10 +7,9 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <new>
 
 #include "formats/bundle/codec/brick_kinds.h"
-#include "formats/bundle/codec/offset_guess.h"
+#include "formats/bundle/codec/offset_prediction.h"
 #include "formats/volume/boundary_record.h"
 
 namespace sonocase::detail {
@@ -39,17 +38,16 @@ void clear(const BlockParts& parts, std::size_t block, const BrickSpans<T>& volu
 
 }  // namespace
 
-BlockWork::BlockWork(const BlockParts& parts) : context_(ZSTD_createDCtx()) {
-    if (context_ == nullptr) throw std::bad_alloc();
+BlockUnpacker::BlockUnpacker(const BlockParts& parts) : context_(ZSTD_createDCtx()) {
     bytes_.resize(std::max(parts.corrections ? parts.corrections->largest() : 0,
                            parts.offsets ? parts.offsets->largest() : 0));
 }
 
-BlockWork::~BlockWork() {
+BlockUnpacker::~BlockUnpacker() {
     ZSTD_freeDCtx(context_);
 }
 
-bool BlockWork::unpack(const BlockParts& parts, std::size_t block) noexcept {
+bool BlockUnpacker::unpack(const BlockParts& parts, std::size_t block) noexcept {
     const bool has_records = parts.boundary.table.empty() || records(parts, block);
     if (!has_records) clear(parts, block, parts.boundary, kNoBoundary);
     const bool has_offsets = parts.echo.table.empty() || offsets(parts, block);
@@ -57,8 +55,8 @@ bool BlockWork::unpack(const BlockParts& parts, std::size_t block) noexcept {
     return has_records && has_offsets;
 }
 
-bool BlockWork::records(const BlockParts& parts, std::size_t block) noexcept {
-    if (!parts.corrections->unpack(context_, block, bytes_.data())) return false;
+bool BlockUnpacker::records(const BlockParts& parts, std::size_t block) noexcept {
+    if (!context_ || !parts.corrections->unpack(context_, block, bytes_.data())) return false;
     std::size_t corrected_bricks = 0;
     parts.grid.each_brick(block, [&](std::size_t brick, bool, bool) {
         const std::uint32_t entry = parts.boundary.table[brick];
@@ -76,11 +74,11 @@ bool BlockWork::records(const BlockParts& parts, std::size_t block) noexcept {
     parts.grid.each_brick(block, [&](std::size_t brick, bool, bool) {
         const std::uint32_t entry = parts.boundary.table[brick];
         if (entry & kUniformBrick) return;
-        BrickLabels alike;
+        BrickLabels uniform;
         const std::uint32_t label_entry = parts.labels.table[brick];
-        const std::uint8_t* label = alike.data();
+        const std::uint8_t* label = uniform.data();
         if (label_entry & kUniformBrick) {
-            alike.fill(parts.labels.uniform[label_entry & ~kUniformBrick]);
+            uniform.fill(parts.labels.uniform[label_entry & ~kUniformBrick]);
         } else {
             label = parts.labels.pool.data() + static_cast<std::size_t>(label_entry) * kBrickVoxels;
         }
@@ -109,8 +107,8 @@ bool BlockWork::records(const BlockParts& parts, std::size_t block) noexcept {
     return good && word == words;
 }
 
-bool BlockWork::offsets(const BlockParts& parts, std::size_t block) noexcept {
-    if (!parts.offsets->unpack(context_, block, bytes_.data())) return false;
+bool BlockUnpacker::offsets(const BlockParts& parts, std::size_t block) noexcept {
+    if (!context_ || !parts.offsets->unpack(context_, block, bytes_.data())) return false;
     const std::uint8_t* from = bytes_.data();
     const std::uint8_t* const end = from + parts.offsets->bytes(block);
     bool good = true;
@@ -128,14 +126,14 @@ bool BlockWork::offsets(const BlockParts& parts, std::size_t block) noexcept {
         const std::int8_t* in_front = has_front ? front.data() : nullptr;
         std::int8_t* to = parts.echo.pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels;
         std::int8_t* values = in_cells ? cells.data() : to;
-        const auto told = [&](int v, std::uint8_t guess) {
-            return values[v] = static_cast<std::int8_t>(*from++ + guess);
+        const auto decode = [&](int v, std::uint8_t prediction) {
+            return values[v] = static_cast<std::int8_t>(*from++ + prediction);
         };
         if (!in_cells) {
-            walk_offsets<kBrickEdge>(at_left, in_front, told);
+            walk_offsets<kBrickEdge>(at_left, in_front, decode);
             return;
         }
-        walk_offsets<2>(at_left, in_front, told);
+        walk_offsets<2>(at_left, in_front, decode);
         for (std::size_t v = 0; v < kBrickVoxels; ++v)
             to[v] = cells[v % 4 / 2 + 2 * (v / 4 % 4 / 2) + 4 * (v / 32)];
     });

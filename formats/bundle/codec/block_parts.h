@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What VoxelBlocks unpacks from and into. For the .cpp files of formats/ only.
+// What VoxelBlocks unpacks from, and into what. For the .cpp files of formats/ only.
 #pragma once
 
 #include <optional>
@@ -14,8 +14,7 @@
 
 namespace sonocase::detail {
 
-// The vectors of the volumes stay where they are while a bundle is moved about: only they are
-// referred to.
+// Refers to the storage of a volume's vectors, which stays in place when a bundle is moved.
 template <class T>
 struct BrickSpans {
     std::span<const std::uint32_t> table;
@@ -46,14 +45,14 @@ struct BlockParts {
     std::optional<BlockFrames> corrections, offsets;
 };
 
-// Memory to unpack one block in.
-class BlockWork {
+// Unpacks blocks, one at a time. Where zstd finds no memory for its context, every block fails.
+class BlockUnpacker {
   public:
-    explicit BlockWork(const BlockParts& parts);
-    ~BlockWork();
-    BlockWork(const BlockWork&) = delete;
-    BlockWork& operator=(const BlockWork&) = delete;
-    // False where the block's bytes make no sense; it is then empty.
+    explicit BlockUnpacker(const BlockParts& parts);
+    ~BlockUnpacker();
+    BlockUnpacker(const BlockUnpacker&) = delete;
+    BlockUnpacker& operator=(const BlockUnpacker&) = delete;
+    // False where the block's bytes are not valid; the block is then empty.
     bool unpack(const BlockParts& parts, std::size_t block) noexcept;
 
   private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the bytes of `vox.kind` and `ofs.kind` say of a brick, and small things that packing and
-// unpacking share. docs/format.md, part 2. For the .cpp files of formats/ only.
+// What the bytes of `vox.kind` and `ofs.kind` say about a brick, and small functions that packing
+// and unpacking share. docs/format.md, part 2. For the .cpp files of formats/ only.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,8 @@
 
 namespace sonocase::detail {
 
-// `vox.kind`: labels in bits 0 and 1, number of patches in bits 2 to 4, and in bit 5 whether some
-// of its records are other than the patches say.
+// `vox.kind`: labels in bits 0 and 1, number of patches in bits 2 to 4, and bit 5 is set if some of
+// its records differ from what the patches say.
 enum LabelKind : unsigned { kAsBefore = 0, kOneLabel = 1, kMixedLabels = 2, kSidesOfPatch = 3 };
 inline constexpr unsigned kCorrected = 32, kKinds = 64;
 inline unsigned label_kind(unsigned kind) {

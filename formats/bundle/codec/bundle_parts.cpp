@@ -53,9 +53,7 @@ void add_textures(ChunkWriter& writer, const std::vector<SolidTexture>& textures
     writer.add("textures", false, std::move(bytes));
 }
 
-Result<std::vector<SolidTexture>> read_textures(const ChunkReader& reader,
-                                                JsonObject& manifest,
-                                                int threads) {
+Result<std::vector<SolidTexture>> read_textures(const ChunkReader& reader, JsonObject& manifest) {
     std::vector<SolidTexture> textures;
     if (!manifest.has("textures")) return textures;
     std::size_t total = 0;
@@ -63,7 +61,7 @@ Result<std::vector<SolidTexture>> read_textures(const ChunkReader& reader,
         SolidTexture texture;
         texture.name = item.text("name");
         texture.edge = static_cast<int>(item.integer("edge", 8, 128));
-        if (!is_power_of_two(texture.edge)) item.complain("edge", "is no power of two");
+        if (!is_power_of_two(texture.edge)) item.complain("edge", "is not a power of two");
         texture.voxel_mm = item.number("voxel_mm");
         if (!(texture.voxel_mm > 0)) item.complain("voxel_mm", "is not above zero");
         const auto edge = static_cast<std::size_t>(texture.edge);
@@ -71,7 +69,7 @@ Result<std::vector<SolidTexture>> read_textures(const ChunkReader& reader,
         textures.push_back(std::move(texture));
     }
     if (!manifest.ok() || textures.empty()) return textures;
-    auto bytes = reader.read_array<std::uint8_t>("textures", total, threads);
+    auto bytes = reader.read_array<std::uint8_t>("textures", total);
     if (!bytes) return bytes.error();
     std::size_t from = 0;
     for (SolidTexture& texture : textures) {
@@ -83,13 +81,13 @@ Result<std::vector<SolidTexture>> read_textures(const ChunkReader& reader,
     return textures;
 }
 
-Result<SpeckleVolume> read_speckle(const ChunkReader& reader, JsonObject& manifest, int threads) {
+Result<SpeckleVolume> read_speckle(const ChunkReader& reader, JsonObject& manifest) {
     SpeckleVolume speckle;
     speckle.edge = static_cast<int>(manifest.integer_or("speckle_edge", 0, 0, 512));
     if (speckle.edge == 0) return speckle;
-    if (!is_power_of_two(speckle.edge)) manifest.complain("speckle_edge", "is no power of two");
+    if (!is_power_of_two(speckle.edge)) manifest.complain("speckle_edge", "is not a power of two");
     const auto edge = static_cast<std::size_t>(speckle.edge);
-    auto voxels = reader.read_array<std::int8_t>("speckle", 2 * edge * edge * edge, threads);
+    auto voxels = reader.read_array<std::int8_t>("speckle", 2 * edge * edge * edge);
     if (!voxels) return voxels.error();
     speckle.voxels = std::move(*voxels);
     return speckle;
@@ -106,11 +104,11 @@ void add_surface(ChunkWriter& writer, const std::string& type, const Surface& su
     writer.add(type, false, std::move(bytes));
 }
 
-Result<Surface> read_surface(const ChunkReader& reader, const std::string& type, int threads) {
+Result<Surface> read_surface(const ChunkReader& reader, const std::string& type) {
     static_assert(sizeof(Point3) == 24 && sizeof(Vector3) == 24);
     Surface surface;
     if (!reader.has(type)) return surface;
-    const auto bytes = reader.read(type, kMaxSurfaceItems * 24, threads);
+    const auto bytes = reader.read(type, kMaxSurfaceItems * 24);
     if (!bytes) return bytes.error();
     std::array<std::uint64_t, 3> counts{};
     if (bytes->size() < sizeof(counts)) return reader.fault("surface '" + type + "' has no counts");
@@ -143,8 +141,9 @@ Result<Surface> read_surface(const ChunkReader& reader, const std::string& type,
     }
     for (const auto& t : surface.triangles) good &= t[0] < points && t[1] < points && t[2] < points;
     if (!good) {
-        return reader.fault("surface '" + type +
-                            "' has a triangle without its points or a point not finite");
+        return reader.fault(
+            "surface '" + type +
+            "' has a triangle whose points do not exist, or a point that is not finite");
     }
     return surface;
 }

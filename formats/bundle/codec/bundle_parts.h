@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Pieces that case bundles and the files between stages share. For the .cpp files of formats/ only.
+// Pieces that case bundles and the files between stages have in common. For the .cpp files of
+// formats/ only.
 #pragma once
 
 #include <algorithm>
@@ -29,14 +30,14 @@ template <class T>
 Result<BrickVolume<T>> read_bricks(const ChunkReader& reader,
                                    const std::string& name,
                                    Int3 size,
-                                   int threads) {
+                                   JobRunner& jobs) {
     BrickVolume<T> bricks;
     bricks.size = size;
     const Int3 n = brick_count(size);
     const std::size_t count = static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) *
                               static_cast<std::size_t>(n.z);
     auto table =
-        reader.read_array<std::uint32_t, RawVector<std::uint32_t>>(name + ".t", count, threads);
+        reader.read_array<std::uint32_t, RawVector<std::uint32_t>>(name + ".t", count, jobs);
     if (!table) return table.error();
     const std::size_t uniform_count = reader.raw_bytes(name + ".u") / sizeof(T);
     const std::size_t pool_count = reader.raw_bytes(name + ".p") / sizeof(T);
@@ -46,9 +47,9 @@ Result<BrickVolume<T>> read_bricks(const ChunkReader& reader,
             "brick volume '" + name + "' holds " + std::to_string(pool_count) + " values",
             "whole bricks, and no more than its grid has");
     }
-    auto uniform = reader.read_array<T>(name + ".u", uniform_count, threads);
+    auto uniform = reader.read_array<T>(name + ".u", uniform_count, jobs);
     if (!uniform) return uniform.error();
-    auto pool = reader.read_array<T, RawVector<T>>(name + ".p", pool_count, threads);
+    auto pool = reader.read_array<T, RawVector<T>>(name + ".p", pool_count, jobs);
     if (!pool) return pool.error();
     const std::size_t stored = pool_count / kBrickVoxels;
     bool inside = true;
@@ -69,14 +70,12 @@ Result<BrickVolume<T>> read_bricks(const ChunkReader& reader,
 // Textures lie one after another in one chunk, in the order of the manifest's list.
 Json json_of_textures(const std::vector<SolidTexture>& textures);
 void add_textures(ChunkWriter& writer, const std::vector<SolidTexture>& textures);
-Result<std::vector<SolidTexture>> read_textures(const ChunkReader& reader,
-                                                JsonObject& manifest,
-                                                int threads);
-Result<SpeckleVolume> read_speckle(const ChunkReader& reader, JsonObject& manifest, int threads);
+Result<std::vector<SolidTexture>> read_textures(const ChunkReader& reader, JsonObject& manifest);
+Result<SpeckleVolume> read_speckle(const ChunkReader& reader, JsonObject& manifest);
 
 // A surface is one chunk: u64 points, u64 normals, u64 triangles, then f64 x 3, f64 x 3, u32 x 3
 // each.
 void add_surface(ChunkWriter& writer, const std::string& type, const Surface& surface);
-Result<Surface> read_surface(const ChunkReader& reader, const std::string& type, int threads);
+Result<Surface> read_surface(const ChunkReader& reader, const std::string& type);
 
 }  // namespace sonocase::detail

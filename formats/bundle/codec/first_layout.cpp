@@ -23,20 +23,20 @@ Result<VoxelVolumes> read_first_layout(const ChunkReader& reader,
                                        bool with_offsets,
                                        Int3 size,
                                        std::size_t palette,
-                                       int threads) {
+                                       JobRunner& jobs) {
     VoxelVolumes out;
-    auto labels = read_bricks<std::uint8_t>(reader, "lab", size, threads);
+    auto labels = read_bricks<std::uint8_t>(reader, "lab", size, jobs);
     if (!labels) return labels.error();
     out.labels = std::move(*labels);
     if (!all_values(out.labels, [&](std::uint8_t v) { return v < palette; }))
         return reader.fault("a voxel has a label beyond the palette", "make the file again");
     if (with_offsets) {
-        auto echo = read_bricks<std::int8_t>(reader, "echo", size, threads);
+        auto echo = read_bricks<std::int8_t>(reader, "echo", size, jobs);
         if (!echo) return echo.error();
         out.echo_offset = std::move(*echo);
     }
     if (with_records) {
-        auto boundary = read_bricks<std::uint32_t>(reader, "bnd", size, threads);
+        auto boundary = read_bricks<std::uint32_t>(reader, "bnd", size, jobs);
         if (!boundary) return boundary.error();
         out.boundary = std::move(*boundary);
         if (!all_values(out.boundary, [&](std::uint32_t v) {

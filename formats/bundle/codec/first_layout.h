@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Brick volumes as files of the first layout hold them: chunks lab.*, bnd.* and echo.* with tables,
-// uniform values and pools as they are in memory. Read, not written.
+// uniform values and pools as they are in memory. Such files are read but no longer written.
 #pragma once
 
 #include "formats/bundle/codec/packed_volumes.h"
@@ -13,6 +13,6 @@ Result<VoxelVolumes> read_first_layout(const ChunkReader& reader,
                                        bool with_offsets,
                                        Int3 size,
                                        std::size_t palette,
-                                       int threads);
+                                       JobRunner& jobs);
 
 }  // namespace sonocase::detail

@@ -7,14 +7,14 @@
 
 #include "formats/base/jobs.h"
 #include "formats/bundle/codec/brick_kinds.h"
-#include "formats/bundle/codec/offset_guess.h"
+#include "formats/bundle/codec/offset_prediction.h"
 
 namespace sonocase::detail {
 namespace {
 
 using Values = std::array<std::int8_t, kBrickVoxels>;
 
-// Whether the brick is 8 cells of alike voxels, and the cells.
+// Whether the brick is 8 cells of equal voxels, and the cells.
 bool cells_of(const Values& values, std::array<std::int8_t, 8>* cells) {
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
         const std::size_t i = v % 4, j = v / 4 % 4, k = v / 16;
@@ -62,16 +62,16 @@ void add_values(const BlockGrid& grid,
             brick_values(volume, brick - static_cast<std::size_t>(grid.bricks.x), front.data());
         const std::int8_t* at_left = has_left ? left.data() : nullptr;
         const std::int8_t* in_front = has_front ? front.data() : nullptr;
-        const auto told = [&](const std::int8_t* from) {
-            return [out, from](int v, std::uint8_t guess) {
-                out->push_back(static_cast<std::uint8_t>(from[v] - guess));
+        const auto coded = [&](const std::int8_t* from) {
+            return [out, from](int v, std::uint8_t prediction) {
+                out->push_back(static_cast<std::uint8_t>(from[v] - prediction));
                 return from[v];
             };
         };
         if (cells_of(values, &cells)) {
-            walk_offsets<2>(at_left, in_front, told(cells.data()));
+            walk_offsets<2>(at_left, in_front, coded(cells.data()));
         } else {
-            walk_offsets<kBrickEdge>(at_left, in_front, told(values.data()));
+            walk_offsets<kBrickEdge>(at_left, in_front, coded(values.data()));
         }
     });
 }
@@ -80,9 +80,10 @@ void add_values(const BlockGrid& grid,
 
 void add_offsets(ChunkWriter& writer,
                  const BlockGrid& grid,
-                 const BrickVolume<std::int8_t>& volume) {
+                 const BrickVolume<std::int8_t>& volume,
+                 JobRunner& jobs) {
     std::vector<Kinds> layers(static_cast<std::size_t>(grid.bricks.z));
-    run_jobs(layers.size(), 0,
+    jobs.run(layers.size(),
              [&](std::size_t k) { layers[k] = kinds_of_layer(volume, static_cast<int>(k)); });
     std::vector<std::uint8_t> kind, one;
     for (const Kinds& layer : layers) {
@@ -91,10 +92,11 @@ void add_offsets(ChunkWriter& writer,
     }
     writer.add("ofs.kind", false, std::move(kind));
     writer.add("ofs.one", false, std::move(one));
-    writer.add_packed("ofs.val", false,
-                      pack_blocks(grid, [&](std::size_t block, std::vector<std::uint8_t>* out) {
-                          add_values(grid, block, volume, out);
-                      }));
+    writer.add_packed(
+        "ofs.val", false,
+        pack_blocks(grid, jobs, [&](std::size_t block, std::vector<std::uint8_t>* out) {
+            add_values(grid, block, volume, out);
+        }));
 }
 
 }  // namespace sonocase::detail

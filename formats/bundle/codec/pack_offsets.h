@@ -11,6 +11,7 @@ namespace sonocase::detail {
 
 void add_offsets(ChunkWriter& writer,
                  const BlockGrid& grid,
-                 const BrickVolume<std::int8_t>& volume);
+                 const BrickVolume<std::int8_t>& volume,
+                 JobRunner& jobs);
 
 }  // namespace sonocase::detail

@@ -16,6 +16,7 @@ void add_surfaces(ChunkWriter& writer,
                   const BlockGrid& grid,
                   const BrickVolume<std::uint8_t>& labels,
                   const BoundaryBricks& boundary,
-                  int reach_steps);
+                  int reach_steps,
+                  JobRunner& jobs);
 
 }  // namespace sonocase::detail

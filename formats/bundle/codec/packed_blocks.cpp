@@ -11,15 +11,16 @@
 namespace sonocase::detail {
 namespace {
 
-constexpr int kZstdLevel = 12;  // blocks are small: higher levels find no more
+constexpr int kZstdLevel = 12;  // higher levels gain nothing on blocks this small
 
 }  // namespace
 
 std::vector<std::uint8_t> pack_blocks(
     const BlockGrid& grid,
+    JobRunner& jobs,
     const std::function<void(std::size_t, std::vector<std::uint8_t>*)>& content) {
     std::vector<std::vector<std::uint8_t>> parts(grid.count());
-    run_jobs(parts.size(), 0, [&](std::size_t block) {
+    jobs.run(parts.size(), [&](std::size_t block) {
         std::vector<std::uint8_t> raw;
         content(block, &raw);
         if (raw.empty()) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Chunks that are unpacked in parts: a volume's bricks in blocks of edge^3, each a zstd frame of
+// Chunks that can be unpacked in parts: a volume's bricks in blocks of edge^3, each a zstd frame of
 // its own. docs/format.md, part 2. For the .cpp files of formats/ only.
 #pragma once
 
@@ -43,8 +43,8 @@ struct BlockGrid {
         return {edge * static_cast<int>(block % x), edge * static_cast<int>(block / x % y),
                 edge * static_cast<int>(block / x / y)};
     }
-    // visit(brick, has_left, has_front): number of the brick, and whether those beside it in x and
-    // y are of the same block.
+    // visit(brick, has_left, has_front): number of the brick, and whether its neighbours in -x and
+    // -y belong to the same block.
     template <class Visit>
     void each_brick(std::size_t block, Visit visit) const {
         const Int3 f = first_brick(block);
@@ -62,22 +62,23 @@ struct BlockGrid {
     }
 };
 
-// content: appends what a block holds to an empty vector. Same bytes for any number of threads.
+// content: appends the bytes of a block to an empty vector.
 std::vector<std::uint8_t> pack_blocks(
     const BlockGrid& grid,
+    JobRunner& jobs,
     const std::function<void(std::size_t block, std::vector<std::uint8_t>*)>& content);
 
 // Where the frames of such a chunk lie. Refers to the bytes of the reader's file.
 class BlockFrames {
   public:
-    // max_bytes: the most that a block has a use for.
+    // max_bytes: the most that a block can hold.
     static Result<BlockFrames> open(const ChunkReader& reader,
                                     const std::string& type,
                                     std::size_t blocks,
                                     std::size_t max_bytes);
     std::size_t bytes(std::size_t block) const { return frames_[block].bytes; }  // unpacked
     std::size_t largest() const { return largest_; }
-    // to: bytes(block) of them. False: it does not unpack.
+    // to: # bytes(block). False: the frame is damaged.
     bool unpack(ZSTD_DCtx_s* context, std::size_t block, std::uint8_t* to) const noexcept;
 
   private:

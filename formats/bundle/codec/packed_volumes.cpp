@@ -15,11 +15,11 @@
 namespace sonocase::detail {
 namespace {
 
-constexpr int kLeastBlock = 8, kLargestBlock = 32;  // bricks an edge
+constexpr int kLeastBlock = 8, kLargestBlock = 32;  // bricks per edge
 constexpr std::size_t kMostBlocks = 4096;
 constexpr int kMostPatchStep = 16;
 
-// Blocks small enough that a frame needs few, large enough that each packs well.
+// Blocks small enough that a frame needs few, large enough that each compresses well.
 BlockGrid block_grid(Int3 size) {
     BlockGrid grid{brick_count(size), kLeastBlock};
     while (grid.count() > kMostBlocks && grid.edge < kLargestBlock) grid.edge *= 2;
@@ -29,14 +29,14 @@ BlockGrid block_grid(Int3 size) {
 // The largest distance of any record, in 1/48 voxel.
 int reach_of(const BrickVolume<std::uint32_t>& boundary) {
     std::uint32_t most = 0;
-    const auto look = [&](std::span<const std::uint32_t> values) {
+    const auto search = [&](std::span<const std::uint32_t> values) {
         for (const std::uint32_t v : values) {
             const std::uint32_t steps = v >> 8 & 0xFFu;
             if (steps < 128) most = std::max(most, steps);
         }
     };
-    look(boundary.uniform);
-    look(boundary.pool);
+    search(boundary.uniform);
+    search(boundary.pool);
     return static_cast<int>(most);
 }
 
@@ -46,7 +46,8 @@ void add_volumes(ChunkWriter& writer,
                  Json& manifest,
                  const BrickVolume<std::uint8_t>& labels,
                  const BoundaryBricks& boundary,
-                 const BrickVolume<std::int8_t>& echo_offset) {
+                 const BrickVolume<std::int8_t>& echo_offset,
+                 JobRunner& jobs) {
     const BlockGrid grid = block_grid(labels.size);
     const int reach_steps = reach_of(boundary);
     manifest["echo_offset"] = !echo_offset.table.empty();
@@ -55,19 +56,21 @@ void add_volumes(ChunkWriter& writer,
     manifest["patch_step"] = boundary.patches.step;
     manifest["block_bricks"] = grid.edge;
     add_manifest(writer, manifest);
-    add_surfaces(writer, grid, labels, boundary, reach_steps);
-    if (!echo_offset.table.empty()) add_offsets(writer, grid, echo_offset);
+    add_surfaces(writer, grid, labels, boundary, reach_steps, jobs);
+    if (!echo_offset.table.empty()) add_offsets(writer, grid, echo_offset, jobs);
 }
 
-Result<VoxelVolumes> read_volumes(
-    const ChunkReader& reader, JsonObject& manifest, Int3 size, std::size_t palette, int threads) {
+Result<VoxelVolumes> read_volumes(const ChunkReader& reader,
+                                  JsonObject& manifest,
+                                  Int3 size,
+                                  std::size_t palette,
+                                  JobRunner& jobs) {
     const bool with_offsets = manifest.flag_or("echo_offset", false);
     const bool with_records = manifest.flag_or("boundary", false);
     if (!reader.has("vox.kind"))
-        return read_first_layout(reader, with_records, with_offsets, size, palette, threads);
+        return read_first_layout(reader, with_records, with_offsets, size, palette, jobs);
     if (reader.has("vox.rec")) {
-        return reader.fault("is of a layout that was in use for a few days only",
-                            "make the file again");
+        return reader.fault("is of an early layout that is no longer read", "make the file again");
     }
     auto parts = std::make_unique<BlockParts>();
     parts->reach_steps = static_cast<int>(manifest.integer("record_reach", 0, 127));
@@ -81,11 +84,11 @@ Result<VoxelVolumes> read_volumes(
     out.boundary.patches.step = step;
     out.labels.size = size;
     if (with_records) out.boundary.size = size;
-    if (Status s = read_surfaces(reader, with_records, threads, parts.get(), &out); !s)
+    if (Status s = read_surfaces(reader, with_records, jobs, parts.get(), &out); !s)
         return s.error();
     if (with_offsets) {
         out.echo_offset.size = size;
-        if (Status s = read_offsets(reader, threads, parts.get(), &out.echo_offset); !s)
+        if (Status s = read_offsets(reader, jobs, parts.get(), &out.echo_offset); !s)
             return s.error();
     }
     out.packed = std::move(parts);

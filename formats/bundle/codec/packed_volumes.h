@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The brick volumes of a case on disk: labels and boundary records as surface patches and what they
-// miss, echo offsets as differences. docs/format.md, part 2.
+// The brick volumes of a case on disk: labels and boundary records as surface patches with
+// corrections, echo offsets as differences. docs/format.md, part 2.
 #pragma once
 
 #include <memory>
@@ -17,23 +17,26 @@ struct VoxelVolumes {
     BrickVolume<std::uint8_t> labels;
     BoundaryBricks boundary;               // empty: none
     BrickVolume<std::int8_t> echo_offset;  // empty: none
-    // What the pools of the latter two are still to be unpacked from, VoxelBlocks; null: all is
-    // there.
+    // What VoxelBlocks unpacks the pools of the latter two from; null: everything is loaded.
     std::unique_ptr<BlockParts> packed;
 };
 
 // Adds the chunks, and to the manifest what is needed to read them. The order of bricks in the
-// pools is not kept, the volumes are.
+// pools is not preserved; the values of the voxels are.
 void add_volumes(ChunkWriter& writer,
                  Json& manifest,
                  const BrickVolume<std::uint8_t>& labels,
                  const BoundaryBricks& boundary,
-                 const BrickVolume<std::int8_t>& echo_offset);
+                 const BrickVolume<std::int8_t>& echo_offset,
+                 JobRunner& jobs);
 
 // size: of the grid. palette: number of labels; no label at or beyond it comes back. The blocks
 // refer to the reader's bytes. Files of the first layout (chunks lab.t and so on) are read too.
-Result<VoxelVolumes> read_volumes(
-    const ChunkReader& reader, JsonObject& manifest, Int3 size, std::size_t palette, int threads);
+Result<VoxelVolumes> read_volumes(const ChunkReader& reader,
+                                  JsonObject& manifest,
+                                  Int3 size,
+                                  std::size_t palette,
+                                  JobRunner& jobs);
 
 // The chunks that either layout may hold; for ChunkReader::open.
 #define SONOCASE_VOLUME_CHUNKS                                                                     \

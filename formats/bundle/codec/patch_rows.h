@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The patches of one layer of bricks, for guessing at the next one from its neighbours; and how
-// what is left of a coefficient is told. For the .cpp files of formats/ only.
+// The patches of one layer of bricks, to predict the next one from its neighbours; and how the
+// residual of a coefficient is coded. For the .cpp files of formats/ only.
 #pragma once
 
 #include <array>
@@ -16,17 +16,17 @@ class PatchRows {
   public:
     // width, bricks: of a row and of the layer.
     PatchRows(std::size_t width, std::size_t bricks) : width_(width), first_(bricks + 1, 0) {}
-    // Bricks come in order; every brick of the layer is told, with how many patches the layer has
-    // up to its end.
+    // To be called for every brick of the layer in order, with the number of patches that the layer
+    // has up to the end of that brick.
     void close(std::size_t brick, std::size_t patches) {
         first_[brick + 1] = static_cast<std::uint32_t>(patches);
     }
 
-    // By those of the brick to the left and of the one in front that part the same labels as
-    // `patch`. known: the layer's patches so far.
-    std::array<std::int16_t, kPatchCoefficients> guess(const SurfacePatch* known,
-                                                       std::size_t brick,
-                                                       const SurfacePatch& patch) const {
+    // Predicts from the patches of the bricks to the left and in front that separate the same
+    // labels as `patch`. known: the layer's patches so far.
+    std::array<std::int16_t, kPatchCoefficients> prediction(const SurfacePatch* known,
+                                                            std::size_t brick,
+                                                            const SurfacePatch& patch) const {
         SurfacePatch found[2]{};
         int count = 0;
         if (brick % width_ != 0) count += find(known, brick - 1, patch, 0, &found[count]);
@@ -55,7 +55,17 @@ class PatchRows {
     std::vector<std::uint32_t> first_;  // # bricks of the layer + 1
 };
 
-// Small numbers of either sign as small numbers.
+// Files hold coefficients in units of BrickPatches::step.
+inline SurfacePatch in_steps(SurfacePatch patch, int step) {
+    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c / step);
+    return patch;
+}
+inline SurfacePatch from_steps(SurfacePatch patch, int step) {
+    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c * step);
+    return patch;
+}
+
+// Zigzag code: small numbers of either sign become small numbers without one.
 inline std::uint16_t folded(std::int16_t v) {
     return static_cast<std::uint16_t>(v < 0 ? -2 * v - 1 : 2 * v);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Tables of the echo offsets on their way out of a file: `ofs.*` of docs/format.md, part 2. For the
+// Reads the tables of the echo offsets: `ofs.*` of docs/format.md, part 2. For the
 // .cpp files of formats/ only.
 #pragma once
 
@@ -9,9 +9,9 @@
 
 namespace sonocase::detail {
 
-// Fills the table of `out` and makes room for its pool, which `parts` will fill.
+// Fills the table of `out` and allocates its pool, which is unpacked later from `parts`.
 Status read_offsets(const ChunkReader& reader,
-                    int threads,
+                    JobRunner& jobs,
                     BlockParts* parts,
                     BrickVolume<std::int8_t>* out);
 

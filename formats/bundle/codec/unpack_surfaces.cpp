@@ -7,7 +7,7 @@
 #include <cstring>
 #include <tuple>
 
-#include "formats/base/jobs.h"
+#include "formats/base/memory.h"
 #include "formats/bundle/codec/brick_kinds.h"
 #include "formats/bundle/codec/patch_rows.h"
 #include "formats/bundle/codec/value_order.h"
@@ -18,7 +18,7 @@ namespace {
 
 using Bytes = RawVector<std::uint8_t>;
 
-// Where a layer's part of each stream begins, and its part of each pool; # what the name says.
+// Where a layer's part of each stream and of each pool begins, in items of that name.
 struct Starts {
     std::size_t one = 0, mix = 0, patch = 0, label_pool = 0, without_records = 0;
 
@@ -40,27 +40,21 @@ struct Packed {
     Bytes kind, one, mix, pair, low, high;
 };
 
-SurfacePatch told_patch(const Packed& in,
-                        std::size_t p,
-                        std::size_t patches,
-                        const PatchRows& rows,
-                        const SurfacePatch* known,
-                        std::size_t brick) {
+SurfacePatch decoded_patch(const Packed& in,
+                           std::size_t p,
+                           std::size_t patches,
+                           const PatchRows& rows,
+                           const SurfacePatch* known,
+                           std::size_t brick) {
     SurfacePatch patch;
     patch.low = in.pair[2 * p];
     patch.high = in.pair[2 * p + 1];
-    const auto guess = rows.guess(known, brick, patch);
+    const auto prediction = rows.prediction(known, brick, patch);
     for (std::size_t i = 0; i < kPatchCoefficients; ++i) {
         const std::size_t from = i * patches + p;
         const auto v = static_cast<std::uint16_t>(in.low[from] | in.high[from] << 8);
-        patch.c[i] = static_cast<std::int16_t>(guess[i] + unfolded(v));
+        patch.c[i] = static_cast<std::int16_t>(prediction[i] + unfolded(v));
     }
-    return patch;
-}
-
-// Told in units of `step`.
-SurfacePatch in_units(SurfacePatch patch, int step) {
-    for (std::int16_t& c : patch.c) c = static_cast<std::int16_t>(c * step);
     return patch;
 }
 
@@ -95,7 +89,7 @@ void unpack_layer(const Packed& in,
         }
         const std::size_t end = at.patch + patch_count(kind);
         for (std::size_t p = at.patch; p < end; ++p)
-            own[p - first_patch] = told_patch(in, p, patches, rows, own, b);
+            own[p - first_patch] = decoded_patch(in, p, patches, rows, own, b);
         rows.close(b, end - first_patch);
         if (labels_as < kMixedLabels) {
             if (labels_as == kOneLabel) before = in.one[at.one];
@@ -105,7 +99,7 @@ void unpack_layer(const Packed& in,
             if (labels_as == kMixedLabels) {
                 std::memcpy(to, in.mix.data() + at.mix * kBrickVoxels, kBrickVoxels);
             } else {
-                labels_from_patch(in_units(own[at.patch - first_patch], step), to);
+                labels_from_patch(from_steps(own[at.patch - first_patch], step), to);
             }
             out->labels.table[brick] = static_cast<std::uint32_t>(at.label_pool);
         }
@@ -120,7 +114,7 @@ void unpack_layer(const Packed& in,
         }
         at.add(kind, 1);
     }
-    for (std::size_t p = 0; p < at.patch - first_patch; ++p) own[p] = in_units(own[p], step);
+    for (std::size_t p = 0; p < at.patch - first_patch; ++p) own[p] = from_steps(own[p], step);
 }
 
 bool below(const Bytes& values, std::size_t limit) {
@@ -133,20 +127,20 @@ bool below(const Bytes& values, std::size_t limit) {
 
 Status read_surfaces(const ChunkReader& reader,
                      bool with_records,
-                     int threads,
+                     JobRunner& jobs,
                      BlockParts* parts,
                      VoxelVolumes* out) {
     const Int3 bricks = parts->grid.bricks;
     const std::size_t layer = layer_bricks(bricks), layers = static_cast<std::size_t>(bricks.z);
     Packed in;
     const auto get = [&](const char* type, std::size_t size, Bytes* to) {
-        auto bytes = reader.read_array<std::uint8_t, Bytes>(type, size, threads);
+        auto bytes = reader.read_array<std::uint8_t, Bytes>(type, size, jobs);
         if (!bytes) return Status(bytes.error());
         *to = std::move(*bytes);
         return Status(Done{});
     };
     if (Status s = get("vox.kind", layer * layers, &in.kind); !s) return s;
-    const LayerKinds kinds(in.kind, layer, threads);
+    const LayerKinds kinds(in.kind, layer, jobs);
     std::vector<Starts> starts(layers + 1);
     bool good = true;
     for (std::size_t k = 0; k < layers; ++k) {
@@ -160,7 +154,7 @@ Status read_surfaces(const ChunkReader& reader,
     }
     const Starts& total = starts[layers];
     good &= with_records || total.without_records == in.kind.size();
-    if (!good) return reader.fault("a brick of 'vox.kind' is of no known kind", "make it again");
+    if (!good) return reader.fault("a brick of 'vox.kind' is of an unknown kind", "make it again");
     for (const auto& [type, size, to] :
          {std::tuple{"vox.one", total.one, &in.one},
           std::tuple{"vox.mix", total.mix * kBrickVoxels, &in.mix},
@@ -173,7 +167,8 @@ Status read_surfaces(const ChunkReader& reader,
         return reader.fault("a voxel has a label beyond the palette", "make the file again");
     bool ordered = true;
     for (std::size_t p = 0; p < total.patch; ++p) ordered &= in.pair[2 * p] < in.pair[2 * p + 1];
-    if (!ordered) return reader.fault("a surface patch parts no two labels", "make it again");
+    if (!ordered)
+        return reader.fault("a surface patch does not separate two labels", "make it again");
     if (!below(in.pair, parts->palette)) {
         return reader.fault("a boundary record has a label beyond the palette",
                             "make the file again");
@@ -190,22 +185,25 @@ Status read_surfaces(const ChunkReader& reader,
         if (kinds.begins_as_before(k, [](unsigned kind) { return label_kind(kind); })) order.met(0);
         for (std::size_t n = starts[k].one; n < starts[k + 1].one; ++n) order.met(in.one[n]);
     }
+    PoolOrder places(in.kind, parts->grid, jobs, has_records);
+    if (!can_allocate(total.label_pool * kBrickVoxels) ||
+        !can_allocate(places.total() * kBrickVoxels * sizeof(std::uint32_t)))
+        return reader.fault("needs more memory than is available", "use larger voxels");
     out->labels.uniform = order.values();
     out->labels.table.resize(in.kind.size());
     out->labels.pool.resize(total.label_pool * kBrickVoxels);
     out->boundary.patches.patches.resize(total.patch);
-    PoolOrder places(in.kind, parts->grid, threads, has_records);
     if (with_records) {
         out->boundary.table.resize(in.kind.size());
         out->boundary.pool.resize(places.total() * kBrickVoxels);
-        // Renderers read the first record where they have no use for one.
+        // Renderers read the first record where they use none.
         if (places.total() > 0) out->boundary.pool[0] = kNoBoundary;
         out->boundary.patches.first.resize(places.total());
         out->boundary.patches.count.resize(places.total());
         parts->corrected.resize(places.total());
         if (total.without_records > 0) out->boundary.uniform = {kNoBoundary};
     }
-    run_jobs(layers, threads, [&](std::size_t k) {
+    jobs.run(layers, [&](std::size_t k) {
         unpack_layer(in, starts[k], total.patch, order.index(), k, &places, parts, out);
     });
     parts->labels = BrickSpans(out->labels);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Labels, tables and patches on their way out of a file: `vox.*` of docs/format.md, part 2. For the
+// Reads labels, tables and patches: `vox.*` of docs/format.md, part 2. For the
 // .cpp files of formats/ only.
 #pragma once
 
@@ -9,12 +9,11 @@
 
 namespace sonocase::detail {
 
-// Fills the labels and the tables of `out`, and makes room for the records, which `parts` will
-// fill:
-// its grid, palette and reach are there, and what records need is added.
+// Fills the labels and the tables of `out`, and allocates the records, which are unpacked later
+// from `parts`. Of `parts`, grid, palette and reach are given; what the records need is added.
 Status read_surfaces(const ChunkReader& reader,
                      bool with_records,
-                     int threads,
+                     JobRunner& jobs,
                      BlockParts* parts,
                      VoxelVolumes* out);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Kinds of bricks by layer, where their voxels lie in pools, and the values of uniform bricks in
-// the order in which a volume's bricks show them. For the .cpp files of formats/ only.
+// Kinds of bricks by layer, positions of bricks in pools, and the values of uniform bricks in order
+// of first occurrence. For the .cpp files of formats/ only.
 #pragma once
 
 #include <array>
@@ -18,11 +18,11 @@ namespace sonocase::detail {
 // How many bricks of each kind a layer has.
 class LayerKinds {
   public:
-    LayerKinds(std::span<const std::uint8_t> kinds, std::size_t layer_bricks, int threads)
+    LayerKinds(std::span<const std::uint8_t> kinds, std::size_t layer_bricks, JobRunner& jobs)
         : kinds_(kinds), layer_(layer_bricks), counts_(layer_ ? kinds.size() / layer_ : 0) {
-        run_jobs(counts_.size(), threads, [&](std::size_t k) {
-            // Four counts in turn: most bricks are as their neighbour, and one would wait for
-            // itself.
+        jobs.run(counts_.size(), [&](std::size_t k) {
+            // Four counts in turn: most bricks are like their neighbour, and one counter would wait
+            // for its own last increment.
             std::array<std::array<std::uint32_t, 256>, 4> parts{};
             const auto kinds_here = kinds_.subspan(k * layer_, layer_);
             for (std::size_t b = 0; b < layer_; ++b) ++parts[b % 4][kinds_here[b]];
@@ -31,8 +31,8 @@ class LayerKinds {
         });
     }
     std::size_t count(std::size_t layer, unsigned kind) const { return counts_[layer][kind]; }
-    // Whether the layer's first uniform brick is as "the one before". value_of: 0 for such a kind,
-    // 1 for one with a value of its own, more for no uniform brick.
+    // Whether the layer's first uniform brick takes the value of "the one before". value_of: 0 for
+    // such a kind, 1 for a kind with a value of its own, more for bricks that are not uniform.
     template <class ValueOf>
     bool begins_as_before(std::size_t layer, ValueOf value_of) const {
         for (const std::uint8_t kind : kinds_.subspan(layer * layer_, layer_)) {
@@ -47,18 +47,18 @@ class LayerKinds {
     std::vector<std::array<std::uint32_t, 256>> counts_;
 };
 
-// Where bricks of a pool lie that follows the order of blocks, so that what is needed together lies
+// Positions of bricks in a pool that is sorted by blocks, so that what is needed together is stored
 // together.
 class PoolOrder {
   public:
-    // stored: whether a brick of that kind has a place in the pool.
+    // stored: whether a brick of that kind is in the pool.
     template <class Stored>
     PoolOrder(std::span<const std::uint8_t> kinds,
               const BlockGrid& grid,
-              int threads,
+              JobRunner& jobs,
               Stored stored)
         : grid_(grid), columns_(columns_of(grid)), at_(layers() * columns_) {
-        run_jobs(layers(), threads, [&](std::size_t k) {
+        jobs.run(layers(), [&](std::size_t k) {
             const std::uint8_t* kind = kinds.data() + k * layer_bricks(grid_.bricks);
             for (int j = 0; j < grid_.bricks.y; ++j, kind += grid_.bricks.x) {
                 for (int first = 0; first < grid_.bricks.x; first += grid_.edge) {
@@ -81,11 +81,11 @@ class PoolOrder {
         }
     }
     std::size_t total() const { return total_; }
-    // A row of a layer's bricks. They are asked for in their order.
+    // A row of a layer's bricks; next() is called in the order of the bricks.
     class Row {
       public:
         Row(std::uint32_t* next, int edge) : next_(next), edge_(edge), end_(edge) {}
-        std::uint32_t next(int i) {  // the place of brick i of the row
+        std::uint32_t next(int i) {  // position of brick i of the row
             for (; i >= end_; end_ += edge_) ++next_;
             return (*next_)++;
         }

@@ -78,7 +78,7 @@ std::vector<Label> labels_from(JsonObject& object, const char* key) {
             }
         }
         if (!names.insert(label.name).second)
-            item.complain("name", "'" + label.name + "' is there twice");
+            item.complain("name", "'" + label.name + "' occurs twice");
         labels.push_back(std::move(label));
     }
     if (object.ok() && (labels.empty() || labels.size() > kMaxLabels)) {

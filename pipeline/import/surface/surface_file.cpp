@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <tuple>
 
+#include "formats/files/atomic_file.h"
 #include "pipeline/base/delimited_text.h"
 #include "pipeline/base/plausible_size.h"
 #include "pipeline/import/surface/surface_readers.h"
@@ -98,8 +99,7 @@ Result<Surface> import_surface(const std::string& path,
     StageReport own;
     own.stage = "surface_file";
     std::error_code code;
-    if (!fs::exists(path, code)) return Error{"no such file", path, "check the path"};
-    if (fs::is_directory(path, code)) return Error{"is a folder", path, "expected a surface file"};
+    if (const Status status = expect_regular_file(path); !status) return status.error();
     if (fs::file_size(path, code) == 0) return Error{"file is empty", path, "export it again"};
     const std::string ending = lower_case(fs::path(path).extension().string());
     const bool mesh = ending == ".ply" || ending == ".stl" || ending == ".obj" || ending == ".vtp";
@@ -116,7 +116,7 @@ Result<Surface> import_surface(const std::string& path,
     for (const Point3 p : surface->points)
         if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
             return Error{"surface has a vertex that is not finite", path, "export it again"};
-    if (surface->points.size() < kFewestSurfacePoints)
+    if (options.torso && surface->points.size() < kFewestSurfacePoints)
         return Error{
             "surface of " + std::to_string(surface->points.size()) + " points", path,
             "expected at least 30 all round the torso, 500 or more are good; take more readings"};
@@ -124,8 +124,10 @@ Result<Surface> import_surface(const std::string& path,
         for (Point3& p : surface->points) p = Point3{} + options.scale * (p - Point3{});
     Box3 box;
     for (const Point3 p : surface->points) box.include(p);
-    if (const auto error = check_torso_extent(box.extent(), "surface", path, "--scale"))
-        return *error;
+    if (options.torso) {
+        if (const auto error = check_torso_extent(box.extent(), "surface", path, "--scale"))
+            return *error;
+    }
 
     if (!surface->triangles.empty()) {
         if (const std::size_t turned = orient_outwards(*surface); turned > 0)

@@ -12,7 +12,8 @@
 namespace sonocase::pipeline {
 
 struct SurfaceFileOptions {
-    double scale = 1;  // mm per unit of the file, > 0
+    double scale = 1;   // mm per unit of the file, > 0
+    bool torso = true;  // false: any object, with no limits on its size or number of points
 };
 
 // The surface in its own frame, mm.
@@ -25,8 +26,8 @@ struct SurfaceFileOptions {
 // Readings that are not finite are left out and counted in `report` (stage "surface_file", may be
 // null).
 //
-// Errors: no such file, unreadable or truncated, fewer than 30 points, an extent that cannot be a
-// torso in mm.
+// Errors: no such file, unreadable or truncated, and for a
+// torso fewer than 30 points, or an extent that no torso has in mm.
 Result<Surface> import_surface(const std::string& path,
                                const SurfaceFileOptions& options = {},
                                StageReport* report = nullptr);

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <unordered_map>
 
+#include "formats/files/atomic_file.h"
 #include "pipeline/import/volume/native_volume.h"
 
 namespace sonocase::pipeline {
@@ -19,6 +20,7 @@ Result<NativeVolume> read_native(const std::string& path) {
     std::error_code code;
     if (!fs::exists(path, code)) return Error{"no such file or folder", path, "check the path"};
     if (fs::is_directory(path, code)) return read_dicom_series(path);
+    if (const Status status = expect_regular_file(path); !status) return status.error();
     if (!is_volume_file_name(path))
         return Error{
             "not a known volume file name", path,

@@ -77,7 +77,7 @@ std::vector<float> smoothing_kernel(double sigma, double moment) {
         for (std::size_t j = 0; j < gauss.size(); ++j)
             kernel[i + j] -= (a - 1) * gauss[i] * gauss[j];
     }
-    // Ends below a thousandth are cut; what is left is brought back to a sum of 1.
+    // Ends below a thousandth are cut, and the rest is normalised again.
     std::size_t cut = 0;
     while (cut + 1 < kernel.size() / 2 && std::abs(kernel[cut]) < 1e-3) ++cut;
     std::vector<float> out;
@@ -100,31 +100,31 @@ std::vector<float> spreading_kernel(double sigma) {
 void smooth_box(const VoxelBox& box,
                 const BoxKernels& kernels,
                 std::vector<float>* values,
-                std::vector<float>* other) {
-    other->resize(values->size());
+                std::vector<float>* scratch) {
+    scratch->resize(values->size());
     const std::size_t nx = static_cast<std::size_t>(box.size.x);
     const std::size_t ny = static_cast<std::size_t>(box.size.y);
     const std::size_t nz = static_cast<std::size_t>(box.size.z);
     if (!kernels.taps[0].empty()) {
         smooth_rows(values->data(), box.size.x, ny * nz, kernels.taps[0], kernels.stride[0],
-                    other->data());
-        values->swap(*other);
+                    scratch->data());
+        values->swap(*scratch);
     }
     if (!kernels.taps[1].empty()) {
         for (std::size_t k = 0; k < nz; ++k) {
             const std::size_t at = k * nx * ny;
             smooth_lines(values->data() + at, nx, box.size.y, nx, kernels.taps[1],
-                         kernels.stride[1], other->data() + at);
+                         kernels.stride[1], scratch->data() + at);
         }
-        values->swap(*other);
+        values->swap(*scratch);
     }
     if (!kernels.taps[2].empty()) {
         for (std::size_t j = 0; j < ny; ++j) {
             const std::size_t at = j * nx;
             smooth_lines(values->data() + at, nx, box.size.z, nx * ny, kernels.taps[2],
-                         kernels.stride[2], other->data() + at);
+                         kernels.stride[2], scratch->data() + at);
         }
-        values->swap(*other);
+        values->swap(*scratch);
     }
 }
 

@@ -8,10 +8,10 @@
 namespace sonocase::pipeline {
 namespace {
 
-// Of sigma.
-constexpr double kWide = 1.76, kMiddle = 0.59;
+constexpr double kWide = 1.76, kMiddle = 0.59;  // widths, in sigma
 
-VoxelBox around(const VoxelBox& a, const VoxelBox& b) {
+// Bounding box of both.
+VoxelBox united(const VoxelBox& a, const VoxelBox& b) {
     if (a.empty()) return b;
     if (b.empty()) return a;
     VoxelBox out;
@@ -31,7 +31,7 @@ LabelVolume slices_last(const LabelVolume& labels) {
         if (g.spacing_mm[a] > g.spacing_mm[thick] * 1.0001) thick = a;
     }
     if (thick == 2) return labels;
-    // A cyclic exchange keeps the frame right-handed, whatever that matters to the caller.
+    // A cyclic exchange of axes keeps the frame right-handed.
     const int from[3] = {(thick + 1) % 3, (thick + 2) % 3, thick};
     LabelVolume out;
     out.labels = labels.labels;
@@ -82,9 +82,10 @@ LabelDistance::LabelDistance(const LabelVolume& labels, const LabelDistanceOptio
     for (int a = 0; a < 3; ++a) {
         if (nodes_.size[a] < 2) continue;
         const auto u = static_cast<std::size_t>(a);
-        // Across slices far apart only their steps are left to flatten: at least a slice is needed.
+        // Between distant slices only their steps remain to be flattened, which takes a width of at
+        // least one slice.
         const double taps = std::max(more * nodes_per_vx(a), thick(a) ? 1.0 * factor_ : 0.0);
-        // What has been smoothed once is told by every second node.
+        // Values that have been smoothed once are resolved by every second node.
         wide_.kernels.stride[u] = taps > 2.4 ? 2 : 1;
         wide_.kernels.taps[u] = smoothing_kernel(taps / wide_.kernels.stride[u]);
         wide_.spread.taps[u] =
@@ -98,8 +99,9 @@ double LabelDistance::nodes_per_vx(int axis) const {
     return std::sqrt(h.x * h.y) / nodes_.spacing_mm[axis];
 }
 
-// Slices this far apart hold no noise that more would average, only curvature to lose.
-double LabelDistance::most_nodes(int axis) const {
+// Between slices this far apart no noise remains that wider smoothing would remove; it would only
+// flatten curvature.
+double LabelDistance::largest_sigma_nodes(int axis) const {
     const Vector3 h = labels_.grid.spacing_mm;
     return thick(axis) && h.z >= 3.5 * std::max(h.x, h.y) ? 0.3 * factor_ : 1e9;
 }
@@ -109,14 +111,14 @@ void LabelDistance::add_level(double sigma_vx, double tolerance_vx) {
     level.tolerance_vx = tolerance_vx;
     for (int a = 0; a < 3; ++a) {
         if (nodes_.size[a] < 2) continue;
-        double sigma = std::min(sigma_vx * nodes_per_vx(a), most_nodes(a));
+        double sigma = std::min(sigma_vx * nodes_per_vx(a), largest_sigma_nodes(a));
         if (thick(a) && options_.sigma_slices > 0) {
             sigma = options_.sigma_slices * factor_ * std::min(1.0, sigma_vx / options_.sigma_vx);
         }
         const auto u = static_cast<std::size_t>(a);
-        // A third answers for the cubic B-spline that the nodes are later read with.
+        // The moment of 1/3 compensates for the cubic B-spline that later interpolates the nodes.
         level.kernels.taps[u] = smoothing_kernel(sigma, 1.0 / 3);
-        // What is thin in one slice is thin half-way to the next.
+        // A structure that is thin in one slice is thin half-way to the next.
         level.spread.taps[u] =
             spreading_kernel(thick(a) ? 0.5 * factor_ : std::max(0.8, 0.7 * sigma));
     }
@@ -125,18 +127,18 @@ void LabelDistance::add_level(double sigma_vx, double tolerance_vx) {
 
 VoxelBox LabelDistance::distance(const LabelSet& labels,
                                  std::vector<float>* phi,
-                                 Scratch* work) const {
+                                 Scratch* scratch) const {
     VoxelBox box;
     for (std::size_t l = 0; l < boxes_.size(); ++l) {
-        if (labels[l]) box = around(box, boxes_[l]);
+        if (labels[l]) box = united(box, boxes_[l]);
     }
     if (box.empty()) {
         phi->clear();
         return box;
     }
     const Vector3 h = labels_.grid.spacing_mm;
-    // Beyond this the labels cannot win; the kernel's reach is added so that its border is not
-    // felt.
+    // Outside the padded box the labels cannot win; the reach of the kernel is added to keep the
+    // border out of the result.
     Int3 pad;
     for (int a = 0; a < 3; ++a) {
         const int kernel = levels_.empty() ? 0 : levels_[0].kernels.reach(a);
@@ -148,20 +150,20 @@ VoxelBox LabelDistance::distance(const LabelSet& labels,
     if (factor_ > 1) {
         box.size.z = (box.size.z - 1) * factor_ + 1;
         box.first.z *= factor_;
-        shape_interpolated(labels, box, phi, work);
+        shape_interpolated(labels, box, phi, scratch);
     } else {
         signed_distance(labels_, labels, box, limit_mm_, {true, true, true}, phi);
     }
     if (levels_.empty()) return box;
-    work->smooth = *phi;
-    smooth_box(box, levels_[0].kernels, &work->smooth, &work->other);
-    work->wide = work->smooth;
-    smooth_box(box, wide_.kernels, &work->wide, &work->other);
-    add_detail(labels, box, *phi, 0, &work->smooth, work);
+    scratch->smooth = *phi;
+    smooth_box(box, levels_[0].kernels, &scratch->smooth, &scratch->other);
+    scratch->wide = scratch->smooth;
+    smooth_box(box, wide_.kernels, &scratch->wide, &scratch->other);
+    add_detail(labels, box, *phi, 0, &scratch->smooth, scratch);
     const std::vector<std::size_t> strays =
-        find_strays(labels, box, work->wide, wide_.tolerance_vx);
-    phi->swap(work->wide);
-    if (!strays.empty()) blend(box, wide_.spread, strays, box, work->smooth, phi, work);
+        find_strays(labels, box, scratch->wide, wide_.tolerance_vx);
+    phi->swap(scratch->wide);
+    if (!strays.empty()) blend(box, wide_.spread, strays, box, scratch->smooth, phi, scratch);
     return box;
 }
 
@@ -175,12 +177,12 @@ std::vector<std::size_t> LabelDistance::find_strays(const LabelSet& labels,
     const std::ptrdiff_t step[3] = {1, g.size.x, static_cast<std::ptrdiff_t>(g.size.x) * g.size.y};
     std::array<bool, 256> member;
     for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
-    // What is one voxel thick has no depth to give. Between thick slices it is the interpolation by
-    // shape that keeps what is thin.
+    // A structure one voxel thick has no depth to lose. Between thick slices, shape interpolation
+    // preserves thin structures.
     const auto limit_of = [&](Int3 v) {
         if (factor_ > 1) return tolerance;
         const std::uint8_t* at = labels_.voxels.data() + g.index(v.x, v.y, v.z);
-        for (int a = 0; a < 3; ++a) {  // a label goes on beyond the border
+        for (int a = 0; a < 3; ++a) {  // a label continues beyond the border
             if (v[a] == 0 || v[a] + 1 == g.size[a]) continue;
             const std::uint8_t before = at[-step[a]], after = at[step[a]];
             if (before != *at && after != *at) return 0.0f;
@@ -189,7 +191,7 @@ std::vector<std::size_t> LabelDistance::find_strays(const LabelSet& labels,
     };
     std::vector<std::size_t> strays;
     for (int k = 0; k < box.size.z; ++k) {
-        if ((box.first.z + k) % factor_ != 0) continue;  // only slices are known
+        if ((box.first.z + k) % factor_ != 0) continue;  // only slices hold voxels of the map
         for (int j = 0; j < box.size.y; ++j) {
             const Int3 start{box.first.x, box.first.y + j, (box.first.z + k) / factor_};
             const std::uint8_t* row = labels_.voxels.data() + g.index(start.x, start.y, start.z);
@@ -210,7 +212,7 @@ void LabelDistance::add_detail(const LabelSet& labels,
                                const std::vector<float>& raw,
                                std::size_t level,
                                std::vector<float>* phi,
-                               Scratch* work) const {
+                               Scratch* scratch) const {
     if (level + 1 >= levels_.size()) return;
     const std::vector<std::size_t> strays =
         find_strays(labels, box, *phi, levels_[level].tolerance_vx);
@@ -234,12 +236,12 @@ void LabelDistance::add_detail(const LabelSet& labels,
         part.first[a] = box.first[a] + first;
         part.size[a] = std::min(box.size[a], high[a] + reach + 1) - first;
     }
-    std::vector<float>&part_raw = work->raw[level], &fine = work->fine[level];
+    std::vector<float>&part_raw = scratch->raw[level], &fine = scratch->fine[level];
     crop(box, raw, part, &part_raw);
     fine = part_raw;
-    smooth_box(part, finer.kernels, &fine, &work->other);
-    add_detail(labels, part, part_raw, level + 1, &fine, work);
-    blend(box, levels_[level].spread, strays, part, fine, phi, work);
+    smooth_box(part, finer.kernels, &fine, &scratch->other);
+    add_detail(labels, part, part_raw, level + 1, &fine, scratch);
+    blend(box, levels_[level].spread, strays, part, fine, phi, scratch);
 }
 
 void LabelDistance::blend(const VoxelBox& box,
@@ -248,8 +250,8 @@ void LabelDistance::blend(const VoxelBox& box,
                           const VoxelBox& part,
                           const std::vector<float>& fine,
                           std::vector<float>* phi,
-                          Scratch* work) const {
-    std::vector<float>& weight = work->weight;
+                          Scratch* scratch) const {
+    std::vector<float>& weight = scratch->weight;
     weight.assign(part.count(), 0.0f);
     const auto nx = static_cast<std::size_t>(box.size.x), ny = static_cast<std::size_t>(box.size.y);
     for (const std::size_t s : strays) {
@@ -257,7 +259,7 @@ void LabelDistance::blend(const VoxelBox& box,
                           static_cast<int>(s / nx % ny) + box.first.y - part.first.y,
                           static_cast<int>(s / nx / ny) + box.first.z - part.first.z)] = 1;
     }
-    smooth_box(part, spread, &weight, &work->other);
+    smooth_box(part, spread, &weight, &scratch->other);
     for (int k = 0; k < part.size.z; ++k) {
         for (int j = 0; j < part.size.y; ++j) {
             const std::size_t from = part.index(0, j, k);

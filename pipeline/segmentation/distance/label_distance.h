@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Signed distance to unions of labels of a map on any grid, made smooth, on nodes fine enough for
-// both.
+// Signed distance to unions of labels of a map on any grid, smoothed, on nodes fine enough for
+// shape interpolation.
 //
-// Thick slices are interpolated by shape (slice_shapes.cpp): a distance field a slice, made a
-// distance in space by the lean of its surfaces, closed by balls where outlines end, blended along
-// the slice axis with Catmull-Rom's cubic; outlines that move sideways are blended along their
-// shift (slice_groups.h). Nearly cubic voxels are measured in 3-D. Then separable smoothing by a
-// kernel without second moment (box_smoothing.h), at several widths: 1.76 sigma where that leaves
-// the map's own voxels on their side of the surface, which flattens the long steps of surfaces that
-// lie nearly along the grid; sigma where it would not; 0.59 sigma and then detail where that would
-// not either (thin structures, edges, vessels), with a smooth passage between them.
+// Thick slices are interpolated by shape (slice_shapes.cpp): each slice has its own distance field;
+// the obliquity of the surfaces turns it into a distance in space, balls close outlines that end,
+// and the slices are blended along their axis by Catmull-Rom cubics. Outlines that move sideways
+// are blended along their shift (slice_groups.h). Nearly cubic voxels are measured in 3-D.
+//
+// The distance is then smoothed by separable kernels without second moment (box_smoothing.h) of
+// several widths. The widest is 1.76 sigma, used where it keeps the map's own voxels on their side
+// of the surface; it flattens the long steps of surfaces nearly parallel to the grid. Elsewhere
+// the width is sigma, then 0.59 sigma, then detail, each where the wider one would move voxels to
+// the wrong side (thin structures, edges, vessels), with a smooth transition between widths.
 #pragma once
 
 #include <array>
@@ -24,14 +26,17 @@
 namespace sonocase::pipeline {
 
 struct LabelDistanceOptions {
-    double sigma_vx = 1.7;       // smoothing, in-plane voxels of the map; 0: none
-    double detail_vx = 0.5;      // smoothing of what is too fine for any other width
-    double tolerance_vx = 0.25;  // how far across they may come to lie; what is one voxel thick not
-    double wide_tolerance_vx = 0.15;  // for the widest
-    double sigma_slices = 0;  // smoothing along thick slices, in slices; 0: as in the plane, in mm,
-                              // but at most 0.3 slices of 3.5 pixels and more
-    double thick_ratio =
-        1.5;  // slice spacing over pixel from which slices are interpolated by shape
+    double sigma_vx = 1.7;   // smoothing, in-plane voxels of the map; 0: none
+    double detail_vx = 0.5;  // smoothing of structures too fine for any other width
+    // How far on the wrong side of the surface a voxel of the map may end; 0 applies where the label
+    // is one voxel thick.
+    double tolerance_vx = 0.25;
+    double wide_tolerance_vx = 0.15;  // of the widest smoothing
+    // Smoothing across thick slices, in slices; 0: as in the plane, in mm, but at most 0.3 slices
+    // where a slice is 3.5 pixels or more.
+    double sigma_slices = 0;
+    // Slice spacing, in pixels, from which slices are interpolated by shape.
+    double thick_ratio = 1.5;
     bool shape_slices = true;  // false: thick slices are measured in 3-D like any others
     bool follow_shift = true;  // blend outlines that move sideways along their shift
 };
@@ -46,34 +51,39 @@ class LabelDistance {
     const SliceGroups& groups() const { return groups_; }
     double limit_mm() const { return limit_mm_; }
 
-    // Scratch space of one thread: the system clears what is allocated anew, which takes as long as
-    // the smoothing does.
+    // Scratch space of one thread. Kept from call to call: the system clears newly allocated memory,
+    // which takes as long as the smoothing does.
     struct Scratch {
         std::vector<float> smooth, wide, other, weight;
-        std::array<std::vector<float>, 3> raw, fine;  // of the levels
-        std::vector<float> flat, within;              // of slices
+        std::array<std::vector<float>, 3> raw, fine;  // per level
+        std::vector<float> flat, within;              // slices
         std::vector<std::uint8_t> capped;
     };
-    // Smooth phi (negative inside, mm) of a union of labels on `box` of the nodes; # box.count().
-    // Outside `box` it is further than the limit. Thread-safe, a Scratch a thread.
+    // Smooth phi (negative inside, mm) of a union of labels on a box of nodes, which is returned;
+    // phi: # box.count().
+    // Outside `box` the distance exceeds the limit. Thread-safe, with one Scratch per thread.
     VoxelBox distance(const LabelSet& labels, std::vector<float>* phi, Scratch* scratch) const;
 
   private:
     void shape_interpolated(const LabelSet& labels,
                             const VoxelBox& box,
                             std::vector<float>* phi,
-                            Scratch* work) const;
-    void lean(const VoxelBox& slices, Scratch* scratch) const;
-    void cap(const SliceGroup& group,
-             bool own,
-             const VoxelBox& slices,
-             std::vector<float>* flat,
-             std::vector<std::uint8_t>* capped) const;
-    // own: the group is of the label of phi; else it is carved out of it.
+                            Scratch* scratch) const;
+    // slice_shapes.cpp. own: the group is of a label of the union; otherwise it is cut out of it.
+    void correct_obliquity(const VoxelBox& slices, Scratch* scratch) const;
+    void close_end(const SliceGroup& group,
+                   bool own,
+                   const VoxelBox& slices,
+                   std::vector<float>* flat,
+                   std::vector<std::uint8_t>* capped) const;
+    void blend_slices(const VoxelBox& box,
+                      const std::vector<float>& flat,
+                      std::vector<float>* phi) const;
     void blend_group(const SliceGroup& group,
                      bool own,
                      const VoxelBox& box,
                      std::vector<float>* phi) const;
+    bool touches(const SliceGroup& group, const VoxelBox& box) const;
 
     LabelVolume labels_;
     LabelDistanceOptions options_;
@@ -89,28 +99,30 @@ class LabelDistance {
     };
     bool thick(int axis) const { return axis == 2 && factor_ > 1; }
     double nodes_per_vx(int axis) const;
-    double most_nodes(int axis) const;
+    double largest_sigma_nodes(int axis) const;
     void add_level(double sigma_vx, double tolerance_vx);
-    // Nodes of the map's own voxels that phi puts on the wrong side; indices in `box`.
+    // Voxels of the map that phi puts on the wrong side of the surface: indices of their nodes in
+    // `box`.
     std::vector<std::size_t> find_strays(const LabelSet& labels,
                                          const VoxelBox& box,
                                          const std::vector<float>& phi,
                                          double tolerance_vx) const;
-    // phi, smoothed by `level`, is replaced by finer levels where it has strays.
+    // Replaces phi, smoothed by `level`, by finer levels near its strays.
     void add_detail(const LabelSet& labels,
                     const VoxelBox& box,
                     const std::vector<float>& raw,
                     std::size_t level,
                     std::vector<float>* phi,
-                    Scratch* work) const;
-    // phi on `box` becomes `fine` on `part` of it near the strays, with a smooth passage.
+                    Scratch* scratch) const;
+    // Replaces phi on `box` by `fine`, given on `part` of it, near the strays, with a smooth
+    // transition.
     void blend(const VoxelBox& box,
                const BoxKernels& spread,
                const std::vector<std::size_t>& strays,
                const VoxelBox& part,
                const std::vector<float>& fine,
                std::vector<float>* phi,
-               Scratch* work) const;
+               Scratch* scratch) const;
 
     std::vector<Level> levels_;  // coarse to fine
     Level wide_;                 // after levels_[0]

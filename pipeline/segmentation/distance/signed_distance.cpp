@@ -9,23 +9,25 @@
 namespace sonocase::pipeline {
 namespace {
 
-// Squared distance along x to the nearest voxel of the row that `is` marks, at most limit_sq.
-void row_distances(const std::uint8_t* is, int count, float spacing, float limit_sq, float* out) {
+// Squared distance along x to the nearest marked voxel of the row, at most limit_sq.
+void row_distances(
+    const std::uint8_t* marked, int count, float spacing, float limit_sq, float* out) {
     float run = 1e9f;
     for (int i = 0; i < count; ++i) {
-        run = is[i] ? 0.0f : run + spacing;
+        run = marked[i] ? 0.0f : run + spacing;
         out[i] = run;
     }
     run = 1e9f;
     for (int i = count - 1; i >= 0; --i) {
-        run = is[i] ? 0.0f : run + spacing;
+        run = marked[i] ? 0.0f : run + spacing;
         const float d = std::min(out[i], run);
         out[i] = std::min(d * d, limit_sq);
     }
 }
 
 // One more axis: out[l] = min over lines m of (in[m] + (l - m)^2 spacing^2), lines of `width`
-// values. Few lines lie within the limit, so that the plain minimum beats an envelope of parabolas.
+// values. Few lines are within the limit, and the plain minimum is then faster than an envelope of
+// parabolas.
 void line_distances(const float* in,
                     std::size_t width,
                     int lines,
@@ -91,7 +93,7 @@ VoxelBox grow(const VoxelBox& box, Int3 voxels, Int3 size) {
 
 namespace {
 
-struct DistanceWork {
+struct DistanceScratch {
     std::vector<float> first, second;
     std::vector<std::uint8_t> mark;
 };
@@ -103,12 +105,12 @@ void distances_on(const LabelVolume& volume,
                   double limit_mm,
                   std::array<bool, 3> axes,
                   float* phi,
-                  DistanceWork* work) {
+                  DistanceScratch* scratch) {
     const std::size_t nx = static_cast<std::size_t>(box.size.x);
     const std::size_t plane = nx * static_cast<std::size_t>(box.size.y);
     const std::size_t count = box.count();
     const Vector3 h = volume.grid.spacing_mm;
-    // Half a voxel between the last centre inside and the surface: the mean over the axes measured.
+    // Half a voxel from the last centre inside to the surface: the mean over the axes measured.
     double sum = 0, measured = 0;
     for (int a = 0; a < 3; ++a) {
         if (axes[static_cast<std::size_t>(a)]) {
@@ -119,11 +121,11 @@ void distances_on(const LabelVolume& volume,
     const float half = static_cast<float>(measured > 0 ? 0.5 * sum / measured : 0);
     const float limit = static_cast<float>(limit_mm) + half;
     const float limit_sq = limit * limit;
-    auto& [first, second, mark] = *work;
+    auto& [first, second, mark] = *scratch;
     first.resize(count);
     second.resize(count);
     mark.resize(nx);
-    for (const bool outside : {false, true}) {  // distance to the label, then to what is not it
+    for (const bool outside : {false, true}) {  // distance to the label, then to its complement
         for (int k = 0; k < box.size.z; ++k) {
             for (int j = 0; j < box.size.y; ++j) {
                 const std::uint8_t* row =
@@ -147,7 +149,8 @@ void distances_on(const LabelVolume& volume,
             first.swap(second);
         }
         if (axes[2]) {
-            for (int j = 0; j < box.size.y; ++j) {  // row by row, so that the lines stay in cache
+            for (int j = 0; j < box.size.y;
+                 ++j) {  // row by row, which keeps the lines in the cache
                 const std::size_t at = static_cast<std::size_t>(j) * nx;
                 line_distances(first.data() + at, nx, box.size.z, plane, static_cast<float>(h.z),
                                limit_sq, second.data() + at);
@@ -178,17 +181,17 @@ void signed_distance(const LabelVolume& volume,
     phi->resize(box.count());
     std::array<std::uint8_t, 256> member;
     for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
-    DistanceWork work;
+    DistanceScratch scratch;
     if (axes[2]) {
-        distances_on(volume, member, box, limit_mm, axes, phi->data(), &work);
+        distances_on(volume, member, box, limit_mm, axes, phi->data(), &scratch);
         return;
     }
-    // Slices that know nothing of each other, in the space of one.
+    // Independent slices, all in the scratch space of one.
     for (int k = 0; k < box.size.z; ++k) {
         const VoxelBox slice{{box.first.x, box.first.y, box.first.z + k},
                              {box.size.x, box.size.y, 1}};
         distances_on(volume, member, slice, limit_mm, axes, phi->data() + box.index(0, 0, k),
-                     &work);
+                     &scratch);
     }
 }
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Signed distance to one label of a label volume, or to several as one, in a box of voxels and up
-// to a limit.
+// Signed distance to one label of a label volume, or to the union of several, in a box of voxels
+// and up to a limit.
 //
-// phi < 0 inside the label, > 0 outside, in mm. The surface is taken to run half-way between a
-// voxel of the label and its neighbour outside. Exact Euclidean distance between voxel centres less
-// half a voxel, clamped to +-limit_mm. With `axes` false along the slices of a thick stack, each
-// slice is measured on its own (shape interpolation needs that). A label that reaches the border of
-// the volume is taken to go on beyond it: no surface runs along the border. Cost: O(limit /
-// spacing) a voxel and axis, vectorised; deterministic.
+// phi < 0 inside the label, > 0 outside, in mm: the exact Euclidean distance between voxel centres
+// minus half a voxel, clamped to +-limit_mm. The surface is thus half-way between a voxel of the
+// label and its neighbour outside. Where `axes` is false along the axis of a stack of thick slices,
+// each slice is measured on its own, as shape interpolation requires. A label that reaches the
+// border of the volume is assumed to continue beyond it: no surface runs along the border. Cost:
+// O(limit / spacing) per voxel and axis, vectorised; deterministic.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@
 
 namespace sonocase::pipeline {
 
-// A box of voxels of a grid: first, first + 1, ... first + size - 1 in each axis.
+// A box of voxels of a grid: first, first + 1, ... first + size - 1 along each axis.
 struct VoxelBox {
     Int3 first{0, 0, 0};
     Int3 size{0, 0, 0};
@@ -37,7 +37,7 @@ struct VoxelBox {
     }
 };
 
-// The smallest box around each label, # labels; empty where a label has no voxel.
+// The bounding box of each label, # labels; empty for a label without voxels.
 std::vector<VoxelBox> label_boxes(const LabelVolume& volume);
 
 // `box` grown by `voxels` on each side and cut to the volume.

@@ -17,9 +17,8 @@ Result<Grid> cooked_grid(const LabelVolume& ct_labels,
                       options.margin_mm);
         return Error{text, "resample", "a voxel edge in [0.2, 10] mm and a margin in [0, 1000] mm"};
     }
-    // The ends of each run of body voxels in a row are enough: with det J > 0 the image of the body
-    // is bounded by the image of its surface, and rows are straight to within what the margin
-    // covers.
+    // The ends of the body in each row of voxels are enough: with det J > 0 the image of the body
+    // is bounded by the image of its surface, and the margin covers the curvature of the rows.
     Box3 image;
     const Grid& g = ct_labels.grid;
     for (int k = 0; k < g.size.z; ++k) {

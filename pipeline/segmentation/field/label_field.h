@@ -1,18 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// All labels of a map as one smooth partition of space, to be read at any point.
+// All labels of a map as one smooth partition of space that can be evaluated at any point.
 //
-//     score_l(x) = sum_e phi_e(x) - price_l        label(x) = argmin_l score_l(x)
-// phi_e  smooth signed distance (label_distance.h) to the union of labels below an edge of the tree
-//        of label_tree.h, over the edges from its root to l; read with the cubic B-spline (C2)
-// price  one number a label, mm: shifts its surface outwards; label_prices.h picks them so that
-//        each label keeps its volume
-// A label that the tree puts between others that touch (LabelTree::between) carries the phi of
-// itself alone as well.
-// No gap and no overlap is possible. Only blocks that hold or touch two labels store anything;
-// elsewhere one byte a node names the label.
-// Between two labels f = score_second - score_first is zero on their surface, and f / |grad f| the
-// distance to it. Before anything is read, and after prices change: find_contests().
+//     score_l(x) = sum_e phi_e(x) - offset_l        label(x) = argmin_l score_l(x)
+//
+// phi_e     smooth signed distance (label_distance.h), mm, to the union of labels below edge e of
+//           the label tree (label_tree.h), over the edges from the root to l; interpolated by the
+//           cubic B-spline (C2)
+// offset_l  volume offset, mm: one number per label that moves its surface outwards;
+//           volume_correction.h chooses the offsets such that each label keeps its volume
+//
+// A label that the tree places between others that touch (LabelTree::between) also has a phi of
+// its own, the distance to that label alone. Gaps and overlaps are impossible by construction.
+//
+// Storage: blocks of nodes. Only blocks near more than one label store distances; elsewhere one
+// byte per node names the label.
+//
+// Between two labels, f = score_second - score_first is zero on their common surface, and
+// f / |grad f| is the distance to it.
+//
+// Call find_candidates() before the first evaluation and after every change of the offsets.
 #pragma once
 
 #include <array>
@@ -28,8 +35,8 @@ namespace sonocase::pipeline {
 
 struct LabelFieldOptions {
     LabelDistanceOptions distance;
-    // Nodes an edge: 4, 8 or 16. Small blocks repeat their rims, large ones hold distances to
-    // labels that are far from most of their nodes.
+    // Nodes per edge of a block: 4, 8 or 16. Small blocks repeat much of their rims; large blocks
+    // hold distances to labels that are far from most of their nodes.
     int block = 8;
 };
 
@@ -41,95 +48,119 @@ class LabelField {
 
     const Grid& nodes() const { return nodes_; }
     const LabelVolume& source() const { return source_; }  // slices along k
-    int factor() const { return factor_; }                 // nodes a slice
+    int factor() const { return factor_; }                 // nodes per slice
     std::size_t label_count() const { return source_.labels.size(); }
-    bool source_isotropic() const { return factor_ == 1; }
 
-    std::vector<float>& prices() { return prices_; }
-    const std::vector<float>& prices() const { return prices_; }
+    // # labels, mm.
+    std::vector<float>& volume_offsets_mm() { return volume_offsets_mm_; }
+    const std::vector<float>& volume_offsets_mm() const { return volume_offsets_mm_; }
 
-    // Labels among which the best two at a point are, and what parts them.
+    // Labels that can be among the best two at a point, and the distances in which they differ.
     struct CandidateSet {
         std::vector<std::uint8_t> labels;
-        std::vector<std::uint16_t> phis;       // places in the block's values
-        std::vector<std::uint16_t> terms;      // of each label in turn: places in phis, ascending,
-                                               // some of them twice or three times
-        std::vector<std::uint16_t> terms_end;  // # labels, in `terms`
+        std::vector<std::uint16_t> phis;       // indices of distances within the block
+        std::vector<std::uint16_t> terms;      // label after label: indices into phis, ascending; a
+                                               // distance may count two or three times
+        std::vector<std::uint16_t> terms_end;  // # labels: end of each label's run in `terms`
     };
     struct Block {
-        Int3 first;                        // node
-        std::vector<std::uint8_t> labels;  // candidates; one: nothing is stored
-        std::vector<std::uint8_t> edges;   // that part candidates: the label at their lower end
-        std::vector<std::uint8_t> alone;   // labels that carry a phi of themselves alone
-        std::size_t values = 0;  // into the pool, a phi after the other: edges, then alone
-        std::vector<CandidateSet> contests;         // the first: all candidates
-        std::vector<std::uint8_t> contest_of_cell;  // block^3; empty: the first
+        Int3 first;                        // its first node
+        std::vector<std::uint8_t> labels;  // candidates; if only one, no distances are stored
+        std::vector<std::uint8_t> edges;   // tree edges that separate candidates, by lower label
+        std::vector<std::uint8_t> own;     // labels that have a phi of their own
+        std::size_t values = 0;  // start in the pool; one phi after another: edges, then own
+        std::vector<CandidateSet> candidate_sets;  // the first holds all candidates
+        std::vector<std::uint8_t> set_of_cell;     // block^3; empty: the first set everywhere
     };
     const std::vector<Block>& blocks() const { return blocks_; }
     int block_edge() const { return 1 << shift_; }  // nodes
     const Block& block_of(int i, int j, int k) const {
-        return blocks_[static_cast<std::size_t>(i >> shift_) +
-                       static_cast<std::size_t>(block_count_.x) *
-                           (static_cast<std::size_t>(j >> shift_) +
-                            static_cast<std::size_t>(block_count_.y) *
-                                static_cast<std::size_t>(k >> shift_))];
+        return blocks_[block_index(i >> shift_, j >> shift_, k >> shift_)];
     }
 
-    // Where a point of node space (clamped to it) lies among the cells, with spline weights.
+    // The cell of a point in node coordinates (clamped to the grid), with its spline weights.
     struct Position {
         const Block* block = nullptr;
-        const CandidateSet* contest = nullptr;
-        std::size_t offset = 0;  // of the first of 4 x 4 x 4 values inside a phi's values
+        const CandidateSet* candidates = nullptr;  // null where the block has a single label
+        std::size_t offset = 0;  // of the first of 4 x 4 x 4 values within the values of a phi
         std::array<std::array<float, 4>, 3> weights;
-        std::array<float, 3> t;  // fraction of the cell
+        std::array<float, 3> t;  // position within the cell, [0, 1)
     };
     Position locate(float x, float y, float z) const;
 
-    // Score of each label of the position's contest, but for a summand that they have in common;
-    // # contest->labels.
+    // Score of each candidate at the position, up to a term common to all of them;
+    // # candidates->labels. The position must have candidates.
     void scores(const Position& position, float* out) const;
-    // Gradient per node, and value, of what is zero on the surface between two labels of the
-    // contest and grows into a by slope() a mm: score_b - score_a where all phis that part them
-    // agree. Where they do not, a wedge between other labels bends one of them, whose gradient
-    // shortens by that: each phi counts by the fourth power of its gradient's length, so that the
-    // one that goes on straight tells where the surface is and how it lies.
+    // Gradient per node, and value, of a function that is zero on the surface between two of the
+    // candidates and rises into label a by slope() per mm: score_b - score_a where all phis that
+    // separate the two agree. Where they disagree, one of them is bent by a wedge of a third label
+    // that closes between two others, and the bend shortens its gradient. Each phi is therefore
+    // weighted by the fourth power of the length of its gradient, such that the phi that continues
+    // straight determines the surface and its normal. a, b: indices into candidates->labels.
     std::array<float, 4> difference(const Position& position, std::size_t a, std::size_t b) const;
-    // Near the surface between two labels their scores part by this much a mm.
+    // Rate at which the scores of two labels separate near their surface, per mm.
     float slope(std::uint8_t a, std::uint8_t b) const {
         return static_cast<float>(tree_.steps_between(a, b) + tree_.between[a] + tree_.between[b]);
     }
 
-    // With the prices as they are: how far (mm) from each node no other label can come near, which
-    // answers most points by one look-up; and in each cell the contest of those labels of which a
-    // surface may lie within reach_mm, which are few beside all of a block's.
-    void find_contests(float reach_mm);
-    // Label at the node and its margin.
+    // For the current offsets: the label of each node with its margin, the distance (mm) within
+    // which no other label can win, which answers most queries by one look-up; and for each cell
+    // the few of its block's candidates whose surface may lie within reach_mm.
+    void find_candidates(float reach_mm);
     std::uint8_t node_label(std::size_t node) const { return node_label_[node]; }
     float node_margin_mm(std::size_t node) const {
         return 0.25f * static_cast<float>(node_margin_[node]);
     }
 
   private:
-    void mark_candidates(const LabelDistance& distance);
+    std::size_t block_index(int x, int y, int z) const {  // block coordinates
+        return static_cast<std::size_t>(x) +
+               static_cast<std::size_t>(block_count_.x) *
+                   (static_cast<std::size_t>(y) +
+                    static_cast<std::size_t>(block_count_.y) * static_cast<std::size_t>(z));
+    }
+    // label_field.cpp: which labels and distances each block holds, and their values.
+    std::vector<LabelSet> swept_labels(const LabelDistance& distance) const;
+    void list_labels(std::size_t b, const LabelSet& swept);
     void list_phis(Block* block) const;
+    void measure(const LabelDistance& distance);
+    void copy_phi(const VoxelBox& box,
+                  const std::vector<float>& phi,
+                  float beyond,
+                  Int3 first,
+                  float* to) const;
+    // label_candidates.cpp
+    CandidateSet candidate_set(const Block& block, const std::vector<std::uint8_t>& labels) const;
     void read_corners(const float* values, float* out) const;
-    CandidateSet contest_of(const Block& block, const std::vector<std::uint8_t>& labels) const;
-    void find_contests(Block* block, float reach_mm, std::vector<float>* at_corners);
-    // Scores of a contest's labels from the values of its phis.
-    void sum_terms(const CandidateSet& contest, const float* phis, float* out) const;
+    void rank_corners(const Block& block,
+                      float reach,
+                      const std::vector<float>& phi_at_corners,
+                      std::vector<std::uint64_t>* near);
+    void find_candidates(Block* block, float reach_mm, std::vector<float>* phi_at_corners);
+    void divide_cells(Block* block, const std::vector<std::uint64_t>& near) const;
+
+    // Scores of candidates from the values of their phis.
+    void sum_terms(const CandidateSet& set, const float* phis, float* out) const {
+        std::size_t t = 0;
+        for (std::size_t l = 0; l < set.labels.size(); ++l) {
+            float score = -volume_offsets_mm_[set.labels[l]];
+            for (; t < set.terms_end[l]; ++t) score += phis[set.terms[t]];
+            out[l] = score;
+        }
+    }
 
     LabelVolume source_;
     LabelTree tree_;
     Grid nodes_;
     int factor_ = 1;
-    int shift_ = 3;  // log2 of a block's edge
-    // A phi's values in a block: with the spline's neighbours, one node below and two above.
-    std::size_t row_ = 0, plane_ = 0, phi_ = 0;  // floats
-    std::array<float, 3> per_mm_{};              // nodes
+    int shift_ = 3;  // log2 of the block's edge
+    // Values of one phi in a block, with the spline's neighbours: one node below and two above.
+    std::size_t row_ = 0, plane_ = 0, phi_ = 0;  // floats per row, plane and phi
+    std::array<float, 3> per_mm_{};              // nodes per mm
     Int3 block_count_;
     std::vector<Block> blocks_;
     std::vector<float> pool_;
-    std::vector<float> prices_;
+    std::vector<float> volume_offsets_mm_;
     std::vector<std::uint8_t> node_label_, node_margin_;
 };
 

@@ -3,14 +3,15 @@
 #include "pipeline/segmentation/field/label_tree.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "pipeline/base/parallel.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-// Area between each two labels, in units of a thousandth of the largest face; diagonal: presence.
-// Whole numbers, so that the sum does not depend on its order.
+// Contact area of each pair of labels, in thousandths of the largest voxel face; the diagonal marks
+// the labels that are present. Integers, such that the sum does not depend on its order.
 std::vector<std::int64_t> contact_areas(const LabelVolume& volume) {
     const Grid& g = volume.grid;
     const std::size_t n = volume.labels.size();
@@ -56,27 +57,22 @@ std::vector<std::int64_t> contact_areas(const LabelVolume& volume) {
     return sum;
 }
 
-}  // namespace
+using Contact = std::function<std::int64_t(std::size_t, std::size_t)>;
 
-LabelTree nest_labels(const LabelVolume& volume) {
-    const std::size_t n = volume.labels.size();
-    const std::vector<std::int64_t> area = contact_areas(volume);
-    const auto contact = [&](std::size_t a, std::size_t b) {
-        return area[std::min(a, b) * n + std::max(a, b)];
-    };
-    LabelTree tree;
-    tree.parent.assign(n, LabelTree::kAbsent);
-    tree.members.resize(n);
-    tree.steps.assign(n * n, 0);
-    // Prim's: the label that shares most with one already hung comes next. Labels of a grid are all
-    // connected; one that touched none would hang below the root by an area of zero.
+// Prim's algorithm: the label with the largest contact to a label of the tree is added next. All
+// labels of a grid are connected; a label without contact would be added below the root.
+// Returns the labels in the order in which they were added, parents before children.
+std::vector<std::size_t> grow_tree(const std::vector<bool>& present,
+                                   const Contact& contact,
+                                   LabelTree* tree) {
+    const std::size_t n = present.size();
     std::vector<std::int64_t> best(n, -1);
     std::vector<std::size_t> from(n, 0), order;
     for (std::size_t l = 0; l < n; ++l) {
-        if (area[l * n + l] == 0) continue;
+        if (!present[l]) continue;
         if (order.empty()) {
             order.push_back(l);
-            tree.parent[l] = LabelTree::kRoot;
+            tree->parent[l] = LabelTree::kRoot;
         } else {
             best[l] = 0;
             from[l] = order[0];
@@ -95,20 +91,19 @@ LabelTree nest_labels(const LabelVolume& volume) {
         }
         if (next == n) break;
         best[next] = -1;
-        tree.parent[next] = static_cast<int>(from[next]);
+        tree->parent[next] = static_cast<int>(from[next]);
         for (const std::size_t l : order) {
-            const auto steps = static_cast<std::uint8_t>(tree.steps[from[next] * n + l] + 1);
-            tree.steps[next * n + l] = tree.steps[l * n + next] = steps;
+            const auto steps = static_cast<std::uint8_t>(tree->steps[from[next] * n + l] + 1);
+            tree->steps[next * n + l] = tree->steps[l * n + next] = steps;
         }
         order.push_back(next);
     }
-    for (std::size_t o = order.size(); o-- > 0;) {
-        const std::size_t l = order[o];
-        tree.members[l].set(l);
-        if (tree.parent[l] >= 0)
-            tree.members[static_cast<std::size_t>(tree.parent[l])] |= tree.members[l];
-    }
-    tree.between.assign(n, false);
+    return order;
+}
+
+// Labels on the path between others that touch, by more than a small share of their own surface.
+std::vector<bool> labels_between(const LabelTree& tree, const Contact& contact) {
+    const std::size_t n = tree.parent.size();
     std::vector<std::int64_t> through(n, 0), own(n, 0);
     for (std::size_t a = 0; a < n; ++a) {
         for (std::size_t b = a + 1; b < n; ++b) {
@@ -122,10 +117,35 @@ LabelTree nest_labels(const LabelVolume& volume) {
             }
         }
     }
-    constexpr double kShare = 0.02;  // of its own surface; less is noise
-    for (std::size_t l = 0; l < n; ++l) {
-        tree.between[l] = static_cast<double>(through[l]) > kShare * static_cast<double>(own[l]);
+    constexpr double kShare = 0.02;  // less is noise
+    std::vector<bool> between(n);
+    for (std::size_t l = 0; l < n; ++l)
+        between[l] = static_cast<double>(through[l]) > kShare * static_cast<double>(own[l]);
+    return between;
+}
+
+}  // namespace
+
+LabelTree nest_labels(const LabelVolume& volume) {
+    const std::size_t n = volume.labels.size();
+    const std::vector<std::int64_t> area = contact_areas(volume);
+    const auto contact = [&](std::size_t a, std::size_t b) {
+        return area[std::min(a, b) * n + std::max(a, b)];
+    };
+    std::vector<bool> present(n);
+    for (std::size_t l = 0; l < n; ++l) present[l] = area[l * n + l] != 0;
+    LabelTree tree;
+    tree.parent.assign(n, LabelTree::kAbsent);
+    tree.members.resize(n);
+    tree.steps.assign(n * n, 0);
+    const std::vector<std::size_t> order = grow_tree(present, contact, &tree);
+    for (std::size_t o = order.size(); o-- > 0;) {
+        const std::size_t l = order[o];
+        tree.members[l].set(l);
+        if (tree.parent[l] >= 0)
+            tree.members[static_cast<std::size_t>(tree.parent[l])] |= tree.members[l];
     }
+    tree.between = labels_between(tree, contact);
     return tree;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The resampling of the paper: each voxel takes the label of the CT voxel nearest to where it came
-// from. Kept for comparison and as the first half of the paper's mode; resample_labels.h is better.
+// The paper's resampling: each voxel takes the label of the CT voxel nearest to its preimage. Kept
+// for comparison and as the first half of the paper's method; resample_labels.h is more accurate.
 #pragma once
 
 #include "formats/registration/registration.h"
@@ -12,19 +12,19 @@ namespace sonocase::pipeline {
 
 struct PreimageCounts {
     std::size_t outside = 0;      // voxels whose preimage lies outside the CT
-    std::size_t no_preimage = 0;  // voxels that come from nowhere
+    std::size_t no_preimage = 0;  // voxels for which the inversion finds no preimage
 };
 
 // Labels of `grid` (in `mannequin`) from `ct_labels` through the inverse of the map. Voxels without
-// a preimage inside the CT are outside (0) and counted. One inversion a voxel; any number of
-// threads gives the same bytes.
+// a preimage inside the CT are outside (0) and counted; counts may be null. Cost: one inversion per
+// voxel. Same bytes for any number of threads.
 LabelVolume nearest_labels(const LabelVolume& ct_labels,
                            const Registration& registration,
                            const Grid& grid,
                            PreimageCounts* counts,
                            const Progress& progress = {});
 
-// The volume in ml that each label should have after the map: its CT voxels times det J. # labels.
+// Volume that each label should have after the map, ml: its CT voxels times det J. # labels.
 std::vector<double> mapped_volumes_ml(const LabelVolume& ct_labels,
                                       const Registration& registration);
 

@@ -43,8 +43,8 @@ struct Strip {
 };
 
 // Scratch space of one thread.
-struct Rows {
-    explicit Rows(std::size_t nx, int bricks_x)
+struct RowScratch {
+    explicit RowScratch(std::size_t nx, int bricks_x)
         : x(nx),
           y(nx),
           z(nx),
@@ -55,7 +55,7 @@ struct Rows {
     std::vector<float> x, y, z;
     std::vector<MapStatus> status;
     std::vector<std::uint32_t> record;  // 16 rows
-    // d(node) / d(voxel of the grid), one for each brick, made when first needed.
+    // d(node) / d(voxel of the grid), one per brick, computed when first needed.
     std::vector<Matrix3> slope;
     std::vector<std::uint8_t> has_slope;
 };
@@ -119,7 +119,7 @@ void join_bricks(std::vector<Strip>* strips, const Grid& grid, BoundaryBricks* b
     }
 }
 
-// Node at which a label comes nearest to winning; nothing if it is a candidate nowhere.
+// Node at which a label comes nearest to winning; empty if the label is a candidate nowhere.
 std::optional<Int3> nearest_to_winning(const LabelField& field, std::uint8_t label) {
     float nearest = 1e30f;
     std::optional<Int3> place;
@@ -135,7 +135,7 @@ std::optional<Int3> nearest_to_winning(const LabelField& field, std::uint8_t lab
             if (!field.nodes().contains(node.x, node.y, node.z)) continue;
             LabelField::Position position = field.locate(
                 static_cast<float>(node.x), static_cast<float>(node.y), static_cast<float>(node.z));
-            position.contest = &block.contests[0];
+            position.candidates = &block.candidate_sets[0];
             field.scores(position, score.data());
             float other = 1e30f;
             for (std::size_t c = 0; c < block.labels.size(); ++c) {
@@ -150,15 +150,15 @@ std::optional<Int3> nearest_to_winning(const LabelField& field, std::uint8_t lab
     return place;
 }
 
-// Guard: no label of the source may vanish without a word.
-void put_back_lost(const LabelField& field, const FieldMap& map, SampledField* out) {
+// Restores the labels of the source that the result lacks, or reports them as lost.
+void restore_lost(const LabelField& field, const FieldMap& map, SampledField* out) {
     const Grid& grid = out->volume.grid;
     const Int3 bricks = brick_count(grid.size);
-    std::array<bool, 256> in_source{}, in_answer{};
+    std::array<bool, 256> in_source{}, in_result{};
     for (const std::uint8_t v : field.source().voxels) in_source[v] = true;
-    for (const std::uint8_t v : out->volume.voxels) in_answer[v] = true;
+    for (const std::uint8_t v : out->volume.voxels) in_result[v] = true;
     for (std::size_t l = 1; l < out->volume.labels.size(); ++l) {
-        if (!in_source[l] || in_answer[l]) continue;
+        if (!in_source[l] || in_result[l]) continue;
         const std::optional<Int3> node = nearest_to_winning(field, static_cast<std::uint8_t>(l));
         Int3 v{-1, -1, -1};
         if (node) {
@@ -174,7 +174,7 @@ void put_back_lost(const LabelField& field, const FieldMap& map, SampledField* o
         out->volume.voxels[grid.index(v.x, v.y, v.z)] = static_cast<std::uint8_t>(l);
         out->rescued.push_back(static_cast<int>(l));
         if (out->boundary.table.empty()) continue;
-        // The voxel is drawn whole.
+        // No surface crosses the voxel.
         const std::size_t brick =
             static_cast<std::size_t>(v.x / 4) +
             static_cast<std::size_t>(bricks.x) *
@@ -194,7 +194,7 @@ void put_back_lost(const LabelField& field, const FieldMap& map, SampledField* o
 SampledField sample_label_field(LabelField* field,
                                 const Grid& grid,
                                 const FieldMap& map,
-                                const FieldReadOptions& options,
+                                const FieldSamplingOptions& options,
                                 const Progress& progress) {
     SampledField out;
     out.volume.grid = grid;
@@ -202,14 +202,14 @@ SampledField sample_label_field(LabelField* field,
     out.volume.voxels.assign(grid.voxel_count(), 0);
     const bool records = options.record_band_vx > 0;
     report_progress(progress, 0, "voxels");
-    field->find_contests(VoxelReader::reach_mm(options.record_band_vx, grid));
+    field->find_candidates(VoxelReader::reach_mm(options.record_band_vx, grid));
     const VoxelReader reader(*field, grid, options.record_band_vx);
     const NodeFromFrame node_from_frame(field->nodes());
     const Int3 bricks = brick_count(grid.size);
     std::vector<Strip> strips(static_cast<std::size_t>(bricks.y) *
                               static_cast<std::size_t>(bricks.z));
 
-    const auto read_row = [&](int by, int bz, int r, Rows* rows, Strip* strip) {
+    const auto read_row = [&](int by, int bz, int r, RowScratch* rows, Strip* strip) {
         const int j = 4 * by + r % 4, k = 4 * bz + r / 4;
         if (j >= grid.size.y || k >= grid.size.z) return;
         map.row(j, k, rows->x.data(), rows->y.data(), rows->z.data(), rows->status.data());
@@ -227,7 +227,7 @@ SampledField sample_label_field(LabelField* field,
                 ++strip->counts.outside;
                 continue;
             }
-            const VoxelRead read = reader(v, [&]() -> const Matrix3& {
+            const VoxelSample sample = reader(v, [&]() -> const Matrix3& {
                 Matrix3& slope = rows->slope[i / 4];
                 if (!rows->has_slope[i / 4]) {
                     rows->has_slope[i / 4] = true;
@@ -236,17 +236,17 @@ SampledField sample_label_field(LabelField* field,
                 }
                 return slope;
             });
-            to[i] = read.label;
-            record[i] = read.record;
+            to[i] = sample.label;
+            record[i] = sample.record;
         }
     };
-    // In a few parts, so that progress can be told from the calling thread.
+    // In a few parts, because progress is reported from the calling thread only.
     constexpr std::size_t kParts = 20;
     for (std::size_t part = 0; part < kParts; ++part) {
         const std::size_t first = strips.size() * part / kParts;
         parallel_for(strips.size() * (part + 1) / kParts - first, 4,
                      [&](std::size_t begin, std::size_t end) {
-                         Rows rows(static_cast<std::size_t>(grid.size.x), bricks.x);
+                         RowScratch rows(static_cast<std::size_t>(grid.size.x), bricks.x);
                          for (std::size_t s = first + begin; s < first + end; ++s) {
                              const auto y = static_cast<std::size_t>(bricks.y);
                              const int by = static_cast<int>(s % y), bz = static_cast<int>(s / y);
@@ -263,7 +263,7 @@ SampledField sample_label_field(LabelField* field,
         out.counts.outside += strip.counts.outside;
         out.counts.no_preimage += strip.counts.no_preimage;
     }
-    put_back_lost(*field, map, &out);
+    restore_lost(*field, map, &out);
     return out;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Reads a label field on a grid of cubic voxels: labels, and boundary records near every surface.
+// Samples a label field on a grid of cubic voxels: labels, and boundary records near every surface.
 #pragma once
 
 #include <cstdint>
@@ -16,18 +16,18 @@
 
 namespace sonocase::pipeline {
 
-// How the voxels of the grid lie in the frame of the field.
+// Where the voxels of the grid lie in the frame of the field. All three are thread-safe.
 struct FieldMap {
-    // Frame positions of voxels (0..size.x-1, j, k), structure of arrays. Thread-safe.
+    // Positions, in the field's frame, of voxels (0..size.x-1, j, k), structure of arrays.
     std::function<void(int j, int k, float* x, float* y, float* z, MapStatus* status)> row;
-    // d(frame) / d(grid's frame) at a frame point.
+    // d(field frame) / d(grid frame) at a point of the field's frame.
     std::function<Matrix3(Point3 frame)> jacobian;
-    // Grid frame from field frame, for the guard of lost labels.
+    // Grid frame from field frame; used to restore lost labels.
     std::function<Point3(Point3 frame)> forward;
 };
 
-struct FieldReadOptions {
-    double record_band_vx = 1.5;  // records where a surface is within this, [0, 2.6]; 0: none
+struct FieldSamplingOptions {
+    double record_band_vx = 1.5;  // records within this distance of a surface, [0, 2.6]; 0: none
 };
 
 struct SampledField {
@@ -35,16 +35,16 @@ struct SampledField {
     BoundaryBricks boundary;
     PreimageCounts counts;
     std::vector<int> rescued;  // labels too small for the grid, kept as one voxel
-    std::vector<int> lost;     // labels whose place lies outside the grid
+    std::vector<int> lost;     // labels whose location is outside the grid
 };
 
-// The field's labels that have voxels in the source and none in the answer are put back as the one
-// voxel where they come nearest to winning. Same bytes for any number of threads.
-// Sets the field's contests for the band of the records.
+// A label with voxels in the source but none in the result is restored as one voxel, the one where
+// it comes nearest to winning. Calls field->find_candidates() for the band of the records. Same
+// bytes for any number of threads.
 SampledField sample_label_field(LabelField* field,
                                 const Grid& grid,
                                 const FieldMap& map,
-                                const FieldReadOptions& options,
+                                const FieldSamplingOptions& options,
                                 const Progress& progress = {});
 
 }  // namespace sonocase::pipeline

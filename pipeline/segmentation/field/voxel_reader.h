@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Reads a label field at single points: the label there, and the boundary record of the surface
-// near it. Internal to sample_label_field.cpp.
+// Samples a label field at single points: the label there, and the boundary record of the surface
+// near it. Internal to sampled_field.cpp.
 #pragma once
 
 #include <algorithm>
@@ -16,42 +16,42 @@
 namespace sonocase::pipeline {
 
 struct TopTwo {                         // the two best labels at a point
-    std::size_t first = 0, second = 0;  // of the contest
-    float gap = 1e9f;                   // score of the second less that of the first
+    std::size_t first = 0, second = 0;  // indices of candidates
+    float gap = 1e9f;                   // score of the second minus that of the first
 };
 
-inline TopTwo standing_of(const float* score, std::size_t count) {
-    TopTwo c;
+inline TopTwo top_two(const float* score, std::size_t count) {
+    TopTwo top;
     float best = 1e30f, next = 1e30f;
     for (std::size_t i = 0; i < count; ++i) {
         if (score[i] < best) {
             next = best;
-            c.second = c.first;
+            top.second = top.first;
             best = score[i];
-            c.first = i;
+            top.first = i;
         } else if (score[i] < next) {
             next = score[i];
-            c.second = i;
+            top.second = i;
         }
     }
-    c.gap = next - best;
-    return c;
+    top.gap = next - best;
+    return top;
 }
 
-// What a voxel of the grid comes to.
-struct VoxelRead {
+// Label and packed boundary record of a voxel of the grid.
+struct VoxelSample {
     std::uint8_t label = 0;
     std::uint32_t record = kNoBoundary;
 };
 
-// Reads single voxels: all that does not change from one to the next.
+// Samples voxels; holds what is the same for all of them.
 class VoxelReader {
   public:
-    // A voxel of the grid in the field's frame, mm, at most: maps stretch by less than 1.5.
+    // Largest size of a voxel of the grid in the field's frame, mm: maps stretch by less than 1.5.
     static float stretched_mm(const Grid& grid) {
         return static_cast<float>(1.5 * grid.spacing_mm.x);
     }
-    // How far a surface within the band may be there.
+    // Largest distance there, mm, of a surface within the band.
     static float reach_mm(double band_vx, const Grid& grid) {
         return static_cast<float>(band_vx) * stretched_mm(grid);
     }
@@ -71,7 +71,8 @@ class VoxelReader {
         }
     }
 
-    // The map says nothing further out than half a voxel beyond its last ones.
+    // Whether a point in node coordinates lies more than half a voxel outside the label map, where
+    // the map holds no information.
     bool beyond(const float* v) const {
         bool out_of = false;
         for (std::size_t a = 0; a < 3; ++a)
@@ -79,82 +80,82 @@ class VoxelReader {
         return out_of;
     }
 
-    // At a place of the nodes. slope(): d(node) / d(voxel of the grid) there, asked for near
-    // surfaces alone.
+    // v        point in node coordinates
+    // slope()  d(node) / d(voxel of the grid) there; called only near surfaces
     template <class Slope>
-    VoxelRead operator()(const float* v, const Slope& slope) const {
+    VoxelSample operator()(const float* v, const Slope& slope) const {
         std::array<int, 3> near;
-        float apart = 0;  // squared
+        float apart_sq = 0;
         for (std::size_t a = 0; a < 3; ++a) {
             near[a] = static_cast<int>(std::clamp(v[a] + 0.5f, 0.0f, last_[a]));
             const float d = h_[a] * (v[a] - static_cast<float>(near[a]));
-            apart += d * d;
+            apart_sq += d * d;
         }
         const std::size_t node = nodes_.index(near[0], near[1], near[2]);
         const float spare = field_.node_margin_mm(node) - reach_mm_;
-        if (spare > 0 && spare * spare > apart) return {field_.node_label(node)};
+        if (spare > 0 && spare * spare > apart_sq) return {field_.node_label(node)};
 
         const LabelField::Position at = field_.locate(v[0], v[1], v[2]);
-        if (at.contest == nullptr) return {at.block->labels[0]};
+        if (at.candidates == nullptr) return {at.block->labels[0]};
         std::array<float, 256> score;
         field_.scores(at, score.data());
-        const auto& labels = at.contest->labels;
-        const TopTwo standing = standing_of(score.data(), labels.size());
-        const std::uint8_t own = labels[standing.first], second = labels[standing.second];
-        VoxelRead read{own};
-        if (band_vx_ <= 0 || standing.gap > reach_mm_ * field_.slope(own, second)) return read;
+        const auto& labels = at.candidates->labels;
+        const TopTwo top = top_two(score.data(), labels.size());
+        const std::uint8_t own = labels[top.first], second = labels[top.second];
+        VoxelSample sample{own};
+        if (band_vx_ <= 0 || top.gap > reach_mm_ * field_.slope(own, second)) return sample;
         const Matrix3& m = slope();
         BoundaryRecord record{second};
-        if (!find_plane(at, v, m, own, &record)) return read;
-        if (third_may_lie_beyond(at, score.data(), standing, record.distance_vx)) {
-            // Labels tie where they meet: the second is whoever lies beyond.
+        if (!find_plane(at, v, m, own, &record)) return sample;
+        if (third_may_lie_beyond(at, score.data(), top, record.distance_vx)) {
+            // Scores tie where three labels meet: the second label is the one beyond the surface.
             const std::uint8_t other = winner(foot(v, m, record, kBeyond_vx), score.data());
             if (other != own && other != second && holds(at, other)) {
                 record.second_label = other;
-                if (!find_plane(at, v, m, own, &record)) return read;
+                if (!find_plane(at, v, m, own, &record)) return sample;
             }
         }
         record.distance_vx = std::max(record.distance_vx, 0.0);
-        read.record = pack_boundary(record);
-        return read;
+        sample.record = pack_boundary(record);
+        return sample;
     }
 
   private:
     static constexpr double kBeyond_vx = 0.3;
 
     static std::size_t place(const LabelField::Position& at, std::uint8_t label) {
-        const auto& labels = at.contest->labels;
+        const auto& labels = at.candidates->labels;
         return static_cast<std::size_t>(std::find(labels.begin(), labels.end(), label) -
                                         labels.begin());
     }
     static bool holds(const LabelField::Position& at, std::uint8_t label) {
-        return place(at, label) < at.contest->labels.size();
+        return place(at, label) < at.candidates->labels.size();
     }
 
-    // Whether a third label can overtake the second on the way to the surface's other side.
+    // Whether a third label can be better than the second on the other side of the surface.
     bool third_may_lie_beyond(const LabelField::Position& at,
                               const float* score,
-                              const TopTwo& standing,
+                              const TopTwo& top,
                               double distance_vx) const {
-        const auto way_mm =
+        const auto path_mm =
             static_cast<float>(std::max(distance_vx, 0.0) + kBeyond_vx) * stretched_mm_;
-        const auto& labels = at.contest->labels;
+        const auto& labels = at.candidates->labels;
         for (std::size_t c = 0; c < labels.size(); ++c) {
-            if (c == standing.first || c == standing.second) continue;
-            if (score[c] - score[standing.second] <=
-                way_mm * field_.slope(labels[standing.second], labels[c]))
+            if (c == top.first || c == top.second) continue;
+            if (score[c] - score[top.second] <=
+                path_mm * field_.slope(labels[top.second], labels[c]))
                 return true;
         }
         return false;
     }
 
     std::uint8_t winner(const LabelField::Position& at, float* score) const {
-        if (at.contest == nullptr) return at.block->labels[0];
+        if (at.candidates == nullptr) return at.block->labels[0];
         field_.scores(at, score);
-        return at.contest->labels[standing_of(score, at.contest->labels.size()).first];
+        return at.candidates->labels[top_two(score, at.candidates->labels.size()).first];
     }
 
-    // The place `more` voxels behind the foot of a plane.
+    // The point `more` voxels behind the foot of a plane.
     LabelField::Position foot(const float* v,
                               const Matrix3& m,
                               const BoundaryRecord& r,
@@ -164,42 +165,44 @@ class VoxelReader {
                              v[2] - static_cast<float>(back.z));
     }
 
-    // f, which is zero on the surface of the two labels (LabelField::difference), and its gradient
-    // per voxel of the grid.
-    double rise(const LabelField::Position& at,
-                const Matrix3& m,
-                std::uint8_t own,
-                std::uint8_t second,
-                Vector3* gradient) const {
+    // f of LabelField::difference, which is zero on the surface between the two labels, and its
+    // gradient per voxel of the grid.
+    double difference(const LabelField::Position& at,
+                      const Matrix3& m,
+                      std::uint8_t own,
+                      std::uint8_t second,
+                      Vector3* gradient) const {
         const auto n = field_.difference(at, place(at, own), place(at, second));
         for (int b = 0; b < 3; ++b)
             (*gradient)[b] = n[0] * m(0, b) + n[1] * m(1, b) + n[2] * m(2, b);
         return n[3];
     }
 
-    // The plane to record->second_label: by f and its gradient at the voxel; then once more at the
-    // foot of the plane found, because f bends near thin structures. False: none within the band.
+    // Plane of the surface to record->second_label, from f and its gradient at the voxel, improved
+    // once at the foot of that plane, because f is curved near thin structures. False: no surface
+    // within the band.
     bool find_plane(const LabelField::Position& at,
                     const float* v,
                     const Matrix3& m,
                     std::uint8_t own,
                     BoundaryRecord* record) const {
         Vector3 g;
-        const double f = rise(at, m, own, record->second_label, &g);
-        const double steep = norm(g);
-        // The scores part by at least 1 mm a mm; much less means no surface here.
-        if (!(steep > flat_)) return false;
-        record->distance_vx = f / steep;
+        const double f = difference(at, m, own, record->second_label, &g);
+        const double slope_vx = norm(g);
+        // Scores separate by at least 1 mm per mm; much less means that no surface is near.
+        if (!(slope_vx > flat_)) return false;
+        record->distance_vx = f / slope_vx;
         if (record->distance_vx > band_vx_ + 0.5) return false;
-        record->normal = g / steep;
+        record->normal = g / slope_vx;
         const LabelField::Position there = foot(v, m, *record, 0);
-        if (there.contest != nullptr && holds(there, own) && holds(there, record->second_label)) {
+        if (there.candidates != nullptr && holds(there, own) &&
+            holds(there, record->second_label)) {
             Vector3 g2;
-            const double f2 = rise(there, m, own, record->second_label, &g2);
-            const double steep2 = norm(g2);
-            if (steep2 > 0.5 * steep) {
-                record->distance_vx += std::clamp(f2 / steep2, -0.5, 0.5);
-                record->normal = g2 / steep2;
+            const double f2 = difference(there, m, own, record->second_label, &g2);
+            const double slope2_vx = norm(g2);
+            if (slope2_vx > 0.5 * slope_vx) {
+                record->distance_vx += std::clamp(f2 / slope2_vx, -0.5, 0.5);
+                record->normal = g2 / slope2_vx;
             }
         }
         return record->distance_vx <= band_vx_;
@@ -208,7 +211,7 @@ class VoxelReader {
     const LabelField& field_;
     const Grid& nodes_;
     double band_vx_;
-    double flat_;  // slopes of f per voxel of the grid that are none
+    double flat_;  // gradients of f, per voxel of the grid, up to which no surface is near
     float stretched_mm_, reach_mm_;
     std::array<float, 3> h_, last_, rim_;
 };

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// One example of a tissue's look: grey pixels of a B-mode image, and which of them count.
+// An example of the texture of a tissue: grey pixels of a B-mode image, and which of them to use.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -14,7 +15,7 @@ struct ExampleImage {
     int width = 0;     // pixels
     int height = 0;
     std::vector<float> grey;        // # width * height, [0, 255], row by row from the top
-    std::vector<std::uint8_t> use;  // # width * height, 1: part of the example; empty: all are
+    std::vector<std::uint8_t> use;  // # width * height, 1: part of the example; empty: all of them
 
     std::size_t count() const {
         return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -25,5 +26,16 @@ struct ExampleImage {
     }
     bool used(std::size_t i) const { return use.empty() || use[i] != 0; }
 };
+
+// Grey of the used pixels, in order.
+std::vector<float> used_grey(const ExampleImage& image);
+
+struct GreyMoments {
+    std::size_t count = 0;  // used pixels
+    double mean = 0;
+    double squares = 0;  // sum of the squared deviations from the mean
+    double sd() const;
+};
+GreyMoments grey_moments(const ExampleImage& image);
 
 }  // namespace sonocase::pipeline

@@ -11,28 +11,6 @@ namespace {
 
 constexpr int kLeastPixels = 64;
 
-struct Moments {
-    std::size_t count = 0;
-    double mean = 0, sd = 0;
-};
-
-Moments moments(const ExampleImage& image) {
-    Moments m;
-    double sum = 0, squares = 0;
-    for (std::size_t i = 0; i < image.count(); ++i) {
-        if (!image.used(i)) continue;
-        ++m.count;
-        sum += image.grey[i];
-    }
-    if (m.count == 0) return m;
-    m.mean = sum / static_cast<double>(m.count);
-    for (std::size_t i = 0; i < image.count(); ++i) {
-        if (image.used(i)) squares += (image.grey[i] - m.mean) * (image.grey[i] - m.mean);
-    }
-    m.sd = std::sqrt(squares / static_cast<double>(m.count));
-    return m;
-}
-
 std::size_t drop_not_finite(ExampleImage& image) {
     std::size_t dropped = 0;
     for (std::size_t i = 0; i < image.count(); ++i) {
@@ -45,7 +23,7 @@ std::size_t drop_not_finite(ExampleImage& image) {
     return dropped;
 }
 
-// Rows and columns at the rim that hold one value only: the border of a window, black or drawn.
+// Rows and columns at the rim that have a single value: the border of a window, black or drawn.
 std::size_t drop_flat_rim(ExampleImage& image) {
     const auto flat = [&](int x0, int y0, int dx, int dy, int n) {
         for (int i = 1; i < n; ++i) {
@@ -65,7 +43,7 @@ std::size_t drop_flat_rim(ExampleImage& image) {
         if (flat(left, top, 0, 1, h())) ++left, again = true;
         if (flat(right, top, 0, 1, h())) --right, again = true;
     }
-    if (w() <= 2 || h() <= 2) return 0;  // nothing but flat lines: not a rim
+    if (w() <= 2 || h() <= 2) return 0;  // all lines are flat: not a rim
     std::size_t dropped = 0;
     for (int y = 0; y < image.height; ++y) {
         for (int x = 0; x < image.width; ++x) {
@@ -77,7 +55,7 @@ std::size_t drop_flat_rim(ExampleImage& image) {
     return dropped;
 }
 
-// Straight runs of one exact value well above the mean, longer than speckle ever holds a value.
+// Marks straight runs of one exact value well above the mean, longer than any in speckle.
 void mark_runs(const ExampleImage& image, double limit, std::vector<std::uint8_t>& mark) {
     const auto scan = [&](bool rows) {
         const int lines = rows ? image.height : image.width;
@@ -90,7 +68,6 @@ void mark_runs(const ExampleImage& image, double limit, std::vector<std::uint8_t
             for (int begin = 0; begin < n;) {
                 int end = begin + 1;
                 while (end < n && image.grey[at(end)] == image.grey[at(begin)]) ++end;
-                // values at the very top saturate over whole areas by themselves
                 if (end - begin >= least && image.grey[at(begin)] > limit) {
                     for (int i = begin; i < end; ++i) mark[at(i)] = 1;
                 }
@@ -102,8 +79,8 @@ void mark_runs(const ExampleImage& image, double limit, std::vector<std::uint8_t
     scan(false);
 }
 
-// Text: one exact bright value, far more frequent than its neighbours in the histogram, whose
-// pixels stand out sharply from what lies beside them.
+// Marks text: pixels of one exact bright value that is far more frequent than its neighbours in the
+// histogram, and that contrasts sharply with the pixels beside it.
 void mark_strokes(const ExampleImage& image, double limit, std::vector<std::uint8_t>& mark) {
     std::array<std::size_t, 256> histogram{};
     for (std::size_t i = 0; i < image.count(); ++i) {
@@ -135,7 +112,7 @@ void mark_strokes(const ExampleImage& image, double limit, std::vector<std::uint
                 if (steepest > 60) ++edges;
             }
         }
-        if (2 * edges < bright) continue;  // saturated tissue rises gently to its plateau
+        if (2 * edges < bright) continue;  // saturated tissue has gradual edges
         for (const std::size_t i : found) mark[i] = 1;
     }
 }
@@ -145,7 +122,7 @@ std::size_t drop_marked(ExampleImage& image, const std::vector<std::uint8_t>& ma
     for (int y = 0; y < image.height; ++y) {
         for (int x = 0; x < image.width; ++x) {
             if (!mark[image.index(x, y)]) continue;
-            for (int dy = -1; dy <= 1; ++dy) {  // and the soft rim round it
+            for (int dy = -1; dy <= 1; ++dy) {  // with the soft rim around it
                 for (int dx = -1; dx <= 1; ++dx) {
                     const int xx = x + dx, yy = y + dy;
                     if (xx < 0 || yy < 0 || xx >= image.width || yy >= image.height) continue;
@@ -203,9 +180,10 @@ void remove_trend(PreparedExample& prepared) {
     ExampleImage& image = prepared.image;
     std::vector<Row> rows = row_statistics(image);
     if (rows.size() < 4) return;
-    const Moments before = moments(image);
+    const GreyMoments before = grey_moments(image);
     const auto [offset, slope] = fit_line(rows, &Row::mean);
-    // Does the parabola tell more than noise? Rows of one grain move together: count grains.
+    // Whether a parabola explains more than noise would. Rows of one grain are correlated, and
+    // therefore grains are counted.
     double curve = 0, shared = 0, step = 0, power = 0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
         rows[i].mean -= offset + slope * rows[i].t;
@@ -228,7 +206,7 @@ void remove_trend(PreparedExample& prepared) {
     }
     prepared.trend_grey = 2 * slope;
 
-    // A gain on a linear display multiplies: mean and spread then rise together.
+    // Gain on a linear display multiplies: mean and spread then increase together.
     const double mean_top = offset - slope, mean_bottom = offset + slope;
     const double rise = std::max(mean_bottom, 1.0) / std::max(mean_top, 1.0);
     const auto [level, change] = fit_line(row_statistics(image), &Row::deviation);
@@ -273,20 +251,20 @@ Result<PreparedExample> prepare_example(const ExampleImage& example) {
         out.warnings.push_back(example.name + ": " + share(not_finite) +
                                " of the pixels are not finite and were left out.");
     }
-    Moments m = moments(image);
+    GreyMoments m = grey_moments(image);
     if (m.count < kLeastPixels) return too_few(m.count);
-    if (m.sd < 1e-6) {
+    if (m.sd() < 1e-6) {
         return Error{"every pixel has grey " + std::to_string(std::lround(m.mean)), example.name,
                      "a texture cannot be learned from a constant image; choose a patch of tissue"};
     }
     std::vector<std::uint8_t> mark(image.count(), 0);
     const std::size_t rim = drop_flat_rim(image);
-    m = moments(image);
-    mark_runs(image, m.mean + 1.5 * m.sd, mark);
-    mark_strokes(image, m.mean + 2.5 * m.sd, mark);
+    m = grey_moments(image);
+    mark_runs(image, m.mean + 1.5 * m.sd(), mark);
+    mark_strokes(image, m.mean + 2.5 * m.sd(), mark);
     std::size_t burnt = 0;
     for (const std::uint8_t b : mark) burnt += b;
-    // More than a fifth of the image in strokes is a picture of two levels, not text on tissue.
+    // An image with more than a fifth in strokes has two levels; it is not text on tissue.
     if (burnt > 0 && 5 * burnt < image.count()) {
         burnt = drop_marked(image, mark);
     } else {
@@ -296,7 +274,7 @@ Result<PreparedExample> prepare_example(const ExampleImage& example) {
         out.warnings.push_back(example.name + ": " + share(rim + burnt) +
                                " of the pixels look burnt in (frame or text) and were left out.");
     }
-    m = moments(image);
+    m = grey_moments(image);
     if (m.count < kLeastPixels) return too_few(m.count);
     std::size_t clipped = 0;
     bool levels[256] = {};
@@ -318,18 +296,19 @@ Result<PreparedExample> prepare_example(const ExampleImage& example) {
         out.warnings.push_back(example.name + ": only " + std::to_string(distinct) +
                                " grey levels; the texture will have no more.");
     }
-    // A ramp would smear a few levels into many, and tear apart what clipping has put together.
+    // Subtracting a ramp would turn a few levels into many, and separate values that were clipped to
+    // the same one.
     if (distinct >= 8 && out.saturated <= 0.05) {
         remove_trend(out);
         for (float& grey : image.grey) grey = std::clamp(grey, 0.f, 255.f);
     }
-    m = moments(image);
-    if (m.sd < 1e-6) {
+    m = grey_moments(image);
+    if (m.sd() < 1e-6) {
         return Error{"nothing but a depth trend", example.name,
                      "the patch holds no texture; choose a patch of tissue"};
     }
     out.mean = m.mean;
-    out.sd = m.sd;
+    out.sd = m.sd();
     return out;
 }
 

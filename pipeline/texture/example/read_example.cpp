@@ -9,6 +9,7 @@
 #include <exception>
 #include <filesystem>
 #include <limits>
+#include <utility>
 
 namespace sonocase::pipeline {
 namespace {
@@ -17,7 +18,6 @@ struct Pixels {
     int width = 0, height = 0, channels = 0, alpha = -1;
     std::vector<float> value;  // as stored, not scaled
     OIIO::TypeDesc::BASETYPE type = OIIO::TypeDesc::UNKNOWN;
-    int bits = 0;  // in use, where the file says
 };
 
 Result<Pixels> read_pixels(const std::string& path, int frame) {
@@ -53,7 +53,6 @@ Result<Pixels> read_pixels(const std::string& path, int frame) {
         out.channels = spec.nchannels;
         out.alpha = spec.alpha_channel;
         out.type = static_cast<OIIO::TypeDesc::BASETYPE>(spec.format.basetype);
-        out.bits = spec.get_int_attribute("oiio:BitsPerSample", 0);
         out.value.resize(static_cast<std::size_t>(spec.width) *
                          static_cast<std::size_t>(spec.height) *
                          static_cast<std::size_t>(spec.nchannels));
@@ -71,7 +70,7 @@ Result<Pixels> read_pixels(const std::string& path, int frame) {
     }
 }
 
-// What a stored 1.0 of OpenImageIO means in grey.
+// Grey of OpenImageIO's 1.0.
 double grey_scale(const Pixels& pixels, std::vector<std::string>* notes, const std::string& path) {
     float top = 0;
     for (const float v : pixels.value) {
@@ -101,6 +100,34 @@ double grey_scale(const Pixels& pixels, std::vector<std::string>* notes, const s
     return top > 1.5f ? 1 : 255;  // floating point, in [0, 255] or [0, 1]
 }
 
+Result<PixelRectangle> part_of(const Pixels& pixels,
+                               const std::optional<PixelRectangle>& wanted,
+                               const std::string& path) {
+    if (!wanted) return PixelRectangle{0, 0, pixels.width, pixels.height};
+    const PixelRectangle part = *wanted;
+    if (part.width < 1 || part.height < 1 || part.x < 0 || part.y < 0 ||
+        part.x > pixels.width - part.width || part.y > pixels.height - part.height) {
+        return Error{"rectangle " + std::to_string(part.x) + "," + std::to_string(part.y) + "," +
+                         std::to_string(part.width) + "," + std::to_string(part.height) +
+                         " leaves the image of " + std::to_string(pixels.width) + " x " +
+                         std::to_string(pixels.height) + " pixels",
+                     path, "expected x,y,width,height inside the image"};
+    }
+    return part;
+}
+
+Result<Pixels> read_mask_for(const Pixels& pixels, const std::string& path) {
+    auto mask = read_pixels(path, 0);
+    if (!mask) return mask.error();
+    if (mask->width != pixels.width || mask->height != pixels.height) {
+        return Error{"mask of " + std::to_string(mask->width) + " x " +
+                         std::to_string(mask->height) + " pixels for an image of " +
+                         std::to_string(pixels.width) + " x " + std::to_string(pixels.height),
+                     path, "expected a mask of the image's size"};
+    }
+    return std::move(*mask);
+}
+
 }  // namespace
 
 Result<ExampleImage> read_example(const std::string& path,
@@ -109,29 +136,16 @@ Result<ExampleImage> read_example(const std::string& path,
     auto read = read_pixels(path, options.frame);
     if (!read) return read.error();
     const Pixels& pixels = *read;
-    PixelRectangle part{0, 0, pixels.width, pixels.height};
-    if (options.rectangle) {
-        part = *options.rectangle;
-        if (part.width < 1 || part.height < 1 || part.x < 0 || part.y < 0 ||
-            part.x > pixels.width - part.width || part.y > pixels.height - part.height) {
-            return Error{"rectangle " + std::to_string(part.x) + "," + std::to_string(part.y) +
-                             "," + std::to_string(part.width) + "," + std::to_string(part.height) +
-                             " leaves the image of " + std::to_string(pixels.width) + " x " +
-                             std::to_string(pixels.height) + " pixels",
-                         path, "expected x,y,width,height inside the image"};
-        }
-    }
+    const auto rectangle = part_of(pixels, options.rectangle, path);
+    if (!rectangle) return rectangle.error();
+    const PixelRectangle part = *rectangle;
     Pixels mask;
+    double mask_scale = 0;
     if (!options.mask_path.empty()) {
-        auto read_mask = read_pixels(options.mask_path, 0);
+        auto read_mask = read_mask_for(pixels, options.mask_path);
         if (!read_mask) return read_mask.error();
         mask = std::move(*read_mask);
-        if (mask.width != pixels.width || mask.height != pixels.height) {
-            return Error{"mask of " + std::to_string(mask.width) + " x " +
-                             std::to_string(mask.height) + " pixels for an image of " +
-                             std::to_string(pixels.width) + " x " + std::to_string(pixels.height),
-                         options.mask_path, "expected a mask of the image's size"};
-        }
+        mask_scale = grey_scale(mask, nullptr, options.mask_path);
     }
     const double scale = grey_scale(pixels, notes, path);
     const int colours = pixels.channels - (pixels.alpha >= 0 ? 1 : 0) >= 3 ? 3 : 1;
@@ -164,8 +178,7 @@ Result<ExampleImage> read_example(const std::string& path,
             }
             if (mask.width > 0) {
                 const float m = mask.value[at * static_cast<std::size_t>(mask.channels)];
-                const double full = grey_scale(mask, nullptr, options.mask_path);
-                if (!(m * full > 127.5)) image.use[to] = 0;
+                if (!(m * mask_scale > 127.5)) image.use[to] = 0;
             }
             const double stored = grey * scale;
             image.grey[to] = std::isfinite(stored)

@@ -18,12 +18,12 @@ struct Look {
     double mean = 100, sd = 15;                     // grey
     double axial = 2.8, lateral = 8;                // full widths at half height of the grain, px
     double slant_rad = 0;                           // of the fibres against the horizontal
-    double fibre = 0;                               // share of the contrast that fibres carry
+    double fibre = 0;                               // share of the contrast due to fibres
     double fibre_length = 20, fibre_thickness = 4;  // full widths, px
     double fibre_skew = 1;                          // how sparse and bright they are
 };
 
-// Widths and grey of the real patches; names without one take a relative's.
+// Widths and grey of the real patches; a name without a patch has those of a similar tissue.
 constexpr Look kLooks[] = {
     {"liver", 110, 16, 2.8, 8.2},
     {"spleen", 101, 13, 2.4, 6.0},
@@ -44,7 +44,8 @@ constexpr Look kLooks[] = {
 };
 
 // Complex Gaussian field with correlation widths along and across a direction: white noise on the
-// pixels smoothed by a Gaussian. The autocorrelation of a kernel of deviation s has width 3.33 s.
+// pixels, smoothed by a Gaussian. The autocorrelation of a kernel of standard deviation s has the
+// width 3.33 s.
 std::vector<std::complex<double>> smooth_field(int width,
                                                int height,
                                                double along_width,
@@ -92,7 +93,7 @@ std::vector<std::complex<double>> smooth_field(int width,
     return field;
 }
 
-// FNV-1a: std::hash differs between standard libraries.
+// FNV-1a, because std::hash differs between standard libraries.
 std::uint64_t name_hash(std::string_view name) {
     std::uint64_t hash = 0xCBF29CE484222325ull;
     for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ull;
@@ -126,12 +127,12 @@ ExampleImage synthetic_example(std::string_view texture,
     image.grey.resize(image.count());
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
-            // log of a Rayleigh envelope, standardised: mean -2.51 dB, sd 5.57 dB re its power
+            // Logarithm of a Rayleigh envelope, standardised: mean -2.51 dB, sd 5.57 dB re its power.
             const double db = 10 * std::log10(0.5 * std::norm(speckle[image.index(x, y)]) + 1e-4);
             double value = std::max((db + 2.51) / 5.57, -3.0);
             if (look.fibre > 0) {
                 const double g = fibres[image.index(x, y)].real();
-                // exponential of a Gaussian, standardised: bright fibres on dark ground
+                // Exponential of a Gaussian, standardised: bright fibres on a dark ground.
                 const double k = look.fibre_skew * 0.45;
                 const double f = (std::exp(k * g) - std::exp(k * k / 2)) /
                                  std::sqrt((std::exp(k * k) - 1) * std::exp(k * k));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Example images made by a formula, for cases that come without real ones (the analytic torso).
+// Example images computed by a formula, for cases without real ones (the analytic torso).
 //
 // Organs: log-compressed Rayleigh speckle with the axial and lateral widths measured on real images
-// (docs/textures.md). Muscle: thin bright fibres along a slant. Fat: septa along the skin. They
-// carry no licence, need no file, and are not a substitute for real ultrasound.
+// (docs/textures.md). Muscle: thin bright fibres at a slant. Fat: septa parallel to the skin. They
+// need no licence and no file, and are not a substitute for real ultrasound.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace sonocase::pipeline {
 
-// Example for one of the built-in texture names; a name that is not known gets plain speckle.
+// Example for one of the built-in texture names; for any other name, plain speckle.
 // width, height in pixels, >= 8. Same bytes for the same seed.
 ExampleImage synthetic_example(std::string_view texture,
                                int width = 160,

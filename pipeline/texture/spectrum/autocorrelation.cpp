@@ -20,6 +20,50 @@ int power_of_two_from(int n) {
     return p;
 }
 
+// Over all pairs of used pixels at each lag: products of standardised grey, and number of pairs.
+struct PairSums {
+    std::vector<double> product, count;  // # (2 reach + 1)^2
+};
+
+PairSums sum_pairs(const ExampleImage& image, const GreyMoments& m, int reach) {
+    const double mean = m.mean, sd = m.sd();
+    // Padded, such that no lag wraps.
+    const int w = power_of_two_from(image.width + reach);
+    const int h = power_of_two_from(image.height + reach);
+    const auto size = static_cast<std::size_t>(w) * static_cast<std::size_t>(h);
+    std::vector<std::complex<double>> plane(size), mask(size);
+    for (int y = 0; y < image.height; ++y) {
+        for (int x = 0; x < image.width; ++x) {
+            const std::size_t i = image.index(x, y);
+            if (!image.used(i)) continue;
+            const std::size_t to = static_cast<std::size_t>(x) +
+                                   static_cast<std::size_t>(w) * static_cast<std::size_t>(y);
+            plane[to] = (image.grey[i] - mean) / sd;
+            mask[to] = 1;
+        }
+    }
+    fourier_plane(plane, w, h, false);
+    fourier_plane(mask, w, h, false);
+    // |F|^2 of each is real and even: one transform returns both results, in its real and its
+    // imaginary part.
+    for (std::size_t i = 0; i < size; ++i) plane[i] = {std::norm(plane[i]), std::norm(mask[i])};
+    fourier_plane(plane, w, h, true);
+    const std::size_t lags = static_cast<std::size_t>((2 * reach + 1) * (2 * reach + 1));
+    PairSums sums{std::vector<double>(lags, 0), std::vector<double>(lags, 0)};
+    for (int y = -reach; y <= reach; ++y) {
+        for (int x = -reach; x <= reach; ++x) {
+            if (std::abs(x) >= image.width || std::abs(y) >= image.height) continue;
+            const std::size_t from =
+                static_cast<std::size_t>((x + w) % w) +
+                static_cast<std::size_t>(w) * static_cast<std::size_t>((y + h) % h);
+            const auto to = static_cast<std::size_t>((y + reach) * (2 * reach + 1) + x + reach);
+            sums.product[to] = plane[from].real();
+            sums.count[to] = std::round(plane[from].imag());
+        }
+    }
+    return sums;
+}
+
 }  // namespace
 
 double Autocorrelation::between(double x, double y) const {
@@ -38,51 +82,13 @@ Autocorrelation autocorrelation(std::span<const ExampleImage> examples, int reac
     std::vector<double> product(out.value.size(), 0), pairs(out.value.size(), 0);
     double used = 0;
     for (const ExampleImage& image : examples) {
-        double count = 0, mean = 0, power = 0;
-        for (std::size_t i = 0; i < image.count(); ++i) {
-            if (image.used(i)) count += 1, mean += image.grey[i];
-        }
-        if (count == 0) continue;
-        mean /= count;
-        for (std::size_t i = 0; i < image.count(); ++i) {
-            if (image.used(i)) power += (image.grey[i] - mean) * (image.grey[i] - mean);
-        }
-        const double sd = std::sqrt(power / count);
-        if (!(sd > 0)) continue;
-        used += count;
-        // Values in the real part, the mask in the imaginary part: one transform serves both.
-        const int w = power_of_two_from(image.width + reach);
-        const int h = power_of_two_from(image.height + reach);
-        const auto size = static_cast<std::size_t>(w) * static_cast<std::size_t>(h);
-        std::vector<std::complex<double>> plane(size), mask(size);
-        for (int y = 0; y < image.height; ++y) {
-            for (int x = 0; x < image.width; ++x) {
-                const std::size_t i = image.index(x, y);
-                if (!image.used(i)) continue;
-                const std::size_t to = static_cast<std::size_t>(x) +
-                                       static_cast<std::size_t>(w) * static_cast<std::size_t>(y);
-                plane[to] = (image.grey[i] - mean) / sd;
-                mask[to] = 1;
-            }
-        }
-        fourier_plane(plane, w, h, false);
-        fourier_plane(mask, w, h, false);
-        for (std::size_t i = 0; i < size; ++i) {
-            // |F|^2 of each is real and even, so the two answers come back in real and imaginary
-            // part
-            plane[i] = {std::norm(plane[i]), std::norm(mask[i])};
-        }
-        fourier_plane(plane, w, h, true);
-        for (int y = -reach; y <= reach; ++y) {
-            for (int x = -reach; x <= reach; ++x) {
-                const std::size_t from =
-                    static_cast<std::size_t>((x + w) % w) +
-                    static_cast<std::size_t>(w) * static_cast<std::size_t>((y + h) % h);
-                const auto to = static_cast<std::size_t>((y + reach) * (2 * reach + 1) + x + reach);
-                if (std::abs(x) >= image.width || std::abs(y) >= image.height) continue;
-                product[to] += plane[from].real();
-                pairs[to] += std::round(plane[from].imag());
-            }
+        const GreyMoments m = grey_moments(image);
+        if (!(m.sd() > 0)) continue;
+        used += static_cast<double>(m.count);
+        const PairSums sums = sum_pairs(image, m, reach);
+        for (std::size_t i = 0; i < product.size(); ++i) {
+            product[i] += sums.product[i];
+            pairs[i] += sums.count[i];
         }
     }
     const double zero = product[product.size() / 2] / std::max(pairs[pairs.size() / 2], 1.0);
@@ -104,8 +110,8 @@ Autocorrelation plane_autocorrelation(std::span<const float> cube, int edge, int
     mean /= static_cast<double>(cube.size());
     std::vector<std::complex<double>> sum(n * n), plane(n * n);
     for (std::size_t z = 0; z < n; z += 2) {
-        // two planes at once, as real and imaginary part: |F|^2 of the pair, made even, is their
-        // sum
+        // Two planes at once, as real and imaginary part: the even part of |F|^2 of the pair is the
+        // sum of theirs.
         for (std::size_t i = 0; i < n * n; ++i) {
             plane[i] = {cube[z * n * n + i] - mean, cube[(z + 1) * n * n + i] - mean};
         }
@@ -119,82 +125,8 @@ Autocorrelation plane_autocorrelation(std::span<const float> cube, int edge, int
     const double zero = sum[0].real();
     for (int y = -reach; y <= reach; ++y) {
         for (int x = -reach; x <= reach; ++x) {
-            const std::size_t i = static_cast<std::size_t>((x + edge) % edge) +
-                                  n * static_cast<std::size_t>((y + edge) % edge);
+            const std::size_t i = torus_index(x, y, edge);
             out.at(x, y) = zero > 0 ? sum[i].real() / zero : 0;
-        }
-    }
-    return out;
-}
-
-ExampleImage without_local_trend(const ExampleImage& image, double sigma_px) {
-    const int reach = static_cast<int>(std::ceil(3 * sigma_px));
-    std::vector<float> taps;
-    for (int i = -reach; i <= reach; ++i) {
-        taps.push_back(static_cast<float>(std::exp(-0.5 * i * i / (sigma_px * sigma_px))));
-    }
-    std::vector<float> sum(image.count()), weight(image.count());
-    double mean = 0, count = 0;
-    for (std::size_t i = 0; i < image.count(); ++i) {
-        if (!image.used(i)) continue;
-        sum[i] = image.grey[i];
-        weight[i] = 1;
-        mean += image.grey[i];
-        count += 1;
-    }
-    mean /= std::max(count, 1.0);
-    const auto pass = [&](std::vector<float>& values, int dx, int dy) {
-        std::vector<float> out(values.size());
-        for (int y = 0; y < image.height; ++y) {
-            for (int x = 0; x < image.width; ++x) {
-                const int place = dx * x + dy * y, end = dx * image.width + dy * image.height;
-                const int from = std::max(-reach, -place), to = std::min(reach, end - 1 - place);
-                float s = 0;
-                for (int t = from; t <= to; ++t) {
-                    s += taps[static_cast<std::size_t>(t + reach)] *
-                         values[image.index(x + t * dx, y + t * dy)];
-                }
-                out[image.index(x, y)] = s;
-            }
-        }
-        values.swap(out);
-    };
-    for (std::vector<float>* values : {&sum, &weight}) {
-        pass(*values, 1, 0);
-        pass(*values, 0, 1);
-    }
-    ExampleImage out = image;
-    for (std::size_t i = 0; i < image.count(); ++i) {
-        if (image.used(i)) out.grey[i] += static_cast<float>(mean) - sum[i] / weight[i];
-    }
-    return out;
-}
-
-std::vector<float> without_local_trend(std::span<const float> cube, int edge, double sigma_px) {
-    const auto n = static_cast<std::size_t>(edge);
-    std::vector<double> gain(n * n);
-    for (std::size_t i = 0; i < n * n; ++i) {
-        const auto wave = [&](std::size_t k) {
-            const double f = static_cast<double>(std::min(k, n - k)) / edge;
-            return 2 * kPi * kPi * sigma_px * sigma_px * f * f;
-        };
-        gain[i] = 1 - std::exp(-wave(i % n) - wave(i / n));
-    }
-    double mean = 0;
-    for (const float v : cube) mean += v;
-    mean /= static_cast<double>(cube.size());
-    std::vector<float> out(cube.size());
-    std::vector<std::complex<double>> plane(n * n);
-    for (std::size_t z = 0; z < n; z += 2) {  // two planes at once
-        for (std::size_t i = 0; i < n * n; ++i) {
-            plane[i] = {cube[z * n * n + i], cube[(z + 1) * n * n + i]};
-        }
-        fourier_plane(plane, edge, edge, false);
-        for (std::size_t i = 0; i < n * n; ++i) plane[i] *= gain[i];
-        fourier_plane(plane, edge, edge, true);
-        for (std::size_t i = 0; i < n * n; ++i) {
-            out[z * n * n + i] = static_cast<float>(mean + plane[i].real());
-            out[(z + 1) * n * n + i] = static_cast<float>(mean + plane[i].imag());
         }
     }
     return out;
@@ -210,9 +142,7 @@ Autocorrelation at_stride(const Autocorrelation& autocorrelation, int stride) {
         for (int x = -out.reach; x <= out.reach; ++x, ++to) {
             out.value[to] = autocorrelation.at(stride * x, stride * y);
             if (out.overlap.empty()) continue;
-            const int side = 2 * autocorrelation.reach + 1;
-            out.overlap[to] = autocorrelation.overlap[static_cast<std::size_t>(
-                (stride * y + autocorrelation.reach) * side + stride * x + autocorrelation.reach)];
+            out.overlap[to] = autocorrelation.window(stride * x, stride * y);
         }
     }
     return out;
@@ -226,10 +156,7 @@ Autocorrelation through_window(const Autocorrelation& autocorrelation,
     out.value.resize(static_cast<std::size_t>((2 * out.reach + 1) * (2 * out.reach + 1)));
     for (int y = -out.reach; y <= out.reach; ++y) {
         for (int x = -out.reach; x <= out.reach; ++x) {
-            const int side = 2 * window.reach + 1;
-            out.at(x, y) =
-                autocorrelation.at(x, y) * window.overlap[static_cast<std::size_t>(
-                                               (y + window.reach) * side + x + window.reach)];
+            out.at(x, y) = autocorrelation.at(x, y) * window.window(x, y);
         }
     }
     return out;

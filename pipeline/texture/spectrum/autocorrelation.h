@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Autocorrelation of grey: estimated from masked images, measured in volumes, and its widths.
+// Autocorrelation of grey: estimated from masked images or measured in cubes, and its widths.
 #pragma once
 
 #include <span>
@@ -14,8 +14,9 @@ namespace sonocase::pipeline {
 // Point-symmetric: at(-x, -y) = at(x, y).
 struct Autocorrelation {
     int reach = 0;
-    std::vector<double> value;    // # (2 reach + 1)^2
-    std::vector<double> overlap;  // # same: share of pixel pairs at the lag; empty: all (a cube)
+    std::vector<double> value;  // # (2 reach + 1)^2
+    std::vector<double>
+        overlap;  // # same: pixel pairs at the lag per used pixel; empty: 1 (a cube)
 
     double at(int x, int y) const {
         return value[static_cast<std::size_t>((y + reach) * (2 * reach + 1) + x + reach)];
@@ -32,40 +33,33 @@ struct Autocorrelation {
     double between(double x, double y) const;
 };
 
-// Of the used pixels of all examples together, each about its own mean and deviation. Every lag is
-// divided by the number of pixel pairs that it has; lags with fewer than a twentieth of the pixels
-// as pairs are given 0.
+// Of the used pixels of all examples together, each standardised by its own mean and standard
+// deviation. Every lag is divided by its number of pixel pairs; lags with fewer pairs than a
+// twentieth of the pixels are 0. Cost: three transforms of the padded image.
 Autocorrelation autocorrelation(std::span<const ExampleImage> examples, int reach);
 
 // Of the planes z = const of a cube that wraps, averaged over all of them; reach <= edge / 2.
 Autocorrelation plane_autocorrelation(std::span<const float> cube, int edge, int reach);
 
-// What is left of an image, or of each plane z = const of a wrapping cube, when its Gaussian mean
-// of deviation sigma_px is taken off; the overall mean stays. Correlation widths of real patches
-// are only comparable after this: shading across the patch would otherwise count as grain.
-ExampleImage without_local_trend(const ExampleImage& image, double sigma_px);
-std::vector<float> without_local_trend(std::span<const float> cube, int edge, double sigma_px);
-inline constexpr double kGrainTrendPx = 12;  // as in the published table of the real patches
-
-// The correlation as a window of the example's size shows it: each lag times its share of pixel
-// pairs, the usual estimate from one image. Long lags of a small patch are mostly chance, and half
-// heights read from them would be chance too. Widths of an example and of a texture are compared
-// through the example's window.
+// The correlation weighted like an estimate from an image of the size of `window`'s example: each lag
+// times its share of pixel pairs. Long lags of a small patch are mostly chance, and so would be a
+// half-height among them. Widths of an example and of a texture are therefore compared through the
+// example's window. window.overlap must not be empty.
 Autocorrelation through_window(const Autocorrelation& autocorrelation,
                                const Autocorrelation& window);
 
 // Full widths at half height, in pixels, along the direction in which the correlation reaches
-// furthest and at right angles to it.
-// A correlation that never falls to a half within the reach has twice the reach for its width.
+// furthest and at right angles to it. If it does not fall to a half within the reach, the width is
+// twice the reach.
 struct CorrelationWidths {
     double along = 0;
     double across = 0;
     double angle_rad = 0;  // of `along` against +x, towards +y (down), in [0, pi)
     double ratio() const { return across > 0 ? along / across : 0; }
 };
-// At every stride-th lag.
-Autocorrelation at_stride(const Autocorrelation& autocorrelation, int stride);
-
 CorrelationWidths correlation_widths(const Autocorrelation& autocorrelation);
+
+// Every stride-th lag.
+Autocorrelation at_stride(const Autocorrelation& autocorrelation, int stride);
 
 }  // namespace sonocase::pipeline

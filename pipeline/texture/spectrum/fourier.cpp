@@ -10,8 +10,8 @@ namespace sonocase::pipeline {
 namespace {
 
 // Radix-2 Stockham transform of `lines` interleaved lines at once: element i of line k is at
-// data[i * lines + k]. Lines side by side make the innermost loop long and free of shuffles, which
-// is what a cube wants: its y and z axes are already laid out that way.
+// data[i * lines + k]. Interleaved lines make the innermost loop long and free of shuffles, and the
+// y and z axes of a cube already have this layout.
 template <class T>
 class Fourier {
   public:
@@ -23,7 +23,7 @@ class Fourier {
         }
     }
 
-    // The answer is in `data`; `scratch` has the same size.
+    // In place; `scratch` has the size of `data`.
     void run(std::complex<T>* data, std::complex<T>* scratch, std::size_t lines) const {
         std::complex<T>* from = data;
         std::complex<T>* to = scratch;
@@ -90,15 +90,15 @@ void fourier_cube(std::vector<std::complex<float>>& cube, int edge, bool inverse
     along_rows(cube, edge, fourier);
     std::vector<std::complex<float>> scratch(n * n);
     for (std::size_t z = 0; z < n; ++z) fourier.run(cube.data() + z * n * n, scratch.data(), n);
-    // z: columns of x at a fixed y, gathered so that the working set stays in cache
-    std::vector<std::complex<float>> slab(n * n);
+    // Along z, plane by plane at fixed y; each plane is copied, which keeps it in the cache.
+    std::vector<std::complex<float>> plane(n * n);
     for (std::size_t y = 0; y < n; ++y) {
         for (std::size_t z = 0; z < n; ++z) {
-            std::copy_n(cube.data() + n * (y + n * z), n, slab.data() + n * z);
+            std::copy_n(cube.data() + n * (y + n * z), n, plane.data() + n * z);
         }
-        fourier.run(slab.data(), scratch.data(), n);
+        fourier.run(plane.data(), scratch.data(), n);
         for (std::size_t z = 0; z < n; ++z) {
-            std::copy_n(slab.data() + n * z, n, cube.data() + n * (y + n * z));
+            std::copy_n(plane.data() + n * z, n, cube.data() + n * (y + n * z));
         }
     }
     if (inverse) scale(cube);

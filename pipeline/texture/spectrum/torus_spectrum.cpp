@@ -7,17 +7,16 @@
 #include <complex>
 
 #include "pipeline/texture/spectrum/fourier.h"
+#include "pipeline/texture/spectrum/local_trend.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-constexpr double kPi = 3.141592653589793238463;
-
-constexpr double kContour = 7;
-constexpr double kZeroLag = 60;
+constexpr double kContour = 7;   // extra weight of lags near the half-height contour
+constexpr double kZeroLag = 60;  // weight of lag 0
 
 struct Term {
-    std::vector<double> wanted, weight;  // per lag on the torus
+    std::vector<double> wanted, weight;  // # edge^2: per lag on the torus
 };
 
 Term term_of(const Autocorrelation& wanted, double scale, double strength, int edge) {
@@ -28,13 +27,12 @@ Term term_of(const Autocorrelation& wanted, double scale, double strength, int e
     Term term{std::vector<double>(n * n), std::vector<double>(n * n)};
     for (int y = -half; y < half; ++y) {
         for (int x = -half; x < half; ++x) {
-            const std::size_t i = static_cast<std::size_t>((x + edge) % edge) +
-                                  n * static_cast<std::size_t>((y + edge) % edge);
+            const std::size_t i = torus_index(x, y, edge);
             const bool known = std::abs(x) <= wanted.reach && std::abs(y) <= wanted.reach;
             term.wanted[i] = known ? scale * wanted.at(x, y) : 0;
             const double r = std::hypot(x, y) / radius;
-            // Seen through the example's window, like the widths; the half-height contour is what
-            // they are read from.
+            // Through the example's window, like the widths, which are read from the half-height
+            // contour.
             const double window = known ? wanted.window(x, y) : 0;
             const double near_half = known ? (window * wanted.at(x, y) - 0.5) / 0.1 : 9;
             const double contour = 1 + kContour * std::exp(-near_half * near_half);
@@ -42,7 +40,7 @@ Term term_of(const Autocorrelation& wanted, double scale, double strength, int e
                              (r < 1 ? contour : std::max(std::exp(-4 * (r - 1) * (r - 1)), 0.02));
         }
     }
-    // Variance put in as white noise would cost one lag only, and lower all correlations.
+    // Variance added as white noise would affect this lag alone, but lower all correlations.
     term.weight[0] = strength * kZeroLag;
     return term;
 }
@@ -59,17 +57,10 @@ std::vector<double> fit_torus_spectrum(const Autocorrelation& whole,
     const std::size_t count = n * n;
     const Term a = term_of(whole, 1, 0.03, edge);
     const Term b = term_of(local, share, 3, edge);
-    std::vector<double> gain(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        const auto wave = [&](std::size_t k) {
-            const double f = static_cast<double>(std::min(k, n - k)) / edge;
-            return 2 * kPi * kPi * trend_vx * trend_vx * f * f;
-        };
-        const double g = i == 0 ? 0 : 1 - std::exp(-wave(i % n) - wave(i / n));
-        gain[i] = g * g;
-    }
-    // Both terms in one transform: real part whole, imaginary part local. Their spectra are even,
-    // so the autocorrelations are real, and the residuals' transforms are real again.
+    std::vector<double> gain = local_trend_gain(edge, trend_vx);  // of amplitudes
+    for (double& g : gain) g *= g;
+    // Both terms in one transform: `whole` in the real part, `local` in the imaginary part. Their
+    // spectra are even: the autocorrelations are real, and so are the transforms of the residuals.
     std::vector<double> s(count, 1), before = s, leap = s;
     std::vector<std::complex<double>> plane(count);
     double momentum = 1;

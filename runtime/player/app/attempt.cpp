@@ -91,7 +91,7 @@ void Attempt::observe(const FrameRecord& record,
     view_.tip_in_view = monitor.tip_in_view();
     view_.in_no_go = monitor.in_no_go();
     for (const LiveEvent& event : events) {
-        std::string words = words_of(event, exercise_, open_->bundle.labels);
+        std::string words = words_of(event, exercise_, open_->bundle->labels);
         if (words.empty()) continue;
         view_.events.push_back(std::move(words));
         if (view_.events.size() > 6) view_.events.erase(view_.events.begin());

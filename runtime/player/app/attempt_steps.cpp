@@ -59,7 +59,7 @@ void start_attempt(App& app, const std::string& path) {
     const Exercise& exercise = loaded.exercise();
     std::string file = path;
     if (file.empty())
-        file = new_session_path(loaded.open->bundle.manifest.case_name, exercise.name);
+        file = new_session_path(loaded.open->bundle->manifest.case_name, exercise.name);
     if (file.empty()) {
         app.view.notices.error("There is no folder to record to: set HOME or XDG_DATA_HOME.");
         return;

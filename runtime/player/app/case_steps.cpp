@@ -79,11 +79,11 @@ bool open_bundle(App& app, const std::string& path, const std::string& exercise)
     loaded.open = std::move(*opened);
     loaded.damage_reported = false;
     for (const std::string& warning : loaded.open->warnings) notices.warning(warning);
-    loaded.skin = std::make_unique<Skin>(loaded.open->bundle);
-    app.view.small_view.view->set_case(loaded.open->bundle);
+    loaded.skin = std::make_unique<Skin>(*loaded.open->bundle);
+    app.view.small_view.view->set_case(*loaded.open->bundle);
     app.view.page = Page::scan;
     choose_exercise(app, *index);
-    app.view.window->set_title(loaded.open->bundle.manifest.case_name + " - sonocase");
+    app.view.window->set_title(loaded.open->bundle->manifest.case_name + " - sonocase");
     remember_bundle(path, app.player.settings.recent);
     return true;
 }
@@ -173,7 +173,7 @@ Status load_initial_calibrations(const PlayerState& player, CaseState& loaded, N
 }
 
 void follow_setup(CaseState& loaded, const SensorAssignment& assignment, double now_s) {
-    if (!loaded.guide) loaded.guide = std::make_unique<SetupGuide>(loaded.open->bundle);
+    if (!loaded.guide) loaded.guide = std::make_unique<SetupGuide>(*loaded.open->bundle);
     SetupGuide& guide = *loaded.guide;
     guide.observe(loaded.frame().reading, assignment, now_s);
     const Calibrations found = guide.calibrations(loaded.scan->tracker_health().device, utc_now());

@@ -136,7 +136,7 @@ Status HeadlessRun::set_up_case() {
 }
 
 Status HeadlessRun::set_up_tracker() {
-    skin_ = std::make_unique<Skin>(open_->bundle);
+    skin_ = std::make_unique<Skin>(*open_->bundle);
     clock_ = session_clock(steady_seconds());
     spec_ = arguments_.tracker;
     if (spec_.empty()) spec_ = exercise_->sweeps.empty() ? "null" : "sweep";

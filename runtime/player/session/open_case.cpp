@@ -30,12 +30,12 @@ Exercise free_scan(const CaseBundle& bundle) {
 }
 
 Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
-    Result<CaseBundle> bundle = open_bundle(path);
+    Result<StreamedBundle> bundle = open_bundle(path);
     if (!bundle) return bundle.error();
     auto open = std::make_unique<OpenCase>();
     open->path = path;
     open->bundle = std::move(*bundle);
-    for (const EmbeddedExercise& embedded : open->bundle.exercises) {
+    for (const EmbeddedExercise& embedded : open->bundle->exercises) {
         Result<Exercise> exercise = parse_exercise(embedded.toml, path + ":" + embedded.name);
         if (!exercise) {
             open->warnings.push_back(exercise.error().message());
@@ -44,12 +44,12 @@ Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
         if (exercise->name.empty()) exercise->name = embedded.name;
         open->exercises.push_back(std::move(*exercise));
     }
-    if (open->exercises.empty()) open->exercises.push_back(free_scan(open->bundle));
+    if (open->exercises.empty()) open->exercises.push_back(free_scan(*open->bundle));
     return open;
 }
 
 Status bundle_health(const OpenCase& open) {
-    const auto& blocks = open.bundle.blocks;
+    const VoxelBlocks* blocks = open.bundle.blocks();
     if (blocks && blocks->damaged()) return blocks->status();
     return Done{};
 }

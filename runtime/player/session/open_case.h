@@ -7,16 +7,18 @@
 #include <string>
 #include <vector>
 
-#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/streamed_bundle.h"
 #include "formats/exercise/exercise.h"
+#include "runtime/imaging/renderer.h"
 
 namespace sonocase::runtime {
 
 struct OpenCase {
     std::string path;
-    CaseBundle bundle;
-    std::vector<Exercise> exercises;    // at least one: without any, a free scan
-    std::vector<std::string> warnings;  // whole sentences
+    StreamedBundle bundle;
+    std::vector<Exercise> exercises;                   // at least one: without any, a free scan
+    std::shared_ptr<const PhysicalTextures> textures;  // null: each renderer makes its own
+    std::vector<std::string> warnings;                 // whole sentences
 };
 
 // Exercises that do not parse are left out and named in `warnings`. On the heap, because renderer

@@ -9,6 +9,7 @@
 #include "formats/base/digest.h"
 #include "formats/files/recording_file.h"
 #include "formats/progress_book/progress_book.h"
+#include "formats/threads/thread_jobs.h"
 #include "runtime/recording/settings_text.h"
 
 namespace sonocase::runtime {
@@ -50,7 +51,7 @@ SessionRun::SessionRun(const OpenCase& open, const ScanEngine& engine, std::stri
       height_px_(engine.render_options().height_px),
       exercise_(engine.exercise()),
       path_(std::move(path)),
-      monitor_(exercise_, anatomy_.get(), open.bundle.labels) {}
+      monitor_(exercise_, anatomy_.get(), open.bundle->labels) {}
 
 Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
                                                       const OpenCase& open,
@@ -60,9 +61,9 @@ Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
                                                       double now_s) {
     std::unique_ptr<SessionRun> run(new SessionRun(open, engine, path));
     SessionHeader header;
-    header.case_name = open.bundle.manifest.case_name;
+    header.case_name = open.bundle->manifest.case_name;
     header.exercise = run->exercise_.name;
-    for (const EmbeddedExercise& embedded : open.bundle.exercises) {
+    for (const EmbeddedExercise& embedded : open.bundle->exercises) {
         if (embedded.name == header.exercise) header.exercise_digest = digest_of(embedded.toml);
     }
     header.trainee = trainee;
@@ -73,7 +74,7 @@ Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
         std::string("model=") + (render.model == ImageModel::paper ? "paper" : "physical") +
         " effects=" + joined(render.effects) + " size=" + std::to_string(render.width_px) + "x" +
         std::to_string(render.height_px) + " seed=" + std::to_string(render.seed);
-    auto recorder = SessionRecorder::start(path, header, run->exercise_, open.bundle.labels);
+    auto recorder = SessionRecorder::start(path, header, run->exercise_, open.bundle->labels);
     if (!recorder) return recorder.error();
     run->recorder_ = std::move(*recorder);
     engine.begin_session(now_s);
@@ -121,7 +122,11 @@ Result<SessionScore> SessionRun::finish() {
     if (!sequence) return sequence.error();
     const auto session = session_from_sequence(*sequence, guess_names(*sequence), path_);
     if (!session) return session.error();
-    SessionScore score = score_session(*session, exercise_, anatomy_.get(), open_.bundle.labels);
+    ThreadJobs jobs;
+    ScoreOptions options;
+    options.jobs = &jobs;
+    SessionScore score =
+        score_session(*session, exercise_, anatomy_.get(), open_.bundle->labels, options);
     if (!session->header.trainee.empty()) {
         // A session that cannot be added to the book still has scores: the trainee sees them, and
         // why.

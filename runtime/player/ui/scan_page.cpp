@@ -99,7 +99,7 @@ ImageViewInput image_input(const App& app, float s) {
     input.measuring = app.view.measuring;
     input.scale = s;
     input.left_lines = {
-        loaded.open->bundle.manifest.case_name,
+        loaded.open->bundle->manifest.case_name,
         std::string(shape_name(probe.shape)) + text("  %.1f MHz", probe.frequency_mhz),
         text("Depth %.1f cm", loaded.image.depth_mm / 10),
         text("Focus %.1f cm", loaded.image.focus_mm / 10)};

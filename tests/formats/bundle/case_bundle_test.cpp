@@ -6,11 +6,13 @@
 
 #include <cstdlib>
 #include <cstring>
+#include <type_traits>
 
 #include "formats/bundle/stage_files.h"
 #include "formats/container/chunk_file.h"
 #include "formats/files/atomic_file.h"
 #include "formats/files/bundle_file.h"
+#include "formats/threads/thread_jobs.h"
 #include "formats/volume/boundary_record.h"
 #include "support/paths.h"
 #include "support/random.h"
@@ -87,6 +89,17 @@ void expect_same(const CaseBundle& a, const CaseBundle& b) {
     EXPECT_EQ(a.preview_png, b.preview_png);
 }
 
+// What the types promise: a bundle is a value, a streamed one has one owner, and a view refers to
+// something that outlives it.
+static_assert(std::is_copy_constructible_v<CaseBundle> && std::is_copy_assignable_v<CaseBundle>);
+static_assert(std::is_move_constructible_v<StreamedBundle> &&
+              !std::is_copy_constructible_v<StreamedBundle> &&
+              !std::is_copy_assignable_v<StreamedBundle>);
+static_assert(std::is_constructible_v<CaseView, const CaseBundle&> &&
+              std::is_constructible_v<CaseView, const StreamedBundle&> &&
+              !std::is_constructible_v<CaseView, CaseBundle> &&
+              !std::is_constructible_v<CaseView, StreamedBundle>);
+
 TEST(CaseBundle, ComesBackAsItWas) {
     const CaseBundle bundle = tiny_case();
     const Bytes bytes = write_bundle(bundle);
@@ -121,7 +134,7 @@ TEST(CaseBundle, EveryDamagedByteIsAnError) {
     for (std::size_t i = 0; i < file.size(); ++i) {
         for (const int change : {0x01, 0x80}) {
             file[i] = static_cast<std::uint8_t>(file[i] ^ change);
-            EXPECT_FALSE(read_bundle(file, "damaged", 1)) << "byte " << i;
+            EXPECT_FALSE(read_bundle(file, "damaged")) << "byte " << i;
             file[i] = static_cast<std::uint8_t>(file[i] ^ change);
         }
     }
@@ -148,7 +161,7 @@ Bytes with_chunk(const Bytes& file, const std::string& type, Change change) {
             writer.add(std::string(name), false, std::move(bytes));
         }
     }
-    return writer.write(1);
+    return writer.write();
 }
 
 Bytes file_of_version_1() {
@@ -180,7 +193,7 @@ TEST(CaseBundle, AnyByteOfThePackedVolumesIsRefusedOrHarmless) {
                 const auto back = read_bundle(
                     with_chunk(file, type,
                                [&](Bytes& b) { b[at] = static_cast<std::uint8_t>(value); }),
-                    "forged", 1);
+                    "forged");
                 if (!back) continue;
                 const BrickVolume<std::uint8_t>& labels = back->label_bricks;
                 for (const std::uint8_t v : labels.pool) ASSERT_LT(v, back->labels.size());
@@ -202,9 +215,11 @@ TEST(CaseBundle, PackedVolumesComeBackExactlyAndSmall) {
     ASSERT_TRUE(back) << back.error().message();
     expect_same(*back, bundle);
     EXPECT_EQ(write_bundle(*back), bytes);
-    const auto one = read_bundle(bytes, "curved", 1);
-    ASSERT_TRUE(one);
-    expect_same(*one, bundle);
+    ThreadJobs jobs(4);
+    EXPECT_EQ(write_bundle(bundle, jobs), bytes);
+    const auto parallel = read_bundle(bytes, "curved", jobs);
+    ASSERT_TRUE(parallel);
+    expect_same(*parallel, bundle);
 }
 
 // What a player does: blocks in any order, each when it is asked for.
@@ -215,26 +230,26 @@ TEST(CaseBundle, OpenedIsAsLoadedBlockByBlock) {
     ASSERT_TRUE(save_bundle(bundle, path));
     auto opened = open_bundle(path);
     ASSERT_TRUE(opened) << opened.error().message();
-    ASSERT_TRUE(opened->blocks);
-    expect_same_volume(opened->label_bricks, bundle.label_bricks);
-    EXPECT_FALSE(opened->blocks->whole());
-    const CaseBundle moved = std::move(*opened);
+    ASSERT_TRUE(opened->blocks());
+    expect_same_volume((*opened)->label_bricks, bundle.label_bricks);
+    EXPECT_FALSE(opened->blocks()->whole());
+    const StreamedBundle moved = std::move(*opened);
     const Int3 size = bundle.grid.size;
     for (int k = size.z - 1; k >= 0; --k) {
         for (int j = 0; j < size.y; ++j) {
             for (int i = 0; i < size.x; ++i) {
-                moved.blocks->ensure_voxel_loaded(i, j, k);
-                ASSERT_EQ(moved.boundary.at(i, j, k), bundle.boundary.at(i, j, k));
-                ASSERT_EQ(moved.echo_offset.at(i, j, k), bundle.echo_offset.at(i, j, k));
+                moved.blocks()->ensure_voxel_loaded(i, j, k);
+                ASSERT_EQ(moved->boundary.at(i, j, k), bundle.boundary.at(i, j, k));
+                ASSERT_EQ(moved->echo_offset.at(i, j, k), bundle.echo_offset.at(i, j, k));
             }
         }
     }
-    EXPECT_TRUE(moved.blocks->whole());
-    EXPECT_TRUE(moved.blocks->status());
+    EXPECT_TRUE(moved.blocks()->whole());
+    EXPECT_TRUE(moved.blocks()->status());
 }
 
-// A block with right checksums that makes no sense: seen when it is asked for, and empty.
-TEST(CaseBundle, ABlockThatMakesNoSenseSaysSoAndHoldsNothing) {
+// A block with right checksums and invalid contents: found when it is asked for, and empty.
+TEST(CaseBundle, AnInvalidBlockSaysSoAndHoldsNothing) {
     const testing::TemporaryFolder folder;
     const std::string path = folder / "forged.sonocase";
     const Bytes good = write_bundle(testing::curved_case());
@@ -245,13 +260,13 @@ TEST(CaseBundle, ABlockThatMakesNoSenseSaysSoAndHoldsNothing) {
         ASSERT_TRUE(write_file(path, file));
         const auto opened = open_bundle(path);
         ASSERT_TRUE(opened) << opened.error().message();
-        EXPECT_TRUE(opened->blocks->status());
-        opened->blocks->ensure_loaded([](Int3) { return true; });
-        EXPECT_TRUE(opened->blocks->damaged());
-        ASSERT_FALSE(opened->blocks->status());
-        EXPECT_NE(opened->blocks->status().error().message().find(path), std::string::npos);
-        for (const std::uint32_t v : opened->boundary.pool)
-            ASSERT_TRUE(v == kNoBoundary || (v & 0xFFu) < opened->labels.size());
+        EXPECT_TRUE(opened->blocks()->status());
+        opened->blocks()->ensure_loaded([](Int3) { return true; });
+        EXPECT_TRUE(opened->blocks()->damaged());
+        ASSERT_FALSE(opened->blocks()->status());
+        EXPECT_NE(opened->blocks()->status().error().message().find(path), std::string::npos);
+        for (const std::uint32_t v : (*opened)->boundary.pool)
+            ASSERT_TRUE(v == kNoBoundary || (v & 0xFFu) < (*opened)->labels.size());
     }
 }
 
@@ -278,7 +293,7 @@ TEST(CaseBundle, ContentsThatWouldBreakTheRendererAreRefused) {
     expect_refused(b, "not finite");
     b = tiny_case();
     b.grid.spacing_mm.y = 3;
-    expect_refused(b, "no cubes");
+    expect_refused(b, "not cubes");
     b = tiny_case();
     b.grid.size.x = 1000;
     expect_refused(b, "calls for");
@@ -313,7 +328,7 @@ TEST(CaseBundle, RandomBytesInAManifestNeverCrash) {
         }
         ChunkWriter writer("CASE");
         writer.add("manifest", true, Bytes(changed.begin(), changed.end()));
-        (void)read_bundle(writer.write(1), "fuzz", 1);
+        (void)read_bundle(writer.write(), "fuzz");
     }
 }
 
@@ -321,7 +336,7 @@ TEST(CaseBundle, DeeplyNestedManifestIsAnErrorNotAnOverflow) {
     const std::string text = "{\"a\":" + std::string(200000, '[');
     ChunkWriter writer("CASE");
     writer.add("manifest", true, Bytes(text.begin(), text.end()));
-    EXPECT_FALSE(read_bundle(writer.write(1), "deep", 1));
+    EXPECT_FALSE(read_bundle(writer.write(), "deep"));
 }
 
 TEST(CaseBundle, TissueOfLabelFollowsTheNames) {

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include <csignal>
+#include <fstream>
 #include <thread>
 
 #include "formats/base/digest.h"
@@ -66,10 +67,38 @@ TEST(AtomicFile, MakesMissingFoldersAndAppendsToPipes) {
     const std::string pipe = folder / "pipe";
     ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
     std::string read;
-    std::jthread reader([&] { read = *read_text_file(pipe); });
+    std::jthread reader([&] { std::getline(std::ifstream(pipe), read); });
     ASSERT_TRUE(write_file(pipe, std::string_view("through")));
     reader.join();
     EXPECT_EQ(read, "through");
+}
+
+// A device may never end, and opening a pipe waits for its writer.
+TEST(AtomicFile, ReadsNeitherDevicesNorPipesNorFolders) {
+    const TemporaryFolder folder;
+    const std::string pipe = folder / "pipe";
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    const auto expect_refused = [](const std::string& path, const std::string& message) {
+        const auto bytes = read_file(path);
+        const auto large = read_large_file(path);
+        const auto text = read_text_file(path);
+        ASSERT_FALSE(bytes);
+        ASSERT_FALSE(large);
+        ASSERT_FALSE(text);
+        EXPECT_EQ(bytes.error().message(), message);
+        EXPECT_EQ(large.error().message(), message);
+        EXPECT_EQ(text.error().message(), message);
+    };
+    expect_refused("/dev/zero", "/dev/zero: is a device; expected a file");
+    expect_refused(pipe, pipe + ": is a pipe; expected a file");
+    expect_refused(folder / "", (folder / "") + ": is a folder; expected a file");
+}
+
+// What the kernel shows as files of size zero is read whole all the same.
+TEST(AtomicFile, ReadsFilesThatClaimToBeEmpty) {
+    const auto text = read_text_file("/proc/self/status");
+    ASSERT_TRUE(text);
+    EXPECT_FALSE(text->empty());
 }
 
 TEST(Digest, IsTheOneOfXxh3AndTellsPartsApart) {

@@ -54,7 +54,7 @@ TEST(Poses, FaultsNameTheLine) {
     const std::string row = "1,0.5,OK,1,2,3,1,0,0,0,1,0,0,0,1\n";
     const auto number = parse_poses(kHeader + row + "2,x,OK,1,2,3,1,0,0,0,1,0,0,0,1\n", "p.csv");
     ASSERT_FALSE(number);
-    EXPECT_EQ(number.error().where, "p.csv, line 3");
+    EXPECT_EQ(number.error().where, "p.csv:3");
     const auto cells = parse_poses(std::string(kHeader) + "1,2,OK\n", "p.csv");
     ASSERT_FALSE(cells);
     EXPECT_NE(cells.error().message().find("3 cells"), std::string::npos);
@@ -65,10 +65,7 @@ TEST(Poses, FaultsNameTheLine) {
 
 TEST(Poses, RealRecordingsAreRead) {
     const std::string path = std::string(SONOCASE_DATA) + "/tracking/pivot_optical_yaniv/poses.csv";
-    if (!std::filesystem::exists(path)) {
-        std::puts("real data absent: nothing tested");
-        return;
-    }
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
     const auto poses = load_poses(path);
     ASSERT_TRUE(poses) << poses.error().message();
     EXPECT_EQ(poses->size(), 481u);

@@ -9,6 +9,7 @@
 
 #include "ball.h"
 #include "formats/scoring/image_region.h"
+#include "formats/threads/thread_jobs.h"
 #include "support/random.h"
 
 namespace sonocase {
@@ -387,9 +388,9 @@ TEST(SessionScore, AgreesWithASlowComputationWhereTheAnatomyBreathes) {
 TEST(SessionScore, DoesNotDependOnThreads) {
     const Scene scene = random_scene(99, true);
     const BreathingBall body = scene.body();
+    ThreadJobs four_threads(4);
     ScoreOptions one, four;
-    one.threads = 1;
-    four.threads = 4;
+    four.jobs = &four_threads;
     EXPECT_EQ(score_json(score_session(scene.session, scene.exercise, &body, kLabels, one),
                          scene.exercise),
               score_json(score_session(scene.session, scene.exercise, &body, kLabels, four),

@@ -12,7 +12,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-// A ball of liver in muscle; the edge is no multiple of a brick.
+// A ball of liver in muscle; the edge is not a multiple of a brick's.
 LabelVolume ball(int edge, double voxel_mm) {
     LabelVolume volume;
     volume.grid.size = {edge, edge, edge};

@@ -3,14 +3,17 @@
 #include "pipeline/import/surface/surface_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <sstream>
 
+#include "support/box_mesh.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
@@ -220,6 +223,31 @@ TEST(ImportSurface, ScaleTurnsMetresIntoMillimetres) {
     SurfaceFileOptions options;
     options.scale = 1000;
     expect_ellipsoid(import_surface(path, options), "scaled");
+}
+
+// A box of 8 corners, 10 units wide: no torso, but a tissue that a recording may be scored with.
+TEST(ImportSurface, LimitsOfATorsoDoNotBelongToOtherMeshes) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("box.obj", testing::kBoxObj);
+    EXPECT_FALSE(import_surface(path));
+    const auto box = import_surface(path, {.torso = false});
+    ASSERT_TRUE(box) << box.error().message();
+    EXPECT_EQ(box->points.size(), 8u);
+    EXPECT_EQ(box->triangles.size(), 12u);
+    for (std::size_t i = 0; i < box->points.size(); ++i)  // outwards, from the middle
+        EXPECT_GT(dot(box->normals[i], box->points[i] - Point3{0, 0, 5}), 0);
+}
+
+TEST(ImportSurfaceRefuses, DevicesAndPipes) {
+    const TemporaryFolder folder;
+    const std::string pipe = folder / "pipe.csv", device = folder / "zero.ply";
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    std::filesystem::create_symlink("/dev/zero", device);
+    for (const auto& [path, what] : {std::pair(pipe, "is a pipe"), {device, "is a device"}}) {
+        const auto surface = import_surface(path);
+        ASSERT_FALSE(surface) << path;
+        EXPECT_EQ(surface.error().what, what);
+    }
 }
 
 TEST(ImportSurfaceRefuses, TooFewPointsNoneAndWhatIsNotThere) {

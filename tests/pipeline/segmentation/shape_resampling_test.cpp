@@ -8,8 +8,7 @@
 
 #include "formats/volume/boundary_record.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/segmentation/field/label_field.h"
-#include "pipeline/segmentation/field/volume_correction.h"
+#include "pipeline/segmentation/known_maps.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/segmentation/smooth_labels.h"
 #include "support/random.h"
@@ -22,24 +21,9 @@ using sonocase::testing::count_label;
 using sonocase::testing::cubic_grid;
 using sonocase::testing::norm_of;
 using sonocase::testing::Random;
+using sonocase::testing::rigid_registration;
 using sonocase::testing::sample_labels;
-
-Registration registration_of(const Rigid& motion, const Grid& grid) {
-    Registration registration;
-    registration.mannequin_from_ct = motion;
-    registration.quadratic = QuadraticMap::from_rigid(motion, {0, 0, 0}, 100);
-    registration.ct_box = grid.bounds();
-    registration.min_det_jacobian = 1;
-    return registration;
-}
-
-Grid thick_grid(int edge, double slice_mm) {
-    Grid grid = cubic_grid(edge);
-    grid.spacing_mm.z = slice_mm;
-    grid.size.z = static_cast<int>(edge / slice_mm);
-    grid.origin_mm.z = -0.5 * slice_mm * (grid.size.z - 1);
-    return grid;
-}
+using sonocase::testing::thick_grid;
 
 double percentile(std::vector<double> values, double part) {
     std::sort(values.begin(), values.end());
@@ -95,14 +79,14 @@ TEST(ShapeResampling, BoundaryPlanesOfATurnedSphereAreExact) {
     const LabelVolume ct =
         sample_labels(cubic_grid(44), 2, [&](Point3 p) { return distance(p) < 0 ? 1 : 0; });
     const Rigid motion = random.rigid(50);
-    const auto result = resample_labels({ct, registration_of(motion, ct.grid)});
+    const auto result = resample_labels({ct, rigid_registration(motion, ct.grid)});
     ASSERT_TRUE(result);
     const RecordErrors errors = record_errors(result->volume, result->boundary, motion, distance);
     ASSERT_GT(errors.distance_mm.size(), 4000u);  // 4 pi r^2 times 3 mm is 8482
-    // What the bar for organs asks; the six facets that voxels leave on a sphere are most of it.
+    // The targets for organs; most of the error is at the six facets that voxels leave on a sphere.
     EXPECT_LT(percentile(errors.distance_mm, 0.95), 0.15);
     EXPECT_LT(percentile(errors.normal_deg, 0.95), 8.0);
-    // Against the voxels of the map; counting voxels on another grid adds 0.3 %.
+    // Compared with the voxels of the map; counting voxels on another grid adds 0.3 %.
     EXPECT_NEAR(result->changes.at(0).change(), 0, 0.01);
 }
 
@@ -111,7 +95,7 @@ TEST(ShapeResampling, TubeOfTwoMillimetresKeepsVolumeAndPlanes) {
     const auto distance = [&](Point3 p) { return norm(cross(p - Point3{}, axis)) - 2.0; };
     const LabelVolume ct =
         sample_labels(cubic_grid(40), 2, [&](Point3 p) { return distance(p) < 0 ? 1 : 0; });
-    const auto result = resample_labels({ct, registration_of({}, ct.grid)});
+    const auto result = resample_labels({ct, rigid_registration({}, ct.grid)});
     ASSERT_TRUE(result);
     const double kept = result->changes.at(0).change();
     EXPECT_NEAR(kept, 0, 0.05);
@@ -125,7 +109,7 @@ TEST(ShapeResampling, ObliqueVesselStaysOnePieceThroughThickSlices) {
     const auto inside = [&](Point3 p) { return norm(cross(p - Point3{}, axis)) < 2.0; };
     const LabelVolume ct =
         sample_labels(thick_grid(60, 5), 3, [&](Point3 p) { return inside(p) ? 1 : 2; });
-    const auto result = resample_labels({ct, registration_of({}, ct.grid)});
+    const auto result = resample_labels({ct, rigid_registration({}, ct.grid)});
     ASSERT_TRUE(result);
     const Grid& g = result->volume.grid;
     for (double along = -20; along <= 20; along += 0.5) {
@@ -138,32 +122,14 @@ TEST(ShapeResampling, ObliqueVesselStaysOnePieceThroughThickSlices) {
     EXPECT_NEAR(result->changes.at(0).change(), 0, 0.05);
 }
 
-// Cells are weighed a block at a time. What all labels together seem to lack of a weight that
-// varies inside the blocks must not drive their prices to the limit, where none is kept.
-TEST(LabelPrices, KeepVolumesWhereTheWeightVaries) {
-    const LabelVolume ct = sample_labels(cubic_grid(48), 4, [](Point3 p) {
-        if (norm(p - Point3{-9, 4, 0}) < 5) return 2;
-        if (norm(p - Point3{9, 0, -6}) < 2) return 3;
-        return norm_of(p) < 19 ? 1 : 0;
-    });
-    LabelField field(ct, {});
-    const LabelPriceReport report = set_label_prices(
-        &field, [](Point3 p) { return 1 + 0.8 * std::cos(0.785398 * (p.x + 20)); });
-    EXPECT_LT(report.largest_miss, 0.01);
-    for (std::size_t l = 0; l < 4; ++l) {
-        EXPECT_NEAR(report.reached_mm3[l] / report.target_mm3[l], 1, 0.01) << l;
-        EXPECT_LT(std::abs(field.prices()[l]), 0.6) << l;  // the limit is 1.5
-    }
-}
-
-// A fit may be proven on a box larger than the map: what lies beyond the map's voxels is not known.
+// A fit may be proven on a box larger than the map, but nothing is known beyond the map's voxels.
 TEST(ShapeResampling, NothingIsReadBeyondTheMap) {
     for (const double slice_mm : {2.0, 5.0}) {
         SCOPED_TRACE(slice_mm);
         Grid grid = thick_grid(40, slice_mm);
         const LabelVolume ct =
             sample_labels(grid, 3, [](Point3 p) { return std::abs(p.x) < 12 ? 1 : 2; });
-        Registration registration = registration_of({{}, {0.4, 0.3, 0.2}}, grid);
+        Registration registration = rigid_registration({{}, {0.4, 0.3, 0.2}}, grid);
         for (int a = 0; a < 3; ++a) {
             registration.ct_box.lower[a] -= 8;
             registration.ct_box.upper[a] += 8;
@@ -183,7 +149,7 @@ TEST(ShapeResampling, SlicesMayLieAlongAnyAxis) {
         grid.size[axis] = 10;
         grid.origin_mm[axis] = -18;
         const LabelVolume ct = sample_labels(grid, 2, inside);
-        const auto result = resample_labels({ct, registration_of({}, grid)});
+        const auto result = resample_labels({ct, rigid_registration({}, grid)});
         ASSERT_TRUE(result);
         const LabelVolume truth = sample_labels(result->volume.grid, 2, inside);
         std::size_t wrong = 0;
@@ -204,7 +170,7 @@ TEST(ShapeResampling, ThinLabelsSurvive) {
         if (p.y == 0) return 2;
         return 1;
     });
-    const auto result = resample_labels({ct, registration_of({}, ct.grid)});
+    const auto result = resample_labels({ct, rigid_registration({}, ct.grid)});
     ASSERT_TRUE(result);
     for (int label = 1; label <= 5; ++label) {
         EXPECT_GT(count_label(result->volume, label), 0u) << label;
@@ -223,13 +189,13 @@ TEST(ShapeResampling, ThinLabelsSurvive) {
     }
 }
 
-// A skin of one voxel round a ball: default smoothing must neither thin nor pierce it.
+// A skin of one voxel around a ball: the default smoothing must neither thin nor pierce it.
 TEST(ShapeResampling, SkinOfOneVoxelStaysWhole) {
     const LabelVolume ct = sample_labels(cubic_grid(54), 3, [](Point3 p) {
         const double r = norm_of(p);
         return r > 22 ? 0 : r > 21 ? 1 : 2;
     });
-    const auto result = resample_labels({ct, registration_of({}, ct.grid)});
+    const auto result = resample_labels({ct, rigid_registration({}, ct.grid)});
     ASSERT_TRUE(result);
     EXPECT_NEAR(result->changes.at(0).change(), 0, 0.2);
     const std::uint64_t seed = 7;
@@ -248,7 +214,7 @@ TEST(ShapeResampling, SkinOfOneVoxelStaysWhole) {
         }
         pierced += !met;
     }
-    // The input's own voxels, where they meet at edges alone, leave gaps for a straight line.
+    // Where voxels of the input itself meet only at edges, a straight line passes between them.
     EXPECT_LT(pierced, 80);
 }
 
@@ -258,7 +224,7 @@ TEST(ShapeResampling, LabelSmallerThanAVoxelIsKeptAndNamed) {
     });
     ResampleOptions options;
     options.voxel_mm = 5;
-    const auto result = resample_labels({ct, registration_of({}, ct.grid)}, options);
+    const auto result = resample_labels({ct, rigid_registration({}, ct.grid)}, options);
     ASSERT_TRUE(result);
     EXPECT_GE(count_label(result->volume, 2), 1u);
     const LabelChange& change = result->changes.at(1);
@@ -272,7 +238,7 @@ TEST(ShapeResampling, SameBytesForOneAndTwoThreads) {
         return norm_of(p) > 17 ? 0 : p.x < 2 * p.z ? 1 : p.y < 0.3 * p.x ? 2 : 3;
     });
     Random random(9);
-    const Registration registration = registration_of(random.rigid(30), ct.grid);
+    const Registration registration = rigid_registration(random.rigid(30), ct.grid);
     std::vector<std::uint8_t> labels[2];
     RawVector<std::uint32_t> records[2];
     for (const int threads : {1, 2}) {
@@ -290,7 +256,7 @@ TEST(ShapeResampling, UnknownMethodIsRefused) {
     const LabelVolume ct = sample_labels(cubic_grid(4), 2, [](Point3) { return 1; });
     ResampleOptions options;
     options.method = "cubic";
-    EXPECT_FALSE(resample_labels({ct, registration_of({}, ct.grid)}, options));
+    EXPECT_FALSE(resample_labels({ct, rigid_registration({}, ct.grid)}, options));
 }
 
 TEST(JointSmoothing, KeepsTheTubeThatLevelSetsRemove) {

@@ -9,6 +9,7 @@
 #include "formats/bundle/stage_files.h"
 #include "formats/volume/boundary_record.h"
 #include "pipeline/base/parallel.h"
+#include "pipeline/segmentation/known_maps.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "support/random.h"
 #include "support/shapes.h"
@@ -20,6 +21,7 @@ using sonocase::testing::count_label;
 using sonocase::testing::cubic_grid;
 using sonocase::testing::norm_of;
 using sonocase::testing::Random;
+using sonocase::testing::rigid_registration;
 using sonocase::testing::sample_labels;
 
 // A ball in a ball, cut by a plane, and a tube: organs, an edge and a vessel.
@@ -29,13 +31,8 @@ ResampleResult torso(double snap_vx) {
         if (norm_of(p) < 9) return 3;
         return norm_of(p) > 19 ? 0 : p.z < 0.2 * p.x ? 1 : 2;
     });
-    Registration registration;
     Random random(3);
-    const Rigid motion = random.rigid(20);
-    registration.mannequin_from_ct = motion;
-    registration.quadratic = QuadraticMap::from_rigid(motion, {0, 0, 0}, 100);
-    registration.ct_box = ct.grid.bounds();
-    registration.min_det_jacobian = 1;
+    const Registration registration = rigid_registration(random.rigid(20), ct.grid);
     ResampleOptions options;
     options.snap_vx = snap_vx;
     return std::move(*resample_labels({ct, registration}, options));

@@ -2,10 +2,13 @@
 
 // The program sonocase as a user meets it: exit statuses, one-line errors, nothing half-written.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "support/box_mesh.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 #include "support/temporary_folder.h"
@@ -92,6 +95,46 @@ TEST(CommandLine, FailureIsStatusOneWithOneLineAndNothingWritten) {
         EXPECT_NE(result.error.find(part), std::string::npos) << arguments << "\n" << result.error;
         EXPECT_EQ(folder.names(), before) << arguments;
     }
+}
+
+// Reading a device may never end, and opening a pipe waits for its writer.
+TEST(CommandLine, DevicesAndPipesAreRefusedAtOnce) {
+    const TemporaryFolder folder;
+    ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+    for (const auto& [arguments, part] :
+         {std::pair<const char*, const char*>{"inspect /dev/zero", "/dev/zero: is a device"},
+          {"inspect pipe", "pipe: is a pipe"},
+          {"validate /dev/zero", "is a device"},
+          {"build /dev/zero -o out.sonocase", "is a device"},
+          {"import /dev/zero -o out.labels", "/dev/zero"},
+          {"score pipe", "is a pipe"}}) {
+        const CommandResult result = sonocase_run(arguments, folder);
+        EXPECT_EQ(result.status, 1) << arguments << "\n" << result.error;
+        EXPECT_EQ(lines(result.error), 1) << arguments << "\n" << result.error;
+        EXPECT_NE(result.error.find(part), std::string::npos) << arguments << "\n" << result.error;
+    }
+}
+
+// A needle that goes 5 mm straight into a box of 8 corners and out again.
+TEST(CommandLine, ScoresARecordingOfAnotherTrainerAgainstItsTissueMesh) {
+    const TemporaryFolder folder;
+    folder.write("box.obj", sonocase::testing::kBoxObj);
+    std::string log = "<TransformRecorderLog>\n";
+    for (int n = 0; n <= 20; ++n) {
+        const int tip_mm = 5 + std::abs(n - 10);  // 15 ... 5 ... 15; the box ends at 10
+        log += "<log TimeStampSec=\"" + std::to_string(n) +
+               "\" TimeStampNSec=\"0\" type=\"transform\" "
+               "DeviceName=\"NeedleToReference\" transform=\"1 0 0 0 0 -1 0 0 0 0 -1 " +
+               std::to_string(tip_mm) + " 0 0 0 1\" />\n";
+    }
+    folder.write("log.xml", log + "</TransformRecorderLog>\n");
+    folder.write("exercise.toml", "name = \"box\"\n");
+    const CommandResult result =
+        sonocase_run("score log.xml --body box.obj --exercise exercise.toml --json", folder);
+    ASSERT_EQ(result.status, 0) << result.error;
+    const auto metrics = nlohmann::json::parse(result.out)["metrics"];
+    EXPECT_EQ(metrics["insertions"], 1);
+    EXPECT_NEAR(metrics["deepest_mm"].get<double>(), 5, 1e-9);
 }
 
 TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A bundle that is unpacked as frames need it shows what a bundle that is all there shows, wherever
-// the probe is, whatever moves.
-#include "formats/bundle/case_bundle.h"
+// A bundle that is unpacked as frames need it shows what a complete bundle shows, wherever the
+// probe is and whatever moves.
+#include "formats/bundle/streamed_bundle.h"
 
 #include <gtest/gtest.h>
 
@@ -17,13 +17,15 @@ namespace {
 
 using sonocase::testing::TemporaryFolder;
 
-// What was not unpacked is not there: its records turn everything into label 1 beyond a plane.
-CaseBundle opened(const std::string& path) {
+// Blocks that are not unpacked hold nonsense: records that turn everything beyond a plane into
+// label 1.
+StreamedBundle opened(const std::string& path) {
     auto bundle = open_bundle(path);
     EXPECT_TRUE(bundle.has_value());
-    EXPECT_TRUE(bundle->blocks);
-    std::fill(bundle->boundary.pool.begin(), bundle->boundary.pool.end(), 0x40408101u);
-    std::fill(bundle->echo_offset.pool.begin(), bundle->echo_offset.pool.end(), std::int8_t{99});
+    EXPECT_TRUE(bundle->blocks());
+    auto& inside = const_cast<CaseBundle&>(**bundle);
+    std::fill(inside.boundary.pool.begin(), inside.boundary.pool.end(), 0x40408101u);
+    std::fill(inside.echo_offset.pool.begin(), inside.echo_offset.pool.end(), std::int8_t{99});
     return std::move(*bundle);
 }
 
@@ -46,11 +48,10 @@ TEST(OpenBundle, FramesAreThoseOfTheWholeBundle) {
         exercise.breathing.amplitude_mm = 12;
         exercise.breathing.direction = {0, 0.6, 0.8};
         const CaseBundle whole = *load_bundle(path);
-        EXPECT_FALSE(whole.blocks);
         auto expected = Renderer::create(whole, exercise, options);
         ASSERT_TRUE(expected);
         for (int n = 0; n < 8; ++n) {
-            const CaseBundle parts = opened(path);
+            const StreamedBundle parts = opened(path);
             auto renderer = Renderer::create(parts, exercise, options);
             ASSERT_TRUE(renderer);
             for (int frame = 0; frame < 3; ++frame) {
@@ -61,7 +62,7 @@ TEST(OpenBundle, FramesAreThoseOfTheWholeBundle) {
                 EXPECT_EQ(expected->render(input, a), renderer->render(input, b));
                 EXPECT_EQ(a, b) << "probe " << static_cast<int>(shape) << " pose " << n << " frame "
                                 << frame;
-                frames_with_blocks_left += !parts.blocks->whole();
+                frames_with_blocks_left += !parts.blocks()->whole();
             }
         }
     }
@@ -72,12 +73,14 @@ TEST(OpenBundle, ReadingAheadChangesNoPixel) {
     const TemporaryFolder folder;
     const std::string path = folder / "phantom.sonocase";
     ASSERT_TRUE(save_bundle(phantom(), path));
-    const CaseBundle whole = *load_bundle(path), parts = opened(path);
+    const CaseBundle whole = *load_bundle(path);
+    const StreamedBundle parts = opened(path);
     RenderOptions options;
     options.width_px = options.height_px = 160;
     const Exercise exercise = phantom_exercise();
     auto expected = Renderer::create(whole, exercise, options);
     options.read_ahead = true;
+    options.host = thread_host();
     auto renderer = Renderer::create(parts, exercise, options);
     ASSERT_TRUE(expected);
     ASSERT_TRUE(renderer);
@@ -91,7 +94,7 @@ TEST(OpenBundle, ReadingAheadChangesNoPixel) {
     }
 }
 
-// The phantom ends within what is read round the plane: a probe at rest finds all of it in the end.
+// The phantom ends within what is read around the plane: a probe at rest ends up with all of it.
 TEST(OpenBundle, ReadsAheadRoundThePlane) {
     const TemporaryFolder folder;
     const std::string path = folder / "phantom.sonocase";
@@ -100,13 +103,14 @@ TEST(OpenBundle, ReadsAheadRoundThePlane) {
     options.width_px = options.height_px = 32;
     std::vector<std::uint8_t> pixels(32 * 32);
     for (const bool ahead : {false, true}) {
-        const CaseBundle parts = opened(path);
+        const StreamedBundle parts = opened(path);
         options.read_ahead = ahead;
+        options.host = thread_host();
         auto renderer = Renderer::create(parts, phantom_exercise(), options);
         ASSERT_TRUE(renderer);
         renderer->render({}, pixels);
-        while (ahead && !parts.blocks->whole()) std::this_thread::yield();
-        EXPECT_EQ(parts.blocks->whole(), ahead);
+        while (ahead && !parts.blocks()->whole()) std::this_thread::yield();
+        EXPECT_EQ(parts.blocks()->whole(), ahead);
     }
 }
 
@@ -114,14 +118,14 @@ TEST(OpenBundle, TheSlowRendererHasAllOfIt) {
     const TemporaryFolder folder;
     const std::string path = folder / "phantom.sonocase";
     ASSERT_TRUE(save_bundle(phantom(), path));
-    const CaseBundle parts = opened(path);
+    const StreamedBundle parts = opened(path);
     RenderOptions options;
     options.kind = RendererKind::reference;
     options.scanlines = 16;
     options.samples = 64;
     options.width_px = options.height_px = 32;
     ASSERT_TRUE(Renderer::create(parts, phantom_exercise(), options));
-    EXPECT_TRUE(parts.blocks->whole());
+    EXPECT_TRUE(parts.blocks()->whole());
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 
 std::unique_ptr<OpenCase> small_open_case() {
     auto open = std::make_unique<OpenCase>();
-    open->bundle = testing::small_case();
+    open->bundle = StreamedBundle(testing::small_case());
     open->exercises = {testing::small_exercise()};
     return open;
 }

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The parts that score_session() puts together: one file per group of docs/metrics.md. Internal to
+// formats/scoring.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "formats/scoring/needle_readings.h"
+#include "formats/scoring/session_score.h"
+
+namespace sonocase::detail {
+
+inline constexpr double kDegrees = 180 / 3.14159265358979323846;
+
+using MetricValues = std::map<std::string, double>;
+
+// What every part reads. Index i is a reading of the needle: needle.points[i], readings[i].
+struct ScoreInput {
+    const Session& session;
+    const Exercise& exercise;
+    const Anatomy* anatomy;  // may be null
+    const ScoreOptions& options;
+    ToolTrack probe, needle;
+    std::vector<NeedleReading> readings;
+
+    double time(std::size_t i) const { return needle.points[i].time_s; }
+    double step_s(std::size_t i) const { return i == 0 ? 0 : time(i) - time(i - 1); }
+    Point3 tip(std::size_t i) const {
+        const Vector3& t = needle.points[i].pose.translation;
+        return {t.x, t.y, t.z};
+    }
+    Vector3 direction(std::size_t i) const { return needle.points[i].pose.rotation.column(2); }
+    // The centre of target t at a time: targets breathe with the anatomy.
+    Point3 target_at(std::size_t t, double time_s) const {
+        const Point3 centre = exercise.targets[t].centre;
+        return anatomy ? anatomy->moved(centre, time_s) : centre;
+    }
+    double target_shift_mm() const { return anatomy ? anatomy->greatest_shift_mm() : 0; }
+};
+
+// docs/metrics.md, part 2. `tool` is the beginning of the names: "needle_", "probe_".
+void score_motion(const std::string& tool,
+                  const ToolTrack& track,
+                  const MotionOptions& options,
+                  MetricValues& values);
+
+// Part 3: the needle in the body, apart from insertions. `has_no_go`: the body has at least one
+// of the structures to be spared.
+void score_tissue(const ScoreInput& input,
+                  bool has_no_go,
+                  MetricValues& values,
+                  std::vector<std::string>& warnings);
+std::vector<InsertionScore> find_insertions(const ScoreInput& input);
+
+// Part 4. `scores` has one entry per target of the exercise.
+void score_targets_hit(const ScoreInput& input,
+                       const std::vector<InsertionScore>& insertions,
+                       MetricValues& values,
+                       std::vector<TargetScore>& scores);
+void score_targets_scanned(const ScoreInput& input,
+                           MetricValues& values,
+                           std::vector<TargetScore>& scores);
+
+// Part 5: needle and image together, and the probe on the skin.
+void score_guidance(const ScoreInput& input, MetricValues& values);
+void score_probe_use(const ScoreInput& input, MetricValues& values);
+
+}  // namespace sonocase::detail

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Wall-clock time on a steady clock, for reports.
+#pragma once
+
+#include <chrono>
+
+namespace sonocase::pipeline {
+
+class Stopwatch {
+  public:
+    // Since construction or the last lap.
+    double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+    // As seconds(), and starts again from 0.
+    double lap() {
+        const Clock::time_point now = Clock::now();
+        const double elapsed = std::chrono::duration<double>(now - start_).count();
+        start_ = now;
+        return elapsed;
+    }
+
+  private:
+    using Clock = std::chrono::steady_clock;
+    Clock::time_point start_ = Clock::now();
+};
+
+}  // namespace sonocase::pipeline

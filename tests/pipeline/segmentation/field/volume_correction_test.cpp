@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/segmentation/field/volume_correction.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/shapes.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using sonocase::testing::cubic_grid;
+using sonocase::testing::norm_of;
+using sonocase::testing::sample_labels;
+
+// Cells are weighted block by block. The deficit that all labels seem to share under a weight that
+// varies inside the blocks must not drive their offsets to the limit, where none is kept.
+TEST(VolumeCorrection, KeepVolumesWhereTheWeightVaries) {
+    const LabelVolume ct = sample_labels(cubic_grid(48), 4, [](Point3 p) {
+        if (norm(p - Point3{-9, 4, 0}) < 5) return 2;
+        if (norm(p - Point3{9, 0, -6}) < 2) return 3;
+        return norm_of(p) < 19 ? 1 : 0;
+    });
+    LabelField field(ct, {});
+    const VolumeCorrectionReport report =
+        correct_volumes(&field, [](Point3 p) { return 1 + 0.8 * std::cos(0.785398 * (p.x + 20)); });
+    EXPECT_LT(report.largest_error, 0.01);
+    for (std::size_t l = 0; l < 4; ++l) {
+        EXPECT_NEAR(report.reached_mm3[l] / report.target_mm3[l], 1, 0.01) << l;
+        EXPECT_LT(std::abs(field.volume_offsets_mm()[l]), 0.6) << l;  // the limit is 1.5
+    }
+}
+
+// Scattered crumbs push offsets to their largest limit, for which cells far from any surface are
+// read: also cells that lie in a block of a single label.
+TEST(VolumeCorrection, LargestLimitReadsBlocksOfOneLabel) {
+    const LabelVolume ct = sample_labels(cubic_grid(64, 3), 4, [](Point3 p) {
+        if (p.x > 60) return p.y < 0 ? 2 : 0;
+        const auto i = static_cast<int>(std::lround(p.x / 3 + 31.5));
+        const auto j = static_cast<int>(std::lround(p.y / 3 + 31.5));
+        const auto k = static_cast<int>(std::lround(p.z / 3 + 31.5));
+        if (i < 12 && (i % 4 == 0) && (j % 4 == 0) && (k % 4 == 0)) return 3;
+        return p.x < -45 ? 1 : norm(p - Point3{30, 0, 0}) < 20 ? 2 : 0;
+    });
+    LabelField field(ct, {});
+    const VolumeCorrectionReport report = correct_volumes(&field, [](Point3) { return 1.0; });
+    double total = 0;
+    for (std::size_t l = 0; l < 4; ++l) total += report.reached_mm3[l] / report.target_mm3[l];
+    EXPECT_NEAR(std::abs(field.volume_offsets_mm()[3]), 4.5, 1e-4);
+    EXPECT_GT(total, 2.5);
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
