@@ -58,7 +58,7 @@ Result<Calibration> parse_calibration(std::string_view json, const std::string& 
     c.scale = object.number_or("scale", 1);
     if (!(c.scale > 0)) object.complain("scale", "is not above zero");
     c.rms_mm = object.number_or("rms_mm", -1);
-    // A null stands for a deviation that could not be found (an unobservable direction).
+    // null stands for an infinite standard deviation (an undetermined direction).
     if (const auto sigma = value.find("sigma_mm");
         sigma != value.end() && sigma->is_array() && sigma->size() == 3) {
         for (std::size_t a = 0; a < 3; ++a) {

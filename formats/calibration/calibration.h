@@ -13,10 +13,10 @@
 
 namespace sonocase {
 
-// kind "probe":      sensor_from_tool = probe_sensor_from_probe (origin and axes of the probe
-// frame) kind "needle":     sensor_from_tool = needle_sensor_from_needle (origin at the tip, z hub
-// to tip) kind "mannequin":  sensor_from_tool = world_from_mannequin, scale applied to the
-// mannequin first
+// kind         sensor_from_tool
+// "probe"      probe_sensor_from_probe: origin and axes of the probe frame
+// "needle"     needle_sensor_from_needle: origin at the tip, z from hub to tip
+// "mannequin"  world_from_mannequin; the scale is applied to the mannequin first
 struct Calibration {
     std::string kind;
     std::string sensor;  // serial or name; empty: unknown
@@ -24,7 +24,7 @@ struct Calibration {
     double scale = 1;
     double rms_mm = -1;            // negative: not measured
     Vector3 sigma_mm{-1, -1, -1};  // one standard deviation of the translation
-    double condition = -1;
+    double condition = -1;         // negative: not measured
     int poses = 0;
     std::string date;         // ISO 8601, UTC; given by the caller
     std::string data_digest;  // of the readings
@@ -34,8 +34,8 @@ struct Calibration {
 Result<Calibration> parse_calibration(std::string_view json, const std::string& where);
 std::string format_calibration(const Calibration& calibration);
 
-// What sonocase calibrate lag saves: the second recording shows a motion lag_s later than the
-// first. Nothing where the text is no such file; an Error where it is one and holds no finite lag.
+// Reads what `sonocase calibrate lag` saves: the second recording shows a motion lag_s later than
+// the first. Empty if the text is not such a file; an Error if it is one without a finite lag.
 Result<std::optional<double>> parse_lag_s(std::string_view json, const std::string& where);
 
 }  // namespace sonocase

@@ -6,9 +6,11 @@
 #include <cassert>
 #include <cmath>
 
-#include "formats/calibration/pivot_system.h"
 #include "formats/calibration/pose_screen.h"
-#include "formats/calibration/words.h"
+#include "formats/calibration/report_text.h"
+#include "formats/calibration/solve/least_squares.h"
+#include "formats/calibration/solve/pivot_search.h"
+#include "formats/calibration/solve/statistics.h"
 
 namespace sonocase {
 namespace {
@@ -19,7 +21,7 @@ struct Line {
     Point3 point;
     Vector3 direction;
     double along = 0;   // standard deviation along the line
-    double across = 0;  // and across it, a component
+    double across = 0;  // and across it, per component
 };
 
 Line fit_line(const std::vector<Point3>& points, const std::vector<std::size_t>& chosen) {
@@ -57,7 +59,8 @@ std::vector<std::size_t> straight_part(const std::vector<Point3>& points,
         for (const Point3& p : points) r.push_back(off_line(line, p));
         return r;
     };
-    // Least median over lines through two readings; wins only if far better than the plain fit.
+    // Least median of squares over lines through two readings; used only if far better than the
+    // plain fit.
     Line best = fit_line(points, all);
     double best_middle = 0.7 * median(residuals(best));
     IndexStream random(options.seed);
@@ -87,29 +90,12 @@ std::vector<std::size_t> straight_part(const std::vector<Point3>& points,
     return kept.size() >= 4 ? kept : all;
 }
 
-}  // namespace
-
-DirectionFit fit_direction(std::span<const Pose> readings, const DirectionOptions& options) {
-    assert(options.outlier_sigmas > 3 && options.trials >= 1);
-    DirectionFit out;
-    out.sigma_rad = INFINITY;
-    PoseScreen screen = screen_poses(readings);
-    out.warnings = std::move(screen.warnings);
-    const std::vector<Pose>& poses = screen.poses;
-    out.poses = static_cast<int>(poses.size());
-    if (poses.size() < 3) {
-        out.problem = text(
-            "%zu usable poses; at least 3 are needed and 30 or more are better: move the "
-            "tool along the direction, 50 mm or more, without turning it",
-            poses.size());
-        return out;
-    }
-    const std::vector<Point3> points = tip_trace(poses, options.tip_mm);
-    const std::vector<std::size_t> kept = straight_part(points, options);
-    Line line = fit_line(points, kept);
-    out.inliers = static_cast<int>(kept.size());
-
-    // The way it first went: the sign of the first stroke of a quarter of the whole length.
+// Points the line the way the sweep first went: that of its first stroke of a quarter of the whole
+// length. Sets the length and whether later strokes went back.
+void orient_line(const std::vector<Point3>& points,
+                 const std::vector<std::size_t>& kept,
+                 Line& line,
+                 DirectionFit& out) {
     double low = INFINITY, high = -INFINITY;
     std::vector<double> along;
     for (std::size_t i : kept) {
@@ -134,8 +120,14 @@ DirectionFit fit_direction(std::span<const Pose> readings, const DirectionOption
     }
     if (first < 0) line.direction = -line.direction;
     out.back_and_forth = turns > 0;
+}
 
-    // Orientation: its mean, and how far it strayed.
+// The line's direction in the sensor's frame, averaged over the poses, and how far the tool turned
+// about its mean orientation.
+void project_into_sensor(const std::vector<Pose>& poses,
+                         const std::vector<std::size_t>& kept,
+                         const Line& line,
+                         DirectionFit& out) {
     Matrix3 mean = {{0, 0, 0, 0, 0, 0, 0, 0, 0}};
     Vector3 k;
     for (std::size_t i : kept) {
@@ -156,7 +148,14 @@ DirectionFit fit_direction(std::span<const Pose> readings, const DirectionOption
         out.turn_rad = 3.14159265358979323846;
     }
     out.direction = normalized(k);
+}
 
+// Distances from the line, their rms, and the correlation of successive ones (0 if within chance).
+double fill_residuals(const std::vector<Pose>& poses,
+                      const std::vector<Point3>& points,
+                      const std::vector<std::size_t>& kept,
+                      const Line& line,
+                      DirectionFit& out) {
     double square = 0, product = 0;
     Vector3 before;
     for (const Pose& p : poses) out.residuals.push_back({p.frame, p.timestamp_s, 0, false, -1});
@@ -175,18 +174,23 @@ DirectionFit fit_direction(std::span<const Pose> readings, const DirectionOption
     out.rms_mm = std::sqrt(square / n);
     double rho = square > 0 ? product / square : 0;
     rho = rho > 2 / std::sqrt(2 * n) ? std::min(rho, 0.98) : 0;
-    out.condition = line.across > 0 ? line.along / line.across : INFINITY;
+    return rho;
+}
 
+// Whether the path determines a direction, and what is doubtful about it.
+void judge_path(const Line& line, double rho, DirectionFit& out) {
+    const auto n = static_cast<double>(out.inliers);
     if (out.length_mm < 1 || out.condition < 3) {
         out.problem =
             out.length_mm < 1
                 ? text("the tool moved only %.2f mm; move it along the direction, 50 mm or more",
                        out.length_mm)
                 : text(
-                      "the path is no line (%.1f mm along, %.1f mm rms across); move the tool "
+                      "the path is not a straight line (%.1f mm along, %.1f mm rms across); move "
+                      "the tool "
                       "along a straight edge",
                       out.length_mm, out.rms_mm);
-        return out;
+        return;
     }
     out.determined = true;
     out.sigma_rad = line.across / (line.along * std::sqrt(n)) * std::sqrt((1 + rho) / (1 - rho));
@@ -216,6 +220,34 @@ DirectionFit fit_direction(std::span<const Pose> readings, const DirectionOption
         out.warnings.push_back(text("%d of %d poses lie off the line and are left out.",
                                     out.poses - out.inliers, out.poses));
     }
+}
+
+}  // namespace
+
+DirectionFit fit_direction(std::span<const Pose> readings, const DirectionOptions& options) {
+    assert(options.outlier_sigmas > 3 && options.trials >= 1);
+    DirectionFit out;
+    out.sigma_rad = INFINITY;
+    PoseScreen screen = screen_poses(readings);
+    out.warnings = std::move(screen.warnings);
+    const std::vector<Pose>& poses = screen.poses;
+    out.poses = static_cast<int>(poses.size());
+    if (poses.size() < 3) {
+        out.problem = text(
+            "%zu usable poses; at least 3 are needed and 30 or more are better: move the "
+            "tool along the direction, 50 mm or more, without turning it",
+            poses.size());
+        return out;
+    }
+    const std::vector<Point3> points = tip_trace(poses, options.tip_mm);
+    const std::vector<std::size_t> kept = straight_part(points, options);
+    Line line = fit_line(points, kept);
+    out.inliers = static_cast<int>(kept.size());
+    orient_line(points, kept, line, out);
+    project_into_sensor(poses, kept, line, out);
+    const double rho = fill_residuals(poses, points, kept, line, out);
+    out.condition = line.across > 0 ? line.along / line.across : INFINITY;
+    judge_path(line, rho, out);
     return out;
 }
 

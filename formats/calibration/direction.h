@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Directions of a tool, seen from the sensor on it, from a sweep along each: the tool is moved
-// along the direction while its orientation is held. Two sweeps give the probe's frame.
+// Directions of a tool in the frame of the sensor on it, from one sweep along each: the tool is
+// moved along the direction while its orientation is held. Two sweeps give the probe's frame.
 //
 // [Magee] eq. (14) takes successive pairs of readings, each a unit vector V_n, and projects them
-// into (S_dir, S_ori, S_3). Pairs that lie close together are mostly noise, and a hand goes back
-// and forth. Here the path is fitted by a robust straight line in the tracker's frame and the line
-// projected into the sensor's frame at every reading; the paper's form is kept as oracle.
+// into (S_dir, S_ori, S_3). Pairs that lie close together are mostly noise, and a hand moves back
+// and forth. Here a straight line is fitted robustly to the path in the tracker's frame and
+// projected into the sensor's frame at every reading; the paper's form is kept as the oracle.
 #pragma once
 
 #include <span>
@@ -27,13 +27,13 @@ struct DirectionOptions {
 };
 
 struct DirectionFit {
-    Vector3 direction{0, 0, 1};   // sensor frame, unit; points the way the sweep first went
-    double sigma_rad = 0;         // one standard deviation, each way; infinite if undetermined
-    double rms_mm = 0;            // distance from the line
-    double length_mm = 0;         // of the path along the line
-    double turn_rad = 0;          // rms change of orientation about its mean
-    double condition = 0;         // spread along the line over spread across it
-    bool back_and_forth = false;  // the way along the line changed sign
+    Vector3 direction{0, 0, 1};  // sensor frame, unit; points the way the sweep went first
+    double sigma_rad = 0;  // one standard deviation about either axis; infinite if undetermined
+    double rms_mm = 0;     // distance from the line
+    double length_mm = 0;  // of the path along the line
+    double turn_rad = 0;   // rms change of orientation about its mean
+    double condition = 0;  // spread along the line over spread across it
+    bool back_and_forth = false;  // the sweep reversed
     int poses = 0, inliers = 0;
     bool determined = false;
     std::string problem;
@@ -41,10 +41,10 @@ struct DirectionFit {
     std::vector<std::string> warnings;
 };
 
-// Never fails; poor data give determined == false or warnings. 5 ms for 1,000 poses.
+// Never fails; poor data give determined == false or warnings. Cost: 5 ms for 1,000 poses.
 DirectionFit fit_direction(std::span<const Pose> poses, const DirectionOptions& options = {});
 
-// Eq. (14) to the letter: mean over successive pairs at least min_step_mm apart. Poses as screened.
+// Eq. (14) as printed: the mean over successive pairs at least min_step_mm apart. Screened poses.
 Vector3 fit_direction_paper(std::span<const Pose> poses, double min_step_mm = 1);
 
 struct ProbeFrame {
@@ -56,8 +56,8 @@ struct ProbeFrame {
     std::vector<std::string> warnings;
 };
 
-// Makes the two orthonormal by turning each by its share of the error, by their variances;
-// elevation is depth x lateral.
+// Makes the two directions orthogonal by turning each by a share of the error in proportion to its
+// variance; elevation is depth x lateral.
 ProbeFrame make_probe_frame(const DirectionFit& depth, const DirectionFit& lateral);
 
 }  // namespace sonocase

@@ -5,14 +5,14 @@
 #include <cassert>
 #include <cmath>
 
-#include "formats/calibration/words.h"
+#include "formats/calibration/report_text.h"
 
 namespace sonocase {
 namespace {
 
 using namespace calibrate;
 
-// Mean of the finite points in another frame; false if there are none. Adds squared scatter.
+// Mean of the finite points in another frame, false if there are none; adds their squared scatter.
 bool mean_in(const Rigid& probe_from_sensor,
              std::span<const Point3> points,
              Point3* mean,
@@ -83,7 +83,7 @@ ImagePlane fit_image_plane(const ImagePlaneInput& input) {
         out.upside_down = front.z - middle.z < 0;
     }
 
-    // Middle of the face in the old frame, then half turns about the depth or the lateral axis.
+    // Middle of the face in the old frame; then half turns about the depth or the lateral axis.
     Rigid probe_from_new{{}, {middle.x, middle.y, middle.z}};
     Matrix3 turn;
     if (out.mirrored) turn = Matrix3::diagonal({-1, -1, 1}) * turn;
@@ -94,13 +94,14 @@ ImagePlane fit_image_plane(const ImagePlaneInput& input) {
 
     if (out.mirrored) {
         out.warnings.push_back(
-            "The marked end lies on the other side than the lateral sweep says: the image would "
-            "be mirrored. The probe's frame was turned round; check the picture, and sweep "
+            "The marked end is on the opposite side to the one that the lateral sweep went to: the "
+            "image would be mirrored. The probe's frame was turned round; check the picture, and "
+            "sweep "
             "towards the mark next time.");
     }
     if (out.upside_down) {
         out.warnings.push_back(
-            "What lies in front of the face has negative depth: the image would be upside down. "
+            "The touches in front of the face have negative depth: the image would be upside down. "
             "The probe's frame was turned over; make the depth sweep into the body next time.");
     }
     if (out.face_angle_rad > 5 * kDegree) {

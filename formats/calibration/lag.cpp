@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/calibration/least_squares.h"
 #include "formats/calibration/pose_screen.h"
-#include "formats/calibration/words.h"
+#include "formats/calibration/report_text.h"
+#include "formats/calibration/solve/least_squares.h"
+#include "formats/calibration/solve/statistics.h"
 
 namespace sonocase {
 namespace {
@@ -65,6 +66,67 @@ double correlation(const double* a, const double* b, std::size_t n) {
         ab += (a[i] - ma) * (b[i] - mb);
     }
     return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0;
+}
+
+// Whether a signal moves: its spread exceeds that of its second differences, which is noise.
+bool moves(const std::vector<double>& y) {
+    double mean = 0, spread = 0, noise = 0;
+    for (double v : y) mean += v / static_cast<double>(y.size());
+    for (std::size_t i = 2; i < y.size(); ++i) {
+        spread += (y[i] - mean) * (y[i] - mean);
+        noise += (y[i] - 2 * y[i - 1] + y[i - 2]) * (y[i] - 2 * y[i - 1] + y[i - 2]);
+    }
+    return spread > 1e-18 && spread > noise;
+}
+
+// Standard deviation of the lag: what the fit of the first signal to the second leaves over,
+// widened by its correlation, against the steepness of the signal.
+double lag_sigma_s(const double* middle, const double* matched, std::size_t n, double step) {
+    double aa = 0, ab = 0, ma = 0, mb = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        ma += middle[i] / static_cast<double>(n);
+        mb += matched[i] / static_cast<double>(n);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+        aa += (middle[i] - ma) * (middle[i] - ma);
+        ab += (middle[i] - ma) * (matched[i] - mb);
+    }
+    const double gain = ab / aa;
+    double left_over = 0, steep = 0, product = 0, before = 0;
+    for (std::size_t i = 1; i < n; ++i) {
+        const double r = matched[i] - mb - gain * (middle[i] - ma);
+        const double slope = gain * (middle[i] - middle[i - 1]) / step;
+        left_over += r * r;
+        steep += slope * slope;
+        product += r * before;
+        before = r;
+    }
+    const double rho = left_over > 0 ? std::clamp(product / left_over, 0.0, 0.99) : 0;
+    const double variance = left_over / static_cast<double>(n);
+    return std::sqrt(variance / steep * (1 + rho) / (1 - rho));
+}
+
+void warn_of_doubtful_lag(double step, LagFit& out) {
+    if (std::abs(out.correlation) < 0.9) {
+        out.warnings.push_back(
+            text("The correlation at the peak is %.2f only; move more briskly, or check the "
+                 "signal taken from the image.",
+                 out.correlation));
+    }
+    // A second peak nearly as high: an even motion fits at several lags.
+    for (std::size_t k = 1; k + 1 < out.curve.size(); ++k) {
+        const double c = std::abs(out.curve[k]);
+        const bool summit = c >= std::abs(out.curve[k - 1]) && c >= std::abs(out.curve[k + 1]);
+        const bool same_sign = out.curve[k] * out.correlation > 0;
+        if (summit && same_sign && std::abs(out.curve_lag_s[k] - out.lag_s) > 5 * step &&
+            c > 0.97 * std::abs(out.correlation)) {
+            out.warnings.push_back(
+                text("A lag of %.3f s fits nearly as well as %.3f s; the motion was too "
+                     "even: move unevenly.",
+                     out.curve_lag_s[k], out.lag_s));
+            break;
+        }
+    }
 }
 
 }  // namespace
@@ -136,16 +198,6 @@ LagFit fit_lag(const Signal& first, const Signal& second, const LagOptions& opti
     const std::vector<double> yb = resampled(b, start, step, count);
     const auto most = static_cast<std::ptrdiff_t>(max_lag / step);
     const std::size_t n = count - static_cast<std::size_t>(2 * most);
-    // Whether anything moves: the spread against that of successive differences, which is noise.
-    const auto moves = [](const std::vector<double>& y) {
-        double mean = 0, spread = 0, noise = 0;
-        for (double v : y) mean += v / static_cast<double>(y.size());
-        for (std::size_t i = 2; i < y.size(); ++i) {
-            spread += (y[i] - mean) * (y[i] - mean);
-            noise += (y[i] - 2 * y[i - 1] + y[i - 2]) * (y[i] - 2 * y[i - 1] + y[i - 2]);
-        }
-        return spread > 1e-18 && spread > noise;
-    };
     if (!moves(ya) || !moves(yb)) {
         out.problem =
             "one of the recordings shows no motion; move the tool up and down briskly, unevenly, "
@@ -174,30 +226,7 @@ LagFit fit_lag(const Signal& first, const Signal& second, const LagOptions& opti
     const double bend = left - 2 * peak + right;
     if (bend != 0) out.lag_s += std::clamp(0.5 * (left - right) / bend, -1.0, 1.0) * step;
 
-    // What is left of the second signal after the first is fitted to it, against its steepness.
-    double aa = 0, ab = 0, ma = 0, mb = 0;
-    const double* matched = yb.data() + best;
-    for (std::size_t i = 0; i < n; ++i) {
-        ma += middle[i] / static_cast<double>(n);
-        mb += matched[i] / static_cast<double>(n);
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-        aa += (middle[i] - ma) * (middle[i] - ma);
-        ab += (middle[i] - ma) * (matched[i] - mb);
-    }
-    const double gain = ab / aa;
-    double left_over = 0, steep = 0, product = 0, before = 0;
-    for (std::size_t i = 1; i < n; ++i) {
-        const double r = matched[i] - mb - gain * (middle[i] - ma);
-        const double slope = gain * (middle[i] - middle[i - 1]) / step;
-        left_over += r * r;
-        steep += slope * slope;
-        product += r * before;
-        before = r;
-    }
-    const double rho = left_over > 0 ? std::clamp(product / left_over, 0.0, 0.99) : 0;
-    const double variance = left_over / static_cast<double>(n);
-    out.sigma_s = std::sqrt(variance / steep * (1 + rho) / (1 - rho));
+    out.sigma_s = lag_sigma_s(middle, yb.data() + best, n, step);
     if (std::abs(out.correlation) < 0.5) {
         out.problem = text(
             "the two recordings do not show one motion (correlation %.2f); record them together, "
@@ -206,26 +235,7 @@ LagFit fit_lag(const Signal& first, const Signal& second, const LagOptions& opti
         return out;
     }
     out.determined = true;
-    if (std::abs(out.correlation) < 0.9) {
-        out.warnings.push_back(
-            text("The correlation at the peak is %.2f only; move more briskly, or check the "
-                 "signal taken from the image.",
-                 out.correlation));
-    }
-    // A second peak nearly as high: an even motion fits at several lags.
-    for (std::size_t k = 1; k + 1 < out.curve.size(); ++k) {
-        const double c = std::abs(out.curve[k]);
-        const bool summit = c >= std::abs(out.curve[k - 1]) && c >= std::abs(out.curve[k + 1]);
-        const bool same_sign = out.curve[k] * out.correlation > 0;
-        if (summit && same_sign && std::abs(out.curve_lag_s[k] - out.lag_s) > 5 * step &&
-            c > 0.97 * std::abs(out.correlation)) {
-            out.warnings.push_back(
-                text("A lag of %.3f s fits nearly as well as %.3f s; the motion was too "
-                     "even: move unevenly.",
-                     out.curve_lag_s[k], out.lag_s));
-            break;
-        }
-    }
+    warn_of_doubtful_lag(step, out);
     return out;
 }
 

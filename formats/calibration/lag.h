@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// How much later one recording shows a motion than another: between a tracker and the image, or
-// between two trackers. Both see the same motion; the lag is where their normalised
-// cross-correlation peaks.
+// How much later one recording shows a motion than another: a tracker and the image, or two
+// trackers. Both see the same motion; the lag is where their normalised cross-correlation peaks.
 #pragma once
 
 #include <span>
@@ -13,7 +12,7 @@
 
 namespace sonocase {
 
-// One number over time. Times need not be even; they are sorted, and repeats are dropped.
+// One number over time. Times need not be evenly spaced; they are sorted, and repeats dropped.
 struct Signal {
     std::vector<double> time_s, value;
 };
@@ -39,7 +38,7 @@ struct LagFit {
     std::vector<double> curve_lag_s, curve;  // correlation over lag, for the picture
 };
 
-// Never fails. 5 ms for 1,000 readings each.
+// Never fails. Cost: 5 ms for 1,000 readings each.
 LagFit fit_lag(const Signal& first, const Signal& second, const LagOptions& options = {});
 
 }  // namespace sonocase

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The rigid motion (with one scale, if asked) between points known in two frames: today's place of
-// the mannequin from landmarks touched on it, or from a sweep of its skin.
+// The rigid motion (with one uniform scale on request) between points known in two frames: where
+// the mannequin is today, from landmarks touched on it or from a sweep of its skin.
 #pragma once
 
 #include <array>
@@ -41,13 +41,13 @@ struct RigidFit {
     std::array<double, 49> covariance{};
 
     Point3 map(Point3 from) const;
-    // One standard deviation of a mapped point, root of the trace: what to expect at a target.
+    // One standard deviation of a mapped point, root of the trace: the error to expect at a target.
     double target_sigma_mm(Point3 from) const;
 };
 
-// Points in pairs; `names` may be empty. Never fails. Quaternion fit (Horn 1987) made exact by
-// Gauss-Newton steps with QR. Looks for one wrong pair, exchanged pairs and a mirror image, and
-// says so.
+// Points in pairs; `names` may be empty. Never fails. Quaternion fit [Horn 1987], refined by
+// Gauss-Newton steps with QR. Looks for wrong pairs, exchanged pairs and a mirror image, and warns
+// of them.
 RigidFit fit_rigid(std::span<const Point3> from,
                    std::span<const Point3> to,
                    std::span<const std::string> names = {},
@@ -57,14 +57,14 @@ struct SweepOptions {
     bool fit_scale = false;
     double trim = 0.1;  // share of the readings with the largest distance that is left out
     int iterations = 40;
-    // Without a start every orientation is tried, and the report says whether the answer is unique.
+    // Without a start every orientation is tried, and a warning says if the answer is not unique.
     bool has_start = false;
     Rigid start;  // to_from
 };
 
-// Readings of the skin (`to` frame, one point on the surface each) laid on the surface (`from`
-// frame): point-to-plane ICP on the nearest surface points. Surface points at most 10 mm apart. 40
-// ms for 1,000 readings with a start.
+// Registers readings of the skin (`to` frame, one point on the surface each) with the surface
+// (`from` frame): point-to-plane ICP on the nearest surface points, which must be at most 10 mm
+// apart. Cost: 40 ms for 1,000 readings with a start.
 RigidFit fit_skin_sweep(const Surface& from,
                         std::span<const Point3> to,
                         const SweepOptions& options = {});

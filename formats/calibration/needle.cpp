@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/calibration/pivot_system.h"
 #include "formats/calibration/pose_screen.h"
-#include "formats/calibration/words.h"
+#include "formats/calibration/report_text.h"
+#include "formats/calibration/resting_poses.h"
+#include "formats/calibration/solve/pivot_system.h"
 
 namespace sonocase {
 namespace {
@@ -32,7 +33,7 @@ Matrix3 weight_of(const std::vector<Pose>& poses, const PointFit& fit) {
     const double freedom = std::max(1.0, 3.0 * fit.inliers - 6);
     const double variance = fit.rms_mm * fit.rms_mm * fit.inliers / freedom *
                             (1 + fit.correlation) / (1 - fit.correlation);
-    // Exact readings still weigh finitely: a tenth of a micrometre.
+    // Exact readings keep a finite weight: a standard deviation of a tenth of a micrometre.
     for (double& v : w.m) v /= std::max(variance, 1e-8);
     return w;
 }
@@ -45,7 +46,7 @@ double quadratic(Vector3 a, const Matrix3& w, Vector3 b) {
     return dot(a, w * b);
 }
 
-// The paper: principal component, projections taken off, mean of what is left.
+// The paper: principal component, then the mean of the points minus their projections on it.
 void paper_axis(const std::vector<AxisPoint>& points, NeedleFit& out) {
     const auto n = static_cast<double>(points.size());
     Vector3 mean;
@@ -66,10 +67,10 @@ void paper_axis(const std::vector<AxisPoint>& points, NeedleFit& out) {
     out.condition = fit.singular[1] > 0 ? fit.singular[0] / fit.singular[1] : INFINITY;
 }
 
-// Line through points of known covariance: Gauss-Newton over two offsets and two tilts, the place
-// of each point along the line eliminated. Gives direction, a point on the line and their
-// variances.
-struct WeighedLine {
+// Line through points of known covariance: Gauss-Newton over two offsets and two tilts; the position
+// of each point along the line is eliminated. Gives the direction, a point on the line and their
+// standard deviations.
+struct WeightedLine {
     Vector3 direction, at;
     double direction_sigma = 0;
     double offset_sigma = 0;  // across, at the centroid
@@ -77,8 +78,8 @@ struct WeighedLine {
     std::vector<double> along;
 };
 
-WeighedLine weighed_line(const std::vector<AxisPoint>& points, Vector3 direction) {
-    WeighedLine line;
+WeightedLine weighted_line(const std::vector<AxisPoint>& points, Vector3 direction) {
+    WeightedLine line;
     line.direction = direction;
     for (const AxisPoint& p : points) line.at = line.at + p.at / static_cast<double>(points.size());
     line.along.resize(points.size());
@@ -91,7 +92,7 @@ WeighedLine weighed_line(const std::vector<AxisPoint>& points, Vector3 direction
             const double dd = quadratic(d, w, d);
             const double s = quadratic(d, w, r) / dd;
             line.along[k] = s;
-            // Weight across the line once the place along it is free.
+            // Weight across the line once the position along it is eliminated.
             const double w1 = quadratic(d, w, e1), w2 = quadratic(d, w, e2);
             const double b11 = quadratic(e1, w, e1) - w1 * w1 / dd;
             const double b12 = quadratic(e1, w, e2) - w1 * w2 / dd;
@@ -118,11 +119,11 @@ WeighedLine weighed_line(const std::vector<AxisPoint>& points, Vector3 direction
 
 void place_tip(const std::vector<AxisPoint>& points,
                const NeedleOptions& options,
-               WeighedLine& line,
+               WeightedLine& line,
                NeedleFit& out) {
     double reach = -INFINITY, along_sigma = 0;
     if (!options.depths_mm.empty()) {
-        // Place of the tip by each point: s_k + depth_k. Regress s on depth first: the slope is -1.
+        // Each point k puts the tip at s_k + depth_k. Regress s on depth first: the slope is -1.
         double ms = 0, md = 0, sd = 0, dd = 0;
         const auto n = static_cast<double>(points.size());
         for (std::size_t k = 0; k < points.size(); ++k) {
@@ -210,7 +211,7 @@ NeedleFit fit_needle(std::span<const std::vector<Pose>> recordings, const Needle
         out.points.push_back(std::move(fit));
     }
     if (!options.depths_mm.empty() && options.depths_mm.size() != recordings.size()) {
-        out.problem = text("%zu depths for %zu recordings; give one a recording",
+        out.problem = text("%zu depths for %zu recordings; give one per recording",
                            options.depths_mm.size(), recordings.size());
         return out;
     }
@@ -231,8 +232,8 @@ NeedleFit fit_needle(std::span<const std::vector<Pose>> recordings, const Needle
             text("the pinhole depths differ by %.1f mm only; spread them over 20 mm or more", far);
         return out;
     }
-    WeighedLine line = weighed_line(points, out.paper_direction);
-    // Points farther off the line than their own sigmas allow: the needle is bent or slipped.
+    WeightedLine line = weighted_line(points, out.paper_direction);
+    // Points farther from the line than their own sigmas allow: the needle bent or slipped.
     const double freedom = 2.0 * static_cast<double>(points.size()) - 4;
     const double excess = freedom > 0 ? line.chi_square / freedom : 0;
     double square = 0;
@@ -282,8 +283,7 @@ NeedleFit fit_needle_spin(std::span<const Pose> readings) {
             poses.size());
         return out;
     }
-    PoseGroup all(poses.size());
-    for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+    const PoseGroup all = all_poses(poses.size());
     const double root_n = std::sqrt(static_cast<double>(poses.size()));
     const PivotSolution free = solve_pivots(poses, std::span(&all, 1));
     const double s0 = free.fit.singular[0] / root_n, s1 = free.fit.singular[1] / root_n,
@@ -295,12 +295,12 @@ NeedleFit fit_needle_spin(std::span<const Pose> readings) {
     }
     if (s2 > 0.3 * s1) {
         out.problem =
-            "the needle was tilted while it spun, so that no one axis stays; spin it in a groove, "
-            "or "
-            "use the recording as a pinhole depth";
+            "the needle was tilted while it spun, so that no axis stays fixed; spin it in a "
+            "groove, "
+            "or use the recording as a pinhole depth";
         return out;
     }
-    // Without the axis itself: along it the position is open.
+    // Without the axis itself: the position along it is undetermined.
     const PivotSolution across = solve_pivots(poses, std::span(&all, 1), 0.999 * s1 / s0);
     out.direction = as_vector(free.fit.direction[2]);
     out.axis_point_mm = across.tip - dot(across.tip, out.direction) * out.direction;
@@ -318,7 +318,7 @@ NeedleFit fit_needle_spin(std::span<const Pose> readings) {
     out.determined = true;
     if (s2 > 0.02) {
         out.warnings.push_back(
-            text("The axis wavered by %.1f degrees rms while the needle spun; hold it in a "
+            text("The axis tilted by %.1f degrees rms while the needle spun; hold it in a "
                  "groove.",
                  s2 / kDegree));
     }

@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 
 #include "formats/base/digest.h"
+#include "formats/calibration/report_text.h"
+#include "formats/calibration/solve/statistics.h"
 
 namespace sonocase {
 namespace {
@@ -15,14 +16,8 @@ Matrix3 relative(const Matrix3& a, const Matrix3& b) {
     return transpose(a) * b;
 }
 
-double component_median(std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
-// Marks rows whose position is that of the others in another unit: scaled by a factor that a unit
-// can have, they fall among the others; as they are, they lie far away.
+// Marks rows whose position is in another unit than that of the others: scaled by the ratio of two
+// units they fall among the others; as they are, they lie far away.
 std::vector<bool> rows_in_other_units(const std::vector<Pose>& poses, double* factor_seen) {
     std::vector<bool> marked(poses.size(), false);
     if (poses.size() < 4) return marked;
@@ -32,15 +27,15 @@ std::vector<bool> rows_in_other_units(const std::vector<Pose>& poses, double* fa
         for (std::size_t i = 0; i < poses.size(); ++i) {
             values[i] = poses[i].tracker_from_tool.translation[c];
         }
-        middle[c] = component_median(values);
+        middle[c] = calibrate::median(values);
     }
     const double far = norm(middle);
-    // Only where the recording as a whole is far from the origin for its extent: about the origin
+    // Only if the whole recording is far from the origin compared with its extent: near the origin
     // every length occurs.
     for (std::size_t i = 0; i < poses.size(); ++i) {
         values[i] = norm(poses[i].tracker_from_tool.translation - middle);
     }
-    if (!(component_median(values) < 0.25 * far)) return marked;
+    if (!(calibrate::median(values) < 0.25 * far)) return marked;
     constexpr std::array<double, 8> kFactors{1000, 1e-3, 100, 1e-2, 25.4, 1 / 25.4, 10, 0.1};
     for (std::size_t i = 0; i < poses.size(); ++i) {
         const Vector3 t = poses[i].tracker_from_tool.translation;
@@ -57,17 +52,17 @@ std::vector<bool> rows_in_other_units(const std::vector<Pose>& poses, double* fa
     return marked;
 }
 
-// Marks rows whose orientation is the inverse of what the neighbours say: the sign of the vector
-// part of a quaternion was lost. The lesser part is marked.
+// Marks rows whose orientation is the inverse of their neighbours': the sign of the vector part of a
+// quaternion was lost. Of the two kinds of rows, the rarer is marked.
 std::vector<bool> rows_with_inverse_orientation(const std::vector<Pose>& poses) {
     std::vector<bool> marked(poses.size(), false);
-    // Only in a recording of a hand that moves: between poses taken singly every jump occurs.
+    // Only in a continuous recording: between poses taken one by one every jump occurs.
     std::vector<double> jumps;
     for (std::size_t i = 1; i < poses.size(); ++i) {
         jumps.push_back(rotation_angle(relative(poses[i - 1].tracker_from_tool.rotation,
                                                 poses[i].tracker_from_tool.rotation)));
     }
-    if (jumps.empty() || !(component_median(jumps) < 0.1)) return marked;
+    if (jumps.empty() || !(calibrate::median(jumps) < 0.1)) return marked;
     bool now = false;
     std::size_t count = 0;
     for (std::size_t i = 1; i < poses.size(); ++i) {
@@ -97,6 +92,54 @@ std::string rows_of(int count, int rows) {
     return std::to_string(count) + " of " + std::to_string(rows) + " rows";
 }
 
+// One warning per kind of trouble. worst: the largest departure from orthonormality among the rows
+// that were straightened; factor: what multiplies the rows in other units.
+void describe(double worst, double factor, PoseScreen& screen) {
+    using calibrate::text;
+    const auto say = [&](const std::string& sentence) { screen.warnings.push_back(sentence); };
+    if (screen.not_ok > 0) {
+        say(rows_of(screen.not_ok, screen.rows) +
+            " have a status other than OK and are left out; keep the sensor in view and in range.");
+    }
+    if (screen.not_finite > 0) {
+        say(rows_of(screen.not_finite, screen.rows) +
+            " hold NaN, infinite or impossibly large numbers and are left out; check the "
+            "tracker's export.");
+    }
+    if (screen.not_rotation > 0) {
+        say(rows_of(screen.not_rotation, screen.rows) +
+            " have a rotation whose columns are not orthonormal and are left out; check the order "
+            "of the nine numbers (row by row) and that no scale is mixed in.");
+    }
+    if (screen.mirrored > 0) {
+        say(rows_of(screen.mirrored, screen.rows) +
+            " have a mirrored rotation (determinant -1) and are left out; the export's axes are "
+            "left-handed: negate one axis there.");
+    }
+    if (screen.straightened > 0) {
+        say(rows_of(screen.straightened, screen.rows) +
+            " have a rotation that is orthonormal only to " + text("%.2g", worst) +
+            " and were replaced by the nearest rotation; export more digits.");
+    }
+    if (screen.other_units > 0) {
+        say(rows_of(screen.other_units, screen.rows) + " have positions " +
+            text("%.4g", factor >= 1 ? factor : 1 / factor) + " times " +
+            (factor >= 1 ? "smaller" : "larger") +
+            " than the others and are left out; units are mixed: export every row in mm.");
+    }
+    if (screen.flipped > 0) {
+        say(rows_of(screen.flipped, screen.rows) +
+            " have the inverse of their neighbours' orientation and are left out; a quaternion "
+            "sign flips "
+            "in the export: flip all four numbers or none.");
+    }
+    if (screen.rows > 4 && 5 * screen.repeated > screen.rows) {
+        say(rows_of(screen.repeated, screen.rows) +
+            " repeat the row before; the tracker was slower than the recording or the sensor "
+            "froze, so they add nothing.");
+    }
+}
+
 }  // namespace
 
 PoseScreen screen_poses(std::span<const Pose> poses) {
@@ -109,7 +152,7 @@ PoseScreen screen_poses(std::span<const Pose> poses) {
             ++screen.not_ok;
             continue;
         }
-        // Beyond ten kilometres from the tracker a number is no position, and its square no number.
+        // More than ten kilometres from the tracker is not a position; its square might overflow.
         const Vector3 t = pose.tracker_from_tool.translation;
         const bool far = std::abs(t.x) > 1e7 || std::abs(t.y) > 1e7 || std::abs(t.z) > 1e7;
         if (!is_finite(pose.tracker_from_tool) || far) {
@@ -147,53 +190,7 @@ PoseScreen screen_poses(std::span<const Pose> poses) {
     screen.flipped = static_cast<int>(std::count(inverse.begin(), inverse.end(), true));
     if (screen.flipped > 0) screen.poses = without(screen.poses, inverse);
 
-    const auto say = [&](const std::string& text) { screen.warnings.push_back(text); };
-    if (screen.not_ok > 0) {
-        say(rows_of(screen.not_ok, screen.rows) +
-            " have a status other than OK and are left out; keep the sensor in view and in range.");
-    }
-    if (screen.not_finite > 0) {
-        say(rows_of(screen.not_finite, screen.rows) +
-            " hold NaN, infinite or impossibly large numbers and are left out; check the "
-            "tracker's export.");
-    }
-    if (screen.not_rotation > 0) {
-        say(rows_of(screen.not_rotation, screen.rows) +
-            " have a rotation whose columns are not orthonormal and are left out; check the order "
-            "of the"
-            " nine numbers (row by row) and that no scale is mixed in.");
-    }
-    if (screen.mirrored > 0) {
-        say(rows_of(screen.mirrored, screen.rows) +
-            " have a mirrored rotation (determinant -1) and are left out; the export's axes are"
-            " left-handed: negate one axis there.");
-    }
-    if (screen.straightened > 0) {
-        char text[32];
-        std::snprintf(text, sizeof text, "%.2g", worst);
-        say(rows_of(screen.straightened, screen.rows) +
-            " have a rotation that is orthonormal only to " + text +
-            " and were replaced by the nearest rotation; export more digits.");
-    }
-    if (screen.other_units > 0) {
-        char text[32];
-        std::snprintf(text, sizeof text, "%.4g", factor >= 1 ? factor : 1 / factor);
-        say(rows_of(screen.other_units, screen.rows) + " have positions " + text + " times " +
-            (factor >= 1 ? "smaller" : "larger") +
-            " than the others and are left out; units are mixed: export every row in mm.");
-    }
-    if (screen.flipped > 0) {
-        say(rows_of(screen.flipped, screen.rows) +
-            " have the inverse of their neighbours' orientation and are left out; a quaternion "
-            "sign flips"
-            " in the export: flip all four numbers or none.");
-    }
-    if (screen.rows > 4 && 5 * screen.repeated > screen.rows) {
-        say(rows_of(screen.repeated, screen.rows) +
-            " repeat the row before; the tracker was slower than the recording or the sensor "
-            "froze, so"
-            " they add nothing.");
-    }
+    describe(worst, factor, screen);
     return screen;
 }
 
@@ -208,7 +205,7 @@ std::vector<Pose> relative_poses(std::span<const Pose> reference, std::span<cons
         const double gap = sorted[i].timestamp_s - sorted[i - 1].timestamp_s;
         if (gap > 0) gaps.push_back(gap);
     }
-    const double half_frame = gaps.empty() ? 0.5 : 0.5 * component_median(gaps);
+    const double half_frame = gaps.empty() ? 0.5 : 0.5 * calibrate::median(gaps);
     for (const Pose& pose : tool) {
         const auto after =
             std::lower_bound(sorted.begin(), sorted.end(), pose.timestamp_s,

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/calibration/words.h"
+#include "formats/calibration/report_text.h"
 
 namespace sonocase {
 
@@ -27,7 +27,7 @@ bool days_from_iso_date(std::string_view t, double* days) {
         if (!number(11, 2, &hour) || !number(14, 2, &minute)) return false;
         number(17, 2, &second);
     }
-    // Days of the civil calendar, years that begin in March.
+    // Days of the civil calendar, counted in years that begin in March.
     const int year = m <= 2 ? y - 1 : y, month = (m + 9) % 12;
     const int era = year / 400, of_era = year - 400 * era;
     const int of_year = (153 * month + 2) / 5 + d - 1;
@@ -44,7 +44,7 @@ std::vector<std::string> calibration_concerns(const Calibration& c,
     const std::string what = "The " + c.kind + " calibration";
     double made = 0, today = 0;
     if (!days_from_iso_date(c.date, &made)) {
-        out.push_back(what + " bears no date; calibrate again to be sure.");
+        out.push_back(what + " has no date; calibrate again to be sure.");
     } else if (days_from_iso_date(now, &today)) {
         if (made > today + 1) {
             out.push_back(what + " is dated in the future (" + c.date +
@@ -57,26 +57,27 @@ std::vector<std::string> calibration_concerns(const Calibration& c,
         out.push_back(what + " does not say how well it fitted; calibrate again.");
     } else if (c.rms_mm > limits.max_rms_mm) {
         out.push_back(what +
-                      text(" fitted its readings to %.1f mm rms only; calibrate again.", c.rms_mm));
+                      text(" fits its readings only to %.1f mm rms; calibrate again.", c.rms_mm));
     }
     const double sigma = std::max({c.sigma_mm.x, c.sigma_mm.y, c.sigma_mm.z});
     if (!std::isfinite(sigma) || sigma > limits.max_sigma_mm) {
         out.push_back(
-            what +
-            text(" is known to %.1f mm only; calibrate again with more and wider motion.", sigma));
+            what + text(" is accurate only to %.1f mm; calibrate again with more and wider motion.",
+                        sigma));
     }
     if (!std::isfinite(c.condition) || c.condition > limits.max_condition) {
         out.push_back(
-            what + text(" rests on a motion that hardly determines it (condition %.0f); calibrate "
-                        "again, tilting every way.",
-                        c.condition));
+            what +
+            text(" comes from a motion that hardly determines it (condition %.0f); calibrate "
+                 "again, tilting in every direction.",
+                 c.condition));
     }
     if (c.kind != "mannequin" && c.poses > 0 && c.poses < limits.min_poses) {
-        out.push_back(what + text(" rests on %d readings only; take 30 or more.", c.poses));
+        out.push_back(what + text(" comes from only %d readings; take 30 or more.", c.poses));
     }
     if (orthonormality_error(c.sensor_from_tool.rotation) > 1e-6 ||
         !is_finite(c.sensor_from_tool)) {
-        out.push_back(what + " holds no proper rotation; calibrate again.");
+        out.push_back(what + " does not hold a proper rotation; calibrate again.");
     }
     if (!(c.scale > 0.5 && c.scale < 2)) {
         out.push_back(what + text(" has a scale of %.3g; check the units.", c.scale));

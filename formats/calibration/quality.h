@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What a user should hear about a saved calibration before relying on it.
+// What to tell the user about a saved calibration before relying on it.
 #pragma once
 
 #include <string>
@@ -19,13 +19,14 @@ struct CalibrationLimits {
     int min_poses = 20;  // probe and needle
 };
 
-// Whole sentences, each with what to do; empty: nothing to say. `now` and the calibration's date
-// are ISO 8601 in UTC ("2026-11-21T02:00:00Z"); an unreadable date is a concern of its own.
+// Whole sentences, each with what to do; empty if there is nothing to report. `now` and the
+// calibration's date are ISO 8601 in UTC ("2026-11-21T02:00:00Z"); an unreadable date is a concern
+// of its own.
 std::vector<std::string> calibration_concerns(const Calibration& calibration,
                                               std::string_view now,
                                               const CalibrationLimits& limits = {});
 
-// Days since 1970-01-01 with fraction; false if the text is no ISO 8601 date.
+// Days since 1970-01-01, with a fraction; false if the text is not an ISO 8601 date.
 bool days_from_iso_date(std::string_view text, double* days);
 
 }  // namespace sonocase

@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-#include "formats/files/atomic_file.h"
+#include "formats/files/whole_file.h"
 #include "formats/recording/transform_log.h"
 
 namespace sonocase {
@@ -16,9 +16,8 @@ Result<std::vector<Pose>> load_poses(const std::string& path) {
 }
 
 Result<Sequence> load_sequence(const std::string& path) {
-    const auto bytes = read_file(path);
-    if (!bytes) return bytes.error();
-    return read_sequence(*bytes, path);
+    return detail::read_whole(
+        path, [&](const RawVector<std::uint8_t>& bytes) { return read_sequence(bytes, path); });
 }
 
 Status save_sequence(const Sequence& sequence, const std::string& path, bool compress) {
@@ -28,11 +27,11 @@ Status save_sequence(const Sequence& sequence, const std::string& path, bool com
 }
 
 Result<Sequence> load_recording_file(const std::string& path) {
-    const auto bytes = read_file(path);
-    if (!bytes) return bytes.error();
-    const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-    if (looks_like_transform_log(text)) return parse_transform_log(text, path);
-    return read_sequence(*bytes, path);
+    return detail::read_whole(path, [&](const RawVector<std::uint8_t>& bytes) {
+        const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+        if (looks_like_transform_log(text)) return parse_transform_log(text, path);
+        return read_sequence(bytes, path);
+    });
 }
 
 }  // namespace sonocase

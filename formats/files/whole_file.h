@@ -12,16 +12,17 @@
 
 namespace sonocase::detail {
 
-// read(bytes): a Result. The bytes are the reader's to keep.
+// read(bytes): a Result. The bytes are the reader's to keep. remedy: what to do about too little
+// memory.
 template <class Read>
-auto read_whole(const std::string& path, const Read& read)
+auto read_whole(const std::string& path, const Read& read, const char* remedy = "")
     -> decltype(read(RawVector<std::uint8_t>())) {
     try {
         auto bytes = read_large_file(path);
         if (!bytes) return bytes.error();
         return read(std::move(*bytes));
     } catch (const std::bad_alloc&) {
-        return Error{"needs more memory than is available", path, "use a case with larger voxels"};
+        return Error{"needs more memory than is available", path, remedy};
     }
 }
 

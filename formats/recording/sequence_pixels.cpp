@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "formats/base/memory.h"
 #include "formats/recording/sequence_header.h"
 
 namespace sonocase::detail {
@@ -65,6 +66,8 @@ Status read_sequence_pixels(std::span<const std::uint8_t> data,
         // Deflate shrinks by a factor of 1032 at most: a larger claim would only cost memory.
         if (needed / 1033 > data.size())
             return sequence_fault(where, "claims more pixels than its compressed bytes can hold");
+        if (!can_allocate(needed))
+            return sequence_fault(where, "needs more memory than is available");
         sequence.pixels.resize(needed);
         if (!inflate_exactly(data, sequence.pixels))
             return sequence_fault(where, "its compressed pixels do not unpack");

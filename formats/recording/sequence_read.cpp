@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <new>
 
 #include "formats/recording/sequence.h"
 #include "formats/recording/sequence_header.h"
@@ -355,13 +354,9 @@ Result<Sequence> Reader::read() {
 }  // namespace
 
 Result<Sequence> read_sequence(std::span<const std::uint8_t> bytes, const std::string& where) {
-    try {
-        const auto header = detail::split_sequence_header(bytes, where);
-        if (!header) return header.error();
-        return Reader(*header, where).read();
-    } catch (const std::bad_alloc&) {
-        return Error{"needs more memory than is free", where, ""};
-    }
+    const auto header = detail::split_sequence_header(bytes, where);
+    if (!header) return header.error();
+    return Reader(*header, where).read();
 }
 
 }  // namespace sonocase

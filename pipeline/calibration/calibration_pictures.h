@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Pictures of a calibration, for the eye that no number replaces: residuals over the recording,
-// their histogram, how far the tool was tilted each way, and the image with its mark. PNG and SVG.
+// Pictures of a calibration, which show what no single number does: residuals over the recording,
+// their histogram, how far the tool was tilted in each direction, and the image with its mark. PNG
+// and SVG.
 #pragma once
 
 #include <string>
@@ -15,7 +16,7 @@
 
 namespace sonocase::pipeline {
 
-// Each writes FOLDER/NAME.png and .svg; the folder is made if need be.
+// Each writes FOLDER/NAME.png and .svg; the folder is made if it does not exist.
 Status draw_point_pictures(std::span<const Pose> poses,
                            const PointFit& fit,
                            const std::string& folder,
@@ -37,8 +38,8 @@ Status draw_lag_pictures(const Signal& first,
                          const LagFit& fit,
                          const std::string& folder,
                          const std::string& name);
-// The image's outline in the probe's plane as it will stand on the screen, with the orientation
-// mark, the letter F (which shows a mirror at once) and the touches.
+// The image's outline in the probe's plane as it will appear on the screen, with the orientation
+// mark, the letter F (which shows a mirrored image at a glance) and the touches.
 Status draw_image_picture(const ImagePlaneInput& input,
                           const ImagePlane& plane,
                           const std::string& folder,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The probe point again, with noise in orientation as well as in position.
+// Refinement of the point calibration that allows for noise in orientation as well as in position.
 //
-// The linear fit takes the rotations as exact. Where the tilt is small their noise biases it: the
-// swing is overestimated and the tip is drawn towards where it costs least. Here each pose may turn
-// by a small rotation w_i, held by its expected size:
+// The linear fit takes the rotations as exact. If the tilt is small their noise biases it: the swing
+// is overestimated and the tip is drawn towards the position with the smallest residuals. Here each pose may turn by a small
+// rotation w_i, penalised by its expected size:
 //
 //     min sum |R_i exp(w_i) t + p_i - c|^2 / sigma_p^2 + |w_i|^2 / sigma_r^2
 //
@@ -18,7 +18,7 @@
 namespace sonocase::pipeline {
 
 struct RefinePointOptions {
-    double position_sigma_mm = 0.5;      // of a reading, a component, > 0
+    double position_sigma_mm = 0.5;      // of one coordinate of a reading, > 0
     double rotation_sigma_rad = 0.0026;  // 0.15 degrees, > 0
     int max_iterations = 50;
 };
@@ -34,8 +34,8 @@ struct RefinePointResult {
     double seconds = 0;
 };
 
-// `start` is a determined fit of the same readings with one rest. Poor convergence is reported, not
-// thrown.
+// `start` is a determined fit of the same readings with one resting point. Poor convergence is
+// reported (converged == false), not an error.
 RefinePointResult refine_point(std::span<const Pose> poses,
                                const PointFit& start,
                                const RefinePointOptions& options = {});

@@ -32,7 +32,7 @@ Result<NamedPoints> parse_named_points(std::string_view csv, const std::string& 
                 first = false;
                 continue;
             }
-            return Error{"a coordinate is no number", at, "expected name,x,y,z or x,y,z in mm"};
+            return Error{"a coordinate is not a number", at, "expected name,x,y,z or x,y,z in mm"};
         }
         first = false;
         if (named) out.names.push_back(row.cells[0]);
@@ -67,7 +67,7 @@ Result<std::pair<NamedPoints, NamedPoints>> pair_points(const NamedPoints& known
         if (found == known.names.end()) {
             std::string names;
             for (const std::string& n : known.names) names += (names.empty() ? "" : ", ") + n;
-            return Error{"there is no landmark called \"" + touched.names[i] + "\"", "",
+            return Error{"no landmark is called \"" + touched.names[i] + "\"", "",
                          "the list has " + names};
         }
         a.names.push_back(touched.names[i]);

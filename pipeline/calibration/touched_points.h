@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Small tables of calibrations: named points and plain signals, as CSV.
+// Small CSV tables for the calibrations: named points, and signals over time.
 #pragma once
 
 #include <string>
@@ -23,7 +23,7 @@ struct NamedPoints {
 Result<NamedPoints> parse_named_points(std::string_view csv, const std::string& where);
 Result<NamedPoints> load_named_points(const std::string& path);
 
-// The two in pairs: by name where both have names, else by order, which needs equal numbers.
+// The two in pairs: by name if both have names, else by order, which needs equal numbers.
 Result<std::pair<NamedPoints, NamedPoints>> pair_points(const NamedPoints& known,
                                                         const NamedPoints& touched);
 

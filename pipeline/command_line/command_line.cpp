@@ -7,7 +7,9 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "formats/files/atomic_file.h"
 
@@ -26,12 +28,43 @@ Json json_of(const StageReport& report) {
     return json;
 }
 
-// One line: a message from a library may hold several.
+// A message from a library may hold several lines; people and scripts get one.
 std::string one_line(std::string text) {
     for (char& c : text)
         if (c == '\n' || c == '\r') c = ' ';
     while (!text.empty() && text.back() == ' ') text.pop_back();
     return text;
+}
+
+// "--switch false" as "--switch=false", which is how CLI11 reads it.
+std::vector<std::string> with_switches_joined(const CLI::App& app, int argc, char** argv) {
+    std::vector<std::string> words(argv, argv + argc);
+    for (std::size_t i = 1; i + 1 < words.size(); ++i) {
+        if (!words[i].starts_with("--") || (words[i + 1] != "true" && words[i + 1] != "false"))
+            continue;
+        const CLI::Option* option = app.get_option_no_throw(words[i]);
+        if (option == nullptr || option->get_items_expected_max() != 0) continue;
+        words[i] += "=" + words[i + 1];
+        words.erase(words.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+    }
+    return words;
+}
+
+// Flags that name a file to write; -o may name a folder instead, which is the verb's own to create.
+constexpr const char* kOutputFiles[] = {"--output",   "--report", "--preview",
+                                        "--markdown", "--front",  "--csv"};
+
+void note_new_folders(const std::string& verb, const CLI::App& app) {
+    for (const char* name : kOutputFiles) {
+        const CLI::Option* option = app.get_option_no_throw(name);
+        if (option == nullptr || option->count() == 0 || option->get_type_name() == "DIR") continue;
+        const auto folder = std::filesystem::path(option->results().back()).parent_path();
+        std::error_code code;
+        if (!folder.empty() && !std::filesystem::exists(folder, code))
+            std::fprintf(stderr,
+                         "sonocase %s: note: folder %s does not exist and will be created\n",
+                         verb.c_str(), one_line(folder.string()).c_str());
+    }
 }
 
 }  // namespace
@@ -53,8 +86,11 @@ std::optional<int> parse_command_line(CLI::App& app, int argc, char** argv) {
     app.name("sonocase " + verb);
     app.get_help_ptr()->group("Common");
     app.get_formatter()->column_width(34);
+    std::vector<std::string> words = with_switches_joined(app, argc, argv);
+    std::vector<const char*> pointers;
+    for (const std::string& word : words) pointers.push_back(word.c_str());
     try {
-        app.parse(argc, argv);
+        app.parse(static_cast<int>(pointers.size()), pointers.data());
     } catch (const CLI::CallForHelp& call) {
         return app.exit(call);
     } catch (const CLI::CallForAllHelp& call) {
@@ -62,6 +98,7 @@ std::optional<int> parse_command_line(CLI::App& app, int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return wrong_usage(verb.c_str(), error.what());
     }
+    note_new_folders(verb, app);
     return std::nullopt;
 }
 
@@ -121,22 +158,6 @@ Progress ProgressBar::progress() {
 
 std::string report_json(const StageReport& report) {
     return json_of(report).dump(2) + "\n";
-}
-
-std::string report_json(std::span<const StageReport> reports) {
-    Json json;
-    double seconds = 0;
-    Json stages = Json::array(), warnings = Json::array();
-    for (const StageReport& report : reports) {
-        seconds += report.seconds;
-        stages.push_back(json_of(report));
-        for (const std::string& warning : report.warnings)
-            warnings.push_back(report.stage + ": " + warning);
-    }
-    json["seconds"] = seconds;
-    json["stages"] = std::move(stages);
-    json["warnings"] = std::move(warnings);
-    return json.dump(2) + "\n";
 }
 
 Status write_report(const CommonOptions& options, const StageReport& report) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The verbs of the program sonocase. Each is a thin call to one stage or subject.
+// The hand-written verbs of the program sonocase. Each is a thin call to one stage or subject; the
+// verbs of most stages follow from their descriptors (pipeline/verbs/stage/stage_verb.h).
 //
 // argv[0] is the verb's own name. Returns the exit status: 0 done, 1 failed with one line on
 // standard error, 2 wrong usage. To add one: write verb_<name>.cpp, declare it here, list the file
@@ -25,31 +26,27 @@
 //
 // Files between the stages are those of formats/bundle/stage_files.h (.labels, .textures, .surface)
 // and formats/registration/registration_json.h (JSON). A stage file holds no seconds, so that the
-// same inputs give the same bytes; they go to --report.
+// same inputs give the same bytes; seconds go to --report.
 #pragma once
 
 namespace sonocase::pipeline {
 
+int verb_align(int argc, char** argv);
 int verb_build(int argc, char** argv);
 int verb_cache(int argc, char** argv);
-int verb_export(int argc, char** argv);
 int verb_calibrate(int argc, char** argv);
-int verb_import(int argc, char** argv);
+int verb_export(int argc, char** argv);
 int verb_inspect(int argc, char** argv);
+int verb_map(int argc, char** argv);
 int verb_pack(int argc, char** argv);
 int verb_plan(int argc, char** argv);
 int verb_progress(int argc, char** argv);
-int verb_resample(int argc, char** argv);
+int verb_register(int argc, char** argv);
 int verb_review(int argc, char** argv);
 int verb_score(int argc, char** argv);
-int verb_smooth(int argc, char** argv);
-int verb_warp(int argc, char** argv);
-int verb_surface(int argc, char** argv);
 int verb_texture(int argc, char** argv);
-int verb_register(int argc, char** argv);
-int verb_map(int argc, char** argv);
-int verb_align(int argc, char** argv);
 int verb_tradeoff(int argc, char** argv);
 int verb_validate(int argc, char** argv);
+int verb_warp(int argc, char** argv);
 
 }  // namespace sonocase::pipeline

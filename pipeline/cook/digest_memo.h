@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Content hashes of files that need not be read again.
+// Content hashes of files, remembered so that unchanged files are not read again.
 //
 // A file is known by path, inode, size, modification and change time, to the nanosecond. The change
 // time is the system's own and moves with every write, also where a tool sets the modification time
-// back. What was written less than ten seconds before it was hashed is not kept, since another
-// write might fall into the same tick of the file system's clock.
+// back. A file that was written less than ten seconds before it was hashed is not remembered, since
+// another write might fall into the same tick of the file system's clock.
 #pragma once
 
 #include <string>
@@ -17,12 +17,12 @@ namespace sonocase::pipeline {
 
 class DigestMemo {
   public:
-    // Reads what save() wrote; a missing or strange file is an empty memo.
+    // Reads what save() wrote; a missing or unreadable file is an empty memo.
     explicit DigestMemo(std::string path);
 
-    // Of a file's bytes; of a folder as digest_of_input has it.
+    // As digest_of_input.
     Result<std::string> digest(const std::string& path);
-    // Writes what was asked for since it was made, if that differs from what the file holds.
+    // Writes the digests asked for since construction, if they differ from what the file holds.
     Status save() const;
 
   private:

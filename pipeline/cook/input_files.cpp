@@ -36,4 +36,25 @@ Result<std::string> digest_of_input(
     return digest.hex();
 }
 
+Result<InputDigests> digest_inputs(const Recipe& recipe, const DigestOfInput& digest) {
+    InputDigests inputs;
+    const RecipeInputs& in = recipe.inputs;
+    struct Item {
+        const std::string& given;
+        std::string& to;
+    };
+    for (const Item& item : {Item{in.labels, inputs.labels},
+                             {in.label_table, inputs.label_table},
+                             {in.surface, inputs.surface},
+                             {in.examples, inputs.examples},
+                             {in.landmarks, inputs.landmarks}}) {
+        if (item.given.empty()) continue;
+        auto hash = digest(recipe.resolve(item.given));
+        if (!hash) return hash.error();
+        item.to = *hash;
+        inputs.files.push_back({item.given, std::move(*hash)});
+    }
+    return inputs;
+}
+
 }  // namespace sonocase::pipeline

@@ -9,7 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/files/atomic_file.h"
+#include "pipeline/cook/case_size.h"
 #include "pipeline/cook/digest_memo.h"
+#include "pipeline/cook/input_files.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -28,7 +30,7 @@ bool is_file_name(const std::string& name) {
            });
 }
 
-// The digest in a state file; empty where it is none.
+// The digest in a state file; empty where the file holds none.
 std::string recorded_digest(const fs::path& state) {
     auto text = read_text_file(state.string());
     if (!text) return {};
@@ -38,7 +40,7 @@ std::string recorded_digest(const fs::path& state) {
                : "";
 }
 
-// Which stages are done, by the state files, of which those of other keys go.
+// Which stages are done, by the state files; state files of other keys are removed.
 void compare(CasePlan& plan, const fs::path& folder, DigestMemo& memo) {
     const fs::path states = folder / "state" / plan.name;
     const fs::path bundle = folder / "cases" / (plan.name + ".sonocase");
@@ -49,7 +51,7 @@ void compare(CasePlan& plan, const fs::path& folder, DigestMemo& memo) {
             std::find_if(plan.stages.begin(), plan.stages.end(),
                          [&](const PlannedStage& stage) { return state_name(stage) == name; });
         bool good = current != plan.stages.end();
-        if (good && current->stage == "pack") {
+        if (good && &*current == &plan.stages.back()) {
             const auto digest =
                 fs::exists(bundle, code) ? memo.digest(bundle.string()) : Result<std::string>("");
             good = digest && !digest->empty() && *digest == recorded_digest(entry.path());
@@ -63,12 +65,13 @@ void compare(CasePlan& plan, const fs::path& folder, DigestMemo& memo) {
 Result<CasePlan> plan_case(const std::string& path,
                            const RecipeOverrides& overrides,
                            const fs::path& folder,
+                           const StageTable& table,
                            DigestMemo& memo,
                            std::map<std::string, std::string>& recipe_of) {
-    auto recipe = load_recipe(path, overrides);
+    auto recipe = load_recipe(path, overrides, table);
     if (!recipe) return recipe.error();
     if (!is_file_name(recipe->name))
-        return Error{"name '" + recipe->name + "' does not serve as a file name", path,
+        return Error{"name '" + recipe->name + "' cannot be a file name", path,
                      "expected letters, digits, '-', '_' and '.'"};
     const auto [named, fresh] = recipe_of.emplace(recipe->name, path);
     if (!fresh)
@@ -80,11 +83,9 @@ Result<CasePlan> plan_case(const std::string& path,
     CasePlan plan;
     plan.name = recipe->name;
     plan.stages = plan_stages(*recipe, *inputs);
+    std::erase_if(plan.stages, [](const PlannedStage& stage) { return stage.is_step(); });
     compare(plan, folder, memo);
-    if (plan.done) return plan;
-    const CaseSize size = case_size(*recipe);
-    for (const PlannedStage& stage : plan.stages)
-        plan.costs.push_back(stage_cost(stage.stage, size));
+    if (!plan.done) plan.size = case_size(*recipe);
     return plan;
 }
 
@@ -92,13 +93,14 @@ Result<CasePlan> plan_case(const std::string& path,
 
 Result<std::vector<CasePlan>> plan_cases(const std::vector<std::string>& recipes,
                                          const RecipeOverrides& overrides,
-                                         const std::string& folder) {
+                                         const std::string& folder,
+                                         const StageTable& table) {
     DigestMemo memo((fs::path(folder) / "digests").string());
     std::vector<CasePlan> plans;
     std::map<std::string, std::string> recipe_of;  // by name of the case
     for (const std::string& given : recipes) {
         const std::string path = fs::absolute(given).lexically_normal().string();
-        auto plan = plan_case(path, overrides, folder, memo, recipe_of);
+        auto plan = plan_case(path, overrides, folder, table, memo, recipe_of);
         if (!plan) {
             const fs::path file(path);
             CasePlan bad;
@@ -130,12 +132,11 @@ std::string plan_json(const std::vector<CasePlan>& plans, const RecipeOverrides&
         } else {
             entry["done"] = plan.done;
             entry["stages"] = Json::array();
-            for (std::size_t i = 0; i < plan.stages.size(); ++i) {
-                const PlannedStage& stage = plan.stages[i];
+            for (const PlannedStage& stage : plan.stages) {
                 Json one{{"stage", stage.stage}, {"key", stage.plan_key}, {"needs", stage.needs}};
                 if (!plan.done) {
-                    one["threads"] = plan.costs[i].threads;
-                    one["memory_mb"] = plan.costs[i].memory_mb;
+                    one["threads"] = stage.descriptor->cost.threads;
+                    one["memory_mb"] = stage.descriptor->cost.memory_mb(plan.size);
                 }
                 entry["stages"].push_back(std::move(one));
             }

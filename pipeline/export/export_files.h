@@ -4,8 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -14,20 +12,10 @@
 
 namespace sonocase::pipeline {
 
-// NRRD, gzip-compressed, in the space right-anterior-superior (the axes of `mannequin`, which NRRD
-// has no name for; Slicer shows it upright). type: "uchar", "signed char" or "unsigned int".
-struct NrrdVolume {
-    Grid grid;
-    std::string type;
-    std::span<const std::uint8_t> bytes;        // voxels, x fastest, little-endian
-    std::map<std::string, std::string> fields;  // key:=value
-};
-std::vector<std::uint8_t> nrrd_file(const NrrdVolume& volume);
-
 // Binary PLY in mm, float coordinates; normals and triangles where the surface has them.
 std::vector<std::uint8_t> ply_file(const Surface& surface, const std::string& comment);
 
-// Writes into `folder`, which is made: labels.seg.nrrd with Slicer's segments, echo-offset.nrrd,
+// Writes into `folder`, which is created: labels.seg.nrrd with Slicer's segments, echo-offset.nrrd,
 // boundary.nrrd, textures/NAME.nrrd, patient-skin.ply, mannequin.ply, preview.png, case.toml, the
 // exercises, manifest.json. Returns the names written, in that order.
 Result<std::vector<std::string>> export_case(const CaseBundle& bundle, const std::string& folder);

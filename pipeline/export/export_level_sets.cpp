@@ -15,7 +15,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-constexpr int kHalfWidth = 3;  // voxels, OpenVDB's own habit
+constexpr int kHalfWidth = 3;  // voxels, OpenVDB's own default
 
 openvdb::FloatGrid::Ptr level_set(const LabelDistance& distance,
                                   std::uint8_t label,

@@ -14,13 +14,13 @@
 namespace sonocase::pipeline {
 
 struct LevelSetExportOptions {
-    double sigma_vx = 1;              // smoothing; 0: as stepped as the voxels
+    double sigma_vx = 1;              // smoothing; 0: none, steps of the voxels stay
     std::vector<std::string> labels;  // names; empty: all but the outside
 };
 
-// One FloatGrid of class LEVEL_SET a label, named like it, with metadata "tissue": signed distance
-// in mm, negative inside, 3 voxels to either side; world coordinates are the volume's frame. Cubic
-// voxels. Errors: an unknown name, voxels that are not cubic, a file that cannot be written.
+// One FloatGrid of class LEVEL_SET per label, named like it, with metadata "tissue": signed
+// distance in mm, negative inside, 3 voxels to either side; world coordinates are the volume's
+// frame. Errors: an unknown name, voxels that are not cubic, a file that cannot be written.
 Status export_level_sets(const LabelVolume& volume,
                          const std::string& path,
                          const LevelSetExportOptions& options = {},

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What a bundle holds, for people and as JSON; and whether it keeps its promises.
+// What a bundle holds, for people and as JSON; and whether its parts agree with one another.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "formats/bundle/case_bundle.h"
-#include "pipeline/cook/error_budget.h"
+#include "pipeline/pack/error_budget.h"
 
 namespace sonocase::pipeline {
 
@@ -15,7 +15,7 @@ struct LabelVolumes {
     std::vector<double> ml;  // # labels
 };
 
-// Volume of every label. One pass over the bricks.
+// Volume of every label in millilitres. Cost: one pass over the bricks.
 LabelVolumes label_volumes(const CaseBundle& bundle);
 
 // Stages' seconds, from the report beside the bundle; negative: not recorded. # manifest.stages.

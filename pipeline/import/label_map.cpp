@@ -12,6 +12,7 @@
 #include "formats/files/stage_file.h"
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/plausible_size.h"
+#include "pipeline/import/source/source_path.h"
 #include "pipeline/import/structure_list.h"
 
 namespace sonocase::pipeline {
@@ -51,14 +52,14 @@ Status check_names(const std::vector<Structure>& structures, const std::string& 
     return Done{};
 }
 
-// What a structure is made of: what is known of its name, else of the class that its table gives.
+// The tissue of a structure: by its name if that is known, else by the class in its table.
 TissueChoice tissue_of(const LabelTableEntry& entry) {
     const TissueChoice by_name = tissue_for_label(entry.name);
     if (by_name.known || entry.tissue_class.empty()) return by_name;
     return tissue_for_label(entry.tissue_class);
 }
 
-// A .labels of this program's own import, as it stands.
+// A .labels file of this program's own import, unchanged.
 Result<ImportedLabels> from_stage_file(const std::string& path) {
     auto file = load_label_file(path);
     if (!file) return file.error();
@@ -68,8 +69,76 @@ Result<ImportedLabels> from_stage_file(const std::string& path) {
     ImportedLabels result;
     result.labels = std::move(file->volume);
     if (!file->reports.empty()) result.report = file->reports.front();
-    result.report.warnings.clear();  // they were told when the file was made
+    result.report.warnings.clear();  // they were reported when the file was made
     return result;
+}
+
+// Names structures that no table names after their value; warns of them. Returns their number.
+int name_unnamed(std::vector<Structure>& structures, std::vector<std::string>& warnings) {
+    std::string unnamed;
+    int unnamed_count = 0;
+    for (Structure& structure : structures) {
+        if (!structure.entry.name.empty()) continue;
+        structure.entry.name = "label_" + std::to_string(structure.entry.value);
+        if (structure.entry.layer > 0)
+            structure.entry.name += "_layer_" + std::to_string(structure.entry.layer);
+        unnamed += (unnamed_count++ > 0 ? ", " : "") + std::to_string(structure.entry.value);
+    }
+    if (unnamed_count > 0)
+        warnings.push_back("no table names the values " + unnamed +
+                           ": they are taken as soft tissue; give a table of value,name");
+    return unnamed_count;
+}
+
+// Appends each structure to the palette; warns of names that no rule gives a tissue. Returns their
+// number.
+int fill_palette(const std::vector<Structure>& structures,
+                 LabelVolume& labels,
+                 std::vector<std::string>& warnings) {
+    std::string strangers;
+    int stranger_count = 0;
+    for (const Structure& structure : structures) {
+        const LabelTableEntry& entry = structure.entry;
+        const TissueChoice choice = tissue_of(entry);
+        if (!choice.known && !entry.name.starts_with("label_"))
+            strangers += (stranger_count++ > 0 ? ", " : "") + entry.name;
+        labels.labels.push_back({entry.name, std::string(choice.tissue), entry.value,
+                                 entry.colour.value_or(colour_of(entry.name))});
+    }
+    if (stranger_count > 0)
+        warnings.push_back(
+            "no rule knows what tissue these are, and they are taken as soft tissue: " + strangers +
+            "; say so in the recipe's [labels]");
+    return stranger_count;
+}
+
+struct PaintCount {
+    std::uint64_t overlaps = 0;  // voxels of more than one structure
+    std::uint64_t body_voxels = 0;
+};
+
+// Writes the structures' runs into the volume; where they overlap the smaller structure remains.
+PaintCount paint(const std::vector<Structure>& structures, LabelVolume& labels) {
+    // Large structures first, so that small ones end on top.
+    std::vector<std::size_t> order(structures.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return structures[a].voxels > structures[b].voxels;
+    });
+    labels.voxels.assign(labels.grid.voxel_count(), 0);
+    PaintCount count;
+    for (const std::size_t s : order) {
+        for (const VoxelRun run : structures[s].runs) {
+            for (std::uint32_t v = run.first; v < run.first + run.count; ++v) {
+                if (labels.voxels[v] != 0)
+                    ++count.overlaps;
+                else
+                    ++count.body_voxels;
+                labels.voxels[v] = static_cast<std::uint8_t>(s + 1);
+            }
+        }
+    }
+    return count;
 }
 
 }  // namespace
@@ -101,8 +170,10 @@ Result<ImportedLabels> import_label_map(const std::string& path,
                                         const Progress& progress) {
     const auto start = std::chrono::steady_clock::now();
     std::error_code code;
-    if (!std::filesystem::exists(path, code))
-        return Error{"no such file or folder", path, "check the path"};
+    if (!std::filesystem::is_directory(path, code)) {
+        if (auto status = check_source_file(path, "expected a label map"); !status)
+            return status.error();
+    }
     if (path.ends_with(".labels")) return from_stage_file(path);
     report_progress(progress, 0, "reading labels");
     auto list = is_mask_folder(path) ? read_mask_folder(path, options.table)
@@ -122,18 +193,7 @@ Result<ImportedLabels> import_label_map(const std::string& path,
     report.stage = "import";
     report.version = kImportVersion;
     report.warnings = std::move(list->warnings);
-    std::string unnamed;
-    int unnamed_count = 0;
-    for (Structure& structure : structures) {
-        if (!structure.entry.name.empty()) continue;
-        structure.entry.name = "label_" + std::to_string(structure.entry.value);
-        if (structure.entry.layer > 0)
-            structure.entry.name += "_layer_" + std::to_string(structure.entry.layer);
-        unnamed += (unnamed_count++ > 0 ? ", " : "") + std::to_string(structure.entry.value);
-    }
-    if (unnamed_count > 0)
-        report.warnings.push_back("no table names the values " + unnamed +
-                                  ": they are taken as soft tissue; give a table of value,name");
+    const int unnamed_count = name_unnamed(structures, report.warnings);
     std::stable_sort(
         structures.begin(), structures.end(),
         [](const Structure& a, const Structure& b) { return a.entry.value < b.entry.value; });
@@ -147,42 +207,11 @@ Result<ImportedLabels> import_label_map(const std::string& path,
         for (int axis = 0; axis < 3; ++axis) labels.grid.origin_mm[axis] *= options.scale;
     }
     labels.labels.push_back({"outside", "outside", 0, {0, 0, 0}});
-    std::string strangers;
-    int stranger_count = 0;
-    for (const Structure& structure : structures) {
-        const LabelTableEntry& entry = structure.entry;
-        const TissueChoice choice = tissue_of(entry);
-        if (!choice.known && !entry.name.starts_with("label_"))
-            strangers += (stranger_count++ > 0 ? ", " : "") + entry.name;
-        labels.labels.push_back({entry.name, std::string(choice.tissue), entry.value,
-                                 entry.colour.value_or(colour_of(entry.name))});
-    }
-    if (stranger_count > 0)
+    const int stranger_count = fill_palette(structures, labels, report.warnings);
+    const PaintCount painted = paint(structures, labels);
+    if (painted.overlaps > 0)
         report.warnings.push_back(
-            "no rule knows what tissue these are, and they are taken as soft tissue: " + strangers +
-            "; say so in the recipe's [labels]");
-    // Large structures first, so that small ones end on top.
-    std::vector<std::size_t> order(structures.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-        return structures[a].voxels > structures[b].voxels;
-    });
-    labels.voxels.assign(labels.grid.voxel_count(), 0);
-    std::uint64_t overlaps = 0, body_voxels = 0;
-    for (const std::size_t s : order) {
-        for (const VoxelRun run : structures[s].runs) {
-            for (std::uint32_t v = run.first; v < run.first + run.count; ++v) {
-                if (labels.voxels[v] != 0)
-                    ++overlaps;
-                else
-                    ++body_voxels;
-                labels.voxels[v] = static_cast<std::uint8_t>(s + 1);
-            }
-        }
-    }
-    if (overlaps > 0)
-        report.warnings.push_back(
-            std::to_string(overlaps) +
+            std::to_string(painted.overlaps) +
             " voxels lie in more than one structure and went to the smaller one");
     const Box3 box = body_box(labels);
     if (const auto error = check_torso_extent(box.extent(), "body", path, "--scale")) return *error;
@@ -192,12 +221,12 @@ Result<ImportedLabels> import_label_map(const std::string& path,
         {"labels", static_cast<double>(structures.size())},
         {"unnamed_labels", static_cast<double>(unnamed_count)},
         {"unknown_tissues", static_cast<double>(unnamed_count + stranger_count)},
-        {"overlapping_voxels", static_cast<double>(overlaps)},
+        {"overlapping_voxels", static_cast<double>(painted.overlaps)},
         {"voxel_volume_mm3", labels.grid.voxel_volume_mm3()},
         {"body_width_mm", box.extent().x},
         {"body_depth_mm", box.extent().y},
         {"body_height_mm", box.extent().z},
-        {"body_volume_ml", static_cast<double>(body_voxels) * voxel_ml},
+        {"body_volume_ml", static_cast<double>(painted.body_voxels) * voxel_ml},
     };
     report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

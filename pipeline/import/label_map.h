@@ -20,28 +20,30 @@ struct ImportOptions {
 
 struct ImportedLabels {
     LabelVolume labels;  // `ct` frame, RAS+ mm; i nearest to right, j to front, k to head
-    StageReport
-        report;  // stage "import": labels, unnamed_labels, body_width_mm, body_volume_ml, ...
+    // Stage "import": labels, unnamed_labels, body_width_mm, body_volume_ml, ...
+    StageReport report;
 };
 
 inline constexpr int kImportVersion = 2;
 
-// path  NIfTI, NRRD, .seg.nrrd, MetaImage; a folder of one binary mask a structure (file name =
-//       structure); a folder with a DICOM series whose pixels are label values; or a .labels that
-//       import wrote, taken as it stands.
-// The palette holds the labels that occur, by rising value after [0], the outside. Label::tissue is
-// what the built-in tissue table says of the name, or of the table's tissue_class where the name is
-// not known. Where masks or segments overlap the smaller structure wins: a vessel stays in its
+// path  NIfTI, NRRD, .seg.nrrd, MetaImage; a folder with one binary mask per structure (file name =
+//       structure); a folder with a DICOM series whose pixels are label values; or a .labels file
+//       that import wrote, returned unchanged.
+// The palette holds the labels that occur, in order of value, after [0], the outside. Label::tissue
+// comes from the built-in tissue table by the name, or by the table's tissue_class if the name is
+// not known. Where masks or segments overlap the smaller structure remains: a vessel stays in its
 // liver.
 //
-// Errors, each with what was found and what to do: no such file; unreadable or truncated; no body;
-// two labels of one name; more than 254 labels; an extent that cannot be a torso in mm.
-// Cost: the file's voxels in their own type plus two bytes a voxel.
+// Errors, each with what was found and what to do: no such file; a pipe or a device; unreadable or
+// truncated; no body; two labels of one name; more than 254 labels; an extent that cannot be a
+// torso in mm.
+// Memory: the file's voxels in their own type plus two bytes per voxel.
 Result<ImportedLabels> import_label_map(const std::string& path,
                                         const ImportOptions& options = {},
                                         const Progress& progress = {});
 
-// Box of everything that is not outside, edge to edge of the voxels, in the volume's frame.
+// Bounding box of everything that is not outside, to the outer faces of the voxels, in the
+// volume's frame.
 Box3 body_box(const LabelVolume& labels);
 
 }  // namespace sonocase::pipeline

@@ -18,7 +18,7 @@ const LabelTableEntry* entry_of(const LabelTable& table, int value) {
     return nullptr;
 }
 
-// A value that two rows of one table name differently is as wrong as a name of two values.
+// Refuses a table with two names for one value.
 Status check_table(const LabelTable& table, const std::string& where) {
     for (std::size_t i = 0; i < table.size(); ++i)
         for (std::size_t j = i + 1; j < table.size(); ++j)
@@ -71,7 +71,7 @@ Result<StructureList> read_label_file(const std::string& path, const std::string
     if (!file) return file.error();
     if (auto status = check_size(file->grid, path); !status) return status.error();
 
-    // The tables in order of precedence; a value takes its name from the first that has it.
+    // The tables in order of precedence; a value takes its name from the first table that has it.
     std::vector<LabelTable> tables;
     if (!table_path.empty()) {
         auto table = load_label_csv(table_path);
@@ -152,7 +152,7 @@ Result<StructureList> read_mask_folder(const std::string& folder, const std::str
         if (!name.starts_with('.') && is_volume_file_name(name))
             files.push_back(entry.path().string());
     }
-    std::sort(files.begin(), files.end());  // the order of a folder is the file system's mood
+    std::sort(files.begin(), files.end());  // a folder lists its files in no fixed order
     LabelTable table;
     if (!table_path.empty()) {
         auto loaded = load_label_csv(table_path);
@@ -187,7 +187,7 @@ Result<StructureList> read_mask_folder(const std::string& folder, const std::str
                 append_runs(mask->layers[0], static_cast<std::uint8_t>(place), structure);
         list.structures.push_back(std::move(structure));
     }
-    // Names that TotalSegmentator does not know get the numbers above its own.
+    // Names that TotalSegmentator does not define get values above its own.
     int next = 1001;
     for (Structure& structure : list.structures)
         if (structure.entry.value == 0) structure.entry.value = next++;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the readers of label maps hand to import_label_map: structures as runs of voxels.
+// What the readers of label maps give to import_label_map: structures as runs of voxels.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct VoxelRun {
 };
 
 struct Structure {
-    LabelTableEntry entry;  // the name may be empty: none was found
+    LabelTableEntry entry;  // the name is empty if none was found
     std::vector<VoxelRun> runs;
     std::uint64_t voxels = 0;
 };
@@ -31,7 +31,7 @@ struct StructureList {
 
 // A single file or a DICOM series.
 Result<StructureList> read_label_file(const std::string& path, const std::string& table_path);
-// A folder of binary masks; anything but 0 is inside.
+// A folder of binary masks; every value other than 0 is inside.
 Result<StructureList> read_mask_folder(const std::string& folder, const std::string& table_path);
 bool is_mask_folder(const std::string& path);
 

@@ -57,7 +57,7 @@ void Canvas::fill(std::span<const CanvasPoint> polygon, CanvasColour colour) {
     }
     body_ += "\"" + colour_text("fill", colour) + "/>\n";
 
-    // Even-odd, four lines a row, exact along each line.
+    // Even-odd rule, four lines per row, exact coverage along each line.
     constexpr int kLines = 4;
     const int first = std::max(0, static_cast<int>(std::floor(std::max(low, y0_))));
     const int last = std::min(height_ - 1, static_cast<int>(std::floor(std::min(high, y1_))));
@@ -135,7 +135,7 @@ void Canvas::line(std::span<const CanvasPoint> points,
         along += length;
         if (dash <= 0 && half > 0.7 && i > 0 && colour[3] == 255) disc(a, half, colour);
     }
-    // One element in the SVG instead of the boxes.
+    // In the SVG one element replaces the boxes.
     body_ = body + "<polyline points=\"";
     for (const CanvasPoint& p : points) body_ += number(p.x) + "," + number(height_ - p.y) + " ";
     body_ += "\" fill=\"none\"" + colour_text("stroke", colour) + " stroke-width=\"" +

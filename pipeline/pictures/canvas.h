@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A small drawing surface that keeps an anti-aliased picture and the same drawing as SVG. It needs
-// no display and gives the same bytes everywhere. Pixels, origin at the lower left, y up, as VTK's
-// 2-D contexts have it.
+// A small drawing surface that produces an anti-aliased picture and the same drawing as SVG. It
+// needs no display and gives the same bytes on every machine. Coordinates are pixels, origin at the
+// lower left, y up, as in VTK's 2-D contexts.
 #pragma once
 
 #include <array>
@@ -31,9 +31,8 @@ class Canvas {
               CanvasColour colour,
               double dash = 0);
     void disc(CanvasPoint centre, double radius, CanvasColour colour);
-    // An opacity mask, rows from the bottom up, laid with its lower left pixel at (x, y). In the
-    // SVG the text stands as text: anchored at `at`, turned by `degrees`, anchor "start", "middle"
-    // or "end".
+    // Text as an opacity mask, rows from the bottom up, with its lower left pixel at (x, y). In the
+    // SVG it remains text: anchored at `at`, turned by `degrees`, anchor "start", "middle" or "end".
     struct Text {
         std::string text;
         CanvasPoint at;
@@ -48,7 +47,7 @@ class Canvas {
               int y,
               CanvasColour colour,
               const Text& text);
-    // Everything drawn later stays inside; all of the canvas without arguments.
+    // Clips everything drawn later to the rectangle; without arguments, to the whole canvas.
     void clip(double x, double y, double width, double height);
     void clip();
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Plots of the reports: VTK's charts, drawn by our own canvas, so that no display is needed and the
-// bytes are the same everywhere.
+// Plots for the reports: VTK's charts, drawn on our own canvas, so that no display is needed and the
+// bytes are the same on every machine. Legends fit their words; long ones are drawn outside the plot.
 #pragma once
 
 #include <array>
@@ -31,8 +31,8 @@ struct Chart {
     bool x_log = false;  // values <= 0 are left out
     bool y_log = false;
     std::vector<Series> series;
-    bool equal_axes = false;  // one unit is as long in x as in y
-    // A grey picture in place of the plot, under the title: row by row from the top, enlarged by a
+    bool equal_axes = false;  // one unit has the same length in x and in y
+    // A grey picture instead of the plot, below the title: rows from the top down, enlarged by a
     // whole factor to fill the cell.
     std::vector<std::uint8_t> picture{};  // # picture_width * picture_height; empty: none
     int picture_width = 0;
@@ -48,7 +48,7 @@ struct ChartSheet {
 };
 
 // Written under a temporary name and renamed. Error: the file cannot be written. Cost: about 50 ms
-// a chart.
+// per chart.
 Status write_chart_png(const ChartSheet& sheet, const std::string& path);
 Status write_chart_svg(const ChartSheet& sheet, const std::string& path);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Text for HTML and SVG that this program writes.
+// Text in the HTML and SVG that this program writes.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace sonocase::pipeline {
 
-// The text with the five characters that mean something in markup replaced; fit for attributes too.
+// The text with the five special characters of markup escaped; suitable for attributes as well.
 std::string escaped_html(std::string_view text);
 
 }  // namespace sonocase::pipeline

@@ -15,11 +15,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <string>
+#include <utility>
 
 namespace sonocase::pipeline {
 namespace {
 
-// Whether a local X server answers for $DISPLAY. Displays of other machines are taken on trust.
+// Whether a local X server answers for $DISPLAY. Displays on other machines are assumed to.
 bool display_answers() {
     const char* display = std::getenv("DISPLAY");
     if (display == nullptr || *display == '\0') return false;
@@ -38,61 +39,65 @@ bool display_answers() {
     return answers;
 }
 
-class Server {
-  public:
-    ~Server() {
-        if (child_ <= 0) return;
-        kill(child_, SIGTERM);
-        waitpid(child_, nullptr, 0);
-    }
-
-    Status start() {
-        int number_pipe[2];
-        if (pipe2(number_pipe, O_CLOEXEC) != 0) {
-            return Error{std::string("no pipe: ") + std::strerror(errno), "Xvfb", ""};
-        }
-        const pid_t parent = getpid();
-        child_ = fork();
-        if (child_ < 0)
-            return Error{std::string("no process: ") + std::strerror(errno), "Xvfb", ""};
-        if (child_ == 0) {
-            // Dies with us, also when we are killed.
-            prctl(PR_SET_PDEATHSIG, SIGTERM);
-            if (getppid() != parent) _exit(1);
-            dup2(number_pipe[1], 3);
-            const int nothing = open("/dev/null", O_RDWR);
-            dup2(nothing, 0);
-            dup2(nothing, 1);
-            dup2(nothing, 2);
-            execlp("Xvfb", "Xvfb", "-displayfd", "3", "-screen", "0", "1600x1200x24", "-nolisten",
-                   "tcp", static_cast<char*>(nullptr));
-            _exit(127);
-        }
-        close(number_pipe[1]);
-        std::string number;
-        char c;
-        pollfd wait{number_pipe[0], POLLIN, 0};
-        while (poll(&wait, 1, 20000) > 0 && read(number_pipe[0], &c, 1) == 1 && c != '\n')
-            number += c;
-        close(number_pipe[0]);
-        if (number.empty()) {
-            return Error{"there is no display, and Xvfb does not start", "pictures",
-                         "install the Debian package xvfb, or run under a display"};
-        }
-        setenv("DISPLAY", (":" + number).c_str(), 1);
-        return Done{};
-    }
-
-  private:
-    pid_t child_ = -1;
-};
-
 }  // namespace
 
-Status ensure_display() {
-    static Server server;
-    static const Status status = display_answers() ? Status(Done{}) : server.start();
-    return status;
+OffscreenDisplay::OffscreenDisplay(OffscreenDisplay&& other) noexcept
+    : child_(std::exchange(other.child_, -1)),
+      previous_display_(std::move(other.previous_display_)) {}
+
+OffscreenDisplay::~OffscreenDisplay() {
+    if (child_ <= 0) return;
+    kill(child_, SIGTERM);
+    waitpid(child_, nullptr, 0);
+    if (previous_display_)
+        setenv("DISPLAY", previous_display_->c_str(), 1);
+    else
+        unsetenv("DISPLAY");
+}
+
+Result<OffscreenDisplay> OffscreenDisplay::open() {
+    OffscreenDisplay display;
+    if (!display_answers()) {
+        if (auto status = display.start(); !status) return status.error();
+    }
+    return display;
+}
+
+Status OffscreenDisplay::start() {
+    if (const char* display = std::getenv("DISPLAY")) previous_display_ = display;
+    int number_pipe[2];
+    if (pipe2(number_pipe, O_CLOEXEC) != 0) {
+        return Error{std::string("cannot open a pipe: ") + std::strerror(errno), "Xvfb", ""};
+    }
+    const pid_t parent = getpid();
+    child_ = fork();
+    if (child_ < 0)
+        return Error{std::string("cannot start a process: ") + std::strerror(errno), "Xvfb", ""};
+    if (child_ == 0) {
+        // Ends with the parent, also if that is killed.
+        prctl(PR_SET_PDEATHSIG, SIGTERM);
+        if (getppid() != parent) _exit(1);
+        dup2(number_pipe[1], 3);
+        const int nothing = ::open("/dev/null", O_RDWR);
+        dup2(nothing, 0);
+        dup2(nothing, 1);
+        dup2(nothing, 2);
+        execlp("Xvfb", "Xvfb", "-displayfd", "3", "-screen", "0", "1600x1200x24", "-nolisten",
+               "tcp", static_cast<char*>(nullptr));
+        _exit(127);
+    }
+    close(number_pipe[1]);
+    std::string number;
+    char c;
+    pollfd wait{number_pipe[0], POLLIN, 0};
+    while (poll(&wait, 1, 20000) > 0 && read(number_pipe[0], &c, 1) == 1 && c != '\n') number += c;
+    close(number_pipe[0]);
+    if (number.empty()) {
+        return Error{"no display, and Xvfb does not start", "pictures",
+                     "install the Debian package xvfb, or run under a display"};
+    }
+    setenv("DISPLAY", (":" + number).c_str(), 1);
+    return Done{};
 }
 
 }  // namespace sonocase::pipeline

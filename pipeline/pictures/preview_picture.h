@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The picture that a bundle carries of itself: three cuts through the body.
+// The preview picture that a bundle contains: three cuts through the body.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ struct Picture {
     std::vector<std::uint8_t> rgb;  // # 3 * width * height, row by row from the top
 };
 
-// Axial, coronal and sagittal cut side by side, each through the middle of what is not outside, at
-// one scale, about 256 pixels high. The cuts run along the grid's axes; the patient's head
+// Axial, coronal and sagittal cuts side by side, each through the middle of the body's box, at one
+// scale, about 256 pixels high. The cuts run along the grid's axes; the patient's head
 // direction is not needed. Labels in their colours, darker at their borders.
 Picture preview_picture(const LabelVolume& volume);
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kFineSkin_mm = 6, kCoarseSkin_mm = 13;
 constexpr double kLattice_mm = 20;
-constexpr double kShallowest_mm = 20;  // below the skin: what lies above is skin, fat and wall
+constexpr double kShallowest_mm = 20;  // below the skin: above are skin, fat and body wall
 
 std::vector<Point3> points_inside(const SkinModel& skin, const Box3& box) {
     const PointIndex index(skin.points);

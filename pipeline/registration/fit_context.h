@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the stages of one registration share: both surfaces made ready, hints checked.
+// What the stages of one registration share: both surfaces prepared, the hints checked.
 #pragma once
 
 #include <vector>
@@ -13,17 +13,17 @@ struct FitContext {
     const SkinSurfaceResult& skin;
     TargetSurface target;
     SkinModel fine, coarse;
-    Box3 box;  // ct, less the skin's origin
+    Box3 box;  // ct, relative to the skin's origin
     PoseHints hints;
     std::vector<Correspondence> landmarks;
     std::vector<std::uint32_t> readings;  // all but lift-offs
-    std::vector<Point3> inside;  // of the body, where organs lie; ct, less the skin's origin
+    std::vector<Point3> inside;  // of the body, where the organs are; ct, relative to the origin
 };
 
 // Errors: see register_surfaces.
 Result<FitContext> prepare_fit(const RegisterInput& input, const RegisterOptions& options);
 
-// The registration of a quadratic alone, in the frames themselves.
+// The registration that consists of a quadratic map only, between the frames themselves.
 Registration in_frames(const FitContext& s, const RigidQuadratic& q);
 
 }  // namespace sonocase::pipeline

@@ -121,7 +121,7 @@ FitMeasure measure_fit(const SkinSurfaceResult& skin,
             }
             if (!(best.distance <= kFarthest_mm)) continue;
             const auto& t = mapped.triangles[best.triangle];
-            // On an open edge the skin has ended and the reading belongs to what lies beyond.
+            // At an open edge the skin ends: the reading belongs to what lies beyond.
             bool beyond = true;
             Vector3 normal;
             for (std::size_t v = 0; v < 3; ++v) {

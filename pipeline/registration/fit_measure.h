@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// How well a map lays the skin on the mannequin: exact distances from readings to the mapped skin's
-// triangles, and the share of readings that they were measured on.
+// How well a map fits the skin to the mannequin: exact distances from the readings to the triangles of
+// the mapped skin, and the share of readings for which they exist.
 #pragma once
 
 #include <vector>
@@ -13,24 +13,24 @@
 namespace sonocase::pipeline {
 
 struct FitMeasure {
-    double rms_mm = -1, median_mm = -1, p95_mm = -1,
-           max_mm = -1;         // negative: no counterpart at all
-    double mean_signed_mm = 0;  // > 0: readings lie outside the skin
+    double rms_mm = -1, median_mm = -1, p95_mm = -1, max_mm = -1;  // negative: no counterparts
+    double mean_signed_mm = 0;  // > 0: the readings lie outside the skin
     double coverage = 0;        // readings with a counterpart over usable readings
-    double skin_coverage = 0;   // skin points that a reading lies near, over skin points
+    double skin_coverage = 0;   // skin points near a reading over all skin points
     long readings = 0, counterparts = 0;
-    long unexplained = 0;  // over the skin, but too far off for the rest: lift-offs, clefts
+    long unexplained =
+        0;  // near the skin, but farther than the others allow: lift-offs, folds of skin
 };
 
-// The skin through the map, mannequin frame less the target's origin.
+// The mapped skin, mannequin frame relative to the target's origin.
 Surface mapped_skin(const Surface& skin, const Registration& registration, Point3 target_origin);
 
 FitMeasure measure_fit(const SkinSurfaceResult& skin,
                        const TargetSurface& target,
                        const Registration& registration);
 
-// Distance from each mapped skin point to the mannequin's local plane, positive where the skin
-// stands out of it; NaN where there is no counterpart.
+// Distance from each mapped skin point to the mannequin's local plane, positive outside the
+// mannequin; NaN without a counterpart.
 std::vector<double> signed_gaps(const Surface& mapped, const TargetSurface& target);
 
 }  // namespace sonocase::pipeline

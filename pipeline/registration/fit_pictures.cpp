@@ -39,7 +39,7 @@ VTK_MODULE_INIT(vtkRenderingFreeType)
 namespace sonocase::pipeline {
 namespace {
 
-// The mannequin's frame turned so that the patient's right, front and head are x, y and z.
+// In the mannequin's frame, turned so that x, y and z point to the patient's right, front and head.
 struct Scene {
     Surface skin;
     std::vector<double> gap;  // # skin points
@@ -171,7 +171,7 @@ Status views(const Scene& scene, const std::string& path, double limit) {
     return write_png(window, path);
 }
 
-// A cut of a mesh as lines, or of a cloud as the readings within 5 mm of the plane.
+// The cut of a mesh as lines; of a cloud, the readings within 5 mm of the plane.
 void add_cut(vtkRenderer* renderer,
              const Surface& surface,
              Point3 at,
@@ -241,8 +241,9 @@ Status write_fit_pictures(const SkinSurfaceResult& skin,
                           double limit_mm) {
     const Result<TargetSurface> target = prepare_target(mannequin);
     if (!target) return target.error();
-    // Before the first window: without a display the library would end the program.
-    if (auto s = ensure_display(); !s) return s.error();
+    // Before the first window: without a display VTK would end the program.
+    const Result<OffscreenDisplay> display = OffscreenDisplay::open();
+    if (!display) return display.error();
     std::error_code made;
     std::filesystem::create_directories(folder, made);
     if (made) return Error{"folder cannot be made", folder, made.message()};

@@ -14,9 +14,10 @@
 
 namespace sonocase::pipeline {
 
-// Writes fit_views.png and fit_cuts.png into the folder, which is made if it is not there.
+// Writes fit_views.png and fit_cuts.png into the folder, which is made if it does not exist.
 // Distances are clipped at +-limit_mm: blue inside the mannequin, red outside, grey without a
-// counterpart.
+// counterpart. Errors: no display (pipeline/pictures/offscreen_display.h), a folder that cannot be
+// written.
 Status write_fit_pictures(const SkinSurfaceResult& skin,
                           const Surface& mannequin,
                           const Registration& registration,

@@ -12,8 +12,8 @@ namespace sonocase::pipeline {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
-// Candidates are judged after a quadratic of this stiffness, by gaps with this Cauchy scale; what
-// has no counterpart costs as much as this gap.
+// Candidates are compared after a quadratic of this stiffness, by gaps with this Cauchy scale; a point
+// without a counterpart costs as much as this gap.
 constexpr double kJudgeConstraint_mm = 10, kJudgeScale_mm = 5, kNoCounterpart_mm = 12;
 constexpr double kCloseScore = 1.10;
 
@@ -22,8 +22,8 @@ double penalty(double gap) {
            std::log1p(gap * gap / (kJudgeScale_mm * kJudgeScale_mm));
 }
 
-// A candidate after a stiff quadratic and a coarse field: gaps, missing counterparts, deformation
-// and hints together.
+// A candidate after a stiff quadratic and a coarse field; its score sums the costs of gaps, missing
+// counterparts, deformation and hints.
 JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCandidate& rigid) {
     JudgedPose judged;
     judged.rigid = rigid;
@@ -48,7 +48,7 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
         deformation = refined.constraint_cost;
         options.first_loss_mm = 5;
     }
-    // What it would still cost to bend the skin all the way: a coarse residual field.
+    // The remaining cost of deforming the skin onto the mannequin: a coarse residual field.
     ResidualOptions field;
     field.spacing_mm = 45;
     field.rounds = 3;
@@ -58,16 +58,16 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
     map.quadratic = in_frames(judged.quadratic, s.coarse.origin, target.origin);
     map.ct_box = s.skin.box;
     const FieldFit fit = fit_field(s.coarse, target, readings, field, &map);
-    const auto mean = [](const std::vector<Match>& list, std::size_t asked) {
+    const auto mean = [](const std::vector<Match>& list, std::size_t queries) {
         double sum = 0;
         for (const Match& m : list) sum += penalty(m.gap_mm);
-        const auto count = static_cast<double>(std::max<std::size_t>(1, asked));
+        const auto count = static_cast<double>(std::max<std::size_t>(1, queries));
         return (sum + (count - static_cast<double>(list.size())) * penalty(kNoCounterpart_mm)) /
                count;
     };
     const Matches& matches = fit.matches;
-    const double gaps = 0.5 * mean(matches.from_target, matches.target_asked) +
-                        0.5 * mean(matches.from_skin, matches.skin_asked);
+    const double gaps = 0.5 * mean(matches.from_target, matches.target_queries) +
+                        0.5 * mean(matches.from_skin, matches.skin_queries);
     double hints = 0;
     for (const Correspondence& c : s.landmarks) {
         const Vector3 r = map_point(judged.quadratic, c.skin) - c.place;
@@ -79,11 +79,11 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
     }
     judged.score_mm = std::sqrt(gaps + 0.5 * deformation + fit.energy_mm2 + hints);
     judged.coverage = static_cast<double>(matches.from_target.size()) /
-                      static_cast<double>(std::max<std::size_t>(1, matches.target_asked));
+                      static_cast<double>(std::max<std::size_t>(1, matches.target_queries));
     return judged;
 }
 
-// How another pose differs from the chosen one, in a word that a case author understands.
+// How another pose differs from the chosen one, in terms that a case author understands.
 RunnerUp described(const JudgedPose& best, const JudgedPose& other) {
     RunnerUp r;
     r.score_mm = other.score_mm;
@@ -112,7 +112,7 @@ RunnerUp described(const JudgedPose& best, const JudgedPose& other) {
     return r;
 }
 
-// One warning for each kind of pose that the surfaces cannot rule out, with the hint that can.
+// One warning per kind of pose that the surfaces cannot rule out, with the hint that can.
 void warn_of_runners_up(const FitContext& s, PoseChoice* choice) {
     std::vector<PoseKind> told;
     for (const RunnerUp& r : choice->runners_up) {
@@ -139,7 +139,7 @@ void warn_of_runners_up(const FitContext& s, PoseChoice* choice) {
     }
 }
 
-// The target seen in a mirror that stands in the patient's middle plane.
+// The target mirrored in the patient's median plane.
 TargetSurface mirrored(const TargetSurface& target, const Rigid& pose) {
     TargetSurface m;
     m.origin = target.origin;
@@ -182,8 +182,8 @@ PoseChoice choose_pose(const FitContext& s,
         choice.runners_up.push_back(described(judged[0], judged[n]));
     }
     warn_of_runners_up(s, &choice);
-    // A mirrored surface (left-handed axes) fits a symmetric torso as well: only one that fits
-    // clearly better in the mirror is worth a word.
+    // A mirrored surface (left-handed axes) also fits a symmetric torso: warn only if the mirrored one
+    // fits clearly better.
     const TargetSurface mirror = mirrored(s.target, judged[0].rigid.target_from_skin);
     const JudgedPose other =
         judge(s, mirror, refine_rigid(s.coarse, mirror, judged[0].rigid.target_from_skin, rigid));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Which of the rigid candidates is the patient's pose, and what else it could have been.
+// Which of the rigid candidates is the patient's pose, and which others fit nearly as well.
 #pragma once
 
 #include <string>
@@ -14,14 +14,15 @@ namespace sonocase::pipeline {
 struct JudgedPose {
     RigidCandidate rigid;
     RigidQuadratic quadratic;
-    double score_mm = 0;  // root of gaps, missing counterparts, deformation and hints together
+    double score_mm =
+        0;  // root of the total cost: gaps, missing counterparts, deformation and hints
     double coverage = 0;
 };
 
 struct PoseChoice {
     JudgedPose best;
     std::vector<RunnerUp> runners_up;  // best first
-    double mirror_score_mm = 0;        // of the surface seen in a mirror
+    double mirror_score_mm = 0;        // of the mirrored surface
     std::vector<std::string> warnings;
 };
 

@@ -60,8 +60,8 @@ void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure
     }
 }
 
-// A landmark is off when neither its own error nor that of the map explains where it ends: four
-// standard deviations of an axis are exceeded by one distance in a thousand.
+// A landmark is wrong if neither its own error nor that of the map explains its distance: four
+// standard deviations per axis are exceeded by one distance in a thousand.
 void warn_of_landmarks(StageReport& report, const RegisterOptions& options, const WarpFit& w) {
     const double map_mm = w.trust.inside_mm;
     const double usual =

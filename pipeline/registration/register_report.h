@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What a registration says of itself: measures for --report, warnings for people.
+// Reports of a registration: measures for --report, warnings for people.
 #pragma once
 
 #include "pipeline/registration/pose_choice.h"

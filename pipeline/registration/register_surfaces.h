@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Registration as a whole: the patient's skin laid on the mannequin, proven not to fold, with how
-// good it is and what the data could not tell.
+// Registration as a whole: maps the patient's skin onto the mannequin, proves that the map does not
+// fold, and reports how good it is and what the data leave undetermined.
 //
 //   rigid starts -> candidates -> quadratic of each -> the best, its runner-up -> RANSAC and
 //   point-to-surface refinement -> residual warp -> proof, measures, warnings
 //
-// Which way a torso lies is partly not in the data: upside-down and rolled fits score within a few
-// per cent. Candidates are judged after a quadratic, counting what has no counterpart; a runner-up
-// within 10 % becomes a warning that names the ambiguity and the hint that settles it. Cost: 1-2 s
-// on two cores for 2,000 readings. Same bytes for any number of threads.
+// The data do not fully determine the orientation of a torso: upside-down and rolled fits score within
+// a few per cent. Candidates are compared after a quadratic, and points without a counterpart count;
+// a runner-up within 10 % becomes a warning that names the ambiguity and the hint that resolves it.
+// Cost: 1-2 s on two cores for 2,000 readings. Same bytes for any number of threads.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ namespace sonocase::pipeline {
 
 inline constexpr int kRegisterVersion = 2;
 
-// The same place of the body on both sides, e.g. navel or crotch.
+// The same point of the body on both surfaces, e.g. navel or crotch.
 struct Landmark {
     std::string name;
     Point3 ct, mannequin;
@@ -48,11 +48,11 @@ struct RegisterOptions {
     RansacOptions ransac;
     bool paper_warp = false;  // stop after RANSAC and re-estimation, eqs. (3)-(9)
     // Weight of eqs. (4)-(6) in mm. 0: sqrt(2) e / strain with the standard error e of the gaps,
-    // so that directions which the readings determine are hardly held and the others are.
+    // so that directions which the readings determine are hardly constrained, and the others are.
     double constraint_mm = 0;
     double strain = 0.03;  // expected slopes of the map beyond a rotation, standard deviation
     double least_constraint_mm = 0.3;
-    double wanted_det = 0.35;  // a weight whose proven det J is below this is not taken
+    double wanted_det = 0.35;  // a weight whose proven det J is below this is rejected
     bool residual_warp = true;
     ResidualOptions residual;
     std::optional<Vector3> up;  // the patient's head direction in the mannequin frame
@@ -64,7 +64,7 @@ struct RegisterOptions {
 enum class PoseKind { shifted, tilted, rolled, upside_down };
 
 struct RunnerUp {
-    PoseKind kind = PoseKind::shifted;  // against the chosen pose
+    PoseKind kind = PoseKind::shifted;  // relative to the chosen pose
     double score_mm = 0, coverage = 0;
     double turn_deg = 0;  // from the chosen pose
     double shift_mm = 0;
@@ -75,7 +75,7 @@ struct RegisterResult {
     Registration registration;  // reports: align, warp
     FitMeasure rigid_fit, quadratic_fit, fit;
     std::vector<RunnerUp> runners_up;  // best first
-    StageReport report;                // stage "register": all of it, as --report shows it
+    StageReport report;                // stage "register": everything, as --report shows it
 };
 
 // Errors: a mannequin surface that cannot be fitted to (see prepare_target), a bad hint.
@@ -83,7 +83,7 @@ Result<RegisterResult> register_surfaces(const RegisterInput& input,
                                          const RegisterOptions& options = {},
                                          const Progress& progress = {});
 
-// The stages alone. align: a registration whose map is rigid. warp: from such a registration.
+// Single stages. align: a registration whose map is rigid. warp: from such a registration.
 Result<RegisterResult> align_surfaces(const RegisterInput& input,
                                       const RegisterOptions& options = {},
                                       const Progress& progress = {});

@@ -11,11 +11,11 @@
 namespace sonocase::pipeline {
 namespace {
 
-// The stiffest weight comes first; each next one is at most this much lighter.
+// The stiffest weight comes first; each of the next is at most this factor smaller.
 constexpr double kFirstConstraint_mm = 30, kLighter = 3.2;
 constexpr int kMostWeights = 6;
 
-// Landmarks weigh as the evidence that they are beside that of the readings.
+// Landmarks are weighted by their evidence relative to that of the readings.
 double landmark_weight(const QuadraticTrust& trust, double landmark_mm) {
     const double ratio = trust.standard_error_mm / std::max(landmark_mm, 0.1);
     return std::clamp(ratio * ratio, 1e-5, 0.02);
@@ -27,7 +27,7 @@ struct Quadratic {
     QuadraticTrust trust;
 };
 
-// Lighter and lighter, down to what the gaps deserve or the option says.
+// Decreasing weights, down to what the gaps justify or the option says.
 Quadratic descend(const FitContext& s,
                   const RigidQuadratic& start,
                   const RegisterOptions& options) {
@@ -89,12 +89,12 @@ WarpFit fit_warp(const FitContext& s,
         trust_quadratic(s.fine, s.target, s.readings, start, stiff, options.strain, s.inside);
     if (!options.paper_warp) {
         report_progress(progress, 0.55, "quadratic warp: point to surface");
-        // The trials' answer is a start like the rigid one.
+        // The result of the trials is another start beside the rigid one.
         const QuadraticTrust trial =
             trust_quadratic(s.fine, s.target, s.readings, q, stiff, options.strain, s.inside);
         if (!(trial.fitted_mm < w.rigid_trust.fitted_mm)) q = start;
         const Quadratic fitted = descend(s, q, options);
-        // Never worse than the rigid answer: what the fit never saw must lie closer, too.
+        // Never worse than the rigid map: patches that the fit did not see must lie closer as well.
         w.kept_rigid =
             !(fitted.trust.patches > 0 && fitted.trust.held_out_mm < w.rigid_trust.fitted_mm);
         w.trust = fitted.trust;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// From a rigid pose to the whole map: RANSAC, the quadratic from points to surfaces with the
-// freedom that the data deserve, the residual field, and the guards between them.
+// From a rigid pose to the complete map: RANSAC, the point-to-surface quadratic with as much freedom
+// as the data justify, the residual field, and the checks between them.
 #pragma once
 
 #include <string>
@@ -14,10 +14,10 @@ namespace sonocase::pipeline {
 struct WarpFit {
     Registration registration;
     RansacResult ransac;
-    double constraint_mm = 0;  // of the weight taken; 0: none, the map is RANSAC's or rigid
+    double constraint_mm = 0;  // the chosen weight; 0: none, the map is that of RANSAC or rigid
     double condition = 0;
     QuadraticTrust trust, rigid_trust;
-    bool kept_rigid = false;  // the quadratic explained left-out patches no better
+    bool kept_rigid = false;  // the quadratic did not explain left-out patches better
     double least_det = 1, sampled_det = 1;
     ResidualReport residual;
     FitMeasure rigid_fit, quadratic_fit, fit;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What a review is made from, loaded and scored.
+// The input of a review: session, bundle, exercise and score.
 #pragma once
 
 #include <string>
@@ -29,7 +29,7 @@ struct ReviewInput {
     CaseBundle bundle;
     Exercise exercise;
     SessionScore score;
-    Sequence pictures;                   // frames that the player kept; none: no frames
+    Sequence pictures;                   // frames that the player kept; empty if it kept none
     std::vector<ProgressEntry> earlier;  // of this trainee and exercise, before this session
     std::vector<std::string> warnings;   // whole sentences
 };
@@ -38,7 +38,7 @@ Result<ReviewInput> load_review(const std::string& session_path,
                                 const std::string& bundle_path,
                                 const ReviewOptions& options);
 
-// The exercise of a bundle by name, a TOML file's, or a free scan where neither is there.
+// The exercise of a bundle by name, or of a TOML file, or a free scan if there is neither.
 Result<Exercise> find_review_exercise(const CaseBundle& bundle,
                                       const std::string& wanted,
                                       const std::string& named_by_session,

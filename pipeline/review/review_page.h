@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The review as one HTML page that needs nothing but itself: pictures and plots are inside.
+// The review as one self-contained HTML page: pictures and plots are embedded. Its template is
+// review_page.html.
 #pragma once
 
 #include <string>

@@ -68,7 +68,7 @@ struct Lane {
     bool absolute = false;
 };
 
-// Each pixel column keeps its least and greatest value, so that no peak is lost in a long session.
+// Each pixel column keeps its minimum and maximum, so that no peak is lost in a long session.
 std::string curve(const TimeAxis& axis,
                   const SessionCurves& c,
                   const Lane& lane,
@@ -151,7 +151,7 @@ std::string timeline_svg(const ReviewInput& input) {
     std::vector<double> probe_times;
     std::vector<bool> on_skin;
     const CaseAnatomy anatomy(input.bundle);
-    // A bar of a thousand pixels needs no more than a few thousand looks at the body.
+    // A bar a thousand pixels wide needs at most a few thousand tests against the body.
     const std::size_t stride = std::max<std::size_t>(1, samples.size() / 4000);
     for (std::size_t i = 0; i < samples.size(); i += stride) {
         probe_times.push_back(samples[i].time_s);
@@ -170,7 +170,7 @@ std::string timeline_svg(const ReviewInput& input) {
     out += bars(
         axis, c.time_s, [&](std::size_t i) { return c.depth_mm[i] > 0; }, y, "bar needle");
     y += 26;
-    // Events: a mark each, told on hover; names only where there is room.
+    // Events: one mark each, described on hover; names only if there is room.
     out += text_at(8, y + 12, "name", "events");
     double free_from = -1;
     for (const SessionEvent& event : input.session.events) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The plots of a review as inline SVG: one time axis, a lane a subject.
+// The plots of a review as inline SVG: one time axis, one lane per subject.
 #pragma once
 
 #include <string>
@@ -13,7 +13,8 @@ namespace sonocase::pipeline {
 // below, inserted length, tip to target, tip to plane and the part of the needle in the beam.
 std::string timeline_svg(const ReviewInput& input);
 
-// A score over this trainee's sessions of the exercise, this one last; empty without earlier ones.
+// A score over this trainee's sessions of the exercise, ending with this one; empty without earlier
+// ones.
 std::string progress_svg(const ReviewInput& input, const std::string& metric);
 
 }  // namespace sonocase::pipeline

@@ -6,13 +6,11 @@
 #include <vtkAutoInit.h>
 #include <vtkCamera.h>
 #include <vtkCellArray.h>
-#include <vtkDiscreteFlyingEdges3D.h>
 #include <vtkFloatArray.h>
 #include <vtkImageData.h>
 #include <vtkLight.h>
 #include <vtkLookupTable.h>
 #include <vtkNew.h>
-#include <vtkPNGWriter.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
@@ -24,15 +22,15 @@
 #include <vtkSmartPointer.h>
 #include <vtkSphereSource.h>
 #include <vtkTubeFilter.h>
-#include <vtkUnsignedCharArray.h>
 #include <vtkWindowToImageFilter.h>
-#include <vtkWindowedSincPolyDataFilter.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "pipeline/pictures/offscreen_display.h"
+#include "pipeline/pictures/png.h"
+#include "pipeline/review/label_surface.h"
 
 VTK_MODULE_INIT(vtkRenderingOpenGL2)
 
@@ -43,16 +41,6 @@ using Colour = std::array<double, 3>;
 constexpr Colour kSkin{0.93, 0.78, 0.68}, kSpared{0.86, 0.22, 0.18}, kOrgan{0.62, 0.36, 0.30};
 constexpr Colour kTarget{0.98, 0.78, 0.10}, kHit{0.20, 0.72, 0.32}, kNeedle{0.30, 0.35, 0.42};
 constexpr Colour kProbe{0.16, 0.47, 0.85}, kPlane{0.35, 0.62, 0.95};
-
-std::vector<std::uint8_t> png_of(vtkImageData* image) {
-    vtkNew<vtkPNGWriter> writer;
-    writer->WriteToMemoryOn();
-    writer->SetInputData(image);
-    writer->Write();
-    const vtkUnsignedCharArray* bytes = writer->GetResult();
-    auto* data = const_cast<vtkUnsignedCharArray*>(bytes);
-    return {data->GetPointer(0), data->GetPointer(0) + data->GetNumberOfTuples()};
-}
 
 vtkSmartPointer<vtkActor> actor_of(vtkPolyData* data, Colour colour, double opacity) {
     vtkNew<vtkPolyDataMapper> mapper;
@@ -85,52 +73,7 @@ vtkSmartPointer<vtkPolyData> mesh_of(const Surface& surface) {
     return normals->GetOutput();
 }
 
-// The labels at every `step`-th voxel, `chosen` as 1 and all else as 0; empty where no voxel is
-// chosen.
-vtkSmartPointer<vtkPolyData> surface_of_labels(const CaseBundle& bundle,
-                                               const std::vector<bool>& chosen,
-                                               int step) {
-    const Int3 size = bundle.grid.size;
-    // A layer of zeros around closes surfaces at the border of the volume.
-    const int nx = size.x / step + 2, ny = size.y / step + 2, nz = size.z / step + 2;
-    vtkNew<vtkImageData> image;
-    image->SetDimensions(nx, ny, nz);
-    image->AllocateScalars(VTK_UNSIGNED_CHAR, 1);
-    auto* to = static_cast<std::uint8_t*>(image->GetScalarPointer());
-    std::fill(to, to + static_cast<std::ptrdiff_t>(nx) * ny * nz, std::uint8_t{0});
-    const double voxel = bundle.grid.spacing_mm.x;
-    image->SetSpacing(step * voxel, step * voxel, step * voxel);
-    const Point3 o = bundle.grid.origin_mm;
-    image->SetOrigin(o.x - step * voxel, o.y - step * voxel, o.z - step * voxel);
-    bool any = false;
-    for (int k = 0; k * step < size.z; ++k) {
-        for (int j = 0; j * step < size.y; ++j) {
-            std::uint8_t* row = to + static_cast<std::ptrdiff_t>(nx) *
-                                         (j + 1 + static_cast<std::ptrdiff_t>(ny) * (k + 1));
-            for (int i = 0; i * step < size.x; ++i) {
-                const bool in = chosen[bundle.label_bricks.at(i * step, j * step, k * step)];
-                if (i + 1 < nx && j + 1 < ny && k + 1 < nz) row[i + 1] = in;
-                any = any || in;
-            }
-        }
-    }
-    if (!any) return nullptr;
-    vtkNew<vtkDiscreteFlyingEdges3D> edges;
-    edges->SetInputData(image);
-    edges->SetValue(0, 1);
-    vtkNew<vtkWindowedSincPolyDataFilter> smooth;
-    smooth->SetInputConnection(edges->GetOutputPort());
-    smooth->SetNumberOfIterations(20);
-    smooth->SetPassBand(0.05);
-    smooth->NormalizeCoordinatesOn();
-    vtkNew<vtkPolyDataNormals> normals;
-    normals->SetInputConnection(smooth->GetOutputPort());
-    normals->SplittingOff();
-    normals->Update();
-    return normals->GetOutput();
-}
-
-// A polyline as a tube; coloured by time where `times` is given.
+// A polyline as a tube, coloured by time or in one colour.
 vtkSmartPointer<vtkActor> trail_of(const std::vector<Point3>& path,
                                    double radius_mm,
                                    Colour colour,
@@ -162,7 +105,7 @@ vtkSmartPointer<vtkActor> trail_of(const std::vector<Point3>& path,
     actor->SetMapper(mapper);
     actor->GetProperty()->SetAmbient(0.35);
     if (by_time) {
-        vtkNew<vtkLookupTable> table;  // from violet over magenta to yellow: even in lightness
+        vtkNew<vtkLookupTable> table;  // violet, magenta, yellow: lightness rises evenly
         table->SetNumberOfTableValues(64);
         static constexpr Colour kStops[] = {
             {0.27, 0.10, 0.55}, {0.74, 0.16, 0.52}, {0.96, 0.45, 0.30}, {0.99, 0.85, 0.20}};
@@ -234,7 +177,7 @@ Point3 at(const Rigid& t) {
     return {t.translation.x, t.translation.y, t.translation.z};
 }
 
-// At most `most` of the points, evenly.
+// At most `most` of the points, evenly spaced along the path.
 std::vector<Point3> thinned(const std::vector<Point3>& path, std::size_t most) {
     if (path.size() <= most) return path;
     std::vector<Point3> out;
@@ -251,9 +194,9 @@ void add_body(Scene& scene, const ReviewInput& input) {
         std::vector<bool> body(256, true);
         body[0] = false;
         const int longest = std::max({bundle.grid.size.x, bundle.grid.size.y, bundle.grid.size.z});
-        skin = surface_of_labels(bundle, body, std::max(1, longest / 128));
+        skin = mesh_of(label_surface(bundle, body, std::max(1, longest / 128)));
     }
-    if (skin && skin->GetNumberOfPoints() > 0) {
+    if (skin->GetNumberOfPoints() > 0) {
         scene.renderer->AddActor(actor_of(skin, kSkin, 0.28));
         double b[6];
         skin->GetBounds(b);
@@ -271,14 +214,17 @@ void add_body(Scene& scene, const ReviewInput& input) {
     const auto no_go = labels_named([&](const std::string& name) {
         return std::find(spared.begin(), spared.end(), name) != spared.end();
     });
-    if (auto mesh = surface_of_labels(bundle, no_go, step))
-        scene.renderer->AddActor(actor_of(mesh, kSpared, 0.4));
+    const auto add = [&](const std::vector<bool>& chosen, Colour colour, double opacity) {
+        const Surface surface = label_surface(bundle, chosen, step);
+        if (!surface.points.empty())
+            scene.renderer->AddActor(actor_of(mesh_of(surface), colour, opacity));
+    };
+    add(no_go, kSpared, 0.4);
     const auto organs = labels_named([&](const std::string& name) {
         return std::any_of(input.exercise.targets.begin(), input.exercise.targets.end(),
                            [&](const Target& t) { return t.inside == name; });
     });
-    if (auto mesh = surface_of_labels(bundle, organs, step))
-        scene.renderer->AddActor(actor_of(mesh, kOrgan, 0.22));
+    add(organs, kOrgan, 0.22);
 }
 
 void add_targets(Scene& scene, const ReviewInput& input) {
@@ -313,7 +259,7 @@ void add_trails(Scene& scene, const ReviewInput& input) {
             std::min(input.exercise.needle.length_mm, s.deepest_mm + 60) * s.final_direction;
         scene.renderer->AddActor(trail_of({hub, s.final_tip}, 0.7, kNeedle, false));
     }
-    // The near views show the moment at which the last insertion came to rest, or the last of the
+    // The near views show the moment at which the last insertion came to rest, or the end of the
     // session.
     double when_s = INFINITY;
     if (!input.score.insertions.empty()) {
@@ -352,27 +298,22 @@ std::vector<std::uint8_t> shoot(
     grab->SetInput(scene.window);
     grab->ReadFrontBufferOff();
     grab->Update();
-    return png_of(grab->GetOutput());
+    vtkImageData* image = grab->GetOutput();  // rows upwards
+    const auto row = static_cast<std::ptrdiff_t>(3) * image->GetDimensions()[0];
+    const int rows = image->GetDimensions()[1];
+    const auto* pixels = static_cast<const std::uint8_t*>(image->GetScalarPointer());
+    std::vector<std::uint8_t> turned(static_cast<std::size_t>(rows * row));
+    for (int y = 0; y < rows; ++y)
+        std::copy_n(pixels + y * row, row, turned.data() + (rows - 1 - y) * row);
+    return png_from_rgb(turned.data(), image->GetDimensions()[0], rows);
 }
 
 }  // namespace
 
-std::vector<std::uint8_t> png_from_grey(const std::uint8_t* pixels, int width_px, int height_px) {
-    vtkNew<vtkImageData> image;
-    image->SetDimensions(width_px, height_px, 1);
-    image->AllocateScalars(VTK_UNSIGNED_CHAR, 1);
-    auto* to = static_cast<std::uint8_t*>(image->GetScalarPointer());
-    // VTK's rows run upwards.
-    for (int y = 0; y < height_px; ++y) {
-        std::copy_n(pixels + static_cast<std::ptrdiff_t>(y) * width_px, width_px,
-                    to + static_cast<std::ptrdiff_t>(height_px - 1 - y) * width_px);
-    }
-    return png_of(image);
-}
-
 Result<std::vector<SessionView>> render_session_views(const ReviewInput& input,
                                                       const ReviewOptions& options) {
-    if (Status display = ensure_display(); !display) return display.error();
+    const Result<OffscreenDisplay> display = OffscreenDisplay::open();
+    if (!display) return display.error();
     Scene scene;
     scene.window->SetOffScreenRendering(1);
     scene.window->SetMultiSamples(0);
@@ -381,8 +322,7 @@ Result<std::vector<SessionView>> render_session_views(const ReviewInput& input,
     scene.window->AddRenderer(scene.renderer);
     scene.renderer->SetBackground(1, 1, 1);
     scene.renderer->SetUseFXAA(false);
-    // Bodies lie in bodies here: transparent sheets are sorted by depth, not by the order of
-    // actors.
+    // The surfaces are nested: transparent ones are sorted by depth, not by the order of actors.
     scene.renderer->SetUseDepthPeeling(1);
     scene.renderer->SetMaximumNumberOfPeels(6);
     scene.renderer->SetOcclusionRatio(0.02);
@@ -395,7 +335,7 @@ Result<std::vector<SessionView>> render_session_views(const ReviewInput& input,
     const Vector3 out = scene.has_probe ? -r.column(2) : Vector3{0, 0, 1};
     const Vector3 up = any_perpendicular(normalized(out));
     if (!scene.body.empty()) {
-        // Upright: the longest axis of the body that is not looked along.
+        // Upright: the body's longest axis across the view direction.
         const Vector3 extent = scene.body.extent();
         Vector3 tall = up;
         double best = -1;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// How far the surfaces of a cooked volume lie from the true ones, in one figure that means
-// something in mm whatever the anatomy.
+// How far the surfaces of a cooked volume are from the true ones: one figure in mm that can be
+// compared between anatomies.
 //
 // At random points the cooked class is compared with the analytic torso's. The share of wrong
 // points, divided by the true interface area per volume, is the mean distance by which surfaces are
@@ -16,7 +16,7 @@
 #include "formats/volume/brick_volume.h"
 #include "formats/volume/label_volume.h"
 #include "pipeline/anatomy/analytic_torso.h"
-#include "pipeline/cook/stage_options.h"
+#include "pipeline/stage/recipe.h"
 
 namespace sonocase::pipeline {
 
@@ -28,7 +28,7 @@ struct BoundaryError {
 
 // cooked: volume and boundary records in `mannequin`, palette as analytic_torso_labels() names it;
 // truth: the map that made the mannequin. Points whose true preimage lies outside truth.ct_box do
-// not count. Deterministic. Cost: about 1 us a point.
+// not count. Deterministic. Cost: about 1 us per point.
 BoundaryError measure_boundary_error(const LabelVolume& cooked,
                                      const BrickVolume<std::uint32_t>& boundary,
                                      const Registration& truth,

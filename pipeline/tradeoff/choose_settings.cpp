@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cassert>
-#include <chrono>
 #include <cmath>
 
 #include "formats/text/number_text.h"
 #include "pipeline/anatomy/analytic_torso.h"
+#include "pipeline/base/stopwatch.h"
 #include "pipeline/segmentation/resample_labels.h"
 
 namespace sonocase::pipeline {
@@ -27,7 +27,7 @@ double voxels(double volume_mm3, const Settings& settings) {
     return volume_mm3 / (h * h * h);
 }
 
-// Of a row, for a case of another volume. What does not depend on the voxels stays.
+// Seconds of a row for a case of another volume. The part that does not depend on voxels stays.
 double seconds_at(const FrontRow& row,
                   const FrontTable& table,
                   const CostModel& model,
@@ -103,17 +103,17 @@ std::string format_front(const std::vector<Trial>& trials,
 
 double probe_seconds() {
     // The stages that a build spends its time in, on a small torso.
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     const LabelVolume ct = sample_analytic_torso(analytic_torso_grid({4, 4, 4}));
     ResampleOptions options;
     options.voxel_mm = 2;
     const Registration truth = analytic_torso_truth();
     (void)resample_labels({ct, truth}, options);
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return watch.seconds();
 }
 
 Choice choose_settings(const FrontTable& table,
-                       const AccuracyTarget& wish,
+                       const AccuracyTarget& target,
                        double volume_mm3,
                        double speed) {
     assert(!table.rows.empty());
@@ -129,29 +129,29 @@ Choice choose_settings(const FrontTable& table,
         [](const FrontRow& a, const FrontRow& b) { return a.error_mm < b.error_mm; });
     const FrontRow* chosen = nullptr;
     Choice choice;
-    if (wish.tolerance_mm > 0) {
+    if (target.tolerance_mm > 0) {
         for (const FrontRow& row : rows) {
-            if (chosen == nullptr && row.error_mm <= wish.tolerance_mm) chosen = &row;
+            if (chosen == nullptr && row.error_mm <= target.tolerance_mm) chosen = &row;
         }
         if (chosen == nullptr) {
             chosen = &best;
             choice.warning =
-                "no setting measured comes within " + number_text(wish.tolerance_mm, 3) +
+                "no setting measured comes within " + number_text(target.tolerance_mm, 3) +
                 " mm; the best, " + number_text(best.error_mm, 3) +
                 " mm, was taken (more readings of the mannequin and thinner CT slices lower it)";
         }
     } else {
         for (const FrontRow& row : rows) {
-            if (seconds(row) > wish.time_budget_s) continue;
+            if (seconds(row) > target.time_budget_s) continue;
             if (chosen == nullptr || row.error_mm < chosen->error_mm) chosen = &row;
         }
         if (chosen == nullptr) chosen = &rows.front();
     }
-    if (wish.time_budget_s > 0 && seconds(*chosen) > wish.time_budget_s) {
+    if (target.time_budget_s > 0 && seconds(*chosen) > target.time_budget_s) {
         choice.warning += (choice.warning.empty() ? "" : "; ") +
                           std::string("the settings chosen take about ") +
                           number_text(seconds(*chosen), 2) + " s, more than the " +
-                          number_text(wish.time_budget_s, 3) + " s given";
+                          number_text(target.time_budget_s, 3) + " s given";
     }
     choice.settings = chosen->settings;
     choice.predicted_error_mm = chosen->error_mm;
@@ -164,7 +164,7 @@ NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3) 
     const auto seconds = [&](const FrontRow& row) {
         return seconds_at(row, table, model, volume_mm3);
     };
-    // The row that the case was cooked with: of its voxel, and among several the cheapest.
+    // The row that the case was cooked with: the cheapest of those with its voxel.
     const FrontRow* now = nullptr;
     for (const FrontRow& row : table.rows) {
         const double off = std::abs(voxel_mm_of(row.settings) - voxel_mm);
@@ -175,7 +175,7 @@ NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3) 
     if (now == nullptr) return step;
     const FrontRow* next = nullptr;
     for (const FrontRow& row : table.rows) {
-        if (row.error_mm >= now->error_mm * 0.99) continue;  // a hundredth is no step
+        if (row.error_mm >= now->error_mm * 0.99) continue;  // less than a hundredth is not worth a step
         if (next == nullptr || seconds(row) < seconds(*next)) next = &row;
     }
     if (next == nullptr) return step;

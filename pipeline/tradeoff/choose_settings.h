@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Which settings for a wanted accuracy, or for the time there is?
+// Chooses settings for a wanted accuracy, or for the time available.
 //
 // The table of measured settings (measured_front.inc, written by scripts/accuracy from a sweep of
 // the whole case on the synthetic bodies) gives the error, the worst of the bodies'. Seconds are
@@ -13,8 +13,7 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "pipeline/cook/error_budget.h"
-#include "pipeline/cook/stage_options.h"
+#include "pipeline/pack/error_budget.h"
 #include "pipeline/tradeoff/trial.h"
 
 namespace sonocase::pipeline {
@@ -59,13 +58,13 @@ struct Choice {
     Settings settings;
     double predicted_error_mm = 0;
     double predicted_seconds = 0;
-    std::string warning;  // what of the wish cannot be had; empty: all of it
+    std::string warning;  // what of the target cannot be achieved; empty: nothing
 };
 
 // volume_mm3: of the case's cooked grid, about the mannequin's bounding box; speed: probe_seconds()
 // over the table's. The table has at least one row.
 Choice choose_settings(const FrontTable& table,
-                       const AccuracyTarget& wish,
+                       const AccuracyTarget& target,
                        double volume_mm3,
                        double speed);
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <random>
 
 #include "formats/calibration/point.h"
+#include "pipeline/base/stopwatch.h"
 #include "pipeline/tradeoff/suites.h"
 
 namespace sonocase::pipeline {
@@ -52,15 +52,14 @@ Result<Measured> measure_point(const Settings& settings) {
         PointOptions options;
         options.rests = RestSearch::one;
         options.trials = trials;
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch watch;
         Vector3 tip;
         if (paper) {
             tip = fit_point_paper(rows);
         } else {
             tip = fit_point(rows, options).tip_mm;
         }
-        seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() /
-                   kDraws;
+        seconds += watch.seconds() / kDraws;
         errors.push_back(norm(tip - kTip));
     }
     std::sort(errors.begin(), errors.end());
@@ -102,7 +101,7 @@ Suite calibrate_suite() {
          "",
          "random starts of the robust fit",
          "the chance that outliers win",
-         "already certain with few starts at one outlier in ten"},
+         "with one outlier in ten, few starts are enough"},
     };
     suite.named = {
         {TrialRole::paper,

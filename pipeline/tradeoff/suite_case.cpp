@@ -5,6 +5,7 @@
 
 #include "formats/registration/registration_json.h"
 #include "pipeline/cook/cook_case.h"
+#include "pipeline/recipe/read_recipe.h"
 #include "pipeline/tradeoff/boundary_error.h"
 #include "pipeline/tradeoff/suites.h"
 
@@ -15,57 +16,20 @@ LabelVolume labels_of(const CaseBundle& bundle) {
     return {bundle.grid, dense_from_bricks(bundle.label_bricks), bundle.labels};
 }
 
-double seconds_of(const CookResult& cooked) {
-    double sum = 0;
-    for (const StageRun& run : cooked.stages) sum += run.report.seconds;
-    return sum;
+Settings settings_of(const Preset& preset) {
+    Settings settings;
+    for (const auto& [option, value] : preset.settings) settings.push_back({option, value});
+    return settings;
 }
 
-std::vector<NamedSettings> preset_points() {
+std::vector<NamedSettings> preset_points(const StageTable& table) {
     std::vector<NamedSettings> named;
-    for (const std::string& preset : preset_names()) {
-        Settings settings;
-        for (const PresetSetting& p : preset_settings(preset)) settings.push_back({p.key, p.value});
-        named.push_back({TrialRole::preset, preset, settings});
-    }
+    for (const Preset& preset : table.presets)
+        named.push_back({TrialRole::preset, preset.name, settings_of(preset)});
     return named;
 }
 
-const std::vector<Knob>& case_knobs() {
-    static const std::vector<Knob> knobs{
-        {"resample.voxel_mm",
-         {"3", "2", "1.5", "1", "0.75"},
-         "1",
-         "mm",
-         "edge of the cooked voxels",
-         "surfaces between voxels",
-         "once finer than the fit of the skin, voxels buy nothing more"},
-        {"surface.working_mm",
-         {"8", "5", "3", "2"},
-         "3",
-         "mm",
-         "voxel to which the body is averaged for its skin",
-         "the skin that is fitted",
-         "the readings of the mannequin, not the skin, set the error"},
-    };
-    return knobs;
-}
-
 }  // namespace
-
-Status apply_settings(const Settings& settings, StageOptions& options) {
-    for (const Setting& s : settings) {
-        const std::size_t dot = s.key.find('.');
-        const OptionKey* key = dot == std::string::npos
-                                   ? nullptr
-                                   : find_option_key(s.key.substr(0, dot), s.key.substr(dot + 1));
-        if (key == nullptr)
-            return Error{"no option '" + s.key + "'", "tradeoff", "see docs/accuracy.md"};
-        if (const Status status = set_option(*key, s.value, options, "tradeoff"); !status)
-            return status;
-    }
-    return Done{};
-}
 
 Suite case_suite(const AnalyticBody& body, const std::string& body_name) {
     Suite suite;
@@ -80,13 +44,13 @@ Suite case_suite(const AnalyticBody& body, const std::string& body_name) {
         "200,000 random points with the analytic anatomy under the known warp. The fit of the skin "
         "cannot see "
         "motion inside the body, so this is larger than the error of resampling alone.";
-    suite.knobs = case_knobs();
-    suite.named = preset_points();
+    suite.knobs = knobs_of(built_in_stages(), suite.name);
+    suite.named = preset_points(built_in_stages());
     suite.measure = [body](const Settings& settings) -> Result<Measured> {
         auto recipe = embedded_recipe();
         if (!recipe) return recipe.error();
         recipe->inputs.torso.body = body;
-        if (const Status s = apply_settings(settings, recipe->options); !s) return s.error();
+        if (const Status s = apply_settings(settings, recipe->settings); !s) return s.error();
         const auto cooked = cook_case(*recipe);
         if (!cooked) return cooked.error();
         const BoundaryError error = measure_boundary_error(cooked->bundle, recipe->inputs.torso);
@@ -114,19 +78,16 @@ Suite own_case_suite(const Recipe& recipe) {
         "No truth is known for this case: each setting is compared, at 200,000 points of a fixed "
         "lattice, with the "
         "preset accurate. What all settings have in common does not show.";
-    suite.knobs = case_knobs();
-    suite.named = preset_points();
+    suite.knobs = knobs_of(built_in_stages(), suite.name);
+    suite.named = preset_points(built_in_stages());
     suite.measure = [state](const Settings& settings) -> Result<Measured> {
         const auto cook = [&](const Settings& with) -> Result<CookResult> {
             Recipe own = state->recipe;
-            if (const Status s = apply_settings(with, own.options); !s) return s.error();
+            if (const Status s = apply_settings(with, own.settings); !s) return s.error();
             return cook_case(own);
         };
         if (state->finest.voxels.empty()) {
-            Settings finest;
-            for (const PresetSetting& p : preset_settings("accurate"))
-                finest.push_back({p.key, p.value});
-            auto made = cook(finest);
+            auto made = cook(settings_of(*built_in_stages().find_preset("accurate")));
             if (!made) return made.error();
             state->finest = labels_of(made->bundle);
             state->finest_boundary = made->bundle.boundary;
@@ -149,7 +110,7 @@ Suite own_case_suite(const Recipe& recipe) {
                 for (double x = box.lower.x; x < box.upper.x; x += step) {
                     const Point3 p{x, y, z};
                     const int here = label_at_point(state->finest, state->finest_boundary, p);
-                    // Lattice directions stand for random ones: the three axes in turn.
+                    // The three axes in turn stand in for random directions.
                     const Vector3 along{count % 3 == 0 ? kSegmentMm : 0,
                                         count % 3 == 1 ? kSegmentMm : 0,
                                         count % 3 == 2 ? kSegmentMm : 0};

@@ -31,7 +31,7 @@ struct KnownFit {
 };
 
 Result<Measured> measure_fit(const KnownFit& known, const Settings& settings) {
-    StageOptions options;
+    StageSettings options(built_in_stages());
     Settings stage_settings;
     AnalyticMannequinOptions readings;
     for (const Setting& s : settings) {
@@ -42,7 +42,7 @@ Result<Measured> measure_fit(const KnownFit& known, const Settings& settings) {
         }
     }
     if (const Status s = apply_settings(stage_settings, options); !s) return s.error();
-    const auto skin = extract_skin_surface(known.ct, options.surface);
+    const auto skin = extract_skin_surface(known.ct, options.of<SkinSurfaceOptions>("surface"));
     if (!skin) return skin.error();
     // The noise of one set of readings moves the error by a third: several sets are averaged.
     Measured measured;
@@ -50,7 +50,7 @@ Result<Measured> measure_fit(const KnownFit& known, const Settings& settings) {
         readings.seed = draw;
         const Surface mannequin = analytic_torso_mannequin(readings);
         // The hints of the demo torso's recipe.
-        RegisterOptions fit = options.fit;
+        RegisterOptions fit = options.of<RegisterOptions>("warp");
         fit.up = Vector3{0, 1, 0};
         fit.landmark_mm = 0.5;
         for (const AnalyticLandmark& mark : analytic_torso_landmarks(14, 0.5, readings))
@@ -90,43 +90,14 @@ Suite register_suite() {
         "readings and markers. Motion along the skin cannot "
         "be seen by any fit "
         "of surfaces; the markers see it, and their error is the floor of the curve.";
-    suite.knobs = {
-        {"mannequin.points",
-         {"200", "500", "1000", "2000", "4000"},
-         "2000",
-         "",
-         "readings of the mannequin",
-         "noise of the readings",
-         ""},
-        {"surface.working_mm",
-         {"8", "5", "3", "2"},
-         "3",
-         "mm",
-         "voxel to which the body is averaged for its skin",
-         "where the skin is",
-         "the labels themselves are sampled at 3 mm"},
-        {"align.starts",
-         {"10", "30", "60", "120", "240"},
-         std::to_string(StageOptions{}.fit.rigid.starts),
-         "",
-         "rotations to start from",
-         "the chance of a wrong pose",
-         "once one start falls into the right valley, more of them end in the same place"},
-        {"warp.trials",
-         {"10", "30", "100", "300"},
-         std::to_string(StageOptions{}.fit.ransac.trials),
-         "",
-         "of the random consensus",
-         "the start of the refinement",
-         "the point-to-surface refinement that follows ends in the same place"},
-        {"warp.spacing_mm",
-         {"80", "60", "40", "30", "20"},
-         "30",
-         "mm",
-         "of the residual's control points",
-         "bumps of the skin",
-         "finer than the readings lie, control points follow their noise"},
-    };
+    suite.knobs = {{"mannequin.points",
+                    {"200", "500", "1000", "2000", "4000"},
+                    "2000",
+                    "",
+                    "readings of the mannequin",
+                    "noise of the readings",
+                    ""}};
+    for (Knob& knob : knobs_of(built_in_stages(), suite.name)) suite.knobs.push_back(knob);
     suite.pairs = {{"mannequin.points", "warp.spacing_mm"}, {"align.starts", "warp.trials"}};
     suite.named = {{TrialRole::paper, "paper, eqs. (3)-(9)", {{"warp.paper", "true"}}},
                    {TrialRole::peer, "quadratic without residual", {{"warp.residual", "false"}}}};

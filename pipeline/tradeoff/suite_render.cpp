@@ -10,6 +10,7 @@
 #include "formats/files/atomic_file.h"
 #include "formats/files/bundle_file.h"
 #include "pipeline/cook/cook_case.h"
+#include "pipeline/recipe/read_recipe.h"
 #include "pipeline/texture/example/read_example.h"
 #include "pipeline/tradeoff/suites.h"
 
@@ -18,7 +19,7 @@ namespace {
 
 constexpr int kFrames = 12;
 
-// The player runs as a program of its own: the two libraries do not see each other.
+// The player runs as a program of its own: pipeline and runtime do not link each other.
 struct Player {
     std::string program, folder, bundle;
     std::vector<ExampleImage> finest;
@@ -74,7 +75,7 @@ Result<std::vector<ExampleImage>> play(const Player& player,
     const auto text = read_text_file(stats);
     if (!text) return text.error();
     const auto json = nlohmann::json::parse(*text, nullptr, false);
-    if (json.is_discarded()) return Error{"no JSON", stats, ""};
+    if (json.is_discarded()) return Error{"is not JSON", stats, ""};
     *seconds = json["frame_ms"].value("median", 0.0) * 1e-3;
     std::vector<ExampleImage> frames;
     for (int i = 0; i < kFrames; ++i) {
@@ -141,7 +142,7 @@ Suite render_suite() {
          "",
          "samples along a beam",
          "detail along the beam",
-         "the speckle's grain is met by about 512 samples"},
+         "about 512 samples resolve the speckle's grain"},
     };
     suite.pairs = {{"render.scanlines", "render.samples"}};
     suite.named = {{TrialRole::paper, "model paper", {{"render.model", "paper"}}},

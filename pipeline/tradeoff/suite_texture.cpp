@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include <algorithm>
-#include <chrono>
 #include <string_view>
 
+#include "pipeline/base/stopwatch.h"
 #include "pipeline/texture/example/prepare_example.h"
 #include "pipeline/texture/example/synthetic_examples.h"
 #include "pipeline/texture/texture_bank.h"
@@ -29,10 +29,9 @@ Result<Measured> measure_bank(const Settings& settings) {
         if (!example) return example.error();
         spec.name = name;
         spec.examples = {synthetic_example(name)};
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch watch;
         const auto made = make_solid_texture(spec);
-        sum.seconds +=
-            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        sum.seconds += watch.seconds();
         if (!made) return made.error();
         const TextureQuality quality = measure_texture(*made, example->image);
         sum.error += quality.distance.grain / std::size(kExamples);
@@ -54,14 +53,7 @@ Suite texture_suite() {
         "difference "
         "between the autocorrelation of example and texture within the grain's width, averaged "
         "over the three.";
-    suite.knobs = {{"texture.edge",
-                    {"16", "32", "64", "128"},
-                    "64",
-                    "voxels",
-                    "edge of the texture cube; memory goes with its cube",
-                    "coarse structure that does not fit",
-                    "coarse examples are thinned to fit small cubes, which changes the grain that "
-                    "is compared"}};
+    suite.knobs = knobs_of(built_in_stages(), suite.name);
     suite.named = {{TrialRole::paper,
                     "paper, eq. (15), 32 voxels",
                     {{"texture.mode", "pyramid"}, {"texture.edge", "32"}}},

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The suites of the tradeoff, one function each: what is measured, against which truth, by which
-// knobs. Preparing a suite may take seconds (sampling a body); measuring one setting runs the stage
-// alone.
+// knobs. The knobs of stages are in the descriptors of their options (pipeline/stage/option.h).
+// Preparing a suite may take seconds (sampling a body); measuring one setting runs the stage alone.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "pipeline/cook/recipe.h"
+#include "pipeline/stages/built_in_stages.h"
 #include "pipeline/tradeoff/trial.h"
 
 namespace sonocase::pipeline {
@@ -31,7 +31,11 @@ Suite case_suite(const AnalyticBody& body, const std::string& body_name);
 // The whole chain on a user's case, against its own finest setting.
 Suite own_case_suite(const Recipe& recipe);
 
-// Settings put into the options of the stages by the recipe's own table of keys.
-Status apply_settings(const Settings& settings, StageOptions& options);
+// Puts settings into the options of the stages, by the names that a recipe has for them. Error: an
+// option or a value that the stages do not know.
+Status apply_settings(const Settings& settings, StageSettings& options);
+
+// The knobs of one suite: every option of the table that is swept in it, with its default.
+std::vector<Knob> knobs_of(const StageTable& table, const std::string& suite);
 
 }  // namespace sonocase::pipeline

@@ -3,8 +3,9 @@
 #include "pipeline/tradeoff/sweep.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+
+#include "pipeline/base/stopwatch.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -27,11 +28,11 @@ std::vector<std::string> values_of(const Knob& knob, std::size_t step) {
 }
 
 bool same_trial(const Trial& a, const Trial& b) {
-    // Not the name: the settings have it, and a file may have changed its commas.
+    // Not by name: the settings say the same, and a file may have changed its commas.
     return a.suite == b.suite && a.body == b.body && a.role == b.role && a.settings == b.settings;
 }
 
-// Without what is at its standard value anyway: settings that come to the same compare equal.
+// Without what is at its standard value anyway: settings with the same effect compare equal.
 Settings in_effect(const Suite& suite, const Settings& settings) {
     Settings own;
     for (const Setting& s : settings) {
@@ -39,11 +40,6 @@ Settings in_effect(const Suite& suite, const Settings& settings) {
         if (knob == nullptr || knob->standard != s.value) own.push_back(s);
     }
     return own;
-}
-
-double now_s() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
-        .count();
 }
 
 Trial measure_trial(const Suite& suite, Trial trial, int repeats) {
@@ -84,7 +80,7 @@ std::vector<Trial> plan_sweep(const Suite& suite, const SweepOptions& options) {
     add(TrialRole::standard, "standard", {});
     bool paper_stands = false;
     for (const NamedSettings& named : suite.named) {
-        // The paper's eq. (10) is the slowest of all; quick is content with one set of constants.
+        // The paper's eq. (10) is the slowest of all; a quick sweep takes one set of constants.
         if (options.quick && named.role == TrialRole::paper && paper_stands) continue;
         paper_stands = paper_stands || named.role == TrialRole::paper;
         add(named.role, named.name, named.settings);
@@ -116,7 +112,7 @@ std::vector<Trial> run_sweep(const Suite& suite,
                              const std::function<void(const Trial&)>& each,
                              const Progress& progress) {
     std::vector<Trial> measured;
-    const double start = now_s();
+    const Stopwatch watch;
     for (std::size_t i = 0; i < plan.size(); ++i) {
         report_progress(progress, static_cast<double>(i) / static_cast<double>(plan.size()),
                         suite.name + ": " + settings_text(plan[i].settings));
@@ -127,7 +123,7 @@ std::vector<Trial> run_sweep(const Suite& suite,
             measured.back().name = plan[i].name;
             continue;
         }
-        // The standard setting stands in every knob's row, and presets are settings too.
+        // The standard setting is part of every knob's row, and presets are settings too.
         const Settings effect = in_effect(suite, plan[i].settings);
         const auto same = std::find_if(measured.begin(), measured.end(), [&](const Trial& t) {
             return in_effect(suite, t.settings) == effect;
@@ -141,7 +137,7 @@ std::vector<Trial> run_sweep(const Suite& suite,
             if (each) each(trial);
             continue;
         }
-        if (options.limit_s > 0 && now_s() - start > options.limit_s) break;
+        if (options.limit_s > 0 && watch.seconds() > options.limit_s) break;
         measured.push_back(measure_trial(suite, plan[i], std::max(options.repeats, 1)));
         if (each) each(measured.back());
     }

@@ -12,7 +12,7 @@
 namespace sonocase::pipeline {
 
 struct SweepOptions {
-    int repeats = 3;     // runs a setting; the median of the seconds is kept, >= 1
+    int repeats = 3;     // runs per setting; the median of the seconds is kept, >= 1
     bool quick = false;  // both ends of each knob and its standard value, no pairs
     double limit_s = 0;  // leave the rest of a suite out after this long; 0: no limit
 };

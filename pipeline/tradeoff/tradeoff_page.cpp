@@ -7,9 +7,9 @@
 
 #include "formats/files/atomic_file.h"
 #include "formats/text/number_text.h"
-#include "pipeline/cook/stage_options.h"
 #include "pipeline/pictures/chart.h"
 #include "pipeline/pictures/markup.h"
+#include "pipeline/stages/built_in_stages.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -119,26 +119,11 @@ std::string knob_rows(const Suite& suite, const std::vector<Trial>& trials, doub
     return html;
 }
 
-// Every option of every stage; what no suite above sweeps is a choice rather than a price.
+// Every option of every stage; an option that no suite above sweeps trades no accuracy for time.
 std::string options_table() {
-    std::string text =
-        "\n## Every option of the stages\n\nSet in a recipe's section or by `--set KEY=VALUE`; "
-        "`sonocase build --list-options` prints the same.\n\n"
-        "| key | default | range | meaning |\n|---|---|---|---|\n";
-    StageOptions defaults;
-    for (const OptionKey& key : option_keys()) {
-        std::string range = key.choices;
-        for (std::size_t bar = 0; (bar = range.find('|', bar)) != std::string::npos; bar += 2)
-            range.replace(bar, 1, ", ");
-        const std::string value = option_value(key, defaults);
-        if (value == "true" || value == "false") range = "true, false";
-        if (range.empty())
-            range = number_text(key.low, 6) + " to " + number_text(key.high, 6) +
-                    (*key.unit ? std::string(" ") + key.unit : std::string());
-        text += std::string("| `") + key.section + "." + key.key + "` | " + value + " | " + range +
-                " | " + key.meaning + " |\n";
-    }
-    return text;
+    return "\n## Every option of the stages\n\nSet in a recipe's section or by `--set KEY=VALUE`; "
+           "`sonocase build --list-options` prints the same.\n\n" +
+           options_markdown(built_in_stages());
 }
 
 constexpr const char* kStyle =

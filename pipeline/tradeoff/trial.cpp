@@ -69,16 +69,16 @@ CurveVerdict judge_curve(const std::vector<Trial>& trials, double noise) {
     CurveVerdict verdict;
     double worst = 0;
     for (std::size_t i = 1; i < by_time.size(); ++i) {
-        const Trial &cheap = by_time[i - 1], &dear = by_time[i];
-        if (dear.seconds < cheap.seconds * (1 + noise)) continue;  // as dear as the other: no order
-        const double rise = dear.error - cheap.error;
-        if (rise <= noise * cheap.error || rise <= worst) continue;
+        const Trial &fast = by_time[i - 1], &slow = by_time[i];
+        if (slow.seconds < fast.seconds * (1 + noise)) continue;  // about the same time: no order
+        const double rise = slow.error - fast.error;
+        if (rise <= noise * fast.error || rise <= worst) continue;
         worst = rise;
         verdict.monotone = false;
         char line[256];
         std::snprintf(line, sizeof line, "%s -> %s: %.4g -> %.4g",
-                      settings_text(cheap.settings).c_str(), settings_text(dear.settings).c_str(),
-                      cheap.error, dear.error);
+                      settings_text(fast.settings).c_str(), settings_text(slow.settings).c_str(),
+                      fast.error, slow.error);
         verdict.worst = line;
     }
     return verdict;

@@ -21,10 +21,10 @@ using Settings = std::vector<Setting>;  // those that differ from the default
 struct Measured {
     double error = 0;    // in the suite's unit, against truth
     double seconds = 0;  // of the stage alone
-    std::string note;    // "3 labels lost"; empty: nothing to say
+    std::string note;    // "3 labels lost"; may be empty
 };
 
-// Why a setting stands in a sweep.
+// Why a setting is part of a sweep.
 enum class TrialRole { standard, knob, pair, preset, paper, peer };
 
 struct Trial {
@@ -44,7 +44,7 @@ struct Trial {
 // A knob: one option with the values that are tried, and the error that it trades for time.
 struct Knob {
     std::string key;
-    std::vector<std::string> values;  // from cheap to dear; the standard one among them
+    std::vector<std::string> values;  // cheapest first; the standard one is among them
     std::string standard;
     std::string unit;  // "" for a count
     std::string meaning;
@@ -79,7 +79,7 @@ Settings parse_settings(const std::string& text);     // of settings_text
 // True where no other trial of the same suite and body is both faster and better. # trials.
 std::vector<bool> pareto_front(const std::vector<Trial>& trials);
 
-// What a knob's curve says: seconds rising, does the error fall? Differences below `noise`
+// Whether the error of a knob's curve falls as its seconds rise. Differences below `noise`
 // (relative) do not count. Trials of one knob in the order of its values.
 struct CurveVerdict {
     bool monotone = true;

@@ -70,7 +70,7 @@ Result<std::vector<Trial>> parse_trials_csv(const std::string& text, const std::
         const std::string place = where + ":" + std::to_string(number_of_line);
         if (number_of_line == 1) {
             if (line != kColumns)
-                return Error{"not a table of trials", place, "remove the file to sweep anew"};
+                return Error{"not a table of trials", place, "remove the file to sweep again"};
             continue;
         }
         std::vector<std::string> cells;
@@ -94,7 +94,7 @@ Result<std::vector<Trial>> parse_trials_csv(const std::string& text, const std::
             }
         }
         if (!known_role)
-            return Error{"a row that is no trial", place, "remove the file to sweep anew"};
+            return Error{"a row that is not a trial", place, "remove the file to sweep again"};
         t.suite = cells[0];
         t.body = cells[1];
         t.name = cells[3];

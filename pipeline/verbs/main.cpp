@@ -2,6 +2,7 @@
 
 // sonocase: turns a segmented CT and a digitised mannequin into a case bundle.
 #include <cstdio>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,48 +11,68 @@
 #include "formats/text/nearest_name.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
+#include "pipeline/stages/built_in_stages.h"
+#include "pipeline/verbs/stage/stage_verb.h"
 
 namespace sonocase::pipeline {
 namespace {
 
+constexpr const char* kCase = "Make and look at a case";
+constexpr const char* kStage = "One stage, files in and files out";
+constexpr const char* kFarm = "Many cases at once";
+constexpr const char* kSession = "Trackers and sessions";
+
 struct Verb {
-    const char* group;
-    const char* name;
-    const char* summary;
-    int (*run)(int argc, char** argv);
+    std::string group;
+    std::string name;
+    std::string summary;
+    std::function<int(int argc, char** argv)> run;
+    std::string after;  // of a verb of kStage: the stage that it follows in the list
 };
 
-// The one table of verbs, in the order in which help shows them.
-[[maybe_unused]] constexpr const char* kCase = "Make and look at a case";
-[[maybe_unused]] constexpr const char* kStage = "One stage, files in and files out";
-[[maybe_unused]] constexpr const char* kFarm = "Many cases at once";
-[[maybe_unused]] constexpr const char* kSession = "Trackers and sessions";
-
-const std::vector<Verb>& verbs() {
+const std::vector<Verb>& hand_written_verbs() {
     static const std::vector<Verb> table{
-        {kCase, "build", "cook a recipe into a case bundle", verb_build},
-        {kCase, "inspect", "show what a bundle holds", verb_inspect},
-        {kCase, "validate", "check a bundle", verb_validate},
-        {kCase, "export", "unpack a bundle for other tools", verb_export},
-        {kCase, "tradeoff", "sweep accuracy against time", verb_tradeoff},
-        {kStage, "import", "read a label map of any kind", verb_import},
-        {kStage, "surface", "extract the patient's skin from a label map", verb_surface},
-        {kStage, "align", "lay the skin on the mannequin rigidly", verb_align},
-        {kStage, "warp", "fit the quadratic and residual warps", verb_warp},
-        {kStage, "register", "surface, align and warp in one call", verb_register},
-        {kStage, "map", "carry points through a fitted map", verb_map},
-        {kStage, "resample", "carry labels through the fit into cubic voxels", verb_resample},
-        {kStage, "smooth", "take the steps out of labels", verb_smooth},
-        {kStage, "texture", "learn solid textures from example images", verb_texture},
-        {kStage, "pack", "put the stages' files into a bundle", verb_pack},
-        {kFarm, "plan", "find what a build farm has to run", verb_plan},
-        {kFarm, "cache", "tidy a folder of stage results", verb_cache},
-        {kSession, "calibrate", "find tips, axes and frames of tracked tools", verb_calibrate},
-        {kSession, "review", "make a page of a recorded session", verb_review},
-        {kSession, "score", "score a recording of this or another trainer", verb_score},
-        {kSession, "progress", "list, export or remove what trainees have done", verb_progress},
+        {kCase, "build", "cook a recipe into a case bundle", verb_build, ""},
+        {kCase, "inspect", "show what a bundle holds", verb_inspect, ""},
+        {kCase, "validate", "check a bundle", verb_validate, ""},
+        {kCase, "export", "unpack a bundle for other tools", verb_export, ""},
+        {kCase, "tradeoff", "sweep accuracy against time", verb_tradeoff, ""},
+        {kStage, "align", "lay the skin on the mannequin rigidly", verb_align, "surface"},
+        {kStage, "warp", "fit the quadratic and residual warps", verb_warp, "warp"},
+        {kStage, "register", "surface, align and warp in one call", verb_register, "warp"},
+        {kStage, "map", "carry points through a fitted map", verb_map, "warp"},
+        {kStage, "texture", "learn solid textures from example images", verb_texture, "texture"},
+        {kStage, "pack", "put the stages' files into a bundle", verb_pack, "pack"},
+        {kFarm, "plan", "find what a build farm has to run", verb_plan, ""},
+        {kFarm, "cache", "tidy a folder of stage results", verb_cache, ""},
+        {kSession, "calibrate", "find tips, axes and frames of tracked tools", verb_calibrate, ""},
+        {kSession, "review", "make a page of a recorded session", verb_review, ""},
+        {kSession, "score", "score a recording of this or another trainer", verb_score, ""},
+        {kSession, "progress", "list, export or remove trainees' results", verb_progress, ""},
     };
     return table;
+}
+
+// All verbs in the order in which help shows them: those of the stages in the order of the stages.
+std::vector<Verb> verbs(const StageTable& stages) {
+    std::vector<Verb> all;
+    const auto add = [&](const char* group, const std::string& after) {
+        for (const Verb& verb : hand_written_verbs())
+            if (verb.group == group && verb.after == after) all.push_back(verb);
+    };
+    add(kCase, "");
+    for (const StageDescriptor& stage : stages.stages) {
+        if (stage.verb)
+            all.push_back({kStage, stage.name, stage.summary,
+                           [&stages, &stage](int argc, char** argv) {
+                               return run_stage_verb(stages, stage, argc, argv);
+                           },
+                           ""});
+        add(kStage, stage.name);
+    }
+    add(kFarm, "");
+    add(kSession, "");
+    return all;
 }
 
 void print_help(std::FILE* out) {
@@ -59,13 +80,13 @@ void print_help(std::FILE* out) {
         "sonocase: case bundles for ultrasound-guided needle placement\n\n"
         "Usage: sonocase VERB [options]\n",
         out);
-    const char* group = "";
-    for (const Verb& verb : verbs()) {
-        if (std::string_view(group) != verb.group) {
+    std::string group;
+    for (const Verb& verb : verbs(built_in_stages())) {
+        if (group != verb.group) {
             group = verb.group;
-            std::fprintf(out, "\n%s:\n", group);
+            std::fprintf(out, "\n%s:\n", group.c_str());
         }
-        std::fprintf(out, "  %-11s %s\n", verb.name, verb.summary);
+        std::fprintf(out, "  %-11s %s\n", verb.name.c_str(), verb.summary.c_str());
     }
     std::fputs(
         "\nsonocase VERB --help    options of a verb, with defaults and ranges\n"
@@ -89,9 +110,9 @@ int run(int argc, char** argv) {
         return kDone;
     }
     std::vector<std::string> names;
-    for (const Verb& verb : verbs()) {
+    for (const Verb& verb : verbs(built_in_stages())) {
         if (name == verb.name) return verb.run(argc - 1, argv + 1);
-        names.emplace_back(verb.name);
+        names.push_back(verb.name);
     }
     std::fprintf(stderr, "sonocase: no verb '%s'; %s (sonocase --help lists all)\n", argv[1],
                  suggest_name(name, names).c_str());

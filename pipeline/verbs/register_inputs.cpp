@@ -10,6 +10,8 @@
 #include "pipeline/import/label_map.h"
 #include "pipeline/import/surface/surface_file.h"
 #include "pipeline/registration/landmark_file.h"
+#include "pipeline/stages/built_in_stages.h"
+#include "pipeline/verbs/stage/option_flags.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -21,7 +23,7 @@ Result<Vector3> parse_direction(const std::string& text) {
         const std::size_t comma = axis < 2 ? rest.find(',') : rest.size();
         if (comma == std::string_view::npos || !parse_number(rest.substr(0, comma), v[axis]) ||
             !std::isfinite(v[axis])) {
-            return Error{"'" + text + "' is no direction", "--up",
+            return Error{"'" + text + "' is not a direction", "--up",
                          "three numbers X,Y,Z, e.g. 0,1,0"};
         }
         rest = rest.substr(std::min(rest.size(), comma + 1));
@@ -35,62 +37,67 @@ Result<Vector3> parse_direction(const std::string& text) {
 
 }  // namespace
 
+RegisterArguments::RegisterArguments() {
+    recipe.settings = StageSettings(built_in_stages());
+}
+
 void add_register_options(CLI::App& app, RegisterArguments& a) {
-    app.add_option("--labels", a.labels,
+    RecipeInputs& in = a.recipe.inputs;
+    app.add_option("--labels", in.labels,
                    "Label map: NIfTI, NRRD, MetaImage, DICOM or a folder of masks")
         ->type_name("FILE")
         ->required();
-    app.add_option("--surface", a.surface, "Mannequin: PLY, STL, OBJ, VTP, or CSV of readings")
+    app.add_option("--surface", in.surface, "Mannequin: PLY, STL, OBJ, VTP, or CSV of readings")
         ->type_name("FILE")
         ->required();
-    app.add_option("--table", a.table, "CSV of value,name[,tissue_class] for the label map")
+    app.add_option("--table", in.label_table, "CSV of value,name[,tissue_class] for the label map")
         ->type_name("FILE.csv");
     app.add_option("--up", a.up, "The patient's head direction in the surface's frame")
         ->type_name("X,Y,Z");
-    app.add_option("--landmarks", a.landmarks, "Rows name,ct_x,ct_y,ct_z,x,y,z in mm")
+    app.add_option("--landmarks", in.landmarks, "Rows name,ct_x,ct_y,ct_z,x,y,z in mm")
         ->type_name("FILE.csv");
-    app.add_option("--scale", a.surface_scale, "mm per unit of the surface file")
-        ->check(CLI::PositiveNumber)
+    app.add_option("--scale", in.surface_scale, "Millimetres per unit of the surface file")
+        ->check(CLI::Range(kSmallestScale, kLargestScale))
         ->capture_default_str();
-    app.add_option("--seed", a.seed, "Seed of the starts and trials")->capture_default_str();
-    app.add_flag("--no-residual", a.no_residual, "Leave the residual warp out");
-    app.add_flag("--paper", a.paper, "Stop after the paper's RANSAC quadratic, eqs. (3)-(9)");
+    const StageTable& table = a.recipe.settings.table();
+    add_option_flags(app, table.common, a.recipe.settings.options(table.common.name));
+    add_option_flags(app, table.find("warp")->options, a.recipe.settings.options("warp"));
     add_common_options(app, a.common);
 }
 
 Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Progress& progress) {
     const Stopwatch watch;
+    const RecipeInputs& in = a.recipe.inputs;
     RegisterInputs inputs;
+    inputs.options = a.recipe.settings.of<RegisterOptions>("warp");
+    inputs.options.seed = case_seed(a.recipe);
     if (!a.up.empty()) {
         const Result<Vector3> up = parse_direction(a.up);
         if (!up) return up.error();
         inputs.options.up = *up;
     }
-    if (!a.landmarks.empty()) {
-        Result<std::vector<Landmark>> landmarks = load_landmarks(a.landmarks);
+    if (!in.landmarks.empty()) {
+        Result<std::vector<Landmark>> landmarks = load_landmarks(in.landmarks);
         if (!landmarks) return landmarks.error();
         inputs.options.landmarks = std::move(*landmarks);
     }
-    inputs.options.seed = a.seed;
-    inputs.options.residual_warp = !a.no_residual;
-    inputs.options.paper_warp = a.paper;
     StageReport surface_report;
-    Result<Surface> surface = import_surface(a.surface, {a.surface_scale}, &surface_report);
+    Result<Surface> surface = import_surface(in.surface, {in.surface_scale}, &surface_report);
     if (!surface) return surface.error();
     inputs.mannequin = std::move(*surface);
     ImportOptions import;
-    import.table = a.table;
-    import.scale = a.labels_scale;
-    Result<ImportedLabels> labels = import_label_map(a.labels, import, progress);
+    import.table = in.label_table;
+    Result<ImportedLabels> labels = import_label_map(in.labels, import, progress);
     if (!labels) return labels.error();
     inputs.warnings = surface_report.warnings;
     inputs.warnings.insert(inputs.warnings.end(), labels->report.warnings.begin(),
                            labels->report.warnings.end());
     inputs.import_seconds = watch.seconds();
-    Result<SkinSurfaceResult> skin = extract_skin_surface(labels->labels);
+    Result<SkinSurfaceResult> skin =
+        extract_skin_surface(labels->labels, a.recipe.settings.of<SkinSurfaceOptions>("surface"));
     if (!skin) {
         Error error = skin.error();
-        if (error.where.empty()) error.where = a.labels;
+        if (error.where.empty()) error.where = in.labels;
         return error;
     }
     inputs.skin = std::move(*skin);

@@ -8,20 +8,22 @@
 #include "formats/base/result.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/registration/register_surfaces.h"
+#include "pipeline/stage/recipe.h"
 
 namespace sonocase::pipeline {
 
 struct RegisterArguments {
-    std::string labels, table, surface, out, up, landmarks;
-    double labels_scale = 1, surface_scale = 1;
-    std::uint64_t seed = 1;
-    bool no_residual = false, paper = false;
+    RegisterArguments();  // options at their defaults
+
+    Recipe recipe;  // inputs, and the options of the stage "warp"
+    std::string out, up;
     CommonOptions common;
 };
 
+// Inputs, every option of the stage "warp", --seed, and what all verbs have.
 void add_register_options(CLI::App& app, RegisterArguments& arguments);
 
-// Label map, skin and mannequin read, hints parsed; warnings of all of them gathered.
+// Label map, skin and mannequin as read, hints parsed; with the warnings of all of them.
 struct RegisterInputs {
     SkinSurfaceResult skin;
     Surface mannequin;
@@ -32,10 +34,10 @@ struct RegisterInputs {
 Result<RegisterInputs> read_register_inputs(const RegisterArguments& arguments,
                                             const Progress& progress);
 
-// Adds what reading and the skin had to say to the stage's report.
+// Adds to the stage's report what was reported when the inputs were read and the skin extracted.
 void add_input_reports(const RegisterInputs& inputs, StageReport& report);
 
-// "name  value" lines of a fit for people, on standard output.
+// A table of the fit's distances for people, on standard output.
 void print_fit(const RegisterResult& result);
 
 }  // namespace sonocase::pipeline

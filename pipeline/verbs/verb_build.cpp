@@ -17,7 +17,9 @@
 #include "pipeline/base/parallel.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
+#include "pipeline/cook/case_size.h"
 #include "pipeline/cook/cook_case.h"
+#include "pipeline/recipe/read_recipe.h"
 #include "pipeline/tradeoff/boundary_error.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/tradeoff/suites.h"
@@ -33,42 +35,41 @@ struct BuildOptions {
     std::string until;
     std::string plan_key;
     std::string preview;
-    bool list_keys = false;
-    AccuracyTarget wish;
+    bool list_options = false;
+    AccuracyTarget target;
     RecipeOverrides overrides;
     CommonOptions common;
 };
 
-void print_keys() {
-    StageOptions defaults;
-    std::string section;
-    for (const OptionKey& key : option_keys()) {
-        if (section != key.section) {
-            section = key.section;
-            std::printf("[%s]\n", key.section);
-        }
-        const std::string value = option_value(key, defaults);
-        if (*key.choices)
-            std::printf("  %-22s %-10s %s; %s\n", key.key, value.c_str(), key.meaning, key.choices);
-        else
-            std::printf("  %-22s %-10s %s; %g to %g %s\n", key.key, value.c_str(), key.meaning,
-                        key.low, key.high, key.unit);
-    }
+// "import, surface, ...": where --until may stop.
+std::string stage_names(const StageTable& table) {
+    std::string names;
+    for (const StageDescriptor& stage : table.stages)
+        if (stage.reports) names += (names.empty() ? "" : ", ") + stage.name;
+    return names;
 }
 
-double seconds_of(const CookResult& cooked) {
-    double sum = 0;
-    for (const StageRun& run : cooked.stages) sum += run.report.seconds;
-    return sum;
+std::string preset_names(const StageTable& table) {
+    std::string names;
+    for (const std::string& name : table.preset_names())
+        names += (names.empty() ? "" : ", ") + name;
+    return names;
 }
 
-// Settings for the accuracy or the time that was asked for, put into the recipe.
-Result<Choice> choose_for(const AccuracyTarget& wish, Recipe& recipe) {
+// The report as people see it: what happened in the cache is of interest for this run as well.
+StageReport with_cache_notes(const StageRun& run) {
+    StageReport report = run.report;
+    report.warnings.insert(report.warnings.end(), run.cache_notes.begin(), run.cache_notes.end());
+    return report;
+}
+
+// Puts settings for the accuracy or the time that was asked for into the recipe.
+Result<Choice> choose_for(const AccuracyTarget& target, Recipe& recipe) {
     auto size = cooked_volume_mm3(recipe);
     if (!size) return size.error();
     const FrontTable& front = measured_front();
-    Choice choice = choose_settings(front, wish, *size, probe_seconds() / front.probe_seconds);
-    if (const Status s = apply_settings(choice.settings, recipe.options); !s) return s.error();
+    Choice choice = choose_settings(front, target, *size, probe_seconds() / front.probe_seconds);
+    if (const Status s = apply_settings(choice.settings, recipe.settings); !s) return s.error();
     return choice;
 }
 
@@ -105,14 +106,63 @@ std::string build_report(const CookResult& cooked,
     json["stages"] = nlohmann::ordered_json::array();
     json["warnings"] = nlohmann::ordered_json::array();
     for (const StageRun& run : cooked.stages) {
-        auto stage = nlohmann::ordered_json::parse(report_json(run.report));
+        const StageReport report = with_cache_notes(run);
+        auto stage = nlohmann::ordered_json::parse(report_json(report));
         stage["from_cache"] = run.from_cache;
         if (!run.key.empty()) stage["key"] = run.key;
         json["stages"].push_back(stage);
-        for (const std::string& warning : run.report.warnings)
-            json["warnings"].push_back(run.report.stage + ": " + warning);
+        for (const std::string& warning : report.warnings)
+            json["warnings"].push_back(report.stage + ": " + warning);
     }
     return json.dump(2) + "\n";
+}
+
+Result<std::optional<Choice>> choose(const AccuracyTarget& target, Recipe& recipe) {
+    if (target.tolerance_mm <= 0 && target.time_budget_s <= 0) return std::optional<Choice>();
+    auto choice = choose_for(target, recipe);
+    if (!choice) return choice.error();
+    std::printf("chosen: %s, about %.2g mm in %.2g s\n", settings_text(choice->settings).c_str(),
+                choice->predicted_error_mm, choice->predicted_seconds);
+    if (!choice->warning.empty())
+        std::fprintf(stderr, "sonocase build: warning: %s\n", choice->warning.c_str());
+    return std::optional<Choice>(std::move(*choice));
+}
+
+Result<CookResult> cook(const BuildOptions& options, const Recipe& recipe) {
+    CookOptions cook;
+    cook.cache_folder = options.cache;
+    cook.cache_bytes = static_cast<std::uint64_t>(options.cache_limit_mb * 1e6);
+    cook.producer = producer();
+    cook.until = options.until;
+    cook.plan_key = options.plan_key;
+    ProgressBar bar(options.common);
+    return cook_case(recipe, cook, bar.progress());
+}
+
+Status write_stage_report(const BuildOptions& options,
+                          const CookResult& cooked,
+                          const std::optional<Choice>& choice,
+                          double seconds) {
+    if (options.common.report_path.empty()) return Done{};
+    return write_file(options.common.report_path,
+                      build_report(cooked, "", cooked.digest, 0, seconds, choice, std::nullopt));
+}
+
+// The bundle, its picture, and the report beside it, which inspect reads: seconds are not part of
+// the bundle, whose bytes they would change from run to run.
+Status write_case(const BuildOptions& options,
+                  const std::string& out,
+                  const CookResult& cooked,
+                  const std::vector<std::uint8_t>& bytes,
+                  const std::string& report) {
+    if (auto status = write_file(out, bytes); !status) return status;
+    if (!options.preview.empty())
+        if (auto status = write_file(options.preview, cooked.bundle.preview_png); !status)
+            return status;
+    for (const std::string& path : {out + ".report.json", options.common.report_path})
+        if (!path.empty())
+            if (auto status = write_file(path, report); !status) return status;
+    return Done{};
 }
 
 int build(const BuildOptions& options) {
@@ -121,65 +171,34 @@ int build(const BuildOptions& options) {
     auto recipe = options.recipe.empty() ? embedded_recipe(options.overrides)
                                          : load_recipe(options.recipe, options.overrides);
     if (!recipe) return fail("build", recipe.error());
-    std::optional<Choice> choice;
-    if (options.wish.tolerance_mm > 0 || options.wish.time_budget_s > 0) {
-        auto chosen = choose_for(options.wish, *recipe);
-        if (!chosen) return fail("build", chosen.error());
-        choice = *chosen;
-        std::printf("chosen: %s, about %.2g mm in %.2g s\n",
-                    settings_text(choice->settings).c_str(), choice->predicted_error_mm,
-                    choice->predicted_seconds);
-        if (!choice->warning.empty())
-            std::fprintf(stderr, "sonocase build: warning: %s\n", choice->warning.c_str());
-    }
-    const std::string out = options.out.empty() ? recipe->name + ".sonocase" : options.out;
-    CookOptions cook;
-    cook.cache_folder = options.cache;
-    cook.cache_bytes = static_cast<std::uint64_t>(options.cache_limit_mb * 1e6);
-    cook.producer = producer();
-    cook.until = options.until;
-    cook.plan_key = options.plan_key;
-    Result<CookResult> cooked = Error{};
-    {
-        ProgressBar bar(options.common);
-        cooked = cook_case(*recipe, cook, bar.progress());
-    }
+    const auto choice = choose(options.target, *recipe);
+    if (!choice) return fail("build", choice.error());
+    const auto cooked = cook(options, *recipe);
     if (!cooked) return fail("build", cooked.error());
-    if (!options.until.empty() && options.until != "pack") {
-        const std::string report =
-            build_report(*cooked, "", cooked->digest, 0, watch.seconds(), choice, std::nullopt);
-        if (!options.common.report_path.empty())
-            if (auto status = write_file(options.common.report_path, report); !status)
-                return fail("build", status.error());
+    if (!cooked->digest.empty()) {  // stopped before the bundle
+        auto status = write_stage_report(options, *cooked, *choice, watch.seconds());
+        if (!status) return fail("build", status.error());
         std::printf("%s of %s, %.1f s\n", options.until.c_str(), recipe->name.c_str(),
                     watch.seconds());
         return kDone;
     }
     // Only the analytic torso's truth is known.
     std::optional<double> achieved_error_mm;
-    if (choice && recipe->inputs.analytic)
+    if (*choice && recipe->inputs.analytic)
         achieved_error_mm =
             measure_boundary_error(cooked->bundle, recipe->inputs.torso).displaced_mm;
+    const std::string out = options.out.empty() ? recipe->name + ".sonocase" : options.out;
     ThreadJobs jobs;
     const std::vector<std::uint8_t> bytes = write_bundle(cooked->bundle, jobs);
-    if (auto status = write_file(out, bytes); !status) return fail("build", status.error());
-    if (!options.preview.empty())
-        if (auto status = write_file(options.preview, cooked->bundle.preview_png); !status)
-            return fail("build", status.error());
-    for (const StageRun& run : cooked->stages) print_warnings("build", run.report);
     const std::string report = build_report(*cooked, out, digest_of(bytes), bytes.size(),
-                                            watch.seconds(), choice, achieved_error_mm);
-    // Beside the bundle, for inspect: the seconds are no part of the bundle, whose bytes they would
-    // change from run to run.
-    for (const std::string& path : {out + ".report.json", options.common.report_path})
-        if (!path.empty())
-            if (auto status = write_file(path, report); !status)
-                return fail("build", status.error());
+                                            watch.seconds(), *choice, achieved_error_mm);
+    if (auto status = write_case(options, out, *cooked, bytes, report); !status)
+        return fail("build", status.error());
+    for (const StageRun& run : cooked->stages) print_warnings("build", with_cache_notes(run));
+    const Grid& grid = cooked->bundle.grid;
     std::printf("%s  %.1f MB, %d x %d x %d voxels of %g mm, %zu labels, %.1f s\n", out.c_str(),
-                static_cast<double>(bytes.size()) / 1e6, cooked->bundle.grid.size.x,
-                cooked->bundle.grid.size.y, cooked->bundle.grid.size.z,
-                cooked->bundle.grid.spacing_mm.x, cooked->bundle.labels.size() - 1,
-                watch.seconds());
+                static_cast<double>(bytes.size()) / 1e6, grid.size.x, grid.size.y, grid.size.z,
+                grid.spacing_mm.x, cooked->bundle.labels.size() - 1, watch.seconds());
     return kDone;
 }
 
@@ -201,37 +220,37 @@ int verb_build(int argc, char** argv) {
         ->expected(1)
         ->take_all();
     app.add_option("--preset", options.overrides.preset,
-                   "draft, balanced or accurate; the recipe's own by default")
+                   "One of " + preset_names(built_in_stages()) + "; the recipe's own by default")
         ->type_name("NAME");
     app.add_option("--cache", options.cache, "Folder of finished stage results; may be shared")
         ->type_name("DIR");
     app.add_option("--cache-limit-mb", options.cache_limit_mb,
-                   "Bound of the cache folder; 0 means none")
+                   "Limit of the cache folder's size; 0 means none")
         ->check(CLI::NonNegativeNumber)
         ->type_name("MB");
     app.add_option("--preview", options.preview, "Write the case's picture as well")
         ->type_name("FILE.png");
-    app.add_option("--until", options.until,
-                   "Stop at a stage, which stays in --cache: import, surface, warp, resample, "
-                   "smooth, texture, structure, pack")
+    app.add_option(
+           "--until", options.until,
+           "Stop at a stage, whose result stays in --cache: " + stage_names(built_in_stages()))
         ->type_name("STAGE");
     app.add_option("--plan-key", options.plan_key,
                    "Fail if recipe and inputs are not those of this key from plan.json")
         ->type_name("KEY");
-    app.add_option("--tolerance-mm", options.wish.tolerance_mm,
+    app.add_option("--tolerance-mm", options.target.tolerance_mm,
                    "Take the cheapest settings whose measured error is within X")
         ->check(CLI::PositiveNumber)
         ->type_name("X");
-    app.add_option("--time-budget-s", options.wish.time_budget_s,
+    app.add_option("--time-budget-s", options.target.time_budget_s,
                    "Take the best settings that this machine manages in T seconds")
         ->check(CLI::PositiveNumber)
         ->type_name("T");
-    app.add_flag("--list-options", options.list_keys,
+    app.add_flag("--list-options", options.list_options,
                  "Print every option key with default and range");
     add_common_options(app, options.common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
-    if (options.list_keys) {
-        print_keys();
+    if (options.list_options) {
+        std::fputs(list_options(built_in_stages()).c_str(), stdout);
         return kDone;
     }
     return build(options);

@@ -20,7 +20,7 @@ int verb_export(int argc, char** argv) {
     app.add_option("BUNDLE", path, "The bundle")->required();
     app.add_option("-o,--output", folder, "Folder to write")->type_name("DIR")->required();
     bool level_sets = false;
-    app.add_flag("--level-sets", level_sets, "Also labels.vdb: an OpenVDB level set a label");
+    app.add_flag("--level-sets", level_sets, "Also labels.vdb: one OpenVDB level set per label");
     add_common_options(app, common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     auto bundle = load_bundle(path);

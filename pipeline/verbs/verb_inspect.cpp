@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase inspect and sonocase validate: what a bundle holds, and whether it is sound.
+// sonocase inspect and sonocase validate: what a bundle holds, and whether it is valid.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <nlohmann/json.hpp>

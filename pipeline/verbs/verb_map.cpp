@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase map: points through a fitted map, either way, each with a status.
+// sonocase map: carries points through a fitted map, either way, each with a status.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <limits>
@@ -21,8 +21,8 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// Columns x, y, z by the header, or the first three. Rows that are no numbers become NaN, so that
-// the output has the rows of the input.
+// Columns x, y, z by the header, or the first three. Rows that are not numbers become NaN, so that
+// the output has the same rows as the input.
 Result<std::vector<Point3>> read_points(const std::string& path) {
     const Result<std::string> text = read_text_file(path);
     if (!text) return text.error();
@@ -72,9 +72,9 @@ bool is_finite(Point3 p) {
 
 int verb_map(int argc, char** argv) {
     CLI::App app(
-        "Carry points through a fitted map. Status ok: inside the CT; outside: the CT end of the "
-        "pair "
-        "lies beyond the CT, where nothing is proven; no_preimage: nothing maps onto the point");
+        "Carry points through a fitted map. Status ok: inside the CT; outside: the point or its "
+        "image is beyond the CT, where nothing is proven; no_preimage: nothing maps onto the "
+        "point");
     std::string registration_path, from, to, in, out;
     CommonOptions common;
     app.add_option("registration", registration_path, "What register wrote")

@@ -15,8 +15,8 @@
 #include "pipeline/base/parallel.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
-#include "pipeline/cook/pack_case.h"
 #include "pipeline/import/surface/surface_file.h"
+#include "pipeline/pack/pack_case.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -28,7 +28,7 @@ struct PackFiles {
     std::uint64_t seed = 1;
 };
 
-// A .surface of ours, or any surface file.
+// A .surface file of ours, or any surface file that import reads.
 Result<Surface> load_any_surface(const std::string& path) {
     const auto bytes = sonocase::read_file(path);
     if (!bytes) return bytes.error();
@@ -82,9 +82,10 @@ Result<PackResult> pack(const PackFiles& files, const Progress& progress) {
         labels->echo_offset = std::move(baked->echo_offset);
         labels->reports.push_back(baked->report);
     }
-    auto packed =
-        pack_case({files.name, "", exercises, has_skin ? &skin : nullptr,
-                   has_fit ? &registration : nullptr, *mannequin, *labels, *textures, tissues});
+    auto packed = pack_case({files.name, "", exercises, has_skin ? &skin : nullptr,
+                             has_fit ? &registration : nullptr, *mannequin, labels->volume,
+                             labels->volume.labels, labels->boundary, labels->echo_offset,
+                             *textures, tissues});
     if (!packed) return packed;
     auto& stages = packed->bundle.manifest.stages;
     for (const auto* reports : {&labels->reports, &textures->reports})
@@ -119,13 +120,13 @@ int verb_pack(int argc, char** argv) {
                                "The fit, for the skin and for exercises in ct")
                     ->type_name("REG.json");
     skin->needs(fit);
-    app.add_option("--exercise", files.exercises, "Exercise to put in; may be repeated")
+    app.add_option("--exercise", files.exercises, "Exercise to include; may be repeated")
         ->type_name("FILE.toml")
         ->take_all();
     app.add_flag("--structure,!--no-structure", files.structure,
                  "Bake structure inside organs where the labels carry none; on by default");
-    app.add_option("--seed", files.seed, "Of that structure")->capture_default_str();
-    app.add_option("--name", files.name, "Of the case")->default_val("case");
+    app.add_option("--seed", files.seed, "Seed of that structure")->capture_default_str();
+    app.add_option("--name", files.name, "Name of the case")->default_val("case");
     app.add_option("-o,--output", files.out, "Bundle to write")
         ->type_name("OUT.sonocase")
         ->required();

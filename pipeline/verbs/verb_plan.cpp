@@ -9,7 +9,7 @@
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
 #include "pipeline/cook/plan_cases.h"
-#include "pipeline/cook/stage_cache.h"
+#include "pipeline/stage/stage_cache.h"
 
 namespace sonocase::pipeline {
 
@@ -55,14 +55,15 @@ int verb_plan(int argc, char** argv) {
 }
 
 int verb_cache(int argc, char** argv) {
-    CLI::App app("Tidy a folder of finished stage results, while others use it or not");
+    CLI::App app("Tidy a folder of finished stage results; other programs may be using it");
     std::string folder;
     double limit_mb = 0;
     bool verify = false;
     app.add_option("DIR", folder, "The folder given to build as --cache")
         ->required()
         ->check(CLI::ExistingDirectory);
-    app.add_option("--limit-mb", limit_mb, "Remove what was not used for longest; 0 means no limit")
+    app.add_option("--limit-mb", limit_mb,
+                   "Remove what has not been used for longest; 0 means no limit")
         ->check(CLI::NonNegativeNumber)
         ->type_name("MB");
     app.add_flag("--verify", verify, "Read every entry and remove the damaged ones");

@@ -3,6 +3,8 @@
 // sonocase register, align, warp: the patient's skin onto the mannequin, in one call or stage by
 // stage.
 #include <CLI/CLI.hpp>
+#include <functional>
+#include <optional>
 
 #include "formats/files/registration_file.h"
 #include "formats/registration/registration_json.h"
@@ -14,115 +16,133 @@
 namespace sonocase::pipeline {
 namespace {
 
-Error at_surface(Error error, const RegisterArguments& arguments) {
-    if (error.where.empty()) error.where = arguments.surface;
-    return error;
+// What sets the three verbs apart.
+struct FitVerb {
+    const char* name;
+    const char* about;
+    bool from_rigid;     // starts from a registration that align wrote
+    bool whole;          // surface to warp: draws pictures, and may write nothing
+    const char* writes;  // help of -o
+    std::function<Result<RegisterResult>(
+        const RegisterInputs& inputs, const Registration& rigid, const Progress& progress)>
+        fit;
+};
+
+struct FitArguments {
+    RegisterArguments common;
+    std::string rigid, pictures;
+};
+
+void add_options(CLI::App& app, const FitVerb& verb, FitArguments& arguments) {
+    if (verb.from_rigid)
+        app.add_option("registration", arguments.rigid, "What align wrote")
+            ->type_name("REG.json")
+            ->required();
+    add_register_options(app, arguments.common);
+    app.add_option("-o,--output", arguments.common.out, verb.writes)
+        ->type_name("REG.json")
+        ->required(!verb.whole);
+    if (verb.whole)
+        app.add_option("--pictures", arguments.pictures, "Write pictures of the fit to this folder")
+            ->type_name("DIR");
 }
 
-int finish(const char* verb,
-           const RegisterArguments& arguments,
-           const RegisterInputs& inputs,
-           RegisterResult& result) {
-    add_input_reports(inputs, result.report);
-    print_warnings(verb, result.report);
-    // The file holds no seconds, so that the same inputs give the same bytes; they go to --report.
-    for (StageReport& report : result.registration.reports) report.seconds = 0;
-    if (!arguments.out.empty()) {
-        if (auto s = save_registration(result.registration, arguments.out); !s) {
-            return fail(verb, s.error());
-        }
+struct Fitted {
+    RegisterInputs inputs;
+    RegisterResult result;
+};
+
+Result<Fitted> fit(const FitVerb& verb, const FitArguments& arguments) {
+    ProgressBar bar(arguments.common.common);
+    Registration rigid;
+    if (verb.from_rigid) {
+        auto start = load_registration(arguments.rigid);
+        if (!start) return start.error();
+        rigid = std::move(*start);
     }
-    if (auto s = write_report(arguments.common, result.report); !s) return fail(verb, s.error());
-    print_fit(result);
+    auto inputs = read_register_inputs(arguments.common, bar.progress());
+    if (!inputs) return inputs.error();
+    auto fitted = verb.fit(*inputs, rigid, bar.progress());
+    if (!fitted) {
+        Error error = fitted.error();
+        if (error.where.empty()) error.where = arguments.common.recipe.inputs.surface;
+        return error;
+    }
+    std::vector<StageReport>& reports = fitted->registration.reports;
+    reports.insert(reports.begin(), rigid.reports.begin(), rigid.reports.end());
+    return Fitted{std::move(*inputs), std::move(*fitted)};
+}
+
+Status write_fit(const FitArguments& arguments, Fitted& fitted) {
+    Registration& registration = fitted.result.registration;
+    if (!arguments.pictures.empty()) {
+        auto status = write_fit_pictures(fitted.inputs.skin, fitted.inputs.mannequin, registration,
+                                         arguments.pictures);
+        if (!status) return status;
+    }
+    // The file holds no seconds, so that the same inputs give the same bytes; they go to --report.
+    for (StageReport& report : registration.reports) report.seconds = 0;
+    if (!arguments.common.out.empty())
+        if (auto status = save_registration(registration, arguments.common.out); !status)
+            return status;
+    return write_report(arguments.common.common, fitted.result.report);
+}
+
+int run_fit_verb(const FitVerb& verb, int argc, char** argv) {
+    CLI::App app(verb.about);
+    FitArguments arguments;
+    add_options(app, verb, arguments);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    const ThreadLimit limit(arguments.common.common.threads);
+    auto fitted = fit(verb, arguments);
+    if (!fitted) return fail(verb.name, fitted.error());
+    add_input_reports(fitted->inputs, fitted->result.report);
+    if (auto status = write_fit(arguments, *fitted); !status)
+        return fail(verb.name, status.error());
+    print_warnings(verb.name, fitted->result.report);
+    print_fit(fitted->result);
     return kDone;
 }
 
 }  // namespace
 
 int verb_register(int argc, char** argv) {
-    CLI::App app("Lay the patient's skin on the mannequin: surface, align and warp in one call");
-    RegisterArguments arguments;
-    std::string pictures;
-    add_register_options(app, arguments);
-    app.add_option("-o,--output", arguments.out, "Where to write the registration")
-        ->type_name("REG.json");
-    app.add_option("--pictures", pictures, "Write pictures of the fit into this folder")
-        ->type_name("DIR");
-    if (const auto status = parse_command_line(app, argc, argv)) return *status;
-    const ThreadLimit limit(arguments.common.threads);
-    std::optional<RegisterInputs> inputs;
-    std::optional<RegisterResult> result;
-    {
-        ProgressBar bar(arguments.common);
-        Result<RegisterInputs> read = read_register_inputs(arguments, bar.progress());
-        if (!read) return fail("register", read.error());
-        inputs = std::move(*read);
-        Result<RegisterResult> fitted =
-            register_surfaces({inputs->skin, inputs->mannequin}, inputs->options, bar.progress());
-        if (!fitted) return fail("register", at_surface(fitted.error(), arguments));
-        result = std::move(*fitted);
-    }
-    if (!pictures.empty()) {
-        const Status drawn =
-            write_fit_pictures(inputs->skin, inputs->mannequin, result->registration, pictures);
-        if (!drawn) return fail("register", drawn.error());
-    }
-    return finish("register", arguments, *inputs, *result);
+    const FitVerb verb{
+        "register",
+        "Lay the patient's skin on the mannequin: surface, align and warp in one call",
+        false,
+        true,
+        "Where to write the registration",
+        [](const RegisterInputs& in, const Registration&, const Progress& progress) {
+            return register_surfaces({in.skin, in.mannequin}, in.options, progress);
+        }};
+    return run_fit_verb(verb, argc, argv);
 }
 
 int verb_align(int argc, char** argv) {
-    CLI::App app("Find the rigid motion that lays the patient's skin on the mannequin");
-    RegisterArguments arguments;
-    add_register_options(app, arguments);
-    app.add_option("-o,--output", arguments.out, "Where to write the rigid registration")
-        ->type_name("REG.json")
-        ->required();
-    if (const auto status = parse_command_line(app, argc, argv)) return *status;
-    const ThreadLimit limit(arguments.common.threads);
-    std::optional<RegisterInputs> inputs;
-    std::optional<RegisterResult> result;
-    {
-        ProgressBar bar(arguments.common);
-        Result<RegisterInputs> read = read_register_inputs(arguments, bar.progress());
-        if (!read) return fail("align", read.error());
-        inputs = std::move(*read);
-        Result<RegisterResult> fitted =
-            align_surfaces({inputs->skin, inputs->mannequin}, inputs->options, bar.progress());
-        if (!fitted) return fail("align", at_surface(fitted.error(), arguments));
-        result = std::move(*fitted);
-    }
-    return finish("align", arguments, *inputs, *result);
+    const FitVerb verb{"align",
+                       "Find the rigid motion that lays the patient's skin on the mannequin",
+                       false,
+                       false,
+                       "Where to write the rigid registration",
+                       [](const RegisterInputs& in, const Registration&, const Progress& progress) {
+                           return align_surfaces({in.skin, in.mannequin}, in.options, progress);
+                       }};
+    return run_fit_verb(verb, argc, argv);
 }
 
 int verb_warp(int argc, char** argv) {
-    CLI::App app("From a rigid registration to the quadratic and residual warps");
-    RegisterArguments arguments;
-    std::string rigid;
-    app.add_option("registration", rigid, "What align wrote")->type_name("REG.json")->required();
-    add_register_options(app, arguments);
-    app.add_option("-o,--output", arguments.out, "Where to write the registration")
-        ->type_name("REG.json")
-        ->required();
-    if (const auto status = parse_command_line(app, argc, argv)) return *status;
-    const ThreadLimit limit(arguments.common.threads);
-    std::optional<RegisterInputs> inputs;
-    std::optional<RegisterResult> result;
-    {
-        ProgressBar bar(arguments.common);
-        const Result<Registration> start = load_registration(rigid);
-        if (!start) return fail("warp", start.error());
-        Result<RegisterInputs> read = read_register_inputs(arguments, bar.progress());
-        if (!read) return fail("warp", read.error());
-        inputs = std::move(*read);
-        Result<RegisterResult> fitted =
-            warp_surfaces({inputs->skin, inputs->mannequin}, start->mannequin_from_ct,
-                          inputs->options, bar.progress());
-        if (!fitted) return fail("warp", at_surface(fitted.error(), arguments));
-        result = std::move(*fitted);
-        result->registration.reports.insert(result->registration.reports.begin(),
-                                            start->reports.begin(), start->reports.end());
-    }
-    return finish("warp", arguments, *inputs, *result);
+    const FitVerb verb{
+        "warp",
+        "From a rigid registration to the quadratic and residual warps",
+        true,
+        false,
+        "Where to write the registration",
+        [](const RegisterInputs& in, const Registration& rigid, const Progress& progress) {
+            return warp_surfaces({in.skin, in.mannequin}, rigid.mannequin_from_ct, in.options,
+                                 progress);
+        }};
+    return run_fit_verb(verb, argc, argv);
 }
 
 }  // namespace sonocase::pipeline

@@ -2,10 +2,8 @@
 
 // sonocase texture: learns solid textures from example images, or makes the whole bank.
 #include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <optional>
 
 #include "formats/bundle/stage_files.h"
@@ -14,136 +12,129 @@
 #include "pipeline/base/parallel.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
+#include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/texture_stage.h"
 #include "pipeline/texture/example/read_example.h"
 #include "pipeline/texture/speckle.h"
 #include "pipeline/texture/texture_pictures.h"
 #include "pipeline/texture/texture_quality.h"
+#include "pipeline/verbs/stage/option_flags.h"
 
 namespace sonocase::pipeline {
+namespace {
 
-int verb_texture(int argc, char** argv) {
-    CLI::App app(
-        "Learn solid textures from example images. Without examples: the bank of the built-in\n"
-        "tissue table, from a folder of patches or from synthetic examples");
-    std::vector<std::string> inputs;
-    std::string folder, out, pictures, mask, mode = "matched", third_axis;
-    std::vector<int> rectangle;
-    TextureBankOptions options;
-    int frame = 0, speckle_edge = 0;
+struct TextureArguments {
+    StageSettings settings{built_in_stages()};
+    std::vector<std::string> images;  // FILE or NAME=FILE
+    std::string folder, out, pictures, mask, third_axis;
+    std::vector<int> rectangle;  // x, y, width, height
+    int frame = 0;
     CommonOptions common;
-    app.add_option("examples", inputs,
+
+    const TextureStageOptions& options() const {
+        return settings.of<TextureStageOptions>("texture");
+    }
+    std::uint64_t seed() const {
+        return static_cast<std::uint64_t>(settings.of<CaseOptions>("case").seed);
+    }
+};
+
+void add_files(CLI::App& app, TextureArguments& a) {
+    app.add_option("examples", a.images,
                    "Images: FILE, or NAME=FILE; files of one name make one texture")
         ->type_name("[NAME=]FILE");
-    app.add_option("--examples", folder,
+    app.add_option("--examples", a.folder,
                    "Folder with patches.csv (columns file, class) for the bank")
         ->type_name("DIR");
-    app.add_option("-o,--output", out, "Where to write the textures")->type_name("OUT.textures");
-    app.add_option("--pictures", pictures, "Folder for a page of pictures and plots a texture")
+    app.add_option("-o,--output", a.out, "Where to write the textures")->type_name("OUT.textures");
+    app.add_option("--pictures", a.pictures,
+                   "Folder for one page of pictures and plots per texture")
         ->type_name("DIR");
-    app.add_option("--mode", mode, "Autocorrelation and histogram, or the pyramid of eq. (15)")
-        ->check(CLI::IsMember({"matched", "pyramid"}))
-        ->capture_default_str();
-    app.add_option("--edge", options.edge, "Voxels a side")
-        ->check(CLI::IsMember({8, 16, 32, 64, 128}))
-        ->capture_default_str();
-    app.add_option("--pixel-mm", options.pixel_mm, "Size of an example pixel in tissue, mm")
-        ->check(CLI::Range(0.01, 10.0))
-        ->capture_default_str();
-    app.add_option("--seed", options.seed, "Another seed, another texture of the same kind")
-        ->capture_default_str();
-    app.add_option("--speckle-edge", speckle_edge,
-                   "Also a speckle volume of this many voxels a side; 0: none")
-        ->check(CLI::IsMember({0, 8, 16, 32, 64, 128, 256}))
-        ->capture_default_str();
+}
+
+void add_image_options(CLI::App& app, TextureArguments& a) {
     const char* const images = "Example images";
-    app.add_option("--rectangle", rectangle, "Part of each image: x,y,width,height in pixels")
+    app.add_option("--rectangle", a.rectangle, "Part of each image: x,y,width,height in pixels")
         ->delimiter(',')
         ->expected(4)
         ->type_name("X,Y,W,H")
         ->group(images);
-    app.add_option("--mask", mask, "Image of the same size: bright pixels are the example")
+    app.add_option("--mask", a.mask, "Image of the same size: bright pixels are the example")
         ->type_name("FILE")
         ->group(images);
-    app.add_option("--frame", frame, "Of a file with several images")
+    app.add_option("--frame", a.frame, "Which image of a file with several")
         ->check(CLI::Range(0, 100000))
         ->capture_default_str()
         ->group(images);
-    app.add_option("--third-axis", third_axis,
+    app.add_option("--third-axis", a.third_axis,
                    "Out of the picture as across the main direction (fibres) or along it (speckle, "
                    "septa); default: along, or what the built-in texture has")
         ->check(CLI::IsMember({"across", "along"}))
         ->group(images);
-    const char* const pyramid = "Mode pyramid";
-    app.add_option("--levels", options.pyramid.levels, "Levels of the pyramid")
-        ->check(CLI::Range(1, 5))
-        ->capture_default_str()
-        ->group(pyramid);
-    app.add_option("--weight", options.pyramid.weight, "K_l of eq. (15)")
-        ->check(CLI::Range(0.0, 1.0))
-        ->capture_default_str()
-        ->group(pyramid);
-    app.add_flag("--decimate", options.pyramid.decimate, "Halve the resolution from level to level")
-        ->group(pyramid);
-    add_common_options(app, common);
-    if (const auto status = parse_command_line(app, argc, argv)) return *status;
-    if (out.empty() && pictures.empty() && common.report_path.empty()) {
-        return wrong_usage("texture", "nothing to write: give -o, --pictures or --report");
-    }
-    if (inputs.empty() && (!rectangle.empty() || !mask.empty())) {
-        return wrong_usage("texture", "--rectangle and --mask want an image to cut from");
-    }
-    if (!inputs.empty() && !folder.empty()) {
-        return wrong_usage("texture", "give images or --examples, not both");
-    }
-    options.mode = mode == "pyramid" ? TextureMode::pyramid : TextureMode::matched;
-    options.example_folder = folder;
-    const ThreadLimit limit(common.threads);
-    const Stopwatch watch;
-    StageReport report;
-    report.stage = "texture";
+}
 
-    std::vector<TextureSpec> specs;
-    if (inputs.empty()) {
-        auto planned = plan_texture_bank(built_in_tissues(), options, &report.warnings);
-        if (!planned) return fail("texture", planned.error());
-        specs = std::move(*planned);
-    }
+// What is wrong with the combination of flags; empty: nothing.
+std::string misuse(const TextureArguments& a) {
+    if (a.out.empty() && a.pictures.empty() && a.common.report_path.empty())
+        return "nothing to write: give -o, --pictures or --report";
+    if (a.images.empty() && (!a.rectangle.empty() || !a.mask.empty()))
+        return "--rectangle and --mask need an image to cut from";
+    if (!a.images.empty() && !a.folder.empty()) return "give images or --examples, not both";
+    return "";
+}
+
+// The textures that the images are examples of; images of one name make one.
+Result<std::vector<TextureSpec>> specs_of_images(const TextureArguments& a,
+                                                 const TextureBankOptions& bank,
+                                                 std::vector<std::string>* notes) {
     ReadExampleOptions read;
-    read.frame = frame;
-    read.mask_path = mask;
-    if (rectangle.size() == 4) {
-        read.rectangle = PixelRectangle{rectangle[0], rectangle[1], rectangle[2], rectangle[3]};
-    }
-    for (const std::string& input : inputs) {
-        const std::size_t equals = input.find('=');
-        const std::string path = equals == std::string::npos ? input : input.substr(equals + 1);
-        const std::string name = equals == std::string::npos
-                                     ? std::filesystem::path(path).stem().string()
-                                     : input.substr(0, equals);
-        auto example = read_example(path, read, &report.warnings);
-        if (!example) return fail("texture", example.error());
+    read.frame = a.frame;
+    read.mask_path = a.mask;
+    if (a.rectangle.size() == 4)
+        read.rectangle =
+            PixelRectangle{a.rectangle[0], a.rectangle[1], a.rectangle[2], a.rectangle[3]};
+    std::vector<TextureSpec> specs;
+    for (const std::string& image : a.images) {
+        const std::size_t equals = image.find('=');
+        const bool named = equals != std::string::npos;
+        const std::string path = named ? image.substr(equals + 1) : image;
+        const std::string name =
+            named ? image.substr(0, equals) : std::filesystem::path(path).stem().string();
+        auto example = read_example(path, read, notes);
+        if (!example) return example.error();
         auto same = std::find_if(specs.begin(), specs.end(),
                                  [&](const TextureSpec& s) { return s.name == name; });
         if (same == specs.end()) {
             TextureSpec spec;
             spec.name = name;
-            spec.mode = options.mode;
-            spec.pyramid = options.pyramid;
-            spec.edge = options.edge;
-            spec.pixel_mm = options.pixel_mm;
-            spec.seed = options.seed;
+            spec.mode = bank.mode;
+            spec.pyramid = bank.pyramid;
+            spec.edge = bank.edge;
+            spec.pixel_mm = bank.pixel_mm;
+            spec.seed = bank.seed;
             spec.third_axis = ThirdAxis::along;
-            specs.push_back(std::move(spec));
-            same = specs.end() - 1;
+            same = specs.insert(specs.end(), std::move(spec));
         }
         same->examples.push_back(std::move(*example));
     }
-    if (!third_axis.empty()) {
-        for (TextureSpec& spec : specs) {
-            spec.third_axis = third_axis == "across" ? ThirdAxis::across : ThirdAxis::along;
-        }
-    }
+    return specs;
+}
 
+Result<std::vector<TextureSpec>> specs_of(const TextureArguments& a,
+                                          std::vector<std::string>* notes) {
+    TextureBankOptions bank = bank_options(a.options(), a.seed());
+    bank.example_folder = a.folder;
+    auto specs = a.images.empty() ? plan_texture_bank(built_in_tissues(), bank, notes)
+                                  : specs_of_images(a, bank, notes);
+    if (specs && !a.third_axis.empty())
+        for (TextureSpec& spec : *specs)
+            spec.third_axis = a.third_axis == "across" ? ThirdAxis::across : ThirdAxis::along;
+    return specs;
+}
+
+// Each texture with its quality, in the order of the specs.
+Result<std::vector<TextureAssessment>> assess(const std::vector<TextureSpec>& specs,
+                                              const CommonOptions& common) {
     std::vector<std::optional<Result<TextureAssessment>>> assessed(specs.size());
     {
         ProgressBar bar(common);
@@ -152,39 +143,81 @@ int verb_texture(int argc, char** argv) {
             for (std::size_t i = begin; i < end; ++i) assessed[i].emplace(assess_texture(specs[i]));
         });
     }
-    TextureFile file;
-    if (!pictures.empty()) {
-        std::error_code made;
-        std::filesystem::create_directories(pictures, made);
-        if (made) {
-            return fail("texture", Error{"the folder cannot be made", pictures, "choose another"});
-        }
-    }
+    std::vector<TextureAssessment> all;
     for (auto& one : assessed) {
-        if (!*one) return fail("texture", one->error());
-        const TextureAssessment& assessment = **one;
-        for (const Measure& m : assessment.measures()) report.measures.push_back(m);
-        report.warnings.insert(report.warnings.end(), assessment.made.warnings.begin(),
-                               assessment.made.warnings.end());
-        if (!pictures.empty()) {
-            const std::string page =
-                (std::filesystem::path(pictures) / (assessment.made.texture.name + ".png"))
-                    .string();
-            if (auto s = write_texture_page(assessment, page); !s)
-                return fail("texture", s.error());
-        }
-        file.textures.push_back(assessment.made.texture);
+        if (!*one) return one->error();
+        all.push_back(std::move(**one));
     }
+    return all;
+}
+
+void add_to_report(const std::vector<TextureAssessment>& textures, StageReport& report) {
+    for (const TextureAssessment& texture : textures) {
+        for (const Measure& m : texture.measures()) report.measures.push_back(m);
+        report.warnings.insert(report.warnings.end(), texture.made.warnings.begin(),
+                               texture.made.warnings.end());
+    }
+}
+
+Status draw_pages(const std::vector<TextureAssessment>& textures, const std::string& folder) {
+    std::error_code failed;
+    std::filesystem::create_directories(folder, failed);
+    if (failed) return Error{"the folder cannot be created", folder, "choose another"};
+    for (const TextureAssessment& texture : textures) {
+        const auto page = std::filesystem::path(folder) / (texture.made.texture.name + ".png");
+        if (auto status = write_texture_page(texture, page.string()); !status) return status;
+    }
+    return Done{};
+}
+
+Status write_textures(const TextureArguments& a,
+                      const std::vector<TextureAssessment>& textures,
+                      const StageReport& report) {
+    if (!a.pictures.empty())
+        if (auto status = draw_pages(textures, a.pictures); !status) return status;
+    if (!a.out.empty()) {
+        TextureFile file;
+        for (const TextureAssessment& texture : textures)
+            file.textures.push_back(texture.made.texture);
+        const int speckle_edge = a.options().speckle_edge;
+        if (speckle_edge > 0) file.speckle = make_speckle(speckle_edge, a.seed());
+        const auto tissues = built_in_tissues();
+        if (a.images.empty()) file.tissues.assign(tissues.begin(), tissues.end());
+        file.reports = without_seconds({report});
+        if (auto status = save_texture_file(file, a.out); !status) return status;
+    }
+    return write_report(a.common, report);
+}
+
+}  // namespace
+
+int verb_texture(int argc, char** argv) {
+    CLI::App app(
+        "Learn solid textures from example images. Without examples: the bank of the built-in\n"
+        "tissue table, from a folder of patches or from synthetic examples");
+    TextureArguments a;
+    a.settings.of<TextureStageOptions>("texture").speckle_edge = 0;  // textures alone
+    add_files(app, a);
+    const StageTable& table = built_in_stages();
+    add_option_flags(app, table.find("texture")->options, a.settings.options("texture"));
+    add_option_flags(app, table.common, a.settings.options(table.common.name));
+    add_image_options(app, a);
+    add_common_options(app, a.common);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    if (const std::string wrong = misuse(a); !wrong.empty()) return wrong_usage("texture", wrong);
+    const ThreadLimit limit(a.common.threads);
+    const Stopwatch watch;
+    StageReport report;
+    report.stage = "texture";
+    const auto specs = specs_of(a, &report.warnings);
+    if (!specs) return fail("texture", specs.error());
+    const auto textures = assess(*specs, a.common);
+    if (!textures) return fail("texture", textures.error());
+    add_to_report(*textures, report);
     report.seconds = watch.seconds();
     print_warnings("texture", report);
-    if (!out.empty()) {
-        if (speckle_edge > 0) file.speckle = make_speckle(speckle_edge, options.seed);
-        const auto tissues = built_in_tissues();
-        if (inputs.empty()) file.tissues.assign(tissues.begin(), tissues.end());
-        file.reports = {report};
-        if (auto s = save_texture_file(file, out); !s) return fail("texture", s.error());
-    }
-    if (auto s = write_report(common, report); !s) return fail("texture", s.error());
+    if (auto status = write_textures(a, *textures, report); !status)
+        return fail("texture", status.error());
     return kDone;
 }
 

@@ -12,7 +12,8 @@
 #include "pipeline/base/parallel.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
-#include "pipeline/cook/cook_case.h"
+#include "pipeline/cook/case_size.h"
+#include "pipeline/recipe/read_recipe.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/tradeoff/suites.h"
 #include "pipeline/tradeoff/sweep.h"
@@ -50,7 +51,7 @@ std::string this_machine(int threads) {
            " threads";
 }
 
-// Whose seconds the measured front gives.
+// The body whose seconds the measured front holds.
 constexpr const char* kTimedBody = "demo-torso";
 
 struct NamedSuite {
@@ -58,7 +59,7 @@ struct NamedSuite {
     std::function<Suite()> make;
 };
 
-// A name may stand for several bodies.
+// Several bodies may share a name.
 std::vector<NamedSuite> suites() {
     return {
         {"register", register_suite},
@@ -172,8 +173,8 @@ int verb_tradeoff(int argc, char** argv) {
         ->check(CLI::IsMember(names));
     app.add_flag("--quick", options.quick,
                  "Fewer values, no pairs, one run each: minutes, not an hour");
-    app.add_flag("--fresh", options.fresh, "Measure anew what DIR already holds");
-    app.add_option("--repeats", options.repeats, "Runs a setting; 3, or 1 with --quick")
+    app.add_flag("--fresh", options.fresh, "Measure again what DIR already holds");
+    app.add_option("--repeats", options.repeats, "Runs per setting; 3, or 1 with --quick")
         ->check(CLI::Range(1, 100))
         ->type_name("N");
     app.add_option("-o,--output", options.out,
@@ -181,7 +182,7 @@ int verb_tradeoff(int argc, char** argv) {
         ->required()
         ->type_name("DIR");
     app.add_option("--case", options.recipe,
-                   "Sweep a case of your own too, against its finest setting")
+                   "Also sweep a case of your own, against its finest setting")
         ->type_name("RECIPE");
     app.add_option("--data", options.data, "Folder that the recipe's input paths start from")
         ->type_name("DIR");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The bend constraint: the deeper the needle, the less a bent handle may turn it in the picture.
+// The bend constraint: the deeper the needle, the less a bent shaft turns it in the picture.
 #pragma once
 
 #include "formats/base/geometry.h"
@@ -23,7 +23,7 @@ struct NeedleConstraintOptions {
 //
 // Source: [Magee] eqs. (16)-(17). Departures: the blend is normalised (the paper does not say); the
 // printed alpha = 60 and delta = 0.12 are per metre and metres.
-// Hard case: directions that cancel have no blend; measured_world is returned.
+// Hard case: opposite directions have no blend; measured_world is returned.
 // Cost: constant, no allocation, cannot fail; meant for the frame loop.
 Vector3 constrain_needle_direction(Vector3 entry_world,
                                    Vector3 measured_world,

@@ -9,7 +9,7 @@
 namespace sonocase::runtime {
 namespace {
 
-// Turns the measured frame by the least rotation that brings its z onto `z`, so that the needle
+// Turns the measured frame by the smallest rotation that brings its z onto `z`, so that the needle
 // does not spin when it bends.
 Matrix3 turned_onto(const Matrix3& measured, Vector3 z) {
     const Vector3 from = measured.column(2);

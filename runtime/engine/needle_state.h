@@ -3,11 +3,12 @@
 // The needle between tracker and picture: where it went through the skin, how deep it is, and the
 // direction in which it is drawn.
 //
-// Calibrated tip and direction come in with every reading. Through the skin the bend constraint of
-// eqs. (16) and (17) takes hold: the drawn direction is blended towards the one held at entry, and
-// the drawn shaft is led through the blend of the two skin points, so that a bent handle moves the
-// picture less the deeper the needle is. At depth 0 the drawn needle is the measured one; the
-// change is continuous. Part of the portable core: constant memory, no allocation, no clock.
+// Every reading brings the calibrated tip and direction. Once the needle is through the skin, the
+// bend constraint of [Magee] eqs. (16) and (17) applies: the drawn direction is blended towards the
+// one held at entry, and the drawn shaft passes through the blend of the two skin points, so that a
+// bent shaft moves the picture less the deeper the needle is. At depth 0 the drawn needle is the
+// measured one; the change is continuous. Part of the portable core: constant memory, no
+// allocation, no clock.
 #pragma once
 
 #include "formats/exercise/exercise.h"
@@ -33,10 +34,10 @@ class NeedleState {
                 const NeedleModel& needle,
                 const InsertionOptions& options = {});
 
-    // Another view of the same body, as after a change of model.
+    // Another anatomy of the same body, as after a change of image model.
     void set_anatomy(const Anatomy* anatomy) { anatomy_ = anatomy; }
 
-    // A reading of the tracked needle; readings without a pose are not given.
+    // Takes one reading of the tracked needle. Not called for readings without a pose.
     NeedleView update(double time_s, const Rigid& mannequin_from_needle);
 
     const InsertionDetector& insertions() const { return detector_; }

@@ -20,7 +20,7 @@ const SensorReading* sensor(const TrackerReading& reading, int index) {
 ToolPoses tool_poses(const TrackerReading& reading,
                      const Calibrations& calibrations,
                      const SensorAssignment& assignment) {
-    // A script and the mouse hand over tools, always in their own places.
+    // Scripts and the mouse deliver tools rather than sensors, always at the default indices.
     const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment;
     const auto place = [&](const SensorReading& s, const std::optional<Calibration>& tool) {
         if (reading.in_mannequin) return s.world_from_sensor;
@@ -86,8 +86,8 @@ void ScanEngine::observe(const TrackerReading& reading, bool is_device) {
     reading_ = reading;
     ToolPoses tools = tool_poses(reading, calibrations_, assignment_);
     // A lost probe keeps its last place, so that the picture freezes rather than flickers.
-    // What comes in `mannequin` (scripts, the mouse, sessions recorded here) was checked where it
-    // was made: holding it back a second time would make a replay differ.
+    // Readings in `mannequin` (scripts, the mouse, sessions recorded here) were checked where they
+    // were made: holding them back a second time would make a replay differ.
     const bool checked = reading.in_mannequin;
     if (!tools.has_probe || (!checked && probe_watch_.hold())) {
         tools.has_probe = tools_.has_probe;
@@ -152,7 +152,7 @@ FrameStatus ScanEngine::finish(const FrameInput& input,
         probe_in_contact(skin_, exercise_.probe, input.mannequin_from_probe)) {
         return status;
     }
-    // Model physical darkens by itself, beam by beam; the paper's image formation knows no air.
+    // Model `physical` darkens beams in air by itself; model `paper` has no air.
     if (options_.render.model == ImageModel::paper) {
         std::fill(pixels.begin(), pixels.end(), std::uint8_t{0});
     }

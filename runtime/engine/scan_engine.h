@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// From tracker readings to pixels: calibrations, sensor checks, needle, renderer. One frame is one
-// call; nothing here waits, reads a file or asks a clock, so that the window, the headless run, a
-// test and a browser drive the same engine.
+// From tracker readings to pixels: calibrations, sensor checks, needle, renderer. Poses go in, a
+// frame and what happened to sensors and needle come out. One frame is one call; nothing here
+// waits, reads a file or looks at a clock, so that the window, the headless run, a test and a
+// browser drive the same engine.
 #pragma once
 
 #include <array>
@@ -26,7 +27,7 @@ namespace sonocase::runtime {
 
 struct Calibrations {
     std::optional<Calibration> probe, needle, mannequin;
-    double needle_lag_s = 0;  // the needle's recording is so much later than the probe's
+    double needle_lag_s = 0;  // by which the needle's readings come later than the probe's
 };
 
 // Which sensor is on which tool; -1: none.
@@ -36,7 +37,7 @@ struct SensorAssignment {
     friend bool operator==(const SensorAssignment&, const SensorAssignment&) = default;
 };
 
-// Tools in `mannequin`, out of a reading.
+// The tools of a reading, in the frame `mannequin`.
 struct ToolPoses {
     bool has_probe = false, has_needle = false;
     Rigid mannequin_from_probe;
@@ -44,13 +45,13 @@ struct ToolPoses {
 };
 
 // Applies sensor_from_tool and world_from_mannequin (with its scale). A sensor that is absent or
-// lost gives no tool. Constant time.
+// lost yields no tool. Constant time.
 ToolPoses tool_poses(const TrackerReading& reading,
                      const Calibrations& calibrations,
                      const SensorAssignment& assignment);
 
-// A frame's input as it was rendered, enough to render the same pixels again: the cine loop keeps
-// these instead of pictures.
+// What a frame was rendered from, enough to render the same pixels again: the cine loop keeps these
+// instead of pictures.
 struct FrameRecord {
     FrameInput input;
     ToolPoses tools;
@@ -64,8 +65,8 @@ struct EngineOptions {
     double focus_mm = 0;  // > 0 overrides the exercise's
 };
 
-// True if the face of the probe touches the skin somewhere: body within 4 mm, what gel bridges, of
-// one of five points across it. Constant time.
+// True if the probe's face touches the skin somewhere: the body lies within 4 mm, which gel
+// bridges, of one of five points across the face. Constant time.
 bool probe_in_contact(const Skin& skin, const Probe& probe, const Rigid& mannequin_from_probe);
 
 class ScanEngine {
@@ -83,8 +84,8 @@ class ScanEngine {
     // yet. What is rendered afterwards depends on readings, settings and times since now_s alone,
     // so that a replay of the recording gives the same pixels.
     void begin_session(double now_s);
-    // Goes on where another engine of the same bundle and exercise stood: session clock, frame
-    // numbers, tools, inserted needle. For a change of depth in the middle of a session.
+    // Continues from another engine of the same bundle and exercise: session clock, frame numbers,
+    // tools, inserted needle. For a change of depth in the middle of a session.
     void take_over(const ScanEngine& before);
     // Renders a past frame again: the same pixels.
     FrameStatus frame_again(const FrameRecord& record, std::span<std::uint8_t> pixels);

@@ -10,7 +10,7 @@ namespace sonocase::runtime {
 bool Skin::inside(Point3 p) const {
     const Point3 v = bundle_->grid.voxel_from_point(p);
     const Int3 size = bundle_->label_bricks.size;
-    // Compared before the conversion, so that no far-off or unordered value reaches it.
+    // Compared before the conversion to int, which is undefined for far-off and unordered values.
     if (!(v.x > -0.5 && v.y > -0.5 && v.z > -0.5 && v.x < size.x - 0.5 && v.y < size.y - 0.5 &&
           v.z < size.z - 0.5)) {
         return false;
@@ -39,7 +39,7 @@ std::optional<Point3> Skin::enter(Point3 start, Vector3 direction, double reach_
 }
 
 std::optional<Point3> Skin::project(Point3 near, Vector3 direction, double reach_mm) const {
-    // Starts that are already inside (a thick limb in the way) move closer until they are out.
+    // A start that lies inside (in a limb in front) moves closer until it is outside.
     for (double back = 1.5 * reach_mm; back >= 0; back -= std::max(0.125 * reach_mm, 0.5)) {
         const Point3 start = near - back * direction;
         if (!inside(start)) return enter(start, direction, back + reach_mm);
@@ -78,7 +78,7 @@ Vector3 Skin::normal(Point3 p, double radius_mm) const {
             }
         }
     }
-    // A volume cropped to the very skin has no air of its own; then the border is the skin.
+    // A volume that is cropped at the skin contains no air; then its border is the skin.
     const Vector3 sum = norm(extended) > 1 ? extended : bare;
     return norm(sum) > 1e-9 ? normalized(sum) : Vector3{0, 0, 0};
 }

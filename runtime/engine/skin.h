@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The skin as the player feels it: where the cooked labels begin. Read from the label volume itself
-// and not from a mesh, so that what the mouse touches is exactly what the picture shows, in every
-// bundle, with or without a surface.
+// The skin as the player's tools touch it: where the cooked labels begin. Read from the label
+// volume itself and not from a mesh, so that what the mouse touches is exactly what the picture
+// shows, in every bundle, with or without a surface mesh. Points and directions are in the frame
+// `mannequin`.
 #pragma once
 
 #include <optional>
@@ -19,21 +20,21 @@ class Skin {
     bool inside(Point3 p_mannequin) const;
 
     // First crossing from outside to inside on the segment from `start` along the unit vector
-    // `direction`, to a hundredth of a millimetre; nothing when there is none within `reach_mm` or
-    // `start` lies inside. Cost: reach / (half a voxel) look-ups.
+    // `direction`, to a hundredth of a millimetre; nothing if there is no crossing within
+    // `reach_mm` or `start` lies inside. Cost: reach / (half a voxel) look-ups.
     std::optional<Point3> enter(Point3 start, Vector3 direction, double reach_mm) const;
 
     // Skin point on the line through `near` along `direction`: searched from 1.5 x reach before it
     // to reach beyond, so that `near` may lie on either side.
     std::optional<Point3> project(Point3 near, Vector3 direction, double reach_mm) const;
 
-    // Outward unit normal: the direction out of the body over a ball of radius_mm about p. A real
-    // probe face bridges small dents, so a radius of half a face is right. Zero vector where the
-    // ball holds only body or only air. Where the volume ends inside the body, the body is taken to
-    // go on. Cost: about 500 look-ups.
+    // Outward unit normal: the mean direction out of the body over a ball of radius_mm about p. A
+    // real probe's face bridges small dents, so the radius should be half a face. Zero vector where
+    // the ball holds only body or only air. Where the volume ends inside the body, the body is
+    // assumed to continue. Cost: about 500 look-ups.
     Vector3 normal(Point3 p, double radius_mm = 12) const;
 
-    // True within a voxel of the volume's border: what is met there is a cut and not skin.
+    // True within a voxel of the volume's border: a surface there is a cut and not skin.
     bool at_border(Point3 p) const;
 
   private:

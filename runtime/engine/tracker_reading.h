@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What a tracker says of all its sensors at one moment. Time is injected: seconds on the session's
-// clock.
+// What a tracker reports about all its sensors at one moment. Time is injected: seconds on the
+// session's clock.
 #pragma once
 
 #include <array>
@@ -18,8 +18,8 @@ inline constexpr int kNeedleSensor = 1;
 enum class SensorState : std::uint8_t {
     absent,  // no such sensor
     ok,
-    poor,  // a pose, of doubtful quality: distorted field, near the edge of the range
-    lost,  // the device sees no pose; the one given is the last good one
+    poor,  // a pose of doubtful quality: distorted field, near the edge of the range
+    lost,  // the device has no pose; the one given is the last good one
 };
 
 struct SensorReading {

@@ -8,6 +8,7 @@
 
 #include "formats/files/bundle_file.h"
 #include "pipeline/cook/cook_case.h"
+#include "pipeline/recipe/read_recipe.h"
 #include "support/paths.h"
 #include "support/random.h"
 

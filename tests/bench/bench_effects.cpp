@@ -22,7 +22,6 @@
 
 #include "bench_scene.h"
 #include "formats/files/bundle_file.h"
-#include "runtime/imaging/effects.h"
 #include "runtime/imaging/paper/paper_fast.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
 
@@ -100,12 +99,16 @@ runtime::NeedleShape needle_of(const Exercise& exercise) {
     return runtime::needle_shape(model, {15, 0, 70}, normalized(Vector3{0.7, 0, 0.7}));
 }
 
+runtime::RenderContext context_of(runtime::Workers& workers) {
+    return {workers, serial_jobs(), runtime::available_simd_targets().front()};
+}
+
 // Both models' renderers, with the switches at hand.
 struct PhysicalRig {
     explicit PhysicalRig(const CaseBundle& bundle, const std::vector<Target>& targets = {})
         : scene(*runtime::make_physical_scene(bundle, targets)),
           breathing(bundle),
-          fast(scene, geometry, tables, noise, workers) {}
+          fast(scene, geometry, tables, noise, context_of(workers)) {}
 
     void render(std::size_t pose,
                 const PhysicalEffects& effects,
@@ -126,11 +129,12 @@ struct PhysicalRig {
         runtime::make_scan_geometry(exercise.probe, kPhysicalLines, kSamples, kPixels, kPixels);
     const runtime::physical::Tables tables =
         runtime::physical::make_tables(exercise.probe, geometry);
-    const runtime::PhysicalNoise noise = runtime::make_physical_noise(1, kPhysicalLines + 128);
+    const runtime::PhysicalNoise noise = runtime::make_physical_noise(
+        runtime::physical_textures().normal_levels, 1, kPhysicalLines + 128);
     const runtime::NeedleShape shaft = needle_of(exercise);
     const std::vector<float> gain = std::vector<float>(kSamples, 0.0f);
     std::vector<std::uint8_t> pixels = std::vector<std::uint8_t>(kPixels * kPixels);
-    runtime::WorkerPool workers{1};
+    runtime::SerialWorkers workers;
     runtime::PhysicalScene scene;
     BreathingField breathing;
     runtime::PhysicalFast fast;
@@ -138,7 +142,8 @@ struct PhysicalRig {
 
 struct PaperRig {
     explicit PaperRig(const CaseBundle& bundle)
-        : scene(*runtime::make_paper_scene(bundle)), fast(scene, geometry, 1, workers) {}
+        : scene(*runtime::make_paper_scene(bundle)),
+          fast(scene, geometry, noise, context_of(workers)) {}
 
     void render(std::size_t pose, const PaperEffects& effects, bool needle) {
         runtime::PaperFrame frame;
@@ -156,7 +161,8 @@ struct PaperRig {
     const runtime::NeedleShape shaft = needle_of(exercise);
     const std::vector<float> gain = std::vector<float>(kSamples, 1.0f);
     std::vector<std::uint8_t> pixels = std::vector<std::uint8_t>(kPixels * kPixels);
-    runtime::WorkerPool workers{1};
+    const std::vector<std::int8_t> noise = runtime::make_paper_noise(1, kPaperLines);
+    runtime::SerialWorkers workers;
     runtime::PaperScene scene;
     runtime::PaperFast fast;
 };
@@ -170,33 +176,41 @@ std::vector<Target> a_target() {
     return {t};
 }
 
-void effect(benchmark::State& state, ImageModel model, const runtime::EffectEntry& entry) {
-    Cost cost{};
-    if (model == ImageModel::paper) {
-        static PaperRig rig(bench_bundle());
-        PaperEffects without;
-        without.*entry.paper = false;
-        cost = take_turns(state, [&](std::size_t pose, bool on) {
-            rig.render(pose, on ? PaperEffects{} : without, true);
-        });
-    } else {
-        static PhysicalRig rig(bench_bundle(), a_target());
-        PhysicalEffects without;
-        without.*entry.physical = false;
-        MotionState motion;
-        if (entry.physical == &PhysicalEffects::breathing) motion.breathing_mm = {0, 0, 8};
-        if (entry.physical == &PhysicalEffects::pulsation) motion.pulse_mm = 0.5;
-        cost = take_turns(state, [&](std::size_t pose, bool on) {
-            rig.render(pose, on ? PhysicalEffects{} : without, true, motion);
-        });
-    }
-    const double samples = kSamples * (model == ImageModel::paper ? kPaperLines : kPhysicalLines);
+using PaperEntry = runtime::EffectEntry<PaperEffects, runtime::PaperMet>;
+using PhysicalEntry = runtime::EffectEntry<PhysicalEffects, runtime::PhysicalMet>;
+
+template <class Entry>
+void report_effect(benchmark::State& state, const Cost& cost, int lines, const Entry& entry) {
+    const double samples = static_cast<double>(kSamples) * lines;
     state.counters["cost_ns"] = cost.ms() * 1e6 / samples;
     state.counters["share"] = cost.ms() / cost.with_ms;
     state.counters["noise"] = cost.noise_ms / cost.with_ms;
     state.counters["gathers"] = entry.gathers;
     state.counters["bytes"] = entry.bytes;
     state.counters["floor_ns"] = entry.gathers * kGatherNs + entry.bytes * kByteNs;
+}
+
+void effect(benchmark::State& state, const PaperEntry& entry) {
+    static PaperRig rig(bench_bundle());
+    PaperEffects without;
+    without.*entry.on = false;
+    const Cost cost = take_turns(state, [&](std::size_t pose, bool on) {
+        rig.render(pose, on ? PaperEffects{} : without, true);
+    });
+    report_effect(state, cost, kPaperLines, entry);
+}
+
+void effect(benchmark::State& state, const PhysicalEntry& entry) {
+    static PhysicalRig rig(bench_bundle(), a_target());
+    PhysicalEffects without;
+    without.*entry.on = false;
+    MotionState motion;
+    if (entry.on == &PhysicalEffects::breathing) motion.breathing_mm = {0, 0, 8};
+    if (entry.on == &PhysicalEffects::pulsation) motion.pulse_mm = 0.5;
+    const Cost cost = take_turns(state, [&](std::size_t pose, bool on) {
+        rig.render(pose, on ? PhysicalEffects{} : without, true, motion);
+    });
+    report_effect(state, cost, kPhysicalLines, entry);
 }
 
 // The case with its bone and gas turned into muscle: the same shapes, nothing that shadows.
@@ -231,15 +245,12 @@ const CaseBundle& plain_bundle() {
     return plain;
 }
 
-// Effects that a scene may not call for.
-bool optional_effect(const runtime::EffectEntry& e) {
-    using Y = PhysicalEffects;
-    for (const auto which : {&Y::breathing, &Y::pulsation, &Y::boundaries, &Y::structure,
-                             &Y::fine_structure, &Y::targets, &Y::interfaces, &Y::edge_shadow,
-                             &Y::bone_tail, &Y::gas_ring_down, &Y::needle})
-        if (e.physical == which) return true;
-    return e.paper != nullptr &&
-           (e.paper == &PaperEffects::shadow || e.paper == &PaperEffects::needle);
+// Effects that a scene may not call for: those that say why they were skipped.
+bool optional_effect(const PhysicalEntry& e) {
+    return e.skipped_because != nullptr && e.on != &PhysicalEffects::contact;
+}
+bool optional_effect(const PaperEntry& e) {
+    return e.skipped_because != nullptr;
 }
 
 void report_off(benchmark::State& state, const Cost& cost) {
@@ -247,28 +258,35 @@ void report_off(benchmark::State& state, const Cost& cost) {
     state.counters["noise"] = 100 * cost.noise_ms / cost.without_ms;
 }
 
-// The switch of an effect that the scene does not call for. which: null takes all of them at once.
-void off(benchmark::State& state, ImageModel model, const runtime::EffectEntry* which) {
-    Cost cost{};
-    if (model == ImageModel::paper) {
-        static PaperRig rig(plain_bundle());
-        PaperEffects without;
-        without.*which->paper = false;
-        cost = take_turns(state, [&](std::size_t pose, bool on) {
-            rig.render(pose, on ? PaperEffects{} : without, false);
-        });
-    } else {
-        static PhysicalRig rig(plain_bundle());
-        PhysicalEffects without;
-        for (const runtime::EffectEntry& e : runtime::effect_table(model)) {
-            if (which != nullptr ? e.physical == which->physical : optional_effect(e))
-                without.*e.physical = false;
-        }
-        cost = take_turns(state, [&](std::size_t pose, bool on) {
-            rig.render(pose, on ? PhysicalEffects{} : without, false);
-        });
+// The switch of an effect that the scene does not call for.
+void off(benchmark::State& state, const PaperEntry& entry) {
+    static PaperRig rig(plain_bundle());
+    PaperEffects without;
+    without.*entry.on = false;
+    report_off(state, take_turns(state, [&](std::size_t pose, bool on) {
+                   rig.render(pose, on ? PaperEffects{} : without, false);
+               }));
+}
+
+void off_physical(benchmark::State& state, const PhysicalEffects& without) {
+    static PhysicalRig rig(plain_bundle());
+    report_off(state, take_turns(state, [&](std::size_t pose, bool on) {
+                   rig.render(pose, on ? PhysicalEffects{} : without, false);
+               }));
+}
+
+void off(benchmark::State& state, const PhysicalEntry& entry) {
+    PhysicalEffects without;
+    without.*entry.on = false;
+    off_physical(state, without);
+}
+
+void all_off(benchmark::State& state) {
+    PhysicalEffects without;
+    for (const PhysicalEntry& e : runtime::kPhysicalEffects) {
+        if (optional_effect(e)) without.*e.on = false;
     }
-    report_off(state, cost);
+    off_physical(state, without);
 }
 
 // A plan for scenes with bone and gas against one that has neither compiled in.
@@ -305,25 +323,23 @@ void finer(benchmark::State& state, ImageModel model, const char* path) {
             ->UseManualTime()
             ->Iterations(61 * rounds);
     };
-    for (const auto model : {ImageModel::paper, ImageModel::physical}) {
-        const std::string prefix = model == ImageModel::paper ? "paper/" : "physical/";
-        for (const runtime::EffectEntry& e : runtime::effect_table(model)) {
-            if (e.paper == nullptr && e.physical == nullptr) continue;  // always on
-            add("Effect/" + prefix + e.name, 12,
-                [model, e](benchmark::State& s) { effect(s, model, e); });
+    const auto add_model = [&](const std::string& prefix, ImageModel model, const auto& table) {
+        for (const auto& e : table) {
+            if (e.on == nullptr) continue;  // always on
+            add("Effect/" + prefix + e.name, 12, [e](benchmark::State& s) { effect(s, e); });
         }
-        for (const runtime::EffectEntry& e : runtime::effect_table(model)) {
+        for (const auto& e : table) {
             if (optional_effect(e))
-                add("Off/" + prefix + e.name, 24,
-                    [model, e](benchmark::State& s) { off(s, model, &e); });
+                add("Off/" + prefix + e.name, 24, [e](benchmark::State& s) { off(s, e); });
         }
         if (const char* path = std::getenv("SONOCASE_BENCH_FINE")) {
             add("Fine/" + prefix + "ratio", 12,
                 [model, path](benchmark::State& s) { finer(s, model, path); });
         }
-    }
-    add("Off/physical/all_of_them", 24,
-        [](benchmark::State& s) { off(s, ImageModel::physical, nullptr); });
+    };
+    add_model("paper/", ImageModel::paper, runtime::kPaperEffects);
+    add_model("physical/", ImageModel::physical, runtime::kPhysicalEffects);
+    add("Off/physical/all_of_them", 24, all_off);
     add("Off/physical/compiled_in", 40, compiled_in);
     return true;
 }();

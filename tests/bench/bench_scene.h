@@ -8,6 +8,7 @@
 
 #include "bench_bundle.h"
 #include "runtime/imaging/renderer.h"
+#include "runtime/workers/thread_host.h"
 
 namespace sonocase::bench {
 
@@ -32,6 +33,9 @@ inline RenderOptions options_of(ImageModel model,
     o.effects = std::move(effects);
     o.threads = threads;
     o.width_px = o.height_px = size;
+    static const auto textures = runtime::make_physical_textures();  // as the player has them
+    o.textures = textures;
+    o.host = runtime::thread_host();
     return o;
 }
 

@@ -12,7 +12,7 @@
 
 #include "formats/bundle/case_bundle.h"
 #include "formats/files/bundle_file.h"
-#include "runtime/imaging/effects.h"
+#include "runtime/imaging/renderer.h"
 #include "runtime/player/session/png_file.h"
 
 namespace sonocase {
@@ -197,18 +197,22 @@ bool save(const std::string& path, const Picture& p) {
     return saved.has_value();
 }
 
+bool always_on(const std::string& effect) {
+    return effect == "slice" || effect == "compression" || effect == "scan_conversion";
+}
+
 bool effect_pictures(const Body& body, const std::string& folder) {
     constexpr int kWidth = 300, kHeight = 300, kGap = 4;
     for (const auto model : {ImageModel::paper, ImageModel::physical}) {
-        for (const runtime::EffectEntry& e : runtime::effect_table(model)) {
-            if (e.paper == nullptr && e.physical == nullptr) continue;
-            const Shot shot = shot_of(e.name);
+        for (const char* name : runtime::effect_names(model)) {
+            if (always_on(name)) continue;
+            const Shot shot = shot_of(name);
             Picture both(2 * kWidth + kGap, kHeight, 90);
             both.put(draw(body, shot, model, {"auto"}, kWidth, kHeight), 0, 0);
-            both.put(draw(body, shot, model, {std::string("-") + e.name}, kWidth, kHeight),
+            both.put(draw(body, shot, model, {std::string("-") + name}, kWidth, kHeight),
                      kWidth + kGap, 0);
             const char* prefix = model == ImageModel::paper ? "/paper-" : "/physical-";
-            if (!save(folder + prefix + e.name + ".png", both)) return false;
+            if (!save(folder + prefix + name + ".png", both)) return false;
         }
     }
     return true;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Givens QR and one-sided Jacobi against long double and against exact rationals.
-#include "formats/calibration/least_squares.h"
+#include "formats/calibration/solve/least_squares.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The only file of the import that includes VTK.
+// Mesh files through VTK: the only file of the import that includes it.
 #include <vtkCallbackCommand.h>
 #include <vtkCellArray.h>
 #include <vtkCleanPolyData.h>
@@ -64,11 +64,11 @@ vtkSmartPointer<vtkPolyData> polygons_of(const PolygonFile& file) {
     return data;
 }
 
-// VTK takes a binary STL file of any length; its header says how long it has to be.
+// VTK accepts a binary STL file of any length; the file's header says how long it must be.
 bool binary_stl_is_cut_off(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     char head[84];
-    if (!file.read(head, sizeof head)) return false;  // the reader says what is wrong
+    if (!file.read(head, sizeof head)) return false;  // the reader reports what is wrong
     char text[512];
     file.read(text, sizeof text);
     const bool ascii =
@@ -144,8 +144,8 @@ Result<Surface> read_mesh_file(const std::string& path) {
         triangles->SetInputData(data);
         triangles->PassVertsOff();
         triangles->PassLinesOff();
-        vtkNew<vtkCleanPolyData>
-            clean;  // one vertex where several coincide, none without a triangle
+        // Merges coincident vertices and drops those without a triangle.
+        vtkNew<vtkCleanPolyData> clean;
         clean->SetInputConnection(triangles->GetOutputPort());
         clean->PointMergingOn();
         clean->ToleranceIsAbsoluteOn();

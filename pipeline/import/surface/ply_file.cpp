@@ -54,8 +54,8 @@ double as_double(const std::uint8_t* bytes) {
     return static_cast<double>(value);
 }
 
-// Reads numbers one after the other; `good` turns false at the end of the file or at a word that is
-// no number, and stays so.
+// Reads numbers one after the other; `good` becomes false, for good, at the end of the file or at a
+// word that is not a number.
 class Body {
   public:
     Body(const std::string& bytes, std::size_t at, Form form)
@@ -164,7 +164,8 @@ Result<Header> parse_header(const std::string& bytes, const std::string& path) {
             property.name = name;
             if (!line || header.elements.empty() || !type_named(type, &property.type) ||
                 (property.is_list && !type_named(count_type, &property.count_type)))
-                return bad("PLY header, line " + std::to_string(line_number) + " is no property");
+                return bad("PLY header, line " + std::to_string(line_number) +
+                           " is not a property");
             header.elements.back().properties.push_back(property);
         }
     }
@@ -188,8 +189,7 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
                              std::to_string(element.count) + " '" + element.name + "' entries",
                          path, "check that the file is complete; export it again"};
         };
-        // Every entry has at least one byte in either form.
-        // An entry takes a byte or more; one without properties can only be damage.
+        // An entry takes at least one byte in either form; one without properties means damage.
         if (element.count > body.left()) return cut_off(0);
         for (std::uint64_t n = 0; n < element.count; ++n) {
             Point3 point{NAN, NAN, NAN};
@@ -219,8 +219,8 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
                     if (!is_polygon) continue;
                     if (!(corner >= 0) || corner >= static_cast<double>(file.points.size()))
                         return Error{
-                            "face " + std::to_string(n) + " names a vertex that is not there", path,
-                            "check that the file is complete; export it again"};
+                            "face " + std::to_string(n) + " names a vertex that does not exist",
+                            path, "check that the file is complete; export it again"};
                     corners.push_back(static_cast<std::uint32_t>(corner));
                 }
                 if (is_polygon && corners.size() >= 3) file.polygons.push_back(std::move(corners));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// PLY, read here and not by VTK: version 9.1 of that aborts the program on a truncated file.
+// PLY, read here because VTK 9.1 aborts the program on a truncated file.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct PolygonFile {
     std::vector<std::vector<std::uint32_t>> polygons;  // >= 3 corners each, all within points
 };
 
-// ASCII and both binary forms; properties it does not know are passed over.
+// ASCII and both binary forms; unknown properties are skipped.
 Result<PolygonFile> read_ply_file(const std::string& path);
 
 }  // namespace sonocase::pipeline

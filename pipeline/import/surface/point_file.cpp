@@ -57,8 +57,9 @@ Result<Surface> read_point_file(const std::string& path, std::vector<std::string
             first = 1;  // XYZ files may begin with the number of points
         } else if (!number_in(rows[0].cells[0])) {
             if (!find_columns(rows[0], &columns))
-                return Error{"no columns x, y, z", path + ":" + std::to_string(rows[0].line),
-                             "expected a header with x,y,z (or tx,ty,tz), or three numbers a row"};
+                return Error{
+                    "no columns x, y, z", path + ":" + std::to_string(rows[0].line),
+                    "expected a header with x,y,z (or tx,ty,tz), or three numbers per row"};
             first = 1;
         }
     }
@@ -82,7 +83,7 @@ Result<Surface> read_point_file(const std::string& path, std::vector<std::string
             const auto value = cell(columns.point[axis]);
             if (!value)
                 return Error{"row without three numbers", path + ":" + std::to_string(row.line),
-                             "expected x, y and z; mend or delete the row"};
+                             "expected x, y and z; correct or delete the row"};
             point[axis] = *value;
             if (has_normals) normal[axis] = cell(columns.normal[axis]).value_or(0.0);
         }

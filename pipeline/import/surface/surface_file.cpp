@@ -11,17 +11,16 @@
 #include "formats/files/atomic_file.h"
 #include "pipeline/base/delimited_text.h"
 #include "pipeline/base/plausible_size.h"
+#include "pipeline/import/source/source_path.h"
 #include "pipeline/import/surface/surface_readers.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-namespace fs = std::filesystem;
-
-// Turns triangles until each agrees with its neighbours and every connected part faces outwards:
-// away from the points' middle, on the whole. The middle is inside a torso, so that a mesh open at
-// its cuts is told as well as a closed one. Edges of more than two triangles do not bind them.
-// Returns how many were turned.
+// Turns triangles until each agrees with its neighbours and every connected part faces outwards: on
+// the whole, away from the mean of the points. That point is inside a torso, so that this works for
+// a mesh that is open at its cuts as well as for a closed one. An edge of more than two triangles
+// does not link them. Returns how many were turned.
 std::size_t orient_outwards(Surface& surface) {
     const std::size_t count = surface.triangles.size();
     struct Side {
@@ -41,7 +40,7 @@ std::size_t orient_outwards(Surface& surface) {
     });
     struct Link {
         std::uint32_t other;
-        bool same_sense;  // both wound alike as they stand
+        bool same_sense;  // both have the same winding as read
     };
     std::vector<std::vector<Link>> links(count);
     for (std::size_t i = 0; i < sides.size();) {
@@ -64,7 +63,7 @@ std::size_t orient_outwards(Surface& surface) {
         return dot(surface.points[corner[0]] - middle,
                    cross(surface.points[corner[1]] - middle, surface.points[corner[2]] - middle));
     };
-    std::vector<std::int8_t> sense(count, 0);  // 1: as it stands, -1: turned, 0: not yet seen
+    std::vector<std::int8_t> sense(count, 0);  // 1: as read, -1: turned, 0: not yet visited
     std::size_t turned = 0;
     for (std::uint32_t seed = 0; seed < count; ++seed) {
         if (sense[seed] != 0) continue;
@@ -98,10 +97,9 @@ Result<Surface> import_surface(const std::string& path,
     const auto start = std::chrono::steady_clock::now();
     StageReport own;
     own.stage = "surface_file";
-    std::error_code code;
-    if (const Status status = expect_regular_file(path); !status) return status.error();
-    if (fs::file_size(path, code) == 0) return Error{"file is empty", path, "export it again"};
-    const std::string ending = lower_case(fs::path(path).extension().string());
+    if (auto status = check_source_file(path, "expected a surface file"); !status)
+        return status.error();
+    const std::string ending = lower_case(std::filesystem::path(path).extension().string());
     const bool mesh = ending == ".ply" || ending == ".stl" || ending == ".obj" || ending == ".vtp";
     const bool cloud = ending == ".csv" || ending == ".xyz" || ending == ".txt" ||
                        ending == ".pts" || ending == ".asc" || ending == ".tsv";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The two kinds of surface files. Internal to import; no checks but of the file itself.
+// The two kinds of surface files. Internal to import; only the file itself is checked.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace sonocase::pipeline {
 
-// PLY, STL, OBJ, VTP; polygons are triangles, vertices that coincide are one.
+// PLY, STL, OBJ, VTP; polygons are cut into triangles and coincident vertices merged.
 Result<Surface> read_mesh_file(const std::string& path);
 // CSV, TXT, XYZ, PTS, ASC.
 Result<Surface> read_point_file(const std::string& path, std::vector<std::string>* warnings);

@@ -28,7 +28,7 @@ Result<NativeVolume> read_dicom_series(const std::string& folder) {
         if (series.empty())
             return Error{
                 "folder holds neither masks nor DICOM slices", folder,
-                "expected one .nii.gz (or .nrrd, .mha) mask a structure, or a DICOM series"};
+                "expected one .nii.gz (or .nrrd, .mha) mask per structure, or a DICOM series"};
         std::vector<std::string> files;
         for (const std::string& uid : series) {
             const std::vector<std::string> candidate = names->GetFileNames(uid);
@@ -45,9 +45,9 @@ Result<NativeVolume> read_dicom_series(const std::string& folder) {
         NativeVolume volume;
         if (series.size() > 1)
             volume.warnings.push_back("folder holds " + std::to_string(series.size()) +
-                                      " DICOM series; the one with most slices (" +
+                                      " DICOM series; the one with the most slices (" +
                                       std::to_string(files.size()) +
-                                      ") was taken: keep one series a folder");
+                                      ") was taken: keep one series per folder");
         double deviation = 0;
         if (itk::ExposeMetaData(image.GetMetaDataDictionary(), "ITK_non_uniform_sampling_deviation",
                                 deviation))

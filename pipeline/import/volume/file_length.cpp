@@ -3,13 +3,10 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <cctype>
-#include <charconv>
 #include <filesystem>
-#include <fstream>
 
 #include "formats/files/atomic_file.h"
-#include "pipeline/base/delimited_text.h"
+#include "pipeline/import/volume/data_file.h"
 #include "pipeline/import/volume/native_volume.h"
 
 namespace sonocase::pipeline {
@@ -23,7 +20,7 @@ Error cut_off(std::uint64_t found, std::uint64_t needed, const std::string& path
             path, "the file is cut off or damaged; copy or export it again"};
 }
 
-// Bytes that a zlib or gzip stream unpacks to; less than `enough` where its end or its checksum is
+// Bytes that a zlib or gzip stream unpacks to; less than `enough` if its end or its checksum is
 // missing.
 std::uint64_t inflated_bytes(const std::vector<std::uint8_t>& packed,
                              std::size_t at,
@@ -54,50 +51,21 @@ std::uint64_t inflated_bytes(const std::vector<std::uint8_t>& packed,
 
 Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes) {
     if (!path.ends_with(".mha") && !path.ends_with(".mhd")) return Done{};
-    // "Key = value" lines; ElementDataFile is the last, and LOCAL means that the voxels follow it.
-    std::ifstream file(path, std::ios::binary);
-    std::string line, data_file;
-    bool compressed = false;
-    std::uint64_t skip = 0;
-    for (int n = 0; n < 1000 && data_file.empty() && std::getline(file, line); ++n) {
-        const std::size_t equals = line.find('=');
-        if (equals == std::string::npos) continue;
-        std::string key = lower_case(line.substr(0, equals)), value = line.substr(equals + 1);
-        const auto trim = [](std::string& text) {
-            while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())))
-                text.pop_back();
-            while (!text.empty() && std::isspace(static_cast<unsigned char>(text.front())))
-                text.erase(text.begin());
-        };
-        trim(key);
-        trim(value);
-        if (key == "elementdatafile") data_file = value;
-        if (key == "compresseddata") compressed = lower_case(value) == "true";
-        if (key == "headersize")
-            skip = static_cast<std::uint64_t>(std::max(0.0, number_in(value).value_or(0)));
-    }
-    std::uint64_t begin = 0;
-    std::string data_path = path;
-    if (lower_case(data_file) == "local") {
-        begin = static_cast<std::uint64_t>(file.tellg());
-    } else if (data_file.find('%') != std::string::npos || lower_case(data_file) == "list") {
-        return Done{};  // one file a slice: the reader misses what is not there
-    } else {
-        data_path = (fs::path(path).parent_path() / data_file).string();
-        begin = skip;
-    }
+    const MetaHeader header = read_meta_header(path);
+    if (header.many_files) return Done{};  // one file per slice: the reader misses absent ones
     std::error_code code;
-    const std::uint64_t size = fs::file_size(data_path, code);
+    const std::uint64_t size = fs::file_size(header.data_path, code);
     if (code)
-        return Error{"its data file " + data_path + " is not there", path, "keep the two together"};
-    if (!compressed) {
-        if (size >= begin + voxel_bytes) return Done{};
-        return cut_off(size > begin ? size - begin : 0, voxel_bytes, path);
+        return Error{"its data file " + header.data_path + " is not there", path,
+                     "keep the two together"};
+    if (!header.compressed) {
+        if (size >= header.voxels_at + voxel_bytes) return Done{};
+        return cut_off(size > header.voxels_at ? size - header.voxels_at : 0, voxel_bytes, path);
     }
-    const auto packed = sonocase::read_file(data_path);
+    const auto packed = sonocase::read_file(header.data_path);
     if (!packed) return packed.error();
-    const std::uint64_t found =
-        inflated_bytes(*packed, std::min<std::size_t>(begin, packed->size()), voxel_bytes);
+    const std::uint64_t found = inflated_bytes(
+        *packed, std::min<std::size_t>(header.voxels_at, packed->size()), voxel_bytes);
     if (found < voxel_bytes) return cut_off(found, voxel_bytes, path);
     return Done{};
 }

@@ -13,6 +13,8 @@
 #include <optional>
 
 #include "pipeline/base/quiet_library.h"
+#include "pipeline/import/source/source_path.h"
+#include "pipeline/import/volume/data_file.h"
 #include "pipeline/import/volume/native_volume.h"
 #include "pipeline/import/volume/volume_file.h"
 
@@ -76,7 +78,7 @@ Result<Grid> grid_of(const itk::ImageIOBase& io, const std::string& path) {
         const auto size = io.GetDimensions(unsigned_axis);
         if (size < 1 || size > 65535)
             return Error{"volume of " + sizes_text(io) + " voxels", path,
-                         "expected 1 to 65535 a side"};
+                         "expected 1 to 65535 per side"};
         grid.size[axis] = static_cast<std::int32_t>(size);
         grid.spacing_mm[axis] = io.GetSpacing(unsigned_axis);
         grid.origin_mm[axis] = io.GetOrigin(unsigned_axis);
@@ -85,10 +87,10 @@ Result<Grid> grid_of(const itk::ImageIOBase& io, const std::string& path) {
             direction(row, axis) = column[static_cast<std::size_t>(row)];
         if (!(grid.spacing_mm[axis] > 0) || !std::isfinite(grid.spacing_mm[axis]) ||
             !std::isfinite(grid.origin_mm[axis]))
-            return Error{"voxel size or origin is no positive, finite number", path,
+            return Error{"voxel size or origin is not a positive, finite number", path,
                          "write the volume again with its geometry in the header"};
     }
-    // ITK speaks LPS: x to the left, y to the back.
+    // ITK uses LPS: x to the left, y to the back.
     for (int row = 0; row < 2; ++row) {
         grid.origin_mm[row] = -grid.origin_mm[row];
         for (int column = 0; column < 3; ++column) direction(row, column) = -direction(row, column);
@@ -123,6 +125,7 @@ std::string volume_stem(const std::string& path) {
 }
 
 std::uint64_t voxel_bytes_in_header(const std::string& path) {
+    if (!check_source_file(path, "") || !check_data_files(path)) return 0;
     const QuietLibrary quiet;
     itk::Object::GlobalWarningDisplayOff();
     try {
@@ -130,13 +133,14 @@ std::uint64_t voxel_bytes_in_header(const std::string& path) {
         io->SetFileName(path);
         io->ReadImageInformation();
         return static_cast<std::uint64_t>(io->GetImageSizeInBytes());
-    } catch (const std::exception&) {  // reading it will tell
+    } catch (const std::exception&) {  // reading the voxels will report it
         return 0;
     }
 }
 
 Result<NativeVolume> read_itk_volume(const std::string& path) {
     const char* todo = "check that the file is complete; export it again";
+    if (auto status = check_data_files(path); !status) return status.error();
     const QuietLibrary quiet;  // the C libraries below ITK print as well as throw
     itk::Object::GlobalWarningDisplayOff();
     try {

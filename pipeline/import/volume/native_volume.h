@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A volume as its file holds it, before labels or Hounsfield units are made of it. Internal to
-// import.
+// A volume as its file holds it, before its values are interpreted as labels. Internal to import.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +19,7 @@ enum class Component { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 };
 struct NativeVolume {
     Grid grid;  // RAS+ mm; orthonormal axes in any order and of any handedness
     Component component = Component::u8;
-    int layers = 1;                // values a voxel, fastest
+    int layers = 1;                // values per voxel, stored side by side
     std::vector<std::byte> bytes;  // # voxels * layers * size of component
     std::map<std::string, std::string> fields;
     std::vector<std::string> warnings;
@@ -29,23 +28,23 @@ struct NativeVolume {
 Result<NativeVolume> read_itk_volume(const std::string& path);      // one file
 Result<NativeVolume> read_dicom_series(const std::string& folder);  // the folder's largest series
 
-// An Error where a NIfTI file holds fewer than `voxel_bytes` after its header, or is damaged gzip:
-// the library below ITK fills what is missing with zeros and says nothing. Done for any other file.
+// An Error if a NIfTI file holds fewer than `voxel_bytes` after its header, or is damaged gzip: the
+// library below ITK silently fills with zeros what is missing. Done for any other file.
 Status check_nifti_length(const std::string& path, std::uint64_t voxel_bytes);
-// Likewise for MetaImage.
+// The same for MetaImage.
 Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes);
-// Likewise for compressed NRRD, whose reader does not miss the end of the stream.
+// The same for compressed NRRD, whose reader does not notice that the end of the stream is missing.
 Status check_nrrd_length(const std::string& path, std::uint64_t voxel_bytes);
 
-// How to turn and flip the axes of a grid so that they lie nearest to those of its frame.
+// How to permute and flip the axes of a grid so that they lie nearest to those of its frame.
 struct AxisOrder {
     int source[3] = {0, 1, 2};                // axis i of the result is this axis of the source
     bool flipped[3] = {false, false, false};  // and runs against it
 };
 AxisOrder canonical_axes(const Matrix3& direction);
 Grid reoriented(const Grid& grid, const AxisOrder& order);
-// Voxel number in the source of every voxel of the result is start + i * step[0] + j * step[1] + k
-// * step[2].
+// Voxel (i, j, k) of the result is voxel number start + i * step[0] + j * step[1] + k * step[2] of
+// the source.
 struct AxisWalk {
     std::ptrdiff_t start = 0;
     std::ptrdiff_t step[3] = {0, 0, 0};

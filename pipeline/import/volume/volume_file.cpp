@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <unordered_map>
 
-#include "formats/files/atomic_file.h"
+#include "pipeline/import/source/source_path.h"
 #include "pipeline/import/volume/native_volume.h"
 
 namespace sonocase::pipeline {
@@ -18,15 +18,18 @@ namespace fs = std::filesystem;
 
 Result<NativeVolume> read_native(const std::string& path) {
     std::error_code code;
-    if (!fs::exists(path, code)) return Error{"no such file or folder", path, "check the path"};
-    if (fs::is_directory(path, code)) return read_dicom_series(path);
-    if (const Status status = expect_regular_file(path); !status) return status.error();
-    if (!is_volume_file_name(path))
+    if (fs::is_directory(path, code)) {
+        if (auto status = check_source_folder(path, "expected DICOM slices"); !status)
+            return status.error();
+        return read_dicom_series(path);
+    }
+    if (fs::exists(path, code) && !is_volume_file_name(path))
         return Error{
             "not a known volume file name", path,
             "expected .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a folder of masks or of DICOM "
             "slices"};
-    if (fs::file_size(path, code) == 0) return Error{"file is empty", path, "export it again"};
+    if (auto status = check_source_file(path, "expected a volume file"); !status)
+        return status.error();
     return read_itk_volume(path);
 }
 
@@ -72,7 +75,7 @@ void walk(const Grid& target, const AxisWalk& walk, Visit visit) {
     }
 }
 
-// The whole number in a voxel; false where it holds none that fits.
+// The whole number in a voxel; false if it holds none, or one that does not fit.
 template <class T>
 bool whole_number(T value, std::int32_t* whole) {
     if constexpr (std::is_floating_point_v<T>) {
@@ -88,8 +91,7 @@ bool whole_number(T value, std::int32_t* whole) {
     }
 }
 
-// The distinct numbers of a volume, at most 256 of them, each with its place in order of
-// appearance.
+// The distinct numbers of a volume, 256 at most, each with its place in order of appearance.
 class ValueTable {
   public:
     // Place of the value; -1 when there is no room.
@@ -134,7 +136,7 @@ Result<LabelLayers> read_label_layers(const std::string& path) {
     result.layers.assign(layer_count, std::vector<std::uint8_t>(result.grid.voxel_count()));
 
     ValueTable table;
-    enum { kFine, kTooMany, kNoWholeNumber } verdict = kFine;
+    enum { kFine, kTooMany, kNotWhole } verdict = kFine;
     with_voxels(*native, [&](const auto* voxels) {
         for (std::size_t layer = 0; layer < layer_count && verdict == kFine; ++layer) {
             std::uint8_t* target = result.layers[layer].data();
@@ -142,7 +144,7 @@ Result<LabelLayers> read_label_layers(const std::string& path) {
                 if (verdict != kFine) return;
                 std::int32_t value = 0;
                 if (!whole_number(voxels[from * layer_count + layer], &value)) {
-                    verdict = kNoWholeNumber;
+                    verdict = kNotWhole;
                     return;
                 }
                 const int place = table.place(value);
@@ -151,8 +153,8 @@ Result<LabelLayers> read_label_layers(const std::string& path) {
             });
         }
     });
-    if (verdict == kNoWholeNumber)
-        return Error{"voxels hold values that are no whole numbers", path,
+    if (verdict == kNotWhole)
+        return Error{"voxels hold values that are not whole numbers", path,
                      "expected a label map; is this the scan itself, or a map resampled smoothly?"};
     if (verdict == kTooMany)
         return Error{
@@ -171,27 +173,6 @@ Result<LabelLayers> read_label_layers(const std::string& path) {
     }
     for (auto& layer : result.layers)
         for (std::uint8_t& voxel : layer) voxel = rank[voxel];
-    return result;
-}
-
-Result<ScalarVolume> read_scalar_volume(const std::string& path) {
-    auto native = read_native(path);
-    if (!native) return native.error();
-    if (native->layers != 1)
-        return Error{std::to_string(native->layers) + " values a voxel", path,
-                     "expected a CT with one value a voxel"};
-    const AxisOrder order = canonical_axes(native->grid.direction);
-    ScalarVolume result;
-    result.grid = reoriented(native->grid, order);
-    result.warnings = std::move(native->warnings);
-    result.voxels.resize(result.grid.voxel_count());
-    with_voxels(*native, [&](const auto* voxels) {
-        walk(result.grid, axis_walk(native->grid, order), [&](std::size_t to, std::size_t from) {
-            const double value = static_cast<double>(voxels[from]);
-            const double held = value > 32767 ? 32767 : value > -32768 ? value : -32768;  // NaN too
-            result.voxels[to] = static_cast<std::int16_t>(std::nearbyint(held));
-        });
-    });
     return result;
 }
 

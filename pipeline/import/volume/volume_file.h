@@ -3,9 +3,10 @@
 // Medical volumes as files: NIfTI, NRRD (also .seg.nrrd), MetaImage, or a folder with a DICOM
 // series.
 //
-// Placement is converted at this border: whatever the file's axis order and world convention, the
-// grid that comes out is RAS+ millimetres with its axes turned and flipped so that i points nearest
-// to right, j to front and k to head. Oblique scans keep the rest of their tilt in grid.direction.
+// Placement is converted here: whatever the file's axis order and world convention, the returned
+// grid is in RAS+ millimetres, its axes permuted and flipped so that i points most nearly to the
+// patient's right, j to the front and k to the head. Oblique scans keep their remaining tilt in
+// grid.direction.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@
 
 namespace sonocase::pipeline {
 
-// A volume of few distinct whole numbers, in one or more layers (a .seg.nrrd may have several).
+// A volume of few distinct whole numbers in one or more layers (a .seg.nrrd may have several).
 struct LabelLayers {
     Grid grid;
     std::vector<std::int32_t> values;  // ascending, distinct, over all layers; # <= 256
@@ -27,21 +28,12 @@ struct LabelLayers {
     std::vector<std::string> warnings;
 };
 
-// Fails on values that are no whole numbers and on more than 256 distinct ones (a CT, most likely).
-// Cost: one pass; memory: the file's voxels in its own type and one byte each.
+// Errors: not a readable volume; a pipe or a device; values that are not whole numbers; more than 256
+// distinct ones (most likely a CT). Cost: one pass; memory: the file's voxels in its own type and
+// one byte each.
 Result<LabelLayers> read_label_layers(const std::string& path);
 
-// A CT in Hounsfield units, rounded and held to 16 bits.
-struct ScalarVolume {
-    Grid grid;
-    std::vector<std::int16_t> voxels;
-    std::vector<std::string> warnings;
-};
-
-Result<ScalarVolume> read_scalar_volume(const std::string& path);
-
-// Bytes of voxels that a file's header speaks of, nothing else being read; 0 where it cannot be
-// told.
+// Bytes of voxels according to the file's header, which is all that is read; 0 if it cannot be read.
 std::uint64_t voxel_bytes_in_header(const std::string& path);
 
 // True for names that read_label_layers takes as a single file.

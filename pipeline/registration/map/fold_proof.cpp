@@ -16,14 +16,14 @@ namespace {
 
 constexpr int kMostNodes = 9;
 constexpr int kDeepestCut = 4;
-constexpr double kLoose = 0.01;  // a bound closer than this to the least sample is left alone
+constexpr double kLoose = 0.01;  // a bound closer than this to the least sample is not refined
 
 // From values at nodes in [0, 1] to Bernstein coefficients of the same polynomial.
 struct BernsteinForm {
     explicit BernsteinForm(int degree) : nodes(degree + 1) {
         Eigen::MatrixXd values(nodes, nodes);
         for (int i = 0; i < nodes; ++i) {
-            // Chebyshev nodes stretched to the ends: well conditioned, and the corners are samples.
+            // Chebyshev nodes stretched to the ends: well conditioned, and corners are sampled.
             node[i] = 0.5 - 0.5 * std::cos(3.14159265358979323846 * i / degree);
             double choose = 1;
             for (int j = 0; j <= degree; ++j) {
@@ -218,8 +218,8 @@ std::vector<Piece> pieces_of(const Registration& r) {
     return pieces;
 }
 
-// Does the residual's grid cover the box? Beyond it the displacement is constant across the faces,
-// and the pieces there are not the spline's.
+// Whether the residual's grid covers the box. Beyond the grid the displacement is constant across the
+// faces, and the map is not one polynomial per cell.
 bool covers(const DisplacementGrid& grid, const Box3& box) {
     if (grid.empty()) return true;
     for (int a = 0; a < 3; ++a) {

@@ -11,8 +11,8 @@ namespace {
 constexpr int kMostCells = 24;  // of the CT box, per axis
 
 // Box around q over a cell, by the 27 Bernstein coefficients of degree 2 in each axis. The
-// coefficients follow from the values at the ends and the middle of each axis: b1 = 2 m - (a + c)
-// / 2.
+// coefficients follow from the values at the ends and the middle of each axis:
+// b1 = 2 m - (a + c) / 2.
 Box3 image_of_cell(const QuadraticMap& q, const Box3& cell) {
     Point3 value[3][3][3];
     const Vector3 e = cell.extent();
@@ -95,7 +95,7 @@ ImageOfBox::ImageOfBox(const Registration& registration) {
                                                  e.z * (k + 1) / cells});
                 Box3 image = image_of_cell(registration.quadratic, cell);
                 widen_by_displacement(registration.residual, cell, &image);
-                // Rounding, and the slack with which a point counts as inside the box.
+                // Rounding, and the tolerance with which a point counts as inside the box.
                 const double slack = 0.01;
                 image.lower = image.lower - slack * Vector3{1, 1, 1};
                 image.upper = image.upper + slack * Vector3{1, 1, 1};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Which places of the mannequin can the CT box reach? A coarse grid of yes and no, where no is
-// proven: the box is cut into cells, and each cell's image lies in the box around the Bernstein
-// coefficients of the quadratic plus the control points of the residual that act on the cell.
+// Which places of the mannequin the CT box can be mapped to: a coarse grid of yes and no, in which
+// "no" is proven. The box is divided into cells; the image of each lies in the bounding box of the
+// Bernstein coefficients of the quadratic plus the control points of the residual that act there.
 #pragma once
 
 #include <cstdint>

@@ -32,8 +32,8 @@ std::vector<std::uint32_t> one_per_cube(std::span<const Point3> points, double s
     return chosen;
 }
 
-// The gap along the mean of the two normals: points of one round surface, a step apart, have gap 0,
-// where either plane alone is off by step^2 / (2 radius).
+// The gap along the mean of the two normals. Two points a step apart on one sphere then have gap 0,
+// while along either normal alone it is step^2 / (2 radius).
 Match match_of(std::uint32_t skin,
                Point3 mapped,
                Vector3 mapped_normal,
@@ -65,7 +65,7 @@ SkinModel thin_skin(const Surface& skin,
     }
     std::vector<std::uint8_t> chosen(points.size(), 0);
     for (std::uint32_t i : one_per_cube(points, spacing_mm)) chosen[i] = 1;
-    // The rim must stay closed against readings beyond it: it is kept whole.
+    // The whole rim is kept: a gap in it would match readings beyond it.
     for (std::size_t i = 0; i < points.size(); ++i) {
         if (chosen[i] || on_rim[i]) take(i);
     }
@@ -98,7 +98,7 @@ Matches find_matches(const SkinModel& skin,
     };
     const double farthest2 = options.farthest_mm * options.farthest_mm;
     Matches matches;
-    matches.target_asked = readings.size();
+    matches.target_queries = readings.size();
     std::vector<Found> found(readings.size());
     parallel_for(readings.size(), 128, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n) {
@@ -115,10 +115,10 @@ Matches find_matches(const SkinModel& skin,
         if (f.ok) matches.from_target.push_back(f.match);
     }
 
-    const std::size_t asked =
+    const std::size_t queries =
         skin_stride > 0 ? (skin.points.size() + skin_stride - 1) / skin_stride : 0;
-    found.assign(asked, {});
-    parallel_for(asked, 128, [&](std::size_t begin, std::size_t end) {
+    found.assign(queries, {});
+    parallel_for(queries, 128, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n) {
             const std::size_t i = n * skin_stride;
             if (skin.on_rim[i]) continue;
@@ -128,15 +128,15 @@ Matches find_matches(const SkinModel& skin,
             if (dot(mapped_normals[i], target.normals[j]) < options.least_cosine) continue;
             const double gap = dot(target.normals[j], mapped[i] - target.points[j]);
             const double aside = std::sqrt(std::max(0.0, d2 - gap * gap));
-            // Beside a rim reading the mannequin may have ended.
+            // Beside a rim reading the mannequin may end.
             if (aside > (target.on_rim[j] ? 0.35 : 1.0) * options.side_step_mm) continue;
             found[n] = {
                 match_of(static_cast<std::uint32_t>(i), mapped[i], mapped_normals[i], target, j),
                 true};
         }
     });
-    for (std::size_t n = 0; n < asked; ++n) {
-        matches.skin_asked += !skin.on_rim[n * skin_stride];
+    for (std::size_t n = 0; n < queries; ++n) {
+        matches.skin_queries += !skin.on_rim[n * skin_stride];
         if (found[n].ok) matches.from_skin.push_back(found[n].match);
     }
     return matches;

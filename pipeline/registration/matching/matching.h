@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Which point of the skin lies against which place of the mannequin, and which have no counterpart.
+// Closest-point matching of the mapped skin f(x) with the mannequin, in both directions: for each
+// reading the closest skin point, and for each skin point the closest place on the mannequin.
 //
-// Both directions (a reading looks for the skin, the skin looks for the mannequin) give rows of one
-// kind, n . (f(x) - y): x a skin point, y a place on the mannequin, n the mean of the mapped skin's
-// normal and the mannequin's.
+// Both give rows of one form, n . (f(x) - y): x a skin point, y a place on the mannequin, n the mean
+// of the two surfaces' normals. Points beyond a rim have no counterpart and give no row.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@
 
 namespace sonocase::pipeline {
 
-// Skin points as the fit uses them: ct frame less `origin`.
+// Skin points as the fit uses them: ct frame, relative to `origin`.
 struct SkinModel {
     Point3 origin;
     std::vector<Point3> points;
@@ -25,37 +25,37 @@ struct SkinModel {
     std::vector<std::uint8_t> on_rim;
 };
 
-// One point per cube of about spacing_mm; 0 takes them all. Rim points stay rim points.
+// One point per cube of about spacing_mm, and every rim point; 0 takes all points.
 SkinModel thin_skin(const Surface& skin,
                     std::span<const std::uint8_t> on_rim,
                     Point3 origin,
                     double spacing_mm);
-// Numbers of one target point per cube of about spacing_mm, lift-offs left out.
+// Indices of one target point per cube of about spacing_mm, without lift-offs; 0 takes all.
 std::vector<std::uint32_t> thin_target(const TargetSurface& target, double spacing_mm);
 
 struct Match {
     std::uint32_t skin = 0;
-    Point3 place;       // on the mannequin, less the target's origin
+    Point3 place;       // on the mannequin, relative to the target's origin
     Vector3 normal;     // unit
     double gap_mm = 0;  // normal . (f(x) - place)
 };
 
 struct MatchOptions {
-    double farthest_mm = 60;    // larger distances have no counterpart
+    double farthest_mm = 60;    // points farther apart are not matched
     double least_cosine = 0.3;  // of the angle between the two normals
-    double side_step_mm =
-        12;  // skin to mannequin: how far beside the nearest reading its plane holds
+    // Skin to mannequin: how far beside the nearest reading its plane is used.
+    double side_step_mm = 12;
 };
 
 struct Matches {
-    std::vector<Match> from_target;  // a reading looked for the skin
-    std::vector<Match> from_skin;    // the skin looked for the mannequin
-    std::size_t target_asked = 0, skin_asked = 0;
+    std::vector<Match> from_target;                    // for each reading, the closest skin point
+    std::vector<Match> from_skin;                      // for each skin point, the closest reading
+    std::size_t target_queries = 0, skin_queries = 0;  // tried
 };
 
-// mapped, mapped_normals  the skin through the map, mannequin less target.origin; # skin.points
-// readings                numbers of the target points that ask
-// skin_stride             every so many-th skin point asks
+// mapped, mapped_normals  the mapped skin, mannequin frame relative to target.origin; # skin.points
+// readings                indices of the target points to match
+// skin_stride             every skin_stride-th skin point is matched
 Matches find_matches(const SkinModel& skin,
                      std::span<const Point3> mapped,
                      std::span<const Vector3> mapped_normals,

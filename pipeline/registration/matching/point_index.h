@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Nearest points among many: a kd-tree over a copy of the points.
+// Nearest neighbours in a set of points: a k-d tree over a copy of them (nanoflann).
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ class PointIndex {
     PointIndex& operator=(PointIndex&&) noexcept;
 
     bool empty() const;
-    // Number of the point nearest to p; the index must not be empty. Ties go to either.
+    // Index of the point nearest to p; the set must not be empty. Ties are broken arbitrarily.
     std::uint32_t nearest(Point3 p, double* squared_distance = nullptr) const;
     // The `count` nearest (fewer if there are fewer), nearest first.
     std::vector<std::uint32_t> nearest(Point3 p, int count) const;

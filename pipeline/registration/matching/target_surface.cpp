@@ -74,7 +74,7 @@ Result<Done> check_units(const Box3& box) {
                  text("a torso of some 200 to 1500 mm was expected; %s", unit)};
 }
 
-// Outward normals of a mesh: area-weighted means of its triangles'.
+// Outward normals of a mesh: area-weighted means over the triangles at each point.
 void normals_from_triangles(TargetSurface& t) {
     t.normals.assign(t.points.size(), {});
     double volume = 0;
@@ -83,7 +83,7 @@ void normals_from_triangles(TargetSurface& t) {
         for (std::uint32_t v : f) t.normals[v] = t.normals[v] + n;
         volume += dot(n, t.points[f[0]] - Point3{});
     }
-    // The origin is the points' mean and lies inside: a mesh turned inside out is turned back.
+    // The origin lies inside the body: a mesh that is inside out is turned.
     const double sign = volume < 0 ? -1 : 1;
     if (volume < 0) {
         for (auto& f : t.triangles) std::swap(f[1], f[2]);
@@ -105,8 +105,8 @@ void rim_from_triangles(TargetSurface& t) {
     }
 }
 
-// Planes through neighbours: normals without sign, lift-offs, and the rim, where the neighbours
-// leave more than a third of the directions empty.
+// Planes through neighbours: normals without sign; lift-offs; and the rim, where more than a third of
+// the directions round a point hold no neighbour.
 void planes_from_neighbours(TargetSurface& t,
                             const std::vector<std::vector<std::uint32_t>>& near,
                             const TargetOptions& options) {
@@ -139,7 +139,8 @@ void planes_from_neighbours(TargetSurface& t,
     });
 }
 
-// One sign for all: along the tree of neighbours whose planes agree best, then outwards as a whole.
+// Gives all normals one sign, along the tree of neighbours whose planes agree best; then turns the
+// whole outwards.
 void orient(TargetSurface& t, const std::vector<std::vector<std::uint32_t>>& near) {
     std::vector<std::uint8_t> done(t.points.size(), 0);
     using Entry = std::tuple<double, std::uint32_t, std::uint32_t>;  // disagreement, to, from
@@ -161,7 +162,7 @@ void orient(TargetSurface& t, const std::vector<std::vector<std::uint32_t>>& nea
                 }
             }
         }
-        // Seen from the middle of the whole cloud the part's planes face outwards on balance.
+        // On balance the part's normals point away from the middle of the whole cloud.
         double outward = 0;
         for (std::uint32_t i : part) outward += dot(t.normals[i], t.points[i] - Point3{});
         if (outward < 0) {
@@ -170,32 +171,29 @@ void orient(TargetSurface& t, const std::vector<std::vector<std::uint32_t>>& nea
     }
 }
 
-}  // namespace
-
-Result<TargetSurface> prepare_target(const Surface& surface, const TargetOptions& options) {
-    TargetSurface t;
-    t.given = static_cast<long>(surface.points.size());
-    Box3 box;
-    std::vector<std::uint32_t> renumbered(surface.points.size(), UINT32_MAX);
+// Indices of the finite points, in order; counts the others.
+std::vector<std::uint32_t> finite_points(const Surface& surface, long* not_finite) {
     std::vector<std::uint32_t> order;
     for (std::size_t i = 0; i < surface.points.size(); ++i) {
         const Point3 p = surface.points[i];
         if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)) {
             order.push_back(static_cast<std::uint32_t>(i));
-            box.include(p);
         } else {
-            ++t.not_finite;
+            ++*not_finite;
         }
     }
-    if (order.size() < kFewestPoints) {
-        return Error{text("surface of %ld usable points (%ld given, %ld not finite)",
-                          static_cast<long>(order.size()), t.given, t.not_finite),
-                     "",
-                     text("at least %ld are needed, 500 or more are good",
-                          static_cast<long>(kFewestPoints))};
-    }
-    // Gross outliers must not hide the units: the middle nine tenths along each axis, a tenth
-    // wider.
+    return order;
+}
+
+Error too_few(const std::string& what) {
+    return {
+        what, "",
+        text("at least %ld are needed, 500 or more are good", static_cast<long>(kFewestPoints))};
+}
+
+// The middle nine tenths along each axis, widened by a tenth: gross outliers must not hide the
+// units.
+Box3 middle_box(const Surface& surface, const std::vector<std::uint32_t>& order) {
     Box3 middle;
     for (int a = 0; a < 3; ++a) {
         std::vector<double> v;
@@ -205,10 +203,16 @@ Result<TargetSurface> prepare_target(const Surface& surface, const TargetOptions
         middle.lower[a] = low - 0.05 * (high - low);
         middle.upper[a] = high + 0.05 * (high - low);
     }
-    if (auto ok = check_units(middle); !ok) return ok.error();
-    t.origin = middle.centre();
+    return middle;
+}
 
-    // Repeated points add no evidence and break neighbourhoods.
+// Takes the distinct points, relative to the origin; repeated points add no evidence and break
+// neighbourhoods. Returns for each point of the input its number in the target; UINT32_MAX if it is
+// not finite.
+std::vector<std::uint32_t> take_distinct_points(const Surface& surface,
+                                                std::vector<std::uint32_t> order,
+                                                TargetSurface& t) {
+    std::vector<std::uint32_t> first_equal(surface.points.size(), UINT32_MAX);
     std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
         const Point3 p = surface.points[a], q = surface.points[b];
         return std::tie(p.x, p.y, p.z, a) < std::tie(q.x, q.y, q.z, b);
@@ -216,11 +220,11 @@ Result<TargetSurface> prepare_target(const Surface& surface, const TargetOptions
     std::vector<std::uint32_t> unique;
     for (std::uint32_t i : order) {
         if (!unique.empty() && surface.points[unique.back()] == surface.points[i]) {
-            renumbered[i] = unique.back();  // for now the number in the input
+            first_equal[i] = unique.back();
             ++t.repeated;
         } else {
             unique.push_back(i);
-            renumbered[i] = i;
+            first_equal[i] = i;
         }
     }
     std::sort(unique.begin(), unique.end());
@@ -229,12 +233,66 @@ Result<TargetSurface> prepare_target(const Surface& surface, const TargetOptions
         position[unique[n]] = static_cast<std::uint32_t>(n);
         t.points.push_back(Point3{} + (surface.points[unique[n]] - t.origin));
     }
+    std::vector<std::uint32_t> number(surface.points.size(), UINT32_MAX);
+    for (std::size_t i = 0; i < number.size(); ++i) {
+        if (first_equal[i] != UINT32_MAX) number[i] = position[first_equal[i]];
+    }
+    return number;
+}
+
+// Triangles between distinct points of the target.
+void take_triangles(const Surface& surface,
+                    const std::vector<std::uint32_t>& number,
+                    TargetSurface& t) {
+    for (const auto& f : surface.triangles) {
+        std::array<std::uint32_t, 3> g{};
+        bool whole_triangle = true;
+        for (std::size_t v = 0; v < 3; ++v) {
+            g[v] = f[v] < number.size() ? number[f[v]] : UINT32_MAX;
+            whole_triangle = whole_triangle && g[v] != UINT32_MAX;
+        }
+        if (whole_triangle && g[0] != g[1] && g[1] != g[2] && g[2] != g[0])
+            t.triangles.push_back(g);
+    }
+}
+
+// The nearest `count` neighbours of each point, itself first; sets spacing_mm.
+std::vector<std::vector<std::uint32_t>> neighbourhoods(TargetSurface& t, int count) {
+    std::vector<double> sixth(t.points.size());
+    std::vector<std::vector<std::uint32_t>> near(t.points.size());
+    parallel_for(t.points.size(), 64, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            near[i] = t.index.nearest(t.points[i], count);
+            // The point itself comes first, whatever the order of ties.
+            auto self = std::find(near[i].begin(), near[i].end(), static_cast<std::uint32_t>(i));
+            if (self != near[i].end()) std::rotate(near[i].begin(), self, self + 1);
+            sixth[i] = distance(t.points[i],
+                                t.points[near[i][std::min<std::size_t>(6, near[i].size() - 1)]]);
+        }
+    });
+    std::nth_element(sixth.begin(), sixth.begin() + static_cast<std::ptrdiff_t>(sixth.size() / 2),
+                     sixth.end());
+    t.spacing_mm = sixth[sixth.size() / 2];
+    return near;
+}
+
+}  // namespace
+
+Result<TargetSurface> prepare_target(const Surface& surface, const TargetOptions& options) {
+    TargetSurface t;
+    t.given = static_cast<long>(surface.points.size());
+    std::vector<std::uint32_t> order = finite_points(surface, &t.not_finite);
+    if (order.size() < kFewestPoints) {
+        return too_few(text("surface of %ld usable points (%ld given, %ld not finite)",
+                            static_cast<long>(order.size()), t.given, t.not_finite));
+    }
+    const Box3 middle = middle_box(surface, order);
+    if (auto ok = check_units(middle); !ok) return ok.error();
+    t.origin = middle.centre();
+    const std::vector<std::uint32_t> number = take_distinct_points(surface, std::move(order), t);
     if (t.points.size() < kFewestPoints) {
-        return Error{text("surface of %ld distinct points among %ld",
-                          static_cast<long>(t.points.size()), t.given),
-                     "",
-                     text("at least %ld are needed, 500 or more are good",
-                          static_cast<long>(kFewestPoints))};
+        return too_few(text("surface of %ld distinct points among %ld",
+                            static_cast<long>(t.points.size()), t.given));
     }
     const Spread whole = spread_of(t.points, all_of(t.points.size()));
     t.thickness_mm = whole.deviation.x;
@@ -248,34 +306,9 @@ Result<TargetSurface> prepare_target(const Surface& surface, const TargetOptions
     t.normals.resize(t.points.size());
     t.on_rim.assign(t.points.size(), 0);
     t.lifted.assign(t.points.size(), 0);
-    for (const auto& f : surface.triangles) {
-        std::array<std::uint32_t, 3> g{};
-        bool whole_triangle = true;
-        for (std::size_t v = 0; v < 3; ++v) {
-            const std::uint32_t r = f[v] < renumbered.size() ? renumbered[f[v]] : UINT32_MAX;
-            whole_triangle = whole_triangle && r != UINT32_MAX;
-            if (whole_triangle) g[v] = position[r];
-        }
-        if (whole_triangle && g[0] != g[1] && g[1] != g[2] && g[2] != g[0])
-            t.triangles.push_back(g);
-    }
-
-    std::vector<double> sixth(t.points.size());
-    std::vector<std::vector<std::uint32_t>> near(t.points.size());
+    take_triangles(surface, number, t);
     const bool mesh = !t.triangles.empty();
-    parallel_for(t.points.size(), 64, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            near[i] = t.index.nearest(t.points[i], mesh ? 7 : options.neighbours + 1);
-            // The point itself comes first, whatever the order of ties.
-            auto self = std::find(near[i].begin(), near[i].end(), static_cast<std::uint32_t>(i));
-            if (self != near[i].end()) std::rotate(near[i].begin(), self, self + 1);
-            sixth[i] = distance(t.points[i],
-                                t.points[near[i][std::min<std::size_t>(6, near[i].size() - 1)]]);
-        }
-    });
-    std::nth_element(sixth.begin(), sixth.begin() + static_cast<std::ptrdiff_t>(sixth.size() / 2),
-                     sixth.end());
-    t.spacing_mm = sixth[sixth.size() / 2];
+    const auto near = neighbourhoods(t, mesh ? 7 : options.neighbours + 1);
     if (mesh) {
         normals_from_triangles(t);
         rim_from_triangles(t);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The mannequin's surface made ready: a mesh, or a cloud of readings with planes fitted through
-// neighbours. Coordinates are those of the file less `origin`, so that far frames lose no digits.
+// The mannequin's surface, prepared for matching: a mesh, or a cloud of readings with planes fitted
+// through neighbours. Coordinates are relative to `origin`, so that far frames lose no accuracy.
 #pragma once
 
 #include <cstdint>
@@ -14,16 +14,17 @@
 namespace sonocase::pipeline {
 
 struct TargetOptions {
-    int neighbours = 12;     // of the plane through a reading, >= 6
-    double lift_off_mm = 8;  // off the plane of its neighbours by more: the sensor was in the air
+    int neighbours = 12;  // that define the plane through a reading, >= 6
+    // A reading farther than this from the plane of its neighbours: the sensor was in the air.
+    double lift_off_mm = 8;
 };
 
 struct TargetSurface {
     Point3 origin;                     // mannequin frame
-    std::vector<Point3> points;        // mannequin frame, less origin
+    std::vector<Point3> points;        // mannequin frame, relative to origin
     std::vector<Vector3> normals;      // outward, unit
-    std::vector<std::uint8_t> on_rim;  // 1 where the surface ends and a counterpart may lie beyond
-    std::vector<std::uint8_t> lifted;  // 1 for lift-offs: they take no part in the fit
+    std::vector<std::uint8_t> on_rim;  // 1 where the surface ends; the counterpart may lie beyond
+    std::vector<std::uint8_t> lifted;  // 1 for lift-offs, which the fit does not use
     std::vector<std::array<std::uint32_t, 3>> triangles;  // of a mesh
     PointIndex index;                                     // over all points
     double spacing_mm = 0;                                // median distance to the sixth neighbour

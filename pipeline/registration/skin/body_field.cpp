@@ -3,17 +3,15 @@
 #include "pipeline/registration/skin/body_field.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "pipeline/base/parallel.h"
+#include "pipeline/registration/skin/mask.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-using Mask = std::vector<std::uint8_t>;
-
-// Share of labelled voxels in blocks of `factor`; a last block that is not whole is left away.
+// Share of labelled voxels in blocks of `factor`; an incomplete last block is dropped.
 std::vector<float> averaged(const LabelVolume& labels, Int3 factor, Int3 size) {
     std::vector<float> share(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
                              static_cast<std::size_t>(size.z));
@@ -48,181 +46,20 @@ std::vector<float> averaged(const LabelVolume& labels, Int3 factor, Int3 size) {
     return share;
 }
 
-// A mask slice by slice, with the in-plane operations that cleaning needs.
-struct Slice {
-    int width, height;
-    std::uint8_t* at;
-    std::size_t count() const {
-        return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-    }
-};
-
-// Everything that no path through zeros joins to the slice's border becomes one.
-void fill_holes(Slice slice) {
-    std::vector<int> stack;
-    Mask outside(slice.count(), 0);
-    const auto push = [&](int i, int j) {
-        const int n = i + slice.width * j;
-        if (slice.at[n] || outside[static_cast<std::size_t>(n)]) return;
-        outside[static_cast<std::size_t>(n)] = 1;
-        stack.push_back(n);
-    };
-    for (int i = 0; i < slice.width; ++i) push(i, 0), push(i, slice.height - 1);
-    for (int j = 0; j < slice.height; ++j) push(0, j), push(slice.width - 1, j);
-    while (!stack.empty()) {
-        const int n = stack.back();
-        stack.pop_back();
-        const int i = n % slice.width, j = n / slice.width;
-        if (i > 0) push(i - 1, j);
-        if (i + 1 < slice.width) push(i + 1, j);
-        if (j > 0) push(i, j - 1);
-        if (j + 1 < slice.height) push(i, j + 1);
-    }
-    for (std::size_t n = 0; n < slice.count(); ++n) {
-        if (!outside[n]) slice.at[n] = 1;
-    }
-}
-
-// Offsets of a disc of the given radii, in voxels.
-std::vector<std::array<int, 2>> disc(double radius_x, double radius_y) {
-    std::vector<std::array<int, 2>> offsets;
-    const int nx = static_cast<int>(radius_x), ny = static_cast<int>(radius_y);
-    for (int j = -ny; j <= ny; ++j) {
-        for (int i = -nx; i <= nx; ++i) {
-            const double x = radius_x > 0 ? i / radius_x : 0, y = radius_y > 0 ? j / radius_y : 0;
-            if (x * x + y * y <= 1 + 1e-9) offsets.push_back({i, j});
-        }
-    }
-    return offsets;
-}
-
-// Voxels whose whole disc is body; beyond the slice counts as body, so that a cut face is not
-// eaten.
-Mask eroded(Slice slice, const std::vector<std::array<int, 2>>& offsets) {
-    Mask out(slice.count(), 0);
-    for (int j = 0; j < slice.height; ++j) {
-        for (int i = 0; i < slice.width; ++i) {
-            if (!slice.at[i + slice.width * j]) continue;
-            bool keep = true;
-            for (const auto& o : offsets) {
-                const int x = i + o[0], y = j + o[1];
-                if (x < 0 || y < 0 || x >= slice.width || y >= slice.height) continue;
-                if (!slice.at[x + slice.width * y]) {
-                    keep = false;
-                    break;
-                }
-            }
-            out[static_cast<std::size_t>(i + slice.width * j)] = keep;
-        }
-    }
-    return out;
-}
-
-// Connected parts (faces) of a mask on a grid; part numbers from 1, sizes at [number].
-struct Parts {
-    std::vector<std::int32_t> number;
-    std::vector<long> size{0};
-    std::int32_t largest() const {
-        std::int32_t best = 0;
-        for (std::size_t n = 1; n < size.size(); ++n) {
-            if (best == 0 || size[n] > size[static_cast<std::size_t>(best)]) {
-                best = static_cast<std::int32_t>(n);
-            }
-        }
-        return best;
-    }
-};
-
-Parts parts_of(const std::uint8_t* mask, Int3 size) {
-    Parts parts;
-    const int row = size.x, slice = size.x * size.y, total = slice * size.z;
-    parts.number.assign(static_cast<std::size_t>(total), 0);
-    std::vector<int> stack;
-    for (int seed = 0; seed < total; ++seed) {
-        if (!mask[seed] || parts.number[static_cast<std::size_t>(seed)]) continue;
-        const auto label = static_cast<std::int32_t>(parts.size.size());
-        long count = 0;
-        parts.number[static_cast<std::size_t>(seed)] = label;
-        stack.push_back(seed);
-        while (!stack.empty()) {
-            const int n = stack.back();
-            stack.pop_back();
-            ++count;
-            const int i = n % row, j = n % slice / row, k = n / slice;
-            const auto visit = [&](bool there, int m) {
-                if (!there || !mask[m] || parts.number[static_cast<std::size_t>(m)]) return;
-                parts.number[static_cast<std::size_t>(m)] = label;
-                stack.push_back(m);
-            };
-            visit(i > 0, n - 1);
-            visit(i + 1 < size.x, n + 1);
-            visit(j > 0, n - row);
-            visit(j + 1 < size.y, n + row);
-            visit(k > 0, n - slice);
-            visit(k + 1 < size.z, n + slice);
-        }
-        parts.size.push_back(count);
-    }
-    return parts;
-}
-
-// Grows `seed` inside `mask` by the disc, slice by slice: what opening by reconstruction gives
-// back.
-void give_edge_back(Mask& seed,
-                    const Mask& mask,
-                    Int3 size,
-                    const std::vector<std::array<int, 2>>& offsets) {
-    const std::size_t count = static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
-    parallel_for(static_cast<std::size_t>(size.z), 4, [&](std::size_t begin, std::size_t end) {
-        Mask grown(count);
-        for (std::size_t k = begin; k < end; ++k) {
-            std::fill(grown.begin(), grown.end(), std::uint8_t{0});
-            std::uint8_t* s = seed.data() + k * count;
-            const std::uint8_t* m = mask.data() + k * count;
-            for (int j = 0; j < size.y; ++j) {
-                for (int i = 0; i < size.x; ++i) {
-                    if (!s[i + size.x * j]) continue;
-                    for (const auto& o : offsets) {
-                        const int x = i + o[0], y = j + o[1];
-                        if (x >= 0 && y >= 0 && x < size.x && y < size.y) {
-                            grown[static_cast<std::size_t>(x + size.x * y)] = 1;
-                        }
-                    }
-                }
-            }
-            for (std::size_t n = 0; n < count; ++n) s[n] = grown[n] && m[n];
-        }
-    });
-}
-
-// How many body voxels lie in each plane across an axis.
-std::vector<long> plane_counts(const Mask& mask, Int3 size, int axis) {
-    std::vector<long> counts(static_cast<std::size_t>(size[axis]), 0);
-    std::size_t n = 0;
-    for (int k = 0; k < size.z; ++k) {
-        for (int j = 0; j < size.y; ++j) {
-            for (int i = 0; i < size.x; ++i, ++n) {
-                if (mask[n]) ++counts[static_cast<std::size_t>(axis == 0 ? i : axis == 1 ? j : k)];
-            }
-        }
-    }
-    return counts;
-}
-
-// Is the body cut at plane `first`, looking inwards along step? A tangent plane meets a round body
-// in an area that grows from nothing; a cut shows its area at once.
+// Whether the body is cut at plane `first`, going inwards by `step`. In planes across a round body
+// the area grows gradually from zero; at a cut the full area appears at once.
 bool is_cut(const std::vector<long>& counts, int first, int step, int axis, double voxel_area_mm2) {
     const int count = static_cast<int>(counts.size());
     if (first + 3 * step < 0 || first + 3 * step >= count) return false;
     const auto at = [&](int n) { return static_cast<double>(counts[static_cast<std::size_t>(n)]); };
     if (at(first) * voxel_area_mm2 < 2500) return false;
-    // Per plane. Flanks are round; a back that lay on a table is nearly flat.
+    // Growth per plane. Flanks are round; a back that lay on a table is nearly flat.
     const double growth = axis == 2 ? 1.6 : axis == 0 ? 1.3 : 1.12;
     return at(first + step) < growth * at(first) &&
            at(first + 2 * step) < growth * at(first + step);
 }
 
-// Separable Gaussian; beyond the faces the field repeats its nearest voxel.
+// Separable Gaussian; beyond the faces the nearest voxel is repeated.
 void smooth(std::vector<float>& field, Int3 size, Vector3 sigma_vx) {
     for (int axis = 0; axis < 3; ++axis) {
         const double sigma = sigma_vx[axis];
@@ -263,7 +100,7 @@ void smooth(std::vector<float>& field, Int3 size, Vector3 sigma_vx) {
     }
 }
 
-// The grid without the planes before `first` and after `last`.
+// Drops the planes before `first` and after `last`.
 void crop(Grid& grid, std::vector<float>& field, Mask& mask, Int3 first, Int3 last) {
     const Grid old = grid;
     grid.size = {last.x - first.x + 1, last.y - first.y + 1, last.z - first.z + 1};
@@ -282,8 +119,8 @@ void crop(Grid& grid, std::vector<float>& field, Mask& mask, Int3 first, Int3 la
     mask.resize(n);
 }
 
-// Does a round field of view cut the body? Many voxels of the body's edge then lie on one circle
-// around the middle of the slice.
+// Radius of a round field of view that cuts the body, 0 if none does: many voxels of the body's edge
+// then lie on one circle about the middle of the slice.
 double round_view_radius(const Mask& mask, const Grid& grid) {
     const double rx = 0.5 * grid.size.x * grid.spacing_mm.x,
                  ry = 0.5 * grid.size.y * grid.spacing_mm.y;
@@ -306,6 +143,122 @@ double round_view_radius(const Mask& mask, const Grid& grid) {
     const double arc_mm =
         slices > 0 ? static_cast<double>(on_circle) * band / 1.5 / static_cast<double>(slices) : 0;
     return beyond == 0 && slices >= 3 && arc_mm > 40 ? radius : 0;
+}
+
+// The body's voxels as they are found, step by step.
+struct BodyMasks {
+    Mask labelled;  // at least half of the voxel carries a label
+    Mask filled;    // with closed slices
+    Mask loose;     // eroded parts that do not belong to the trunk: arms have one, sheets do not
+    Mask trunk;     // what is kept
+};
+
+// In each slice, the eroded parts that are not much smaller than the largest; the others are loose.
+void split_slices(
+    BodyMasks& masks, Mask& core, Int3 size, const Disc& small_disc, double least_part) {
+    const std::size_t slice_count =
+        static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
+    parallel_for(static_cast<std::size_t>(size.z), 4, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            const Slice slice{size.x, size.y, masks.filled.data() + k * slice_count};
+            fill_holes(slice);
+            const Mask small = eroded(slice, small_disc);
+            const Parts parts = parts_of(small.data(), {size.x, size.y, 1});
+            const std::int32_t largest = parts.largest();
+            if (largest == 0) continue;
+            const double least =
+                least_part * static_cast<double>(parts.size[static_cast<std::size_t>(largest)]);
+            for (std::size_t n = 0; n < slice_count; ++n) {
+                const std::int32_t part = parts.number[n];
+                if (part == 0) continue;
+                const bool keep =
+                    static_cast<double>(parts.size[static_cast<std::size_t>(part)]) >= least;
+                core[k * slice_count + n] = keep;
+                masks.loose[k * slice_count + n] = !keep;
+            }
+        }
+    });
+}
+
+// Closed slices; then the trunk: of the parts that survive an erosion in each slice, the largest
+// connected one in space, with its edge restored.
+void find_trunk(BodyMasks& masks,
+                Int3 size,
+                Vector3 spacing_mm,
+                const SkinSurfaceOptions& options) {
+    const double rx = 0.5 * options.bridge_mm / spacing_mm.x;
+    const double ry = 0.5 * options.bridge_mm / spacing_mm.y;
+    masks.filled = masks.labelled;
+    masks.loose.assign(masks.labelled.size(), 0);
+    Mask core(masks.labelled.size(), 0);
+    split_slices(masks, core, size, disc(rx, ry), options.least_part);
+    masks.trunk = masks.filled;
+    const Parts parts = parts_of(core.data(), size);
+    const std::int32_t largest = parts.largest();
+    if (largest == 0) return;  // a body that is thinner than the bridges everywhere is kept whole
+    for (std::size_t n = 0; n < core.size(); ++n) {
+        if (core[n] && parts.number[n] != largest) masks.loose[n] = 1;
+        core[n] = parts.number[n] == largest;
+    }
+    masks.trunk = core;
+    restore_edge(masks.trunk, masks.filled, size, disc(rx + 1.5, ry + 1.5));
+}
+
+// Counts what was left out, part by part: an arm has a loose core, a sheet or a fragment has none.
+void count_left_out(const BodyMasks& masks, Int3 size, BodyField& body) {
+    const Mask &mask = masks.labelled, &filled = masks.filled, &kept = masks.trunk;
+    const std::size_t slice_count =
+        static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
+    Mask left_out(mask.size());
+    for (std::size_t n = 0; n < mask.size(); ++n) left_out[n] = filled[n] && !kept[n];
+    const Parts others = parts_of(left_out.data(), size);
+    std::vector<std::uint8_t> is_arm(others.size.size(), 0);
+    for (std::size_t n = 0; n < mask.size(); ++n) {
+        if (masks.loose[n]) is_arm[static_cast<std::size_t>(others.number[n])] = 1;
+    }
+    long filled_voxels = 0, kept_voxels = 0;
+    const auto touches_air = [&](std::size_t n, int i, int j, int k) {
+        const std::size_t slice = slice_count, row = static_cast<std::size_t>(size.x);
+        return (i > 0 && !filled[n - 1]) || (i + 1 < size.x && !filled[n + 1]) ||
+               (j > 0 && !filled[n - row]) || (j + 1 < size.y && !filled[n + row]) ||
+               (k > 0 && !filled[n - slice]) || (k + 1 < size.z && !filled[n + slice]);
+    };
+    std::size_t n = 0;
+    for (int k = 0; k < size.z; ++k) {
+        for (int j = 0; j < size.y; ++j) {
+            for (int i = 0; i < size.x; ++i, ++n) {
+                kept_voxels += kept[n];
+                filled_voxels += kept[n] && !mask[n];
+                if (filled[n] && !kept[n] && touches_air(n, i, j, k)) {
+                    const auto part = static_cast<std::size_t>(others.number[n]);
+                    ++(is_arm[part] ? body.arm_voxels : body.table_voxels);
+                }
+            }
+        }
+    }
+    body.body_ml = static_cast<double>(kept_voxels) * body.grid.voxel_volume_mm3() / 1000;
+    body.hollow =
+        static_cast<double>(filled_voxels) / static_cast<double>(std::max(1L, kept_voxels));
+}
+
+// Planes that cut the body inside a padded grid, first and last per axis, to which the field is
+// cropped so that the surface stays open there. Counts the voxels at the cuts.
+void find_cut_planes(const Mask& kept, BodyField& body, Int3* first_plane, Int3* last_plane) {
+    const Int3 size = body.grid.size;
+    Int3 first{0, 0, 0}, last{size.x - 1, size.y - 1, size.z - 1};
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::vector<long> counts = plane_counts(kept, size, axis);
+        const double area = body.grid.voxel_volume_mm3() / body.grid.spacing_mm[axis];
+        int low = 0, high = size[axis] - 1;
+        while (low < high && counts[static_cast<std::size_t>(low)] == 0) ++low;
+        while (high > low && counts[static_cast<std::size_t>(high)] == 0) --high;
+        if (low > 0 && is_cut(counts, low, 1, axis, area)) first[axis] = low;
+        if (high < size[axis] - 1 && is_cut(counts, high, -1, axis, area)) last[axis] = high;
+        if (first[axis] == low) body.cut_voxels += counts[static_cast<std::size_t>(low)];
+        if (last[axis] == high) body.cut_voxels += counts[static_cast<std::size_t>(high)];
+    }
+    *first_plane = first;
+    *last_plane = last;
 }
 
 }  // namespace
@@ -332,7 +285,9 @@ Result<BodyField> make_body_field(const LabelVolume& labels, const SkinSurfaceOp
         source.point_from_voxel({0.5 * (factor.x - 1), 0.5 * (factor.y - 1), 0.5 * (factor.z - 1)});
     std::vector<float> share = averaged(labels, factor, size);
 
-    Mask mask(share.size());
+    BodyMasks masks;
+    Mask& mask = masks.labelled;
+    mask.resize(share.size());
     long labelled = 0;
     for (std::size_t n = 0; n < share.size(); ++n) labelled += mask[n] = share[n] >= 0.5f;
     if (labelled == 0) {
@@ -344,105 +299,26 @@ Result<BodyField> make_body_field(const LabelVolume& labels, const SkinSurfaceOp
                      "label 0 must be the outside of the body"};
     }
 
-    // Closed slices; then the trunk: in each slice the parts that survive an erosion and are not
-    // much smaller than the largest, and of these the largest part in space.
-    const std::size_t slice_count =
-        static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
-    const double rx = 0.5 * options.bridge_mm / body.grid.spacing_mm.x;
-    const double ry = 0.5 * options.bridge_mm / body.grid.spacing_mm.y;
-    const auto small_disc = disc(rx, ry), large_disc = disc(rx + 1.5, ry + 1.5);
-    Mask filled = mask, core(mask.size(), 0), loose(mask.size(), 0);
-    parallel_for(static_cast<std::size_t>(size.z), 4, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) {
-            const Slice slice{size.x, size.y, filled.data() + k * slice_count};
-            fill_holes(slice);
-            const Mask small = eroded(slice, small_disc);
-            const Parts parts = parts_of(small.data(), {size.x, size.y, 1});
-            const std::int32_t largest = parts.largest();
-            if (largest == 0) continue;
-            const double least = options.least_part *
-                                 static_cast<double>(parts.size[static_cast<std::size_t>(largest)]);
-            for (std::size_t n = 0; n < slice_count; ++n) {
-                const std::int32_t part = parts.number[n];
-                if (part == 0) continue;
-                const bool keep =
-                    static_cast<double>(parts.size[static_cast<std::size_t>(part)]) >= least;
-                core[k * slice_count + n] = keep;
-                loose[k * slice_count + n] = !keep;
-            }
-        }
-    });
-    const Parts trunk = parts_of(core.data(), size);
-    const std::int32_t largest = trunk.largest();
-    Mask kept = filled;
-    if (largest != 0) {  // a body thinner than the bridges everywhere is kept as it is
-        for (std::size_t n = 0; n < core.size(); ++n) {
-            if (core[n] && trunk.number[n] != largest) loose[n] = 1;
-            core[n] = trunk.number[n] == largest;
-        }
-        kept = core;
-        give_edge_back(kept, filled, size, large_disc);
-    }
-    // What was left out, part by part: an arm has a core of its own, a sheet or a crumb has none.
-    Mask left_out(mask.size());
-    for (std::size_t n = 0; n < mask.size(); ++n) left_out[n] = filled[n] && !kept[n];
-    const Parts others = parts_of(left_out.data(), size);
-    std::vector<std::uint8_t> is_arm(others.size.size(), 0);
-    for (std::size_t n = 0; n < mask.size(); ++n) {
-        if (loose[n]) is_arm[static_cast<std::size_t>(others.number[n])] = 1;
-    }
-    long filled_voxels = 0, kept_voxels = 0;
-    const auto touches_air = [&](std::size_t n, int i, int j, int k) {
-        const std::size_t slice = slice_count, row = static_cast<std::size_t>(size.x);
-        return (i > 0 && !filled[n - 1]) || (i + 1 < size.x && !filled[n + 1]) ||
-               (j > 0 && !filled[n - row]) || (j + 1 < size.y && !filled[n + row]) ||
-               (k > 0 && !filled[n - slice]) || (k + 1 < size.z && !filled[n + slice]);
-    };
-    std::size_t n = 0;
-    for (int k = 0; k < size.z; ++k) {
-        for (int j = 0; j < size.y; ++j) {
-            for (int i = 0; i < size.x; ++i, ++n) {
-                kept_voxels += kept[n];
-                filled_voxels += kept[n] && !mask[n];
-                if (filled[n] && !kept[n] && touches_air(n, i, j, k)) {
-                    const auto part = static_cast<std::size_t>(others.number[n]);
-                    ++(is_arm[part] ? body.arm_voxels : body.table_voxels);
-                }
-            }
-        }
-    }
-    body.body_ml = static_cast<double>(kept_voxels) * body.grid.voxel_volume_mm3() / 1000;
-    body.hollow =
-        static_cast<double>(filled_voxels) / static_cast<double>(std::max(1L, kept_voxels));
-
+    find_trunk(masks, size, body.grid.spacing_mm, options);
+    count_left_out(masks, size, body);
     // The field: shares of voxels at the edge of the trunk, one inside it, zero outside.
+    const Mask& kept = masks.trunk;
     for (std::size_t m = 0; m < share.size(); ++m) {
         if (kept[m]) {
-            if (filled[m] && !mask[m]) share[m] = 1;
+            if (masks.filled[m] && !mask[m]) share[m] = 1;
         } else if (share[m] >= 0.5f) {
             share[m] = 0;
         }
     }
 
-    // Planes that cut the body inside a padded grid: crop to them, so that the surface stays open.
-    Int3 first{0, 0, 0}, last{size.x - 1, size.y - 1, size.z - 1};
-    for (int axis = 0; axis < 3; ++axis) {
-        const std::vector<long> counts = plane_counts(kept, size, axis);
-        const double area = body.grid.voxel_volume_mm3() / body.grid.spacing_mm[axis];
-        int low = 0, high = size[axis] - 1;
-        while (low < high && counts[static_cast<std::size_t>(low)] == 0) ++low;
-        while (high > low && counts[static_cast<std::size_t>(high)] == 0) --high;
-        if (low > 0 && is_cut(counts, low, 1, axis, area)) first[axis] = low;
-        if (high < size[axis] - 1 && is_cut(counts, high, -1, axis, area)) last[axis] = high;
-        if (first[axis] == low) body.cut_voxels += counts[static_cast<std::size_t>(low)];
-        if (last[axis] == high) body.cut_voxels += counts[static_cast<std::size_t>(high)];
-    }
+    Int3 first, last;
+    find_cut_planes(kept, body, &first, &last);
     body.round_view_mm = round_view_radius(kept, body.grid);
     if (body.round_view_mm > 0) {
         body.round_view_centre =
             body.grid.point_from_voxel({0.5 * (size.x - 1), 0.5 * (size.y - 1), 0});
     }
-    crop(body.grid, share, kept, first, last);
+    crop(body.grid, share, masks.trunk, first, last);
 
     Vector3 sigma;
     for (int a = 0; a < 3; ++a) sigma[a] = options.smoothing_mm / body.grid.spacing_mm[a];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The body as a smooth field on a coarse grid, cleaned of what is not trunk. Internal to the skin
-// surface: this half holds no third-party library.
+// The body as a smooth field on a coarse grid, without what is not trunk. Internal to the skin
+// surface: this half uses no third-party library.
 #pragma once
 
 #include <vector>
@@ -18,14 +18,15 @@ struct BodyField {
     double round_view_mm = 0;   // radius of a round field of view that cuts the body; 0: none
     Point3 round_view_centre;   // its axis runs along the grid's k axis through this point
 
-    // Voxels of the working grid's body that touch the named thing.
-    long cut_voxels = 0;    // a face of the field of view
-    long table_voxels = 0;  // sheets and loose parts
-    long arm_voxels = 0;    // parts beside the trunk
+    // Voxels of the working grid at the surface of what was left out, and at cuts.
+    long cut_voxels = 0;    // of the body at a face of the field of view
+    long table_voxels = 0;  // of sheets and fragments
+    long arm_voxels = 0;    // of parts beside the trunk
     double body_ml = 0;
-    double hollow = 0;  // share of the body that was no label and had to be filled
+    double hollow = 0;  // share of the body that carried no label and was filled
 };
 
+// Errors: a map too small, without a body, or that is body everywhere.
 Result<BodyField> make_body_field(const LabelVolume& labels, const SkinSurfaceOptions& options);
 
 }  // namespace sonocase::pipeline

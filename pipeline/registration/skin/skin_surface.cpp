@@ -56,7 +56,7 @@ Contour contour(const BodyField& body) {
     return out;
 }
 
-// Downhill direction of the field at a point given in voxels, in the grid's frame.
+// Unit direction of steepest descent of the field at a point given in voxels, in the grid's frame.
 Vector3 outward(const BodyField& body, Point3 voxel) {
     const Int3 size = body.grid.size;
     int first[3];
@@ -65,7 +65,7 @@ Vector3 outward(const BodyField& body, Point3 voxel) {
         first[a] = std::clamp(static_cast<int>(voxel[a]), 0, size[a] - 2);
         t[a] = voxel[a] - first[a];
     }
-    // Central differences at the eight corners, mixed linearly.
+    // Central differences at the eight corners, interpolated linearly.
     Vector3 gradient;
     for (int corner = 0; corner < 8; ++corner) {
         int at[3];
@@ -114,8 +114,8 @@ void keep_only(const std::vector<std::uint8_t>& keep, Surface* surface) {
     surface->triangles = std::move(triangles);
 }
 
-// Points that belong to the largest connected part of the mesh: inner walls of cavities that slices
-// could not close are not skin.
+// Points of the largest connected parts of the mesh: the inner walls of cavities that stayed open in
+// the slices are not skin.
 std::vector<std::uint8_t> largest_part(const Surface& surface) {
     std::vector<std::uint32_t> parent(surface.points.size());
     for (std::size_t i = 0; i < parent.size(); ++i) parent[i] = static_cast<std::uint32_t>(i);
@@ -133,7 +133,7 @@ std::vector<std::uint8_t> largest_part(const Surface& surface) {
     for (std::size_t i = 0; i < parent.size(); ++i) ++size[root(static_cast<std::uint32_t>(i))];
     const std::uint32_t most = size.empty() ? 0 : *std::max_element(size.begin(), size.end());
     std::vector<std::uint8_t> keep(parent.size(), 0);
-    // A cut can part the skin into pieces of like importance: keep every piece above a tenth.
+    // A cut can divide the skin into several large pieces: keep every piece above a tenth.
     for (std::size_t i = 0; i < parent.size(); ++i) {
         keep[i] = size[root(static_cast<std::uint32_t>(i))] * 10 >= most;
     }

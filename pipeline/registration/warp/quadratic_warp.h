@@ -7,9 +7,10 @@
 //   (7)-(8)  matches: D(v, m) = |v - m| / |v - C(v)| < T_d
 //   (9)  consensus: share of mapped skin points within T_c of a mannequin point
 //
-// Departures. Coordinates are centred and scaled (w = R x / scale, x about the skin's origin): the
-// condition falls from 1e8 to 1e2. The constraint's weight is an option in mm; the paper's rows,
-// taken in raw mm, have weight 1 and fold space. Solved by QR for all three dimensions.
+// Departures. Coordinates are centred and scaled (w = R x / scale, x about the skin's origin), which
+// lowers the condition number from 1e8 to 1e2. The constraint's weight is an option in mm; the
+// paper's rows, in plain mm, have weight 1, and their maps fold. All three dimensions are solved by
+// one QR factorisation.
 #pragma once
 
 #include <array>
@@ -23,7 +24,7 @@
 
 namespace sonocase::pipeline {
 
-// Quadratic about a rigid alignment, between the frames less their origins.
+// A quadratic map about a rigid alignment, between the frames relative to their origins.
 struct RigidQuadratic {
     Rigid rigid;
     double scale_mm = 200;
@@ -46,7 +47,7 @@ RigidQuadratic fit_correspondences(std::span<const Correspondence> pairs,
 
 struct RansacOptions {
     double match_ratio = 1.3;  // T_d
-    int correspondences = 25;  // a trial, the paper's 20-30
+    int correspondences = 25;  // per trial; the paper has 20-30
     int trials = 100;
     double consensus_share =
         0.05;                   // T_c over the mean distance of mannequin points from their mean
@@ -59,12 +60,12 @@ struct RansacResult {
     RigidQuadratic map;
     double rigid_consensus = 0, best_trial_consensus = 0, consensus = 0;
     double consensus_mm = 0;  // T_c
-    int folding_trials = 0;   // refused: det J <= 0.2 somewhere in the box
+    int folding_trials = 0;   // rejected: det J <= 0.2 somewhere in the box
     int best_trial = -1;      // -1: no trial beat the rigid map
     bool re_estimated = false;
 };
 
-// box  ct, less the skin's origin; every candidate must prove det J > 0.2 over it.
+// box  ct, relative to the skin's origin; det J > 0.2 over it is proven for every candidate.
 RansacResult ransac_quadratic(const SkinModel& skin,
                               const TargetSurface& target,
                               const Rigid& rigid,
@@ -75,7 +76,7 @@ RansacResult ransac_quadratic(const SkinModel& skin,
 // Every n-th point, about `count` of them.
 std::vector<Point3> subsample(const std::vector<Point3>& points, std::size_t count);
 
-// Skin through a map, ready for matching.
+// The mapped skin, ready for matching.
 struct MappedSkin {
     std::vector<Point3> points;
     std::vector<Vector3> normals;
@@ -85,12 +86,12 @@ MappedSkin map_skin(const SkinModel& skin, const RigidQuadratic& q);
 
 struct RefineOptions {
     double constraint_mm = 10;
-    double first_loss_mm = 8, last_loss_mm = 2.5;  // Cauchy scale, falling
-    double first_gate_mm = 60, last_gate_mm = 30;  // farther has no counterpart
+    double first_loss_mm = 8, last_loss_mm = 2.5;  // Cauchy scale, from first to last iteration
+    double first_gate_mm = 60, last_gate_mm = 30;  // a point farther away has no counterpart
     int iterations = 6;
     int skin_queries = 2500;
-    std::vector<Correspondence> landmarks;  // each as a soft row beside the gaps
-    double landmark_weight = 0.02;  // times its squared distance, beside the mean squared gap
+    std::vector<Correspondence> landmarks;  // each is a soft row in addition to the gaps
+    double landmark_weight = 0.02;          // of its squared distance against the mean squared gap
 };
 
 struct RefineResult {
@@ -99,28 +100,28 @@ struct RefineResult {
     double constraint_cost = 0;  // constraint_mm^2 mean |dq/dz - I|^2, mm^2
 };
 
-// Point-to-surface: minimises robust gaps in both directions plus the constraint.
+// Point to surface: minimises robust gaps in both directions plus the constraint.
 RefineResult refine_quadratic(const SkinModel& skin,
                               const TargetSurface& target,
                               std::span<const std::uint32_t> readings,
                               const RigidQuadratic& start,
                               const RefineOptions& options);
 
-// What the data say about a fitted quadratic.
+// How far the data support a fitted quadratic.
 struct QuadraticTrust {
     double sigma_mm = 0;           // robust spread of the gaps
-    double standard_error_mm = 0;  // of a mean gap: gaps of one 60 mm patch count as one
+    double standard_error_mm = 0;  // of a mean gap; gaps of one 60 mm patch count as one
     int patches = 0;
     double fitted_mm = 0;    // root of the mean squared gap, gaps beyond 8 mm counted as 8
-    double held_out_mm = 0;  // the same where each gap's patch took no part in the fit
+    double held_out_mm = 0;  // the same, but fitted without the patch of each gap
     double inside_mm = 0;    // expected error inside the body, root mean square
 };
 
-// strain  what is expected of the map's slopes beforehand (standard deviation); with it and the
+// strain  the standard deviation of the map's slopes that is expected beforehand; with it and the
 //         standard error e the best constraint weight is sqrt(2) e / strain, and the spread of the
-//         answer is known. A surface says little of what happens along it: that spread is the
-//         honest figure of a fit, the gaps are not.
-// inside  skin frame, less its origin. Cost: about two iterations of refine_quadratic.
+//         answer follows. A surface shows little of displacements along it: the honest figure of a
+//         fit is that spread, not the gaps.
+// inside  skin frame, relative to its origin. Cost: about two iterations of refine_quadratic.
 QuadraticTrust trust_quadratic(const SkinModel& skin,
                                const TargetSurface& target,
                                std::span<const std::uint32_t> readings,
@@ -129,7 +130,7 @@ QuadraticTrust trust_quadratic(const SkinModel& skin,
                                double strain,
                                std::span<const Point3> inside);
 
-// Least det J over a box of skin coordinates, proven.
+// A proven lower bound of det J over a box of skin coordinates.
 double proven_min_det(const RigidQuadratic& q, const Box3& box);
 
 }  // namespace sonocase::pipeline

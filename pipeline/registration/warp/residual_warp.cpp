@@ -60,16 +60,15 @@ void add_depth_penalty(const SkinModel& skin,
     }
 }
 
-// Robust point-to-plane rows on the displacement: weight (normal . d(x) - wish)^2.
+// Robust point-to-plane rows on the displacement: weight (normal . d(x) - wanted)^2.
 struct DataRow {
     SplineFootprint at;
     Vector3 normal;
-    double wish, weight;
+    double wanted, weight;
 };
 
 // Jacobi-preconditioned conjugate gradients on (M + rows) d = rhs, from the d given. Single
-// precision is ample for a tolerance of a thousandth; sums over all control points are taken in
-// double.
+// precision is ample for a tolerance of a thousandth; sums over all control points are in double.
 int solve(const SplinePenalty& penalty,
           const DisplacementGrid& grid,
           const std::vector<DataRow>& rows,
@@ -95,11 +94,11 @@ int solve(const SplinePenalty& penalty,
         const Lanes n = {static_cast<float>(root * row.normal.x),
                          static_cast<float>(root * row.normal.y),
                          static_cast<float>(root * row.normal.z), 0};
-        const auto wish = static_cast<float>(root * row.wish);
+        const auto wanted = static_cast<float>(root * row.wanted);
         scaled.push_back({&row.at, n});
         for (std::size_t w = 0; w < 64; ++w) {
             const float f = row.at.weight[w];
-            right[row.at.first + offset[w]] += wish * f * n;
+            right[row.at.first + offset[w]] += wanted * f * n;
             diagonal[row.at.first + offset[w]] += f * f * n * n;
         }
     }
@@ -237,10 +236,10 @@ FieldFit fit_field(const SkinModel& skin,
             for (const Match& m : list) {
                 const Point3 x = skin.origin + (skin.points[m.skin] - Point3{});
                 // The gap that the displacement as a whole must close.
-                const double wish = dot(m.normal, displacement(r.residual, x)) - m.gap_mm;
+                const double wanted = dot(m.normal, displacement(r.residual, x)) - m.gap_mm;
                 const double w = 0.5 / static_cast<double>(list.size()) /
                                  (1 + m.gap_mm * m.gap_mm / (loss * loss));
-                rows.push_back({spline_footprint(shape, x), m.normal, wish, w});
+                rows.push_back({spline_footprint(shape, x), m.normal, wanted, w});
             }
         };
         add(matches.from_target);
@@ -286,7 +285,7 @@ ResidualReport fit_residual(const SkinModel& skin,
             moved += norm(displacement(trial.residual, skin.origin + (p - Point3{})));
         report.inside_mm = inside.empty() ? 0 : moved / static_cast<double>(inside.size());
         if (report.inside_mm > options.inside_mm) {
-            // The deep field falls about as the root of its penalty.
+            // The displacement at depth falls about with the square root of its penalty.
             const double over = report.inside_mm / options.inside_mm;
             tried.depth_penalty *= std::clamp(1.3 * over * over, 1.5, 8.0);
             report.reason = "it moves the inside of the body by more than the surface supports";

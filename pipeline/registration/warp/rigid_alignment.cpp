@@ -12,18 +12,18 @@ namespace sonocase::pipeline {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-// What a point without a counterpart costs: as much as this gap. It is about the gap between two
-// bodies after a rigid alignment, so that overlap as such neither pays nor is punished.
+// A point without a counterpart costs as much as this gap, which is about the gap between two bodies
+// after a rigid alignment: overlap as such is neither rewarded nor penalised.
 constexpr double kNoCounterpart_mm = 12;
 constexpr double kScoreScale_mm = 10;
 
-// Of both surfaces: who asks. The skin that is asked may hold more points than ask.
+// The points of both surfaces that are matched; the skin that is searched may hold more points.
 struct Pair {
     const SkinModel& skin;
     PointIndex skin_index;
     std::vector<std::uint32_t> skin_queries;
     const TargetSurface& target;
-    std::vector<std::uint32_t> target_askers;
+    std::vector<std::uint32_t> target_queries;
 };
 
 std::vector<std::uint32_t> every_nth(const std::vector<std::uint32_t>& all, int count) {
@@ -43,8 +43,8 @@ Pair make_pair_of(const SkinModel& skin, const TargetSurface& target, int points
         if (!skin.on_rim[i]) all.push_back(static_cast<std::uint32_t>(i));
     }
     pair.skin_queries = every_nth(all, points);
-    // Twice the spacing that would give the count: the cloud is thinned evenly, then cut to number.
-    pair.target_askers = every_nth(thin_target(target, 1.5 * target.spacing_mm), points);
+    // Thinned evenly at 1.5 times the spacing first, then subsampled.
+    pair.target_queries = every_nth(thin_target(target, 1.5 * target.spacing_mm), points);
     return pair;
 }
 
@@ -53,7 +53,7 @@ double penalty(double gap, double scale) {
     return scale * scale * std::log1p(gap * gap / (scale * scale));
 }
 
-// Calls row(from_target, p, n, gap) for every point that has a counterpart, p on the moved skin,
+// Calls row(from_target, p, n, gap) for every point with a counterpart, p on the moved skin,
 // and missing(from_target) for the others.
 template <class RowOf, class Missing>
 void for_rows(const Pair& pair,
@@ -64,7 +64,7 @@ void for_rows(const Pair& pair,
     const TargetSurface& target = pair.target;
     const Rigid back = inverse(pose);
     const double farthest2 = farthest_mm * farthest_mm;
-    for (std::uint32_t j : pair.target_askers) {
+    for (std::uint32_t j : pair.target_queries) {
         double d2 = 0;
         const Point3 y = target.points[j];
         const std::uint32_t i = pair.skin_index.nearest(back * y, &d2);
@@ -84,7 +84,7 @@ void for_rows(const Pair& pair,
         const Vector3 n = target.normals[j];
         const double gap = dot(n, p - target.points[j]);
         const double aside2 = d2 - gap * gap;
-        // Far from the surface the nearest reading is seldom straight below.
+        // Far from the surface the nearest reading is seldom along the normal.
         const double limit = side + 0.7 * std::abs(gap);
         if (target.lifted[j] || d2 > farthest2 || dot(n, pose * pair.skin.normals[i]) < 0.3 ||
             aside2 > (target.on_rim[j] ? 0.15 : 1.0) * limit * limit) {
@@ -103,11 +103,11 @@ Rigid step(const Pair& pair,
            double farthest_mm) {
     Eigen::Matrix<double, 6, 6> a = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
-    // About the moved origin of the skin and in units of 100 mm, so that turns and shifts weigh
-    // alike.
+    // About the moved origin of the skin and in units of 100 mm, so that rotations and translations
+    // have similar weight.
     const Point3 centre = pose * Point3{};
     constexpr double kUnit = 100;
-    const double target_share = 1 / static_cast<double>(pair.target_askers.size());
+    const double target_share = 1 / static_cast<double>(pair.target_queries.size());
     const double skin_share = 1 / static_cast<double>(pair.skin_queries.size());
     for_rows(
         pair, pose, farthest_mm,
@@ -120,7 +120,7 @@ Rigid step(const Pair& pair,
             b -= w * gap * r;
         },
         [](bool) {});
-    // Hints count against the sum of two means, hence twice.
+    // The gaps are a sum of two means, so that hints count twice.
     for (const PoseHints::Place& place : hints.landmarks) {
         const Point3 p = pose * place.skin;
         const Vector3 r = p - place.target, arm = (p - centre) / kUnit;
@@ -145,7 +145,7 @@ Rigid step(const Pair& pair,
             b -= 2 * hints.up_weight_mm2 * r[axis] * row;
         }
     }
-    // A faint pull to rest keeps still what the rows do not see.
+    // A small penalty on every unknown keeps those at rest that the rows do not determine.
     a.diagonal().array() += 1e-4 * a.trace() / 6 + 1e-12;
     const Eigen::Matrix<double, 6, 1> x = a.ldlt().solve(b);
     const Vector3 turn{x[0] / kUnit, x[1] / kUnit, x[2] / kUnit};
@@ -168,10 +168,10 @@ RigidCandidate scored(const Pair& pair, const PoseHints& hints, const Rigid& pos
         [&](bool from_target) { cost[from_target] += penalty(kNoCounterpart_mm, kScoreScale_mm); });
     RigidCandidate c;
     c.target_from_skin = pose;
-    c.score_mm = std::sqrt(0.5 * cost[1] / static_cast<double>(pair.target_askers.size()) +
+    c.score_mm = std::sqrt(0.5 * cost[1] / static_cast<double>(pair.target_queries.size()) +
                            0.5 * cost[0] / static_cast<double>(pair.skin_queries.size()) +
                            hints.cost_mm2(pose));
-    c.coverage = counterparts / static_cast<double>(pair.target_askers.size());
+    c.coverage = counterparts / static_cast<double>(pair.target_queries.size());
     return c;
 }
 
@@ -205,7 +205,7 @@ std::vector<Matrix3> spread_rotations(const RigidOptions& options) {
     const int count = std::max(1, options.starts);
     std::vector<Matrix3> rotations;
     if (options.hints.up) {
-        // Heads on rings of a cap, each with turns about it.
+        // Head directions on rings of a cap, each with rotations about it.
         const Vector3 up = normalized(*options.hints.up);
         const Vector3 u = any_perpendicular(up), v = cross(up, u);
         const double phase = 2 * kPi * uniform();
@@ -239,12 +239,12 @@ std::vector<Matrix3> spread_rotations(const RigidOptions& options) {
     return rotations;
 }
 
-// The shift that lays readings on those parts of the turned skin that face their way: right for a
-// sweep of one side as well as for a whole one.
+// The shift that moves the turned skin to the readings, using only parts that face the same way:
+// correct for a sweep of one side as well as of the whole body.
 Vector3 facing_shift(const Pair& pair, const Matrix3& rotation) {
     Vector3 sum;
     int count = 0;
-    for (std::uint32_t j : pair.target_askers) {
+    for (std::uint32_t j : pair.target_queries) {
         Vector3 mean;
         int facing = 0;
         for (std::uint32_t i : pair.skin_queries) {

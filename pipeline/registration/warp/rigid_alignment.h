@@ -4,11 +4,11 @@
 // starts.
 //
 // Source: the paper's second stage ("multiple (randomly selected) starting offsets and rotations").
-// Departures: starts are spread evenly over all rotations and the seed turns the whole set; gaps
-// are point-to-plane in both directions under a robust weight, which needs a sixth of the
-// iterations and lands closer; the score counts what has no counterpart, so that an open, longer or
-// partly swept mannequin is not won by sliding off it. Several distinct candidates come back: a
-// torso is nearly a cylinder, and which end is up is decided later, or by a hint.
+// Departures: starts are spread evenly over all rotations and the seed rotates the whole set; gaps
+// are point-to-plane in both directions with a robust weight, which needs a sixth of the iterations
+// and ends closer; points without a counterpart count in the score, so that sliding off an open,
+// longer or partly swept mannequin does not pay. Several distinct candidates are returned: a torso is
+// nearly a cylinder, and which end is up is decided later, or by a hint.
 #pragma once
 
 #include <cstdint>
@@ -21,16 +21,17 @@
 
 namespace sonocase::pipeline {
 
-// What the user knows besides the surfaces, in the frames less their origins.
+// What the user knows in addition to the surfaces; frames relative to their origins.
 struct PoseHints {
     std::optional<Vector3> up;  // the patient's head direction (skin z) on the mannequin; unit
     struct Place {
         Point3 skin, target;
     };
     std::vector<Place> landmarks;
-    double up_weight_mm2 =
-        300;  // times |head - up|^2: 15 degrees cost as much as 4.5 mm everywhere
-    double landmark_weight = 0.02;  // each, times its squared distance, beside the mean squared gap
+    // Of |head - up|^2: 15 degrees cost as much as gaps of 4.5 mm everywhere.
+    double up_weight_mm2 = 300;
+    // Of each squared distance, against the mean squared gap.
+    double landmark_weight = 0.02;
 
     double cost_mm2(const Rigid& pose) const;  // distances beyond 60 mm count as 60
 };
@@ -44,14 +45,14 @@ struct RigidOptions {
     int kept = 14;            // refined on fine_points
     int fine_iterations = 25;
     int fine_points = 700;
-    int candidates = 6;  // handed on
+    int candidates = 6;  // returned
     PoseHints hints;
     double cone_rad = 0.7;  // with hints.up: largest tilt of the head from it
     std::uint64_t seed = 1;
 };
 
 struct RigidCandidate {
-    Rigid target_from_skin;  // between the frames less their origins
+    Rigid target_from_skin;  // between the frames relative to their origins
     double score_mm = 0;     // root of the mean penalty over both surfaces
     double coverage = 0;     // share of readings with a counterpart
 };
@@ -76,7 +77,7 @@ Rigid refine_rigid_robust(const SkinModel& skin,
                           double loss_mm,
                           int rounds);
 
-// Angle between two poses, and how far apart they carry the skin's origin.
+// Whether two poses differ by less than angle_rad and, at the skin's origin, shift_mm.
 bool same_pose(const Rigid& a, const Rigid& b, double angle_rad, double shift_mm);
 
 }  // namespace sonocase::pipeline

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The rigid refinement by Ceres; the one file that sees it.
+// The rigid refinement by Ceres: the only file of this room that includes it.
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
@@ -12,15 +12,20 @@
 namespace sonocase::pipeline {
 namespace {
 
-// weight (normal . (turn * p + shift - place)); p is the skin point turned by the start.
+template <class T>
+void rotate(const T* turn, Vector3 v, T* to) {
+    const T from[3] = {T(v.x), T(v.y), T(v.z)};
+    ceres::AngleAxisRotatePoint(turn, from, to);
+}
+
+// weight (normal . (turn * p + shift - place)); p is the skin point rotated by the start.
 struct Gap {
     Vector3 p, place, normal;
     double weight;
     template <class T>
     bool operator()(const T* turn, const T* shift, T* residual) const {
-        const T from[3] = {T(p.x), T(p.y), T(p.z)};
         T to[3];
-        ceres::AngleAxisRotatePoint(turn, from, to);
+        rotate(turn, p, to);
         residual[0] = weight * (normal.x * (to[0] + shift[0] - place.x) +
                                 normal.y * (to[1] + shift[1] - place.y) +
                                 normal.z * (to[2] + shift[2] - place.z));
@@ -33,9 +38,8 @@ struct Place {
     double weight;
     template <class T>
     bool operator()(const T* turn, const T* shift, T* residual) const {
-        const T from[3] = {T(p.x), T(p.y), T(p.z)};
         T to[3];
-        ceres::AngleAxisRotatePoint(turn, from, to);
+        rotate(turn, p, to);
         residual[0] = weight * (to[0] + shift[0] - place.x);
         residual[1] = weight * (to[1] + shift[1] - place.y);
         residual[2] = weight * (to[2] + shift[2] - place.z);
@@ -48,9 +52,8 @@ struct Head {
     double weight;
     template <class T>
     bool operator()(const T* turn, T* residual) const {
-        const T from[3] = {T(head.x), T(head.y), T(head.z)};
         T to[3];
-        ceres::AngleAxisRotatePoint(turn, from, to);
+        rotate(turn, head, to);
         residual[0] = weight * (to[0] - up.x);
         residual[1] = weight * (to[1] - up.y);
         residual[2] = weight * (to[2] - up.z);
@@ -86,7 +89,7 @@ Rigid refine_rigid_robust(const SkinModel& skin,
         double shift[3] = {pose.translation.x, pose.translation.y, pose.translation.z};
         ceres::Problem problem;
         const auto add = [&](const std::vector<Match>& list) {
-            // Scaled after the loss, so that both directions weigh as one.
+            // Scaled after the loss, so that both directions have the same total weight.
             const double share = 1 / static_cast<double>(std::max<std::size_t>(1, list.size()));
             for (const Match& m : list) {
                 const Vector3 p = pose.rotation * (skin.points[m.skin] - Point3{});
@@ -115,7 +118,7 @@ Rigid refine_rigid_robust(const SkinModel& skin,
         ceres::Solver::Options options;
         options.linear_solver_type = ceres::DENSE_QR;
         options.max_num_iterations = 8;
-        options.num_threads = 1;  // the order of sums is part of the answer
+        options.num_threads = 1;  // the order of summation affects the result
         options.logging_type = ceres::SILENT;
         ceres::Solver::Summary summary;
         ceres::Solve(options, &problem, &summary);

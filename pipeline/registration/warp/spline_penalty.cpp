@@ -24,8 +24,8 @@ std::array<double, 4> spline_values(double t, int derivative) {
     }
 }
 
-// Mean over the cells of an axis of B_i^(n) B_(i + offset)^(n), in units of a cell: [i][offset +
-// 3]. Four Gauss points integrate degree 6 exactly.
+// Mean over the cells of an axis of B_i^(n) B_(i + offset)^(n), in units of a cell, at
+// [i][offset + 3]. Four Gauss points integrate degree 6 exactly.
 using Gram = std::vector<std::array<double, 7>>;
 Gram gram(int controls, int derivative) {
     constexpr double kNode[4] = {0.06943184420297371, 0.33000947820757187, 0.66999052179242813,

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The quadratic penalty on a B-spline displacement, as one scalar matrix that acts alike on x, y
-// and z.
+// The quadratic penalty on a B-spline displacement, as one scalar matrix for each of x, y and z.
 #pragma once
 
 #include <span>
@@ -11,7 +10,7 @@
 
 namespace sonocase::pipeline {
 
-// Splines that are not zero at a point: number of the first control point, and 64 weights, x
+// The splines that are not zero at a point: index of the first control point, and 64 weights, x
 // fastest.
 struct SplineFootprint {
     std::size_t first = 0;
@@ -30,13 +29,13 @@ class SplinePenalty {
     void add_point(Point3 p, double weight);
     double diagonal(std::size_t control) const { return row_[control * 343 + 171]; }
 
-    // out = M in, three components with a fourth of padding; # control points.
+    // out = M in, three components and one of padding; # control points.
     typedef float Lanes __attribute__((vector_size(16)));
     void apply(std::span<const Lanes> in, std::span<Lanes> out) const;
 
   private:
     DisplacementGrid grid_;   // without control points
-    std::vector<float> row_;  // 7 x 7 x 7 a control point, x fastest
+    std::vector<float> row_;  // 7 x 7 x 7 per control point, x fastest
 };
 
 }  // namespace sonocase::pipeline

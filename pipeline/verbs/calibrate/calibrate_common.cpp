@@ -23,8 +23,7 @@ void CalibrateOptions::add(CLI::App& app, int fewest) {
         ->expected(std::max(1, fewest), 1000);
     app.add_option("--reference", reference,
                    "Recording of a reference sensor, one for each of --poses or one for all: "
-                   "poses are taken "
-                   "relative to it")
+                   "poses are taken relative to it")
         ->type_name("FILE")
         ->expected(1, 1000);
     app.add_option("--transform", transform,
@@ -77,7 +76,7 @@ Result<std::vector<Pose>> CalibrateOptions::load(const std::string& path) const 
         pose.frame = frame.number;
         pose.timestamp_s = frame.timestamp_s;
         pose.ok = given.ok;
-        // Poor rotations are kept as read: the screen names them.
+        // Poor rotations are kept as read: screen_poses reports them.
         for (int r = 0; r < 3; ++r) {
             for (int c = 0; c < 3; ++c) {
                 pose.tracker_from_tool.rotation(r, c) =
@@ -110,6 +109,16 @@ Result<std::vector<Pose>> CalibrateOptions::recording(std::size_t k) const {
     return relative;
 }
 
+Result<std::vector<Pose>> CalibrateOptions::all_recordings() const {
+    std::vector<Pose> all;
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+        auto part = recording(k);
+        if (!part) return part;
+        all.insert(all.end(), part->begin(), part->end());
+    }
+    return all;
+}
+
 Json json_number(double v) {
     return std::isfinite(v) ? Json(v) : Json(nullptr);
 }
@@ -126,7 +135,6 @@ Json json_matrix(const Matrix3& m) {
     return rows;
 }
 
-// Prints, draws and saves what a sub-verb found; the last word on whether it worked.
 int finish_calibration(const CalibrateOptions& options,
                        const Json& result,
                        const std::string& people,

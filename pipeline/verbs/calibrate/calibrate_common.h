@@ -16,6 +16,8 @@ namespace sonocase::pipeline {
 
 using Json = nlohmann::ordered_json;
 
+inline constexpr double kDegree = 3.14159265358979323846 / 180;
+
 struct CalibrateOptions {
     CommonOptions common;
     std::vector<std::string> poses, reference;
@@ -25,10 +27,11 @@ struct CalibrateOptions {
     void add(CLI::App& app, int fewest);  // fewest recordings that --poses must name
     Result<std::vector<Pose>> load(const std::string& path) const;
     Result<std::vector<Pose>> recording(std::size_t k) const;  // relative to --reference
+    Result<std::vector<Pose>> all_recordings() const;          // one after the other
     std::string today() const;                                 // --date, or now
 };
 
-// Not finite is null.
+// A number that is not finite is written as null.
 Json json_number(double v);
 Json json_triple(Vector3 v);
 Json json_triple(Point3 v);
@@ -37,7 +40,8 @@ Json json_residuals(const std::vector<PoseResidual>& residuals);
 
 std::string text_line(const char* format, ...) __attribute__((format(printf, 1, 2)));
 
-// Prints, draws and saves what a kind found; the last word on whether it worked.
+// Prints and saves the result of a kind; returns the exit status. An empty `problem` means that
+// there is an answer; `people` is the text that is printed without --json.
 int finish_calibration(const CalibrateOptions& options,
                        const Json& result,
                        const std::string& people,

@@ -20,7 +20,7 @@ constexpr SubVerb kSubVerbs[] = {
      calibrate_point},
     {"direction", "the probe's axes, from a sweep along each", calibrate_direction},
     {"needle", "axis and tip of the needle, through a pinhole at several depths", calibrate_needle},
-    {"mannequin", "where the mannequin stands, from landmarks or a sweep of its skin",
+    {"mannequin", "where the mannequin is, from landmarks or a sweep of its skin",
      calibrate_mannequin},
     {"image", "the image in the probe, from touches of both ends of the face", calibrate_image},
     {"lag", "how much later one recording shows a motion than another", calibrate_lag},
@@ -38,7 +38,7 @@ int verb_calibrate(int argc, char** argv) {
     }
     const bool help = name == "--help" || name == "-h" || name == "help";
     if (!help && !name.empty())
-        std::fprintf(stderr, "sonocase calibrate: there is no \"%s\"\n", name.c_str());
+        std::fprintf(stderr, "sonocase calibrate: unknown kind \"%s\"\n", name.c_str());
     std::FILE* out = help ? stdout : stderr;
     std::fputs(
         "Usage: sonocase calibrate KIND --poses FILE.csv ... [-o CAL.json] [--json] [--pictures "

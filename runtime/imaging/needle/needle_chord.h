@@ -4,8 +4,8 @@
 //
 // The needle is a cylinder of radius rho that ends at the tip; the plane is a slab |y| <= t / 2. At
 // (x, 0, z) the share is the length of the segment {(x, y, z), |y| <= t / 2} inside the cylinder,
-// over t: the partial volume of [Magee], "Needle Rendering". With w(y) = (x, y, z) - tip and axis
-// a,
+// over t: the partial volume of [Magee], "Needle Rendering". With w(y) = (x, y, z) - tip and the
+// unit axis a,
 //     |w - (w.a) a|^2 <= rho^2   is a quadratic in y,   -length <= w.a <= 0   an interval.
 // All in the probe frame, mm. Constant time.
 #pragma once

@@ -13,7 +13,7 @@
 
 namespace sonocase::runtime {
 
-inline constexpr int kBeamBlock = 16;  // beams worked on together; a cache line of floats
+inline constexpr int kBeamBlock = 16;  // beams that are processed together; a cache line of floats
 
 // Beams relative to the needle's tip; see needle_share().
 struct NeedleRow {
@@ -46,8 +46,6 @@ class NeedleStrip {
         length_ = std::hypot(dx, dz);
         if (length_ > 1e-9) direction_ = {dx / length_, dz / length_};
     }
-
-    bool near_plane() const { return near_; }
 
     // Samples [k0, k1) of a beam that can show the needle; false if none.
     bool range(const ScanGeometry& g, int line, int& k0, int& k1) const {

@@ -25,24 +25,22 @@ namespace {
 
 constexpr std::uint32_t kLevels = 4096;  // equally likely values
 
-// The upper half of them, for deviation 1; the lower half mirrors it.
-const std::vector<double>& upper_levels() {
-    static const std::vector<double> levels = [] {
-        std::vector<double> out(kLevels / 2);
-        for (std::uint32_t i = 0; i < kLevels / 2; ++i)
-            out[i] = inverse_normal((kLevels / 2 + i + 0.5) / kLevels);
-        return out;
-    }();
-    return levels;
-}
-
 }  // namespace
 
-std::vector<std::int8_t> make_noise_tile(double sigma, std::uint32_t seed, int overhang) {
+std::vector<double> normal_levels() {
+    std::vector<double> upper(kLevels / 2);
+    for (std::uint32_t i = 0; i < kLevels / 2; ++i)
+        upper[i] = inverse_normal((kLevels / 2 + i + 0.5) / kLevels);
+    return upper;
+}
+
+std::vector<std::int8_t> make_noise_tile(std::span<const double> upper,
+                                         double sigma,
+                                         std::uint32_t seed,
+                                         int overhang) {
     // Each of the equally likely values once, in an order drawn by the seed: the tile's own mean
     // and deviation are then exact.
     std::vector<std::int8_t> tile(kNoiseTile + static_cast<std::size_t>(overhang));
-    const std::vector<double>& upper = upper_levels();
     for (std::uint32_t i = 0; i < kLevels / 2; ++i) {
         const double value = std::min(std::round(sigma * upper[i]), 127.0);
         for (std::uint32_t j = 0; j < kNoiseTile; j += kLevels) {

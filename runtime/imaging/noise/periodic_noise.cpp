@@ -11,7 +11,7 @@
 namespace sonocase::runtime {
 namespace {
 
-// Values are summed so many at a time, in vectors: numbers of values are multiples of it.
+// Values are summed this many at a time, in vectors; the number of values is a multiple of it.
 constexpr std::size_t kAtOnce = 16;
 
 void add(const float* from, float* to, std::size_t n) {

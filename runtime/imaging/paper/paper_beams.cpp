@@ -11,6 +11,8 @@
 #include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+//
+#include "runtime/imaging/needle/needle_chord-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
@@ -18,7 +20,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr int kPrefetchStep = 8;  // samples: shorter than a brick
 
-// Material and grey of one block of beams. Returns the union of all stage values.
+// Material and grey of one block of beams; see sample_paper_block().
 template <bool kTexture, bool kInside>
 std::uint32_t sample_block_as(const PaperBlock& b) {
     const hn::CappedTag<std::int32_t, kPaperBlock> d;
@@ -43,7 +45,7 @@ std::uint32_t sample_block_as(const PaperBlock& b) {
         const auto dtx = hn::BitCast(du, load(b.step, 3)), dty = hn::BitCast(du, load(b.step, 4)),
                    dtz = hn::BitCast(du, load(b.step, 5));
         std::uint16_t* out = b.stage + v;
-        HWY_ALIGN std::int32_t ahead[kPaperBlock] = {};  // bricks that a later sample will ask
+        HWY_ALIGN std::int32_t ahead[kPaperBlock] = {};  // bricks that a later sample will read
         for (int k = 0; k < b.samples; ++k, out += kPaperBlock) {
             if (kInside && k % kPrefetchStep == 0) {
                 // Words of the bricks two steps ahead, voxels one step ahead.
@@ -119,7 +121,6 @@ std::uint32_t sample_block(const PaperBlock& b) {
     return b.inside ? sample_block_as<false, true>(b) : sample_block_as<false, false>(b);
 }
 
-// The needle over the stage, rows [row_begin, row_end). Same formula as needle_share().
 void draw_needle(const PaperBlock& b, const NeedleRow& n, int row_begin, int row_end) {
     const hn::CappedTag<float, kPaperBlock> d;
     const hn::RebindToSigned<decltype(d)> di;
@@ -131,46 +132,16 @@ void draw_needle(const PaperBlock& b, const NeedleRow& n, int row_begin, int row
         const auto dx = hn::LoadU(d, n.direction_x + v), dz = hn::LoadU(d, n.direction_z + v);
         for (int k = row_begin; k < row_end; ++k) {
             const auto r = hn::Set(d, (static_cast<float>(k) + 0.5f) * n.step);
-            const auto wx = hn::Add(ox, hn::Mul(r, dx)), wz = hn::Add(oz, hn::Mul(r, dz));
-            const auto wy = hn::Set(d, n.wy);
-            const auto u0 = hn::Add(hn::Add(hn::Mul(wx, hn::Set(d, n.ax)), hn::Set(d, n.wy * n.ay)),
-                                    hn::Mul(wz, hn::Set(d, n.az)));
-            auto low = hn::Set(d, -0.5f * n.slab), high = hn::Set(d, 0.5f * n.slab);
-            const auto bb = hn::Sub(wy, hn::Mul(u0, hn::Set(d, n.ay)));
-            // Perpendicular part first: the difference of two large squares would lose the needle's
-            // radius.
-            const auto px = hn::Sub(wx, hn::Mul(u0, hn::Set(d, n.ax)));
-            const auto pz = hn::Sub(wz, hn::Mul(u0, hn::Set(d, n.az)));
-            const auto c =
-                hn::Sub(hn::Add(hn::Add(hn::Mul(px, px), hn::Mul(bb, bb)), hn::Mul(pz, pz)),
-                        hn::Set(d, n.radius * n.radius));
-            auto hit = hn::Lt(c, hn::Set(d, 1e30f));
-            if (n.a > 1e-6f) {
-                const auto disc = hn::Sub(hn::Mul(bb, bb), hn::Mul(hn::Set(d, n.a), c));
-                hit = hn::Gt(disc, zero);
-                const auto root = hn::Sqrt(hn::Max(disc, zero));
-                const auto a = hn::Set(d, n.a);
-                low = hn::Max(low, hn::Div(hn::Sub(hn::Neg(bb), root), a));
-                high = hn::Min(high, hn::Div(hn::Add(hn::Neg(bb), root), a));
-            } else {
-                hit = hn::Le(c, zero);
-            }
-            if (std::abs(n.ay) > 1e-6f) {
-                const auto y0 = hn::Div(hn::Sub(hn::Set(d, -n.length), u0), hn::Set(d, n.ay));
-                const auto y1 = hn::Div(hn::Neg(u0), hn::Set(d, n.ay));
-                low = hn::Max(low, hn::Min(y0, y1));
-                high = hn::Min(high, hn::Max(y0, y1));
-            } else {
-                hit = hn::And(hit, hn::And(hn::Le(u0, zero), hn::Ge(u0, hn::Set(d, -n.length))));
-            }
-            if (hn::AllFalse(d, hit)) continue;
-            const auto share = hn::IfThenElseZero(
-                hit, hn::Div(hn::Max(hn::Sub(high, low), zero), hn::Set(d, n.slab)));
-            const auto along = hn::Max(hn::Neg(u0), zero);
-            const auto near_tip = hn::Min(
-                hn::Max(hn::Sub(hn::Set(d, 1.0f), hn::Mul(along, hn::Set(d, n.inverse_reach))),
-                        zero),
-                hn::Set(d, 1.0f));
+            const auto chord =
+                needle_chord(d, n, hn::Add(ox, hn::Mul(r, dx)), hn::Add(oz, hn::Mul(r, dz)));
+            if (hn::AllFalse(d, chord.hit)) continue;
+            const auto share =
+                hn::IfThenElseZero(chord.hit, hn::Div(chord.length_mm, hn::Set(d, n.slab)));
+            const auto near_tip =
+                hn::Min(hn::Max(hn::Sub(hn::Set(d, 1.0f),
+                                        hn::Mul(chord.from_tip_mm, hn::Set(d, n.inverse_reach))),
+                                zero),
+                        hn::Set(d, 1.0f));
             const auto opacity =
                 hn::Add(hn::Set(d, n.shaft_opacity),
                         hn::Mul(hn::Set(d, n.tip_opacity - n.shaft_opacity), near_tip));
@@ -179,7 +150,8 @@ void draw_needle(const PaperBlock& b, const NeedleRow& n, int row_begin, int row
             const auto grey = hn::ConvertTo(d, hn::And(value, hn::Set(di, 0xFF)));
             const auto lit =
                 hn::Add(grey, hn::Mul(hn::Sub(hn::Set(d, 255.0f), grey), hn::Mul(share, opacity)));
-            const auto out = hn::Or(hn::NearestInt(lit), hn::And(value, hn::Set(di, 0x100)));
+            const auto out =
+                hn::Or(hn::NearestInt(lit), hn::And(value, hn::Set(di, PaperBlock::kCastsShadow)));
             hn::StoreU(hn::DemoteTo(d16, out), d16, stage);
         }
     }
@@ -207,9 +179,10 @@ void finish_block_as(const PaperBlock& b) {
             }
             auto fixed = hn::ShiftLeft<7>(hn::BitCast(d, grey));
             if constexpr (kShadow) {
-                const auto blocked = hn::TestBit(value, hn::Set(d, 0x100));
+                const auto blocked = hn::TestBit(value, hn::Set(d, PaperBlock::kCastsShadow));
                 light = hn::IfThenElse(blocked, hn::MulHigh(light, dim), light);
-                // Full light is exactly 1, so that skipping the shadow changes nothing.
+                // Full light leaves the value as it is, so that skipping the shadow changes
+                // nothing.
                 fixed = hn::IfThenElse(hn::Eq(light, hn::Set(d, 0xFFFF)), fixed,
                                        hn::MulHigh(fixed, light));
             }
@@ -256,24 +229,26 @@ HWY_EXPORT(draw_needle);
 HWY_EXPORT(finish_block);
 HWY_EXPORT(blur_row);
 
-std::uint32_t sample_paper_block(const PaperBlock& block) {
-    return HWY_DYNAMIC_DISPATCH(sample_block)(block);
+std::uint32_t sample_paper_block(SimdTarget simd, const PaperBlock& block) {
+    return HWY_DISPATCH_TABLE(sample_block)[simd.index](block);
 }
 
-void draw_paper_needle(const PaperBlock& block,
-                       const NeedleRow& needle,
-                       int row_begin,
-                       int row_end) {
-    HWY_DYNAMIC_DISPATCH(draw_needle)(block, needle, row_begin, row_end);
+void draw_paper_needle(
+    SimdTarget simd, const PaperBlock& block, const NeedleRow& needle, int row_begin, int row_end) {
+    HWY_DISPATCH_TABLE(draw_needle)[simd.index](block, needle, row_begin, row_end);
 }
 
-void finish_paper_block(const PaperBlock& block) {
-    HWY_DYNAMIC_DISPATCH(finish_block)(block);
+void finish_paper_block(SimdTarget simd, const PaperBlock& block) {
+    HWY_DISPATCH_TABLE(finish_block)[simd.index](block);
 }
 
-void blur_paper_row(
-    const std::uint8_t* in, int count, const std::uint16_t* taps, int reach, std::uint8_t* out) {
-    HWY_DYNAMIC_DISPATCH(blur_row)(in, count, taps, reach, out);
+void blur_paper_row(SimdTarget simd,
+                    const std::uint8_t* in,
+                    int count,
+                    const std::uint16_t* taps,
+                    int reach,
+                    std::uint8_t* out) {
+    HWY_DISPATCH_TABLE(blur_row)[simd.index](in, count, taps, reach, out);
 }
 
 }  // namespace sonocase::runtime

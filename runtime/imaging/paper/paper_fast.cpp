@@ -3,21 +3,23 @@
 #include "runtime/imaging/paper/paper_fast.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
-#include <chrono>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 
+#include "runtime/imaging/host/pass_timer.h"
 #include "runtime/imaging/noise/noise.h"
 #include "runtime/imaging/paper/paper_kernels.h"
 #include "runtime/imaging/paper/paper_model.h"
 #include "runtime/imaging/scan/scan_convert.h"
-#include "runtime/imaging/simd/stopwatch.h"
 
 namespace sonocase::runtime {
 namespace {
 
-// Slack behind every row and buffer: the widest vector there is, so that no kernel needs a tail.
+// Slack behind every row and buffer: the widest vector of any instruction set, so that no kernel
+// needs to treat the last values apart.
 constexpr int kSlack = 64;
 
 // 16.16 fixed point; beyond its range the point is far outside any volume.
@@ -56,16 +58,18 @@ std::vector<std::uint16_t> make_blur_taps(const ScanGeometry& g) {
 
 PaperFast::PaperFast(const PaperScene& scene,
                      const ScanGeometry& geometry,
-                     std::uint32_t seed,
-                     WorkerPool& workers)
-    : scene_(scene), geometry_(geometry), workers_(workers) {
+                     std::span<const std::int8_t> noise,
+                     const RenderContext& context)
+    : scene_(scene), geometry_(geometry), noise_(noise), context_(context) {
     const auto samples = static_cast<std::size_t>(geometry.samples);
     lines_ = (geometry.scanlines + kPaperBlock - 1) / kPaperBlock * kPaperBlock;
-    noise_ = make_noise_tile(paper::kNoiseSigma, seed, lines_ + kSlack);
+    assert(noise_.size() >= kNoiseTile + static_cast<std::size_t>(lines_));
     blur_taps_ = make_blur_taps(geometry);
     margin_ = static_cast<int>(blur_taps_.size()) / 2;
     stride_ = margin_ + lines_ + margin_ + kSlack;
-    table_ = make_scan_conversion_table(geometry, (lines_ + kSlack - 1) / kSlack * kSlack);
+    pair_stride_ =
+        (lines_ + kSlack - 1) / kSlack * kSlack;  // rows of two parts never share a vector
+    table_ = make_scan_conversion_table(context.jobs, geometry, pair_stride_);
     table_.offset.resize(table_.offset.size() + kSlack);
     table_.weight.resize(table_.weight.size() + kSlack);
     start_.resize(6 * static_cast<std::size_t>(lines_) + kSlack);
@@ -76,12 +80,10 @@ PaperFast::PaperFast(const PaperScene& scene,
     for (std::size_t k = 0; k < samples; ++k) {
         brightness_[k] = paper_brightness((static_cast<double>(k) + 0.5) * geometry.step_mm, true);
     }
-    const auto threads = static_cast<std::size_t>(workers.threads());
+    const auto threads = static_cast<std::size_t>(context.workers.threads());
     stage_.resize(threads * samples * kPaperBlock + kSlack);
     image_.resize(samples * static_cast<std::size_t>(stride_) + kSlack);
     blurred_.resize(threads * 2 * static_cast<std::size_t>(lines_ + kSlack));
-    pair_stride_ =
-        (lines_ + kSlack - 1) / kSlack * kSlack;  // rows of two parts never share a vector
     pairs_.resize(samples * static_cast<std::size_t>(pair_stride_) + kSlack);
 }
 
@@ -117,15 +119,9 @@ bool PaperFast::place_block(const Rigid& volume_from_probe, int first_line) {
     return inside;
 }
 
-void PaperFast::render(const PaperFrame& frame,
-                       bool flip,
-                       bool keep_all,
-                       std::span<std::uint8_t> pixels) {
-    const ScanGeometry& g = geometry_;
-    auto clock = std::chrono::steady_clock::now();
-    passes_ = {};
-
-    for (int k = 0; k < g.samples; ++k) {
+// Noise and brightness of every row.
+void PaperFast::set_rows(const PaperFrame& frame) {
+    for (int k = 0; k < geometry_.samples; ++k) {
         const auto i = static_cast<std::size_t>(k);
         noise_start_[i] = noise_row_start(frame.seed, frame.frame, static_cast<std::uint32_t>(k));
         const double scale = (frame.effects.attenuation ? brightness_[i] : 1.0) *
@@ -133,39 +129,42 @@ void PaperFast::render(const PaperFrame& frame,
         row_scale_[i] =
             static_cast<std::uint16_t>(std::lround(std::clamp(scale * 4096, 0.0, 65535.0)));
     }
+}
 
-    PaperBlock base;
-    base.lines = lines_;
-    base.samples = g.samples;
-    base.table = reinterpret_cast<const std::int32_t*>(scene_.table.data());
-    base.pool = reinterpret_cast<const std::int32_t*>(scene_.pool.data());
-    base.atlas = reinterpret_cast<const std::int32_t*>(scene_.atlas.data());
+// What all blocks of a frame share. flat: mean grey of the materials, in bytes.
+PaperBlock PaperFast::block_of_scene(const PaperFrame& frame,
+                                     std::span<const std::int32_t> flat) const {
+    PaperBlock b;
+    b.lines = lines_;
+    b.samples = geometry_.samples;
+    b.table = reinterpret_cast<const std::int32_t*>(scene_.table.data());
+    b.pool = reinterpret_cast<const std::int32_t*>(scene_.pool.data());
+    b.atlas = reinterpret_cast<const std::int32_t*>(scene_.atlas.data());
+    b.flat = flat.data();
+    b.size = scene_.grid.size;
+    b.bricks_x = scene_.bricks.x;
+    b.bricks_xy = scene_.bricks.x * scene_.bricks.y;
+    b.edge_log2 = scene_.edge_log2;
+    b.texture = frame.effects.texture;
+    b.with_noise = frame.effects.noise;
+    b.noise_start = noise_start_.data();
+    b.row_scale = row_scale_.data();
+    b.image_stride = stride_;
+    b.shadow_factor = static_cast<std::uint16_t>(
+        std::lround(65536.0 * std::exp(-geometry_.step_mm / paper::kShadowLengthMm)));
+    return b;
+}
+
+double PaperFast::sample_beams(const PaperFrame& frame, bool keep_all) {
+    const ScanGeometry& g = geometry_;
     alignas(64) std::array<std::int32_t, 33> flat{};
     std::memcpy(flat.data(), scene_.flat_grey.data(), scene_.flat_grey.size());
-    base.flat = flat.data();
-    base.size = scene_.grid.size;
-    base.bricks_x = scene_.bricks.x;
-    base.bricks_xy = scene_.bricks.x * scene_.bricks.y;
-    base.edge_log2 = scene_.edge_log2;
-    base.texture = frame.effects.texture;
-    base.with_noise = frame.effects.noise;
-    base.noise_start = noise_start_.data();
-    base.row_scale = row_scale_.data();
-    base.image_stride = stride_;
-    base.shadow_factor = static_cast<std::uint16_t>(
-        std::lround(65536.0 * std::exp(-g.step_mm / paper::kShadowLengthMm)));
-
+    const PaperBlock base = block_of_scene(frame, flat);
     const bool needle = frame.effects.needle && frame.needle != nullptr;
     const NeedleStrip strip = needle ? NeedleStrip(*frame.needle) : NeedleStrip();
-    // Beyond the outermost beams their values repeat, for the blur.
-    const auto repeat_edge = [&](std::uint8_t* row, int to, int count, int from) {
-        for (int k = 0; k < g.samples; ++k, row += stride_)
-            std::memset(row + to, row[from], static_cast<std::size_t>(count));
-    };
     std::atomic<bool> shadow_met{false}, needle_met{false};
-    std::atomic<std::int64_t> needle_ns{0};
-    const int blocks = lines_ / kPaperBlock;
-    workers_.for_each(blocks, [&](int part, int block) {
+    std::atomic<double> needle_ms{0};
+    context_.workers.for_each(lines_ / kPaperBlock, [&](int part, int block) {
         PaperBlock b = base;
         const int line = block * kPaperBlock;
         b.start = start_.data() + line;
@@ -175,35 +174,44 @@ void PaperFast::render(const PaperFrame& frame,
         b.image = image_.data() + margin_ + line;
         b.noise = noise_.data() + line;
         b.inside = place_block(frame.volume_from_probe, line);
-        const std::uint32_t met = sample_paper_block(b);
-        if (needle) {
-            NeedleRow row;
-            int k0 = 0, k1 = 0;
-            if (strip.prepare_block(*frame.needle, g, line, keep_all, row, k0, k1)) {
-                const auto start = std::chrono::steady_clock::now();
-                draw_paper_needle(b, row, k0, k1);
-                needle_ns.fetch_add((std::chrono::steady_clock::now() - start).count());
-                needle_met.store(true, std::memory_order_relaxed);
-            }
+        const std::uint32_t met = sample_paper_block(context_.simd, b);
+        NeedleRow row;
+        int k0 = 0, k1 = 0;
+        if (needle && strip.prepare_block(*frame.needle, g, line, keep_all, row, k0, k1)) {
+            PassTimer timer(context_.clock);
+            draw_paper_needle(context_.simd, b, row, k0, k1);
+            needle_ms.fetch_add(timer.lap_ms());
+            needle_met.store(true, std::memory_order_relaxed);
         }
-        b.with_shadow = frame.effects.shadow && ((met & 0x100u) != 0 || keep_all);
+        b.with_shadow = frame.effects.shadow && ((met & PaperBlock::kCastsShadow) != 0 || keep_all);
         if (b.with_shadow) shadow_met.store(true, std::memory_order_relaxed);
-        finish_paper_block(b);
-        if (line == 0) repeat_edge(b.image, -margin_, margin_, 0);
-        if (block == blocks - 1) {
-            const int last = g.scanlines - 1 - line;
-            repeat_edge(b.image, last + 1, lines_ - g.scanlines + margin_, last);
-        }
+        finish_paper_block(context_.simd, b);
+        finish_edges(block);
     });
-    passes_.shadow_met = shadow_met.load();
-    passes_.needle_met = needle_met.load();
-    passes_.needle_ms = static_cast<double>(needle_ns.load()) * 1e-6 / workers_.threads();
-    passes_.beams_ms = std::max(milliseconds_since(clock) - passes_.needle_ms, 0.0);
-    clock = std::chrono::steady_clock::now();
+    met_ = {frame.needle != nullptr, needle_met.load(), shadow_met.load()};
+    return needle_ms.load() / context_.workers.threads();
+}
 
+// Beyond the outermost beams their values repeat, for the blur.
+void PaperFast::finish_edges(int block) {
+    const int line = block * kPaperBlock;
+    const auto repeat = [&](int to, int count, int from) {
+        std::uint8_t* row = image_.data() + margin_ + line;
+        for (int k = 0; k < geometry_.samples; ++k, row += stride_)
+            std::memset(row + to, row[from], static_cast<std::size_t>(count));
+    };
+    if (line == 0) repeat(-margin_, margin_, 0);
+    if (block == lines_ / kPaperBlock - 1) {
+        const int last = geometry_.scanlines - 1 - line;
+        repeat(last + 1, lines_ - geometry_.scanlines + margin_, last);
+    }
+}
+
+void PaperFast::blur_rows(const PaperFrame& frame) {
+    const int samples = geometry_.samples;
     constexpr int kRows = 32;  // that a thread takes at a time
-    workers_.for_each((g.samples + kRows - 1) / kRows, [&](int part, int item) {
-        const int begin = item * kRows, end = std::min(begin + kRows, g.samples);
+    context_.workers.for_each((samples + kRows - 1) / kRows, [&](int part, int item) {
+        const int begin = item * kRows, end = std::min(begin + kRows, samples);
         std::uint8_t* rows[2];
         rows[0] = blurred_.data() +
                   static_cast<std::size_t>(part) * 2 * static_cast<std::size_t>(lines_ + kSlack);
@@ -214,23 +222,35 @@ void PaperFast::render(const PaperFrame& frame,
                 margin_;
             if (!frame.effects.blur) return in;
             std::uint8_t* out = rows[k & 1];
-            blur_paper_row(in, lines_, blur_taps_.data(), margin_, out);
+            blur_paper_row(context_.simd, in, lines_, blur_taps_.data(), margin_, out);
             return out;
         };
         const std::uint8_t* upper = filtered(begin);
         for (int k = begin; k < end; ++k) {
-            const std::uint8_t* lower = k + 1 < g.samples ? filtered(k + 1) : upper;
-            pair_rows(upper, lower, lines_,
+            const std::uint8_t* lower = k + 1 < samples ? filtered(k + 1) : upper;
+            pair_rows(context_.simd, upper, lower, lines_,
                       pairs_.data() +
                           static_cast<std::size_t>(k) * static_cast<std::size_t>(pair_stride_));
             upper = lower;
         }
     });
-    passes_.blur_ms = milliseconds_since(clock);
-    clock = std::chrono::steady_clock::now();
+}
 
-    scan_convert(workers_, table_, pairs_, g, flip, pixels);
-    passes_.convert_ms = milliseconds_since(clock);
+void PaperFast::render(const PaperFrame& frame,
+                       bool flip,
+                       bool keep_all,
+                       std::span<std::uint8_t> pixels) {
+    const auto time_of = [&](Pass pass) -> double& {
+        return pass_ms_[static_cast<std::size_t>(pass)];
+    };
+    PassTimer timer(context_.clock);
+    set_rows(frame);
+    time_of(Pass::needle) = sample_beams(frame, keep_all);
+    time_of(Pass::beams) = std::max(timer.lap_ms() - time_of(Pass::needle), 0.0);
+    blur_rows(frame);
+    time_of(Pass::filter) = timer.lap_ms();
+    scan_convert(context_.workers, context_.simd, table_, pairs_, geometry_, flip, pixels);
+    time_of(Pass::convert) = timer.lap_ms();
 }
 
 }  // namespace sonocase::runtime

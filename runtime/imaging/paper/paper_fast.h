@@ -2,47 +2,50 @@
 
 // Model `paper` in beam space: beams x depth first, then one scan conversion. The shadow is a
 // running product down the beam and the blur a filter across beams, so that no pixel marches and no
-// copy is turned. Integer arithmetic of fixed order: every instruction set and thread count gives
-// the same pixels.
+// copy is turned. Integer arithmetic in a fixed order: every instruction set and thread count gives
+// the same pixels. Cost: about 0.6 ms per frame of 512 x 512 samples and pixels on one thread.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
+#include "runtime/imaging/formation/render_context.h"
+#include "runtime/imaging/needle/needle_strip.h"
 #include "runtime/imaging/paper/paper_reference.h"
-#include "runtime/imaging/simd/worker_pool.h"
 
 namespace sonocase::runtime {
 
-// Milliseconds of the last frame, and what it met.
-struct PaperPasses {
-    double beams_ms = 0, needle_ms = 0, blur_ms = 0, convert_ms = 0;
-    bool shadow_met = false, needle_met = false;
-};
+struct PaperBlock;
 
 class PaperFast {
   public:
+    // noise: make_paper_noise() of at least as many beams. Scene and noise outlive this.
     PaperFast(const PaperScene& scene,
               const ScanGeometry& geometry,
-              std::uint32_t seed,
-              WorkerPool& workers);
+              std::span<const std::int8_t> noise,
+              const RenderContext& context);
 
-    // keep_all: also run what cannot show; the pixels are the same.
+    // keep_all: also works out what cannot show; the pixels are the same.
     void render(const PaperFrame& frame, bool flip, bool keep_all, std::span<std::uint8_t> pixels);
-    const PaperPasses& passes() const { return passes_; }
-    std::span<const std::int8_t> noise_tile() const { return noise_; }
+
+    // Of the last frame.
+    const PassTimes& pass_ms() const { return pass_ms_; }
+    const PaperMet& met() const { return met_; }
 
   private:
+    void set_rows(const PaperFrame& frame);
+    PaperBlock block_of_scene(const PaperFrame& frame, std::span<const std::int32_t> flat) const;
     bool place_block(const Rigid& volume_from_probe, int first_line);
+    double sample_beams(const PaperFrame& frame, bool keep_all);  // returns the needle's time, ms
+    void finish_edges(int block);
+    void blur_rows(const PaperFrame& frame);
 
     const PaperScene& scene_;
     const ScanGeometry geometry_;
-    WorkerPool& workers_;
+    const std::span<const std::int8_t> noise_;
+    const RenderContext context_;
     ScanConversionTable table_;
-    std::vector<std::int8_t> noise_;
     std::vector<std::uint16_t> blur_taps_;  // # 2 * reach + 1, sum 256
     int lines_ = 0;                         // padded to whole blocks
     int stride_ = 0;                        // of a row: margin, lines, margin
@@ -56,7 +59,8 @@ class PaperFast {
     std::vector<std::uint8_t> blurred_;       // per thread: two rows
     int pair_stride_ = 0;
     std::vector<std::uint16_t> pairs_;  // samples x pair_stride
-    PaperPasses passes_;
+    PassTimes pass_ms_{};
+    PaperMet met_;
 };
 
 }  // namespace sonocase::runtime

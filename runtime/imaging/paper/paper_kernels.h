@@ -7,6 +7,7 @@
 
 #include "formats/base/geometry.h"
 #include "runtime/imaging/needle/needle_strip.h"
+#include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime {
 
@@ -25,23 +26,31 @@ struct PaperBlock {
     const std::uint32_t* noise_start = nullptr;
     const std::uint16_t* row_scale = nullptr;
     std::uint16_t shadow_factor = 0;
-    std::uint16_t* stage = nullptr;  // samples x kPaperBlock: grey, bit 8 where a shadow is cast
+    static constexpr std::uint32_t kCastsShadow = 0x100;
+    std::uint16_t* stage = nullptr;  // samples x kPaperBlock: grey, kCastsShadow where one is cast
     std::uint8_t* image = nullptr;
     int image_stride = 0;
 };
 
-// Vectorised; integer or single precision in fixed order.
-// Fills the stage; returns the union of all its values.
-std::uint32_t sample_paper_block(const PaperBlock& block);
+// Vectorised, for the instruction set that is named: integers, or single precision in fixed order.
+
+// Fills the stage; returns the union (bitwise or) of all its values.
+std::uint32_t sample_paper_block(SimdTarget simd, const PaperBlock& block);
+
 // The needle over the stage, samples [row_begin, row_end). Same formula as needle_share().
-void draw_paper_needle(const PaperBlock& block,
-                       const NeedleRow& needle,
-                       int row_begin,
-                       int row_end);
+void draw_paper_needle(
+    SimdTarget simd, const PaperBlock& block, const NeedleRow& needle, int row_begin, int row_end);
+
 // Noise, shadow and brightness of the stage, into the image.
-void finish_paper_block(const PaperBlock& block);
-// One row: taps across beams. `in` has a margin of `reach` values before and behind.
-void blur_paper_row(
-    const std::uint8_t* in, int count, const std::uint16_t* taps, int reach, std::uint8_t* out);
+void finish_paper_block(SimdTarget simd, const PaperBlock& block);
+
+// One row, filtered across beams: out = sum of taps * in / 256. `in` has a margin of `reach` values
+// before and behind.
+void blur_paper_row(SimdTarget simd,
+                    const std::uint8_t* in,
+                    int count,
+                    const std::uint16_t* taps,
+                    int reach,
+                    std::uint8_t* out);
 
 }  // namespace sonocase::runtime

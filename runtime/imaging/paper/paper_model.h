@@ -7,11 +7,11 @@
 
 namespace sonocase::runtime::paper {
 
-inline constexpr double kNoiseSigma = 15;     // grey; printed
-inline constexpr double kShadowLengthMm = 4;  // bone or gas that dims to 1/e; the paper only says
-                                              // "the more, the darker"
-inline constexpr double kAttenuationLengthMm =
-    250;  // depth that dims to 1/e; "a decreasing function"
+inline constexpr double kNoiseSigma = 15;  // grey; printed
+// Length of bone or gas that dims to 1/e; the paper only says "the more, the darker".
+inline constexpr double kShadowLengthMm = 4;
+// Depth that dims to 1/e; the paper only says "a decreasing function".
+inline constexpr double kAttenuationLengthMm = 250;
 
 // Radial blur: copies turned by j * kBlurStepRad about the fan's centre, j = -4..4, blended with
 // these weights (sum 1). A linear probe's copies are shifted by j * kBlurStepMm.

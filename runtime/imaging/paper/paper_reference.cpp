@@ -31,7 +31,116 @@ double texture_grey(const PaperScene& scene, std::uint32_t material, Point3 p) {
     return scene.atlas[n * n * n * (material & 0x7F) + wrap(q.x) + n * (wrap(q.y) + n * wrap(q.z))];
 }
 
+// The picture by pixels, row by row.
+class Picture {
+  public:
+    explicit Picture(const ScanGeometry& g)
+        : geometry_(g),
+          values_(static_cast<std::size_t>(g.width_px) * static_cast<std::size_t>(g.height_px),
+                  0.0) {}
+
+    double& at(int column, int row) { return values_[index(column, row)]; }
+    double at(int column, int row) const { return values_[index(column, row)]; }
+
+    // work(column, row, line, sample) for every pixel of the scanned area.
+    template <class Work>
+    void for_scanned(const Work& work) const {
+        for (int row = 0; row < geometry_.height_px; ++row) {
+            for (int column = 0; column < geometry_.width_px; ++column) {
+                double line = 0, sample = 0;
+                if (geometry_.locate(geometry_.pixel_centre(column, row), line, sample))
+                    work(column, row, line, sample);
+            }
+        }
+    }
+
+  private:
+    std::size_t index(int column, int row) const {
+        return static_cast<std::size_t>(row) * static_cast<std::size_t>(geometry_.width_px) +
+               static_cast<std::size_t>(column);
+    }
+
+    const ScanGeometry& geometry_;
+    std::vector<double> values_;
+};
+
+double with_needle(double grey, const NeedleShape& needle, PlanePoint p) {
+    double along = 0;
+    const double share = needle_share(needle, p.x, p.z, along);
+    const double near_tip = std::clamp(1 - along / kTipReachMm, 0.0, 1.0);
+    const double opacity =
+        needle.shaft_opacity + (needle.tip_opacity - needle.shaft_opacity) * near_tip;
+    return grey + (255 - grey) * share * opacity;
+}
+
+// Length in bone and gas from the probe's face down to a sample, mm.
+double length_in_shadow_mm(const PaperScene& scene,
+                           const ScanGeometry& g,
+                           const Rigid& volume_from_probe,
+                           double line,
+                           double sample) {
+    double in_shadow_mm = 0;
+    for (int k = 0; k <= sample; ++k) {
+        const PlanePoint q = g.point(line, k);
+        if (material_of_point(scene, volume_from_probe * Point3{q.x, 0, q.z}) &
+            PaperScene::kShadowBit) {
+            in_shadow_mm += g.step_mm;
+        }
+    }
+    return in_shadow_mm;
+}
+
+// Texture, needle, noise and shadow of a pixel.
+double grey_at(const PaperScene& scene,
+               const ScanGeometry& g,
+               std::span<const std::int8_t> noise_tile,
+               const PaperFrame& frame,
+               PlanePoint p,
+               double line,
+               double sample) {
+    const Point3 x = frame.volume_from_probe * Point3{p.x, 0, p.z};
+    const std::uint32_t material = material_of_point(scene, x);
+    double grey =
+        frame.effects.texture ? texture_grey(scene, material, x) : scene.flat_grey[material & 0x7F];
+    if (frame.effects.needle && frame.needle != nullptr) grey = with_needle(grey, *frame.needle, p);
+    if (frame.effects.noise) {
+        const int l = std::clamp(nearest(line), 0, g.scanlines - 1);
+        const int k = std::clamp(nearest(sample), 0, g.samples - 1);
+        grey += noise_tile[noise_row_start(frame.seed, frame.frame, static_cast<std::uint32_t>(k)) +
+                           static_cast<std::uint32_t>(l)];
+        grey = std::clamp(grey, 0.0, 255.0);
+    }
+    if (frame.effects.shadow) {
+        grey *= std::exp(-length_in_shadow_mm(scene, g, frame.volume_from_probe, line, sample) /
+                         paper::kShadowLengthMm);
+    }
+    return grey;
+}
+
+// The mean of copies of the picture turned about the fan's centre.
+Picture blurred_picture(const ScanGeometry& g, const Picture& raw) {
+    Picture blurred(g);
+    for (int copy = -paper::kBlurReach; copy <= paper::kBlurReach; ++copy) {
+        const double weight =
+            paper::kBlurWeights[static_cast<std::size_t>(copy + paper::kBlurReach)];
+        blurred.for_scanned([&](int column, int row, double line, double sample) {
+            // The copy's pixel that lands here; beyond the sector its edge is repeated.
+            line += copy * (g.fan ? paper::kBlurStepRad : paper::kBlurStepMm) / g.line_step;
+            const PlanePoint q = g.point(std::clamp(line, 0.0, g.scanlines - 1.0), sample);
+            const double cx = std::clamp(q.x / g.mm_per_px + g.origin_x_px, 0.0, g.width_px - 1.0);
+            const double cy = std::clamp(q.z / g.mm_per_px + g.origin_y_px, 0.0, g.height_px - 1.0);
+            blurred.at(column, row) += weight * raw.at(nearest(cx), nearest(cy));
+        });
+    }
+    return blurred;
+}
+
 }  // namespace
+
+std::vector<std::int8_t> make_paper_noise(std::uint32_t seed, int scanlines) {
+    constexpr int kSlack = 2 * 64;  // a block of beams and a vector beyond the last beam
+    return make_noise_tile(normal_levels(), paper::kNoiseSigma, seed, scanlines + kSlack);
+}
 
 double paper_brightness(double depth_mm, bool attenuation) {
     return attenuation ? std::exp(-depth_mm / paper::kAttenuationLengthMm) : 1.0;
@@ -42,93 +151,23 @@ void render_paper_reference(const PaperScene& scene,
                             std::span<const std::int8_t> noise_tile,
                             const PaperFrame& frame,
                             std::span<std::uint8_t> pixels) {
-    const std::size_t width = static_cast<std::size_t>(g.width_px);
-    const std::size_t count = width * static_cast<std::size_t>(g.height_px);
-    std::vector<double> raw(count, 0.0);
-
-    for (int row = 0; row < g.height_px; ++row) {
-        for (int column = 0; column < g.width_px; ++column) {
-            const PlanePoint p = g.pixel_centre(column, row);
-            double line = 0, sample = 0;
-            if (!g.locate(p, line, sample)) continue;
-            const Point3 x = frame.volume_from_probe * Point3{p.x, 0, p.z};
-            const std::uint32_t material = material_of_point(scene, x);
-            double grey = frame.effects.texture ? texture_grey(scene, material, x)
-                                                : scene.flat_grey[material & 0x7F];
-            if (frame.effects.needle && frame.needle != nullptr) {
-                double along = 0;
-                const double share = needle_share(*frame.needle, p.x, p.z, along);
-                const double near_tip = std::clamp(1 - along / kTipReachMm, 0.0, 1.0);
-                const double opacity =
-                    frame.needle->shaft_opacity +
-                    (frame.needle->tip_opacity - frame.needle->shaft_opacity) * near_tip;
-                grey += (255 - grey) * share * opacity;
-            }
-            if (frame.effects.noise) {
-                const int l = std::clamp(nearest(line), 0, g.scanlines - 1);
-                const int k = std::clamp(nearest(sample), 0, g.samples - 1);
-                grey += noise_tile[noise_row_start(frame.seed, frame.frame,
-                                                   static_cast<std::uint32_t>(k)) +
-                                   static_cast<std::uint32_t>(l)];
-                grey = std::clamp(grey, 0.0, 255.0);
-            }
-            if (frame.effects.shadow) {
-                double in_shadow_mm = 0;
-                for (int k = 0; k <= sample; ++k) {
-                    const PlanePoint q = g.point(line, k);
-                    if (material_of_point(scene, frame.volume_from_probe * Point3{q.x, 0, q.z}) &
-                        PaperScene::kShadowBit) {
-                        in_shadow_mm += g.step_mm;
-                    }
-                }
-                grey *= std::exp(-in_shadow_mm / paper::kShadowLengthMm);
-            }
-            raw[static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column)] = grey;
-        }
-    }
-
-    std::vector<double> blurred = raw;
-    if (frame.effects.blur) {
-        std::fill(blurred.begin(), blurred.end(), 0.0);
-        for (int copy = -paper::kBlurReach; copy <= paper::kBlurReach; ++copy) {
-            const double weight =
-                paper::kBlurWeights[static_cast<std::size_t>(copy + paper::kBlurReach)];
-            for (int row = 0; row < g.height_px; ++row) {
-                for (int column = 0; column < g.width_px; ++column) {
-                    double line = 0, sample = 0;
-                    if (!g.locate(g.pixel_centre(column, row), line, sample)) continue;
-                    // The copy's pixel that lands here; beyond the sector its edge is repeated.
-                    line += copy * (g.fan ? paper::kBlurStepRad : paper::kBlurStepMm) / g.line_step;
-                    const PlanePoint q = g.point(std::clamp(line, 0.0, g.scanlines - 1.0), sample);
-                    const double cx =
-                        std::clamp(q.x / g.mm_per_px + g.origin_x_px, 0.0, g.width_px - 1.0);
-                    const double cy =
-                        std::clamp(q.z / g.mm_per_px + g.origin_y_px, 0.0, g.height_px - 1.0);
-                    blurred[static_cast<std::size_t>(row) * width +
-                            static_cast<std::size_t>(column)] +=
-                        weight * raw[static_cast<std::size_t>(nearest(cy)) * width +
-                                     static_cast<std::size_t>(nearest(cx))];
-                }
-            }
-        }
-    }
-
-    for (int row = 0; row < g.height_px; ++row) {
-        for (int column = 0; column < g.width_px; ++column) {
-            const std::size_t i =
-                static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
-            double line = 0, sample = 0;
-            double grey = 0;
-            if (g.locate(g.pixel_centre(column, row), line, sample)) {
-                const auto k =
-                    static_cast<std::size_t>(std::clamp(nearest(sample), 0, g.samples - 1));
-                grey = blurred[i] *
-                       paper_brightness((sample + 0.5) * g.step_mm, frame.effects.attenuation) *
-                       static_cast<double>(frame.row_gain[k]);
-            }
-            pixels[i] = static_cast<std::uint8_t>(std::lround(std::clamp(grey, 0.0, 255.0)));
-        }
-    }
+    Picture raw(g);
+    raw.for_scanned([&](int column, int row, double line, double sample) {
+        raw.at(column, row) =
+            grey_at(scene, g, noise_tile, frame, g.pixel_centre(column, row), line, sample);
+    });
+    const Picture blurred = frame.effects.blur ? blurred_picture(g, raw) : raw;
+    std::fill(pixels.begin(), pixels.end(), std::uint8_t{0});
+    blurred.for_scanned([&](int column, int row, double, double sample) {
+        const auto k = static_cast<std::size_t>(std::clamp(nearest(sample), 0, g.samples - 1));
+        const double grey =
+            blurred.at(column, row) *
+            paper_brightness((sample + 0.5) * g.step_mm, frame.effects.attenuation) *
+            static_cast<double>(frame.row_gain[k]);
+        pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(g.width_px) +
+               static_cast<std::size_t>(column)] =
+            static_cast<std::uint8_t>(std::lround(std::clamp(grey, 0.0, 255.0)));
+    });
 }
 
 }  // namespace sonocase::runtime

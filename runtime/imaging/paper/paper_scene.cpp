@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "runtime/imaging/paper/paper_scene.h"
-#include "runtime/imaging/simd/gather_slack.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "runtime/imaging/simd/gather_slack.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -16,8 +17,8 @@ const SolidTexture* find_texture(const CaseBundle& bundle, const std::string& na
     return nullptr;
 }
 
-// A tissue's cube of grey. A texture of another voxel size is resampled to the scene's; one that
-// does not fill the cube repeats, and both keep its period a divisor of the cube's.
+// A tissue's cube of grey. A texture of another voxel size is resampled to the scene's, and one
+// that does not fill the cube is repeated; in both cases its period divides the cube's edge.
 void bake(const Tissue& tissue,
           const SolidTexture* texture,
           int edge,
@@ -65,7 +66,7 @@ Result<PaperScene> make_paper_scene(const CaseBundle& bundle) {
     for (std::size_t l = 1; l < tissue_of.size(); ++l) {
         if (tissue_of[l] >= 0) used[static_cast<std::size_t>(tissue_of[l])] = true;
     }
-    // The commonest edge and the finest voxel in use decide the cube.
+    // The largest edge and the finest voxel in use decide the cube.
     int edge = 0;
     double voxel_mm = 0;
     for (std::size_t t = 0; t < bundle.tissues.size(); ++t) {

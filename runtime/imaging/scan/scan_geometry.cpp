@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "runtime/imaging/simd/parallel_halves.h"
+#include "runtime/imaging/host/parallel_halves.h"
 
 namespace sonocase::runtime {
 
@@ -100,7 +100,7 @@ ScanConversionTable conversion_of_rows(const ScanGeometry& g, int stride, int be
             line = std::clamp(line, 0.0, g.scanlines - 1.0);
             sample = std::clamp(sample, 0.0, g.samples - 1.0);
             const int l = static_cast<int>(line), k = static_cast<int>(sample);
-            // A byte each: at most 1/256 of the step between neighbours is lost.
+            // One byte each: the error is at most 1/256 of the step between neighbours.
             table.offset.push_back(static_cast<std::uint32_t>(k) *
                                        static_cast<std::uint32_t>(stride) +
                                    static_cast<std::uint32_t>(l));
@@ -113,9 +113,9 @@ ScanConversionTable conversion_of_rows(const ScanGeometry& g, int stride, int be
 
 }  // namespace
 
-ScanConversionTable make_scan_conversion_table(const ScanGeometry& g, int stride) {
+ScanConversionTable make_scan_conversion_table(JobRunner& jobs, const ScanGeometry& g, int stride) {
     ScanConversionTable halves[2];
-    parallel_halves(static_cast<std::size_t>(g.height_px),
+    parallel_halves(jobs, static_cast<std::size_t>(g.height_px),
                     [&](std::size_t half, std::size_t begin, std::size_t end) {
                         halves[half] = conversion_of_rows(g, stride, static_cast<int>(begin),
                                                           static_cast<int>(end));

@@ -2,9 +2,9 @@
 
 // Where the beams of a probe run in the scan plane, and which beam sample each pixel shows.
 //
-// Scan plane: the probe frame's x (lateral) and z (depth), mm, origin at the middle of the probe
-// face. Beam l of L, l in [0, L), leaves origin(l) along direction(l); sample k of S lies at depth
-// (k + 1/2) * step_mm along it. Fractional beams and samples are allowed everywhere.
+// Scan plane: the probe frame's x (lateral) and z (depth), mm, origin at the middle of the probe's
+// face. Beam l of L, l in [0, L), leaves beam_origin(l) along beam_direction(l); sample k of S lies
+// at depth (k + 1/2) * step_mm along it. Fractional beams and samples are allowed everywhere.
 // Linear: parallel beams over the face. Curvilinear: beams fan out from the centre of the face's
 // curvature. Phased: the same with radius 0, so that the sector's tip is the origin.
 // Constant time except make_*; nothing fails.
@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "formats/base/jobs.h"
 #include "formats/exercise/exercise.h"
 
 namespace sonocase::runtime {
@@ -23,7 +24,7 @@ struct PlanePoint {
 
 struct ScanGeometry {
     bool fan = true;
-    double radius_mm = 0;    // fan: of the face
+    double radius_mm = 0;    // fan: of the probe's face
     double half_extent = 0;  // fan: half the opening angle, rad; linear: half the face, mm
     double depth_mm = 0;
     int scanlines = 0, samples = 0;
@@ -61,6 +62,9 @@ struct ScanConversionTable {
     std::vector<std::uint16_t> weight;  // low byte across beams, high byte along them
 };
 
-ScanConversionTable make_scan_conversion_table(const ScanGeometry& geometry, int stride);
+// stride: of a row of beam samples, in values. Cost: 5 ms for 512 x 512 pixels, in two jobs.
+ScanConversionTable make_scan_conversion_table(JobRunner& jobs,
+                                               const ScanGeometry& geometry,
+                                               int stride);
 
 }  // namespace sonocase::runtime

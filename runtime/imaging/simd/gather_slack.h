@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Vector look-ups read four bytes at a time.
+// Vector look-ups (gathers) read four bytes at a time.
 #pragma once
 
 #include <cstddef>

@@ -20,7 +20,7 @@ constexpr float kRoundingShift = 12582912.0f;
 constexpr std::int32_t kRoundingBits = 0x4B400000;
 
 // The nearest integer plus kRoundingBits, whose 22 low bits are zero: enough where only low bits
-// count.
+// are used.
 template <class D, class V>
 HWY_INLINE hn::Vec<hn::RebindToSigned<D>> rounded_bits(D d, V x) {
     return hn::BitCast(hn::RebindToSigned<D>(), hn::Add(x, hn::Set(d, kRoundingShift)));
@@ -81,7 +81,7 @@ HWY_INLINE hn::Vec<D> signed_byte(D d, I word) {
     return hn::ConvertTo(d, hn::ShiftRight<24>(hn::ShiftLeft<24 - 8 * kByte>(word)));
 }
 
-// Noise of a tile: a signed byte a lane.
+// Noise of a tile: one signed byte per lane.
 template <class D>
 HWY_INLINE hn::Vec<D> noise_of(D d, const std::int8_t* p) {
     const hn::RebindToSigned<D> di;

@@ -2,40 +2,24 @@
 
 #include "runtime/imaging/simd/simd_target.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "simd_target.cpp"
-#include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include <hwy/targets.h>
 
-HWY_BEFORE_NAMESPACE();
-namespace sonocase::runtime::HWY_NAMESPACE {
-std::int64_t this_target() {
-    return HWY_TARGET;
-}
-}  // namespace sonocase::runtime::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#if HWY_ONCE
 namespace sonocase::runtime {
-
-HWY_EXPORT(this_target);
 
 std::vector<SimdTarget> available_simd_targets() {
     std::vector<SimdTarget> out;
-    for (const std::int64_t id : hwy::SupportedAndGeneratedTargets())
-        out.push_back({hwy::TargetName(id), id});
+    for (const std::int64_t id : hwy::SupportedAndGeneratedTargets()) {
+#if HWY_IDE || ((HWY_TARGETS & (HWY_TARGETS - 1)) == 0)
+        const std::size_t index = 0;  // compiled for one: its table has one entry
+#else
+        hwy::ChosenTarget only;
+        only.Update(id);
+        const std::size_t index = only.GetIndex();
+#endif
+        out.push_back({hwy::TargetName(id), index});
+    }
     return out;
 }
 
-void choose_simd_target() {
-    if (!hwy::GetChosenTarget().IsInitialized())
-        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-}
-
-void force_simd_target(std::int64_t id) {
-    hwy::SetSupportedTargetsForTest(id);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-}
-
 }  // namespace sonocase::runtime
-#endif

@@ -1,22 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Which instruction set the vectorised kernels run on. Chosen at run time; tests force each in
-// turn, because every one must give the same pixels.
+// The instruction set that vectorised kernels run on. Every kernel is compiled for several, and
+// each call is told which one to use: a renderer's choice is its own and depends on no state of the
+// process. All of them give the same pixels.
 #pragma once
 
-#include <cstdint>
-#include <string>
+#include <cstddef>
 #include <vector>
 
 namespace sonocase::runtime {
 
 struct SimdTarget {
-    std::string name;
-    std::int64_t id = 0;
+    const char* name = "";  // Highway's: "AVX3", "AVX2", "SSE4", ...
+    std::size_t index = 0;  // of a kernel's table: HWY_DISPATCH_TABLE(kernel)[index]
 };
 
-std::vector<SimdTarget> available_simd_targets();  // of this machine and this build, best first
-void choose_simd_target();                         // before the first kernel runs
-void force_simd_target(std::int64_t id);  // 0: back to the best. Not thread-safe: tests only.
+// Those that this machine and this build have, best first; never empty.
+std::vector<SimdTarget> available_simd_targets();
 
 }  // namespace sonocase::runtime

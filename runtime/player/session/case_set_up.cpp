@@ -5,21 +5,22 @@
 #include <new>
 #include <thread>
 
-#include "runtime/imaging/physical/model/physical_scene.h"
 #include "runtime/tracking/factory/make_tracker.h"
+#include "runtime/workers/thread_host.h"
 
 namespace sonocase::runtime {
 
 Result<std::unique_ptr<OpenCase>> open_case_to_render(const std::string& path) {
-    std::thread tables([] {
+    std::shared_ptr<const PhysicalTextures> textures;
+    std::thread making([&textures] {
         try {
-            (void)rough_surfaces();
-            (void)fine_cubes();
-        } catch (const std::bad_alloc&) {  // reported where the tables are needed
+            textures = make_physical_textures();
+        } catch (const std::bad_alloc&) {  // the renderer makes its own, or reports it
         }
     });
     Result<std::unique_ptr<OpenCase>> opened = open_case(path);
-    tables.join();
+    making.join();
+    if (opened) (*opened)->textures = std::move(textures);
     return opened;
 }
 
@@ -48,6 +49,8 @@ Result<ScanEngine> make_engine(const OpenCase& open,
     render.kind = arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
     render.threads = arguments.threads;
     render.read_ahead = true;
+    render.textures = open.textures;
+    render.host = thread_host();
     render.scanlines = arguments.scanlines;
     render.samples = arguments.samples;
     render.effects = image.effects;

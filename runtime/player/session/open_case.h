@@ -9,14 +9,16 @@
 
 #include "formats/bundle/streamed_bundle.h"
 #include "formats/exercise/exercise.h"
+#include "runtime/imaging/renderer.h"
 
 namespace sonocase::runtime {
 
 struct OpenCase {
     std::string path;
     StreamedBundle bundle;
-    std::vector<Exercise> exercises;    // at least one: without any, a free scan
-    std::vector<std::string> warnings;  // whole sentences
+    std::vector<Exercise> exercises;                   // at least one: without any, a free scan
+    std::shared_ptr<const PhysicalTextures> textures;  // null: each renderer makes its own
+    std::vector<std::string> warnings;                 // whole sentences
 };
 
 // Exercises that do not parse are left out and named in `warnings`. On the heap, because renderer

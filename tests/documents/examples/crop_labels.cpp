@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 #include "documents/examples/crop_labels.h"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // Cuts a label volume down to the box of its body and a margin.
 #pragma once
 
@@ -19,7 +21,7 @@ struct CropResult {
 };
 
 // Labels, palette and frame stay; so does every voxel centre, to the last digit of its grid.
-// Errors: a volume without body. Cost: one pass over the voxels.
+// Errors: a volume without a body. Cost: one pass over the voxels.
 Result<CropResult> crop_labels(const LabelVolume& input, const CropOptions& options = {});
 
 }  // namespace sonocase::pipeline

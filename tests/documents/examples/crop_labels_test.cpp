@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The worked stage of docs/extending.md.
 #include "documents/examples/crop_labels.h"
 

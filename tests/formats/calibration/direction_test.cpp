@@ -102,7 +102,7 @@ TEST(Direction, StillShortAndCurvedSweepsSaySo) {
     EXPECT_FALSE(fit_direction(sweep({1, 0, 0}, 0, random, 0)).determined);
     EXPECT_NE(fit_direction(sweep({1, 0, 0}, 0, random, 0)).problem.find("moved only"),
               std::string::npos);
-    EXPECT_NE(fit_direction(sweep({1, 0, 0}, 5, random, 2)).problem.find("no line"),
+    EXPECT_NE(fit_direction(sweep({1, 0, 0}, 5, random, 2)).problem.find("not a straight line"),
               std::string::npos);
     EXPECT_NE(fit_direction({}).problem.find("0 usable"), std::string::npos);
     const DirectionFit brief = fit_direction(sweep({1, 0, 0}, 0.1, random, 12));

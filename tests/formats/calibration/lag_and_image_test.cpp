@@ -172,10 +172,10 @@ TEST(Quality, OldPoorAndStrangeCalibrationsAreNamed) {
     concern([](Calibration& c) { c.date = "2027-01-01"; }, "future");
     concern([](Calibration& c) { c.rms_mm = 3; }, "3.0 mm rms");
     concern([](Calibration& c) { c.rms_mm = -1; }, "does not say");
-    concern([](Calibration& c) { c.sigma_mm.y = INFINITY; }, "known to inf");
+    concern([](Calibration& c) { c.sigma_mm.y = INFINITY; }, "only to inf");
     concern([](Calibration& c) { c.condition = 1e4; }, "hardly determines");
     concern([](Calibration& c) { c.poses = 5; }, "5 readings");
-    concern([](Calibration& c) { c.sensor_from_tool.rotation(0, 0) = 2; }, "no proper rotation");
+    concern([](Calibration& c) { c.sensor_from_tool.rotation(0, 0) = 2; }, "not hold a proper rotation");
     concern([](Calibration& c) { c.scale = 0.001; }, "units");
 }
 

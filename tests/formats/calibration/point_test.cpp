@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "formats/calibration/least_squares.h"
 #include "formats/calibration/pose_screen.h"
+#include "formats/calibration/solve/least_squares.h"
 #include "support/calibration_motion.h"
 #include "support/read_recording.h"
 
@@ -304,6 +304,63 @@ TEST(PointCalibration, SlowDriftWidensTheSigma) {
         }
     }
     EXPECT_GT(inside / 300.0, 0.5);
+}
+
+// 57 poses with 2 mm noise, three of them 25 mm away from where they should be.
+std::vector<Pose> recording_with_strays(Random& random) {
+    PivotMotion motion;
+    motion.poses = 57;
+    motion.gaussian_mm = 2;
+    std::vector<Pose> poses = pivot_recording(motion, random);
+    for (const std::size_t i : {10u, 30u, 50u}) {
+        poses[i].tracker_from_tool.translation =
+            poses[i].tracker_from_tool.translation + 25.0 * random.direction();
+    }
+    return poses;
+}
+
+bool warns_of_shift(const PointFit& fit) {
+    return std::any_of(fit.warnings.begin(), fit.warnings.end(), [](const std::string& w) {
+        return w.find("with them the tip would lie") != std::string::npos;
+    });
+}
+
+TEST(PointCalibration, ShiftByPosesLeftOutIsTheDistanceToThePlainLeastSquaresTip) {
+    Random random(57);
+    int warned = 0, quiet = 0;
+    for (int draw = 0; draw < 50; ++draw) {
+        const std::vector<Pose> poses = recording_with_strays(random);
+        const PointFit fit = fit_point(poses, {.rests = RestSearch::one});
+        const PointFit all = fit_point(poses, {.rests = RestSearch::one, .reject_outliers = false});
+        ASSERT_TRUE(fit.determined);
+        ASSERT_LT(fit.inliers, fit.poses);
+        EXPECT_NEAR(fit.left_out_shift_mm, norm(fit.tip_mm - all.tip_mm), 1e-9);
+        EXPECT_EQ(all.left_out_shift_mm, 0);
+        // The warning says so exactly where the shift exceeds one standard deviation.
+        EXPECT_EQ(warns_of_shift(fit), fit.left_out_shift_mm > fit.left_out_sigma_mm);
+        EXPECT_GT(fit.left_out_sigma_mm,
+                  0.9 * std::min({fit.sigma_mm.x, fit.sigma_mm.y, fit.sigma_mm.z}));
+        EXPECT_LT(fit.left_out_sigma_mm,
+                  1.1 * std::max({fit.sigma_mm.x, fit.sigma_mm.y, fit.sigma_mm.z}));
+        (warns_of_shift(fit) ? warned : quiet) += 1;
+    }
+    EXPECT_GT(warned, 5);
+    EXPECT_GT(quiet, 5);
+}
+
+TEST(PointCalibration, ShiftIsZeroWhereNothingIsLeftOutAndNotMeasuredBetweenSeveralRests) {
+    Random random(58);
+    PivotMotion motion;
+    motion.gaussian_mm = 0.3;
+    const PointFit one = fit_point(pivot_recording(motion, random));
+    EXPECT_EQ(one.inliers, one.poses);
+    EXPECT_EQ(one.left_out_shift_mm, 0);
+    std::vector<Pose> poses = pivot_recording(motion, random);
+    motion.pivot_mm = motion.pivot_mm + Vector3{80, 0, 0};
+    for (const Pose& p : pivot_recording(motion, random)) poses.push_back(p);
+    const PointFit several = fit_point(poses, {.rests = RestSearch::several});
+    ASSERT_EQ(several.rests.size(), 2u);
+    EXPECT_LT(several.left_out_shift_mm, 0);
 }
 
 TEST(PointCalibration, SameReadingsSameAnswer) {

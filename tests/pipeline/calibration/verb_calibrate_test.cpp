@@ -61,11 +61,12 @@ TEST_F(CalibrateVerb, PointPrintsItsKeysSavesAndDraws) {
         << err_;
     const auto json = nlohmann::json::parse(out_);
     for (const char* key : {"tip_mm", "pivot_mm", "rms_mm", "sigma_mm", "condition", "poses",
-                            "inliers", "warnings"}) {
+                            "inliers", "left_out_shift_mm", "warnings"}) {
         EXPECT_TRUE(json.contains(key)) << key;
     }
     EXPECT_NEAR(json["tip_mm"][2].get<double>(), motion.tip_mm.z, 0.1);
     EXPECT_EQ(json["poses"], 100);
+    EXPECT_EQ(json["left_out_shift_mm"], 0);
     EXPECT_EQ(json["residuals"].size(), 100u);
     EXPECT_TRUE(err_.empty()) << err_;
     const auto saved = load_calibration(path("cal.json"));

@@ -8,13 +8,15 @@
 #include <filesystem>
 #include <map>
 
+#include "formats/bundle/stage_files.h"
 #include "formats/exercise/exercise.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/cook/exercise_frame.h"
 #include "pipeline/export/export_files.h"
 #include "pipeline/export/inspect_case.h"
 #include "pipeline/import/label_map.h"
 #include "pipeline/import/surface/surface_file.h"
+#include "pipeline/pack/exercise_frame.h"
+#include "pipeline/recipe/read_recipe.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
@@ -199,7 +201,7 @@ TEST(CookCase, StopsOnlyAtStagesThatTheCaseHasAndWithACache) {
     EXPECT_TRUE(folder.names().empty());
 }
 
-TEST(CookCase, DamagedCacheEntryIsMadeAgainAndToldOf) {
+TEST(CookCase, DamagedCacheEntryIsMadeAgainAndNoted) {
     const TemporaryFolder folder;
     CookOptions options;
     options.cache_folder = folder.path();
@@ -219,8 +221,8 @@ TEST(CookCase, DamagedCacheEntryIsMadeAgainAndToldOf) {
     EXPECT_EQ(write_bundle(first->bundle), write_bundle(second->bundle));
     bool told = false;
     for (const StageRun& run : second->stages)
-        for (const std::string& warning : run.report.warnings)
-            told = told || warning.find("damaged cache entry") != std::string::npos;
+        for (const std::string& note : run.cache_notes)
+            told = told || note.find("damaged cache entry") != std::string::npos;
     EXPECT_TRUE(told);
 }
 
@@ -230,7 +232,32 @@ TEST(CookCase, CacheThatCannotBeWrittenCostsAWarningAndNotTheCase) {
     options.cache_folder = folder.write("a-file", "x");  // no folder can be made below a file
     const auto cooked = cook_case(*coarse_recipe(), options);
     ASSERT_TRUE(cooked.has_value()) << cooked.error().message();
-    EXPECT_FALSE(cooked->stages[0].report.warnings.empty());
+    EXPECT_FALSE(cooked->stages[0].cache_notes.empty());
+}
+
+// A warning that happens to name the cache belongs to the bundle; notes on the cache do not.
+TEST(CookCase, NotesOnTheCacheAreKeptApartFromTheWarningsOfTheBundle) {
+    StageTable table = built_in_stages();
+    for (StageDescriptor& stage : table.stages)
+        if (stage.name == "import")
+            stage.run = [run = stage.run](StageInputs& inputs, const Progress& progress) {
+                auto value = run(inputs, progress);
+                LabelFile file = value->take<LabelFile>();
+                file.reports[0].warnings = {"a cache of gallstones lies in the label map"};
+                return Result<StageValue>(StageValue::of(std::move(file)));
+            };
+    const TemporaryFolder folder;
+    CookOptions options;
+    options.cache_folder = folder.write("a-file", "x");  // no folder can be made below a file
+    const auto base = coarse_recipe();
+    const std::vector<EmbeddedExercise> none;
+    const auto recipe = parse_recipe(base->text, "coarse.toml", {}, &none, table);
+    ASSERT_TRUE(recipe.has_value()) << recipe.error().message();
+    const auto cooked = cook_case(*recipe, options);
+    ASSERT_TRUE(cooked.has_value()) << cooked.error().message();
+    EXPECT_FALSE(cooked->stages[0].cache_notes.empty());
+    EXPECT_EQ(cooked->bundle.manifest.stages[0].warnings,
+              (std::vector<std::string>{"a cache of gallstones lies in the label map"}));
 }
 
 TEST(CookCase, WrongLabelsAndTissuesOfTheRecipeNameTheLine) {

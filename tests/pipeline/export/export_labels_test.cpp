@@ -9,8 +9,8 @@
 #include <set>
 
 #include "pipeline/export/export_level_sets.h"
-#include "pipeline/export/export_seg_nrrd.h"
-#include "pipeline/export/segmentation_pictures.h"
+#include "pipeline/export/labels/export_seg_nrrd.h"
+#include "pipeline/export/labels/segmentation_pictures.h"
 #include "pipeline/import/label_map.h"
 #include "support/shapes.h"
 

@@ -3,12 +3,14 @@
 #include "pipeline/import/label_map.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 
+#include "pipeline/import/volume/volume_file.h"
 #include "pipeline/import/volume_files.h"
 #include "support/paths.h"
 #include "support/temporary_folder.h"
@@ -274,6 +276,57 @@ void expect_refused(const Result<ImportedLabels>& imported,
 TEST(ImportLabelMapRefuses, WhatIsNotThere) {
     const TemporaryFolder folder;
     expect_refused(import_label_map(folder / "no.nii.gz"), folder / "no.nii.gz", "no such file");
+}
+
+// Without the check each of these would wait or read for ever.
+TEST(ImportLabelMapRefuses, PipesAndDevicesWithoutOpeningThem) {
+    const TemporaryFolder folder;
+    for (const char* name :
+         {"a.nii", "a.nii.gz", "a.nrrd", "a.nhdr", "a.mha", "a.mhd", "a.labels"}) {
+        const std::string pipe = folder / name;
+        ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+        expect_refused(import_label_map(pipe), pipe, "is a named pipe");
+        if (is_volume_file_name(pipe)) {
+            EXPECT_EQ(voxel_bytes_in_header(pipe), 0u);
+        }
+        const std::string device = folder / (std::string("zero_") + name);
+        std::filesystem::create_symlink("/dev/zero", device);
+        expect_refused(import_label_map(device), device, "is a device");
+    }
+}
+
+TEST(ImportLabelMapRefuses, PipesAndDevicesThatAHeaderRefersTo) {
+    const TemporaryFolder folder;
+    ASSERT_EQ(mkfifo((folder / "pipe.raw").c_str(), 0600), 0);
+    std::filesystem::create_symlink("/dev/zero", folder / "zero.raw");
+    const std::string meta =
+        "ObjectType = Image\nNDims = 3\nDimSize = 4 4 4\nElementType = MET_UCHAR\n"
+        "ElementDataFile = ";
+    const std::string nrrd =
+        "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4 4 4\nencoding: raw\ndata file: ";
+    for (const auto& [data, what] :
+         {std::pair{"pipe.raw", "is a named pipe"}, std::pair{"zero.raw", "is a device"}}) {
+        for (const auto& [name, head] :
+             {std::pair{"h.mhd", meta}, std::pair{"h.nhdr", nrrd}, std::pair{"h.nrrd", nrrd}}) {
+            const std::string path = folder.write(name, head + data + "\n");
+            expect_refused(import_label_map(path), data, what);
+            EXPECT_EQ(voxel_bytes_in_header(path), 0u);
+        }
+    }
+    const std::string list = folder.write("l.mhd", meta + "LIST\npipe.raw\n");
+    expect_refused(import_label_map(list), "raw", "is a ");
+    const std::string absent = folder.write("n.nhdr", nrrd + "absent.raw\n");
+    expect_refused(import_label_map(absent), absent, "is not there");
+}
+
+TEST(ImportLabelMapRefuses, FoldersThatHoldAPipe) {
+    const TemporaryFolder folder;
+    folder.write("slices/a.dcm", "no DICOM");
+    ASSERT_EQ(mkfifo((folder / "slices/b.dcm").c_str(), 0600), 0);
+    expect_refused(import_label_map(folder / "slices"), "b.dcm", "is a named pipe");
+    folder.write("masks/a.nii", testing::nifti_bytes(ras_volume()));
+    ASSERT_EQ(mkfifo((folder / "masks/b.nii").c_str(), 0600), 0);
+    expect_refused(import_label_map(folder / "masks"), "b.nii", "is a named pipe");
 }
 
 TEST(ImportLabelMapRefuses, EveryTruncationOfEveryFormat) {

@@ -277,6 +277,26 @@ TEST(ImportSurfaceRefuses, TooFewPointsNoneAndWhatIsNotThere) {
     }
 }
 
+// Without the check each of these would wait or read for ever.
+TEST(ImportSurfaceRefuses, PipesAndDevicesWithoutOpeningThem) {
+    const TemporaryFolder folder;
+    for (const char* name : {"p.ply", "p.stl", "p.obj", "p.vtp", "p.csv", "p.xyz"}) {
+        const std::string pipe = folder / name;
+        ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+        const std::string device = folder / (std::string("zero_") + name);
+        std::filesystem::create_symlink("/dev/zero", device);
+        for (const auto& [path, what] :
+             {std::pair{pipe, "is a named pipe"}, std::pair{device, "is a device"}}) {
+            const auto surface = import_surface(path);
+            ASSERT_FALSE(surface.has_value()) << path;
+            EXPECT_NE(surface.error().what.find(what), std::string::npos)
+                << surface.error().message();
+            EXPECT_EQ(surface.error().where, path);
+            EXPECT_FALSE(surface.error().expected.empty());
+        }
+    }
+}
+
 TEST(ImportSurfaceRefuses, EveryTruncationOfFormatsThatSayTheirLength) {
     const TemporaryFolder folder;
     const Mesh mesh = ellipsoid();

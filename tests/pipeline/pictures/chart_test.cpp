@@ -10,6 +10,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "pipeline/pictures/chart_legend.h"
+
 namespace sonocase::pipeline {
 namespace {
 
@@ -52,6 +54,62 @@ TEST(Chart, SvgHoldsTheTitle) {
     for (const char* words : {"Error against time", "seconds", "error in mm", "front", "paper"}) {
         EXPECT_NE(svg.find(words), std::string::npos) << words;
     }
+}
+
+// The names that the trade-off plots show, and longer ones.
+std::vector<LegendItem> six_items() {
+    return {
+        {"settings tried", SeriesLook::points, {190, 190, 190, 255}, 2.5},
+        {"Pareto front", SeriesLook::line_and_points, {0, 114, 178, 255}, 2},
+        {"preset draft: 2.0 mm voxels, no residual warp", SeriesLook::points, {9, 9, 9, 255}, 4.5},
+        {"preset standard", SeriesLook::diamonds, {9, 9, 9, 255}, 4.5},
+        {"preset best", SeriesLook::crosses, {9, 9, 9, 255}, 4.5},
+        {"paper", SeriesLook::dashed, {9, 9, 9, 255}, 12}};
+}
+
+TEST(ChartLegend, FrameHoldsWordsAndSymbolsAndNothingOverlaps) {
+    const Legend legend = lay_out_legend(six_items(), 700);
+    ASSERT_EQ(legend.entries.size(), 6u);
+    double above = legend.height;
+    for (const LegendEntry& e : legend.entries) {
+        for (const LegendBox& box : {e.symbol, e.words}) {
+            EXPECT_GT(box.left, 0);
+            EXPECT_GT(box.bottom, 0);
+            EXPECT_LT(box.left + box.width, legend.width) << e.item.name;
+            EXPECT_LT(box.bottom + box.height, above) << e.item.name;
+        }
+        EXPECT_LT(e.symbol.left + e.symbol.width, e.words.left) << e.item.name;
+        EXPECT_GT(e.words.width, 4.0 * static_cast<double>(e.item.name.size())) << e.item.name;
+        above = e.symbol.bottom;
+    }
+    EXPECT_EQ(legend.entries[2].item.name, six_items()[2].name);  // not shortened
+}
+
+TEST(ChartLegend, NamesThatDoNotFitAreShortenedBetweenCharacters) {
+    std::vector<LegendItem> items = six_items();
+    items[0].name.clear();
+    for (int i = 0; i < 200; ++i) items[0].name += "\xc3\xa4";  // a with two dots
+    const Legend legend = lay_out_legend(items, 250);
+    EXPECT_LE(legend.width, 250);
+    const std::string& name = legend.entries[0].item.name;
+    ASSERT_TRUE(name.ends_with("..."));
+    EXPECT_EQ((name.size() - 3) % 2, 0u);
+    EXPECT_GT(name.size(), 20u);
+    EXPECT_EQ(lay_out_legend({}, 250).width, 0);
+}
+
+TEST(ChartLegend, IsDrawnOutsideThePlotWhereItIsLong) {
+    ChartSheet one;
+    one.charts.push_back(sheet().charts[0]);
+    one.charts[0].series.clear();
+    for (const LegendItem& item : six_items())
+        one.charts[0].series.push_back({item.name, {1, 2, 3}, {3, 2, 1}, item.look});
+    const std::string path = ::testing::TempDir() + "chart_legend";
+    ASSERT_TRUE(write_chart_svg(one, path + ".svg"));
+    ASSERT_TRUE(write_chart_png(one, path + ".png"));
+    const std::string svg = read_all(path + ".svg");
+    for (const LegendItem& item : six_items())
+        EXPECT_NE(svg.find(">" + item.name + "<"), std::string::npos) << item.name;
 }
 
 TEST(Chart, FolderThatCannotBeIsAnErrorThatNamesTheFile) {

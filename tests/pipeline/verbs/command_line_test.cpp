@@ -187,7 +187,9 @@ TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {
     const CommandResult damaged = sonocase_run("validate bad.sonocase", folder);
     EXPECT_EQ(damaged.status, 1);
     EXPECT_EQ(lines(damaged.error), 1) << damaged.error;
-}  // The stages one by one, files in and files out, come to what build makes of the same inputs.
+}
+
+// The stages one by one, files in and files out, come to what build makes of the same inputs.
 TEST(CommandLine, StagesAloneMakeTheCaseThatBuildMakes) {
     const TemporaryFolder folder;
     const auto ok = [&](const std::string& arguments) {
@@ -220,12 +222,55 @@ TEST(CommandLine, StagesAloneMakeTheCaseThatBuildMakes) {
         EXPECT_EQ(read_text(folder / (std::string("parts/") + name)),
                   read_text(folder / (std::string("whole/") + name)))
             << name;
+    // Structure may also be baked by its own verb, before packing.
+    ASSERT_TRUE(ok("structure cooked.labels -o baked.labels"));
+    ASSERT_TRUE(
+        ok("pack --labels baked.labels --textures bank.textures --surface in/mannequin.ply "
+           "--no-structure -o baked.sonocase"));
+    ASSERT_TRUE(ok("export baked.sonocase -o baked"));
+    EXPECT_EQ(read_text(folder / "baked/echo-offset.nrrd"),
+              read_text(folder / "whole/echo-offset.nrrd"));
     // No seconds in the files between: made again they are the same.
     const std::string first = read_text(folder / "cooked.labels");
     ASSERT_TRUE(
         ok("resample ct.labels --registration reg.json --voxel-mm 6 -o cooked.labels"
            " --threads 1"));
     EXPECT_TRUE(first == read_text(folder / "cooked.labels"));
+}
+
+// A folder that does not exist is created, but not silently: it may be a typing error.
+TEST(CommandLine, NewFolderOfAnOutputFileIsNamedBeforeTheWork) {
+    const TemporaryFolder folder;
+    folder.write("case.toml", kTinyRecipe);
+    const CommandResult new_folder =
+        sonocase_run("build case.toml --until import --cache c --report no/such/r.json", folder);
+    EXPECT_EQ(new_folder.status, 0) << new_folder.error;
+    EXPECT_NE(new_folder.error.find("note: folder no/such does not exist and will be created"),
+              std::string::npos)
+        << new_folder.error;
+    EXPECT_TRUE(std::filesystem::exists(folder / "no/such/r.json"));
+    const CommandResult old_folder =
+        sonocase_run("build case.toml --until import --cache c --report no/such/r.json", folder);
+    EXPECT_EQ(old_folder.error, "");
+}
+
+// Every option of a stage is a flag of its verb; a switch takes true or false as in a recipe.
+TEST(CommandLine, OptionsOfAStageAreFlagsOfItsVerb) {
+    const TemporaryFolder folder;
+    const std::string resample = sonocase_run("resample --help", folder).out;
+    for (const char* flag : {"--voxel-mm", "--follow-shift", "--snap-vx", "--closest-point"})
+        EXPECT_NE(resample.find(flag), std::string::npos) << flag;
+    const std::string fit = sonocase_run("register --help", folder).out;
+    for (const char* flag : {"--starts", "--trials", "--paper", "--no-residual", "--spacing-mm"})
+        EXPECT_NE(fit.find(flag), std::string::npos) << flag;
+    for (const char* given : {"--closest-point false", "--no-closest-point", "--closest-point",
+                              "--passes 2 --iterations 3"}) {
+        const CommandResult result =
+            sonocase_run(std::string("smooth no.labels -o x.labels ") + given, folder);
+        EXPECT_EQ(result.status, 1) << given << result.error;  // the file, not the flags
+        EXPECT_NE(result.error.find("no.labels"), std::string::npos) << result.error;
+    }
+    EXPECT_EQ(sonocase_run("smooth no.labels -o x.labels --passes 21", folder).status, 2);
 }
 
 }  // namespace

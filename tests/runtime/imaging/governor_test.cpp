@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/imaging/governor.h"
+#include "runtime/imaging/accuracy/governor.h"
 
 #include <gtest/gtest.h>
 
@@ -24,8 +24,8 @@ TEST(Governor, SettlesOnTheFinestLevelThatFits) {
     }
 }
 
-// Each level gives up something of both, and saves less than the samples that it leaves out: some
-// of a frame is the same for all.
+// Each level gives up some beams and some samples, and saves less than their share: part of a
+// frame's work is the same at all levels.
 TEST(Governor, LevelsFallInEveryRespect) {
     for (std::size_t i = 1; i < kAccuracyLevels.size(); ++i) {
         const AccuracyLevel &finer = kAccuracyLevels[i - 1], &coarser = kAccuracyLevels[i];
@@ -46,16 +46,23 @@ TEST(Governor, ComesBackWhenTheSceneIsEasyAndIgnoresOneLateFrame) {
     EXPECT_EQ(governor.level(), 0);
 }
 
+// A clock by which everything is slow: it advances by a second per call.
+double every_frame_takes_long() {
+    static double now_s = 0;
+    return now_s += 1;
+}
+
 TEST(Governor, OffByDefaultAndTheFirstLevelIsTheFullPicture) {
     Governor off;
     for (int i = 0; i < 100; ++i) off.frame_took(1e6);
     EXPECT_EQ(off.level(), 0);
     RenderOptions options;
     options.width_px = options.height_px = 128;
+    options.host.clock = every_frame_takes_long;
     const auto plain = draw(phantom_exercise(), options, needle_input());
     options.frame_budget_ms = 1e6;
     EXPECT_TRUE(draw(phantom_exercise(), options, needle_input()) == plain);
-    options.frame_budget_ms = 1e-6;  // cannot be met: ends at the coarsest, and says so
+    options.frame_budget_ms = 1;  // cannot be met: ends at the coarsest, and says so
     auto renderer = Renderer::create(phantom(), phantom_exercise(), options);
     ASSERT_TRUE(renderer.has_value());
     std::vector<std::uint8_t> pixels(128 * 128);
@@ -63,6 +70,19 @@ TEST(Governor, OffByDefaultAndTheFirstLevelIsTheFullPicture) {
     EXPECT_EQ(renderer->accuracy().level, 3);
     EXPECT_EQ(renderer->accuracy().scanlines, 96);
     EXPECT_LT(compare(pixels, plain).mean, 25);  // the same scene
+}
+
+TEST(Governor, DoesNothingWithoutAClock) {
+    RenderOptions options;
+    options.width_px = options.height_px = 64;
+    options.frame_budget_ms = 1e-6;
+    auto renderer = Renderer::create(phantom(), phantom_exercise(), options);
+    ASSERT_TRUE(renderer.has_value());
+    std::vector<std::uint8_t> pixels(64 * 64);
+    for (int i = 0; i < 30; ++i) renderer->render(needle_input(), pixels);
+    EXPECT_EQ(renderer->accuracy().level, 0);
+    EXPECT_EQ(renderer->accuracy().levels, 1);
+    for (const EffectCost& cost : renderer->costs()) EXPECT_EQ(cost.ms, 0) << cost.name;
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Scenes, poses and sizes at the edge of what can be asked, with both models: they render, agree
+// Scenes, poses and sizes at the limits of what is allowed, with both models: they render, agree
 // with the slow renderer, and look as they must.
 #include <gtest/gtest.h>
 
@@ -102,6 +102,24 @@ TEST(HardCases, BadPosesHoldTheFrameOfBothModels) {
             input.mannequin_from_probe = pose;
             EXPECT_EQ(renderer->render(input, pixels), FrameStatus::held_bad_pose);
             EXPECT_EQ(pixels, before);
+        }
+    }
+}
+
+TEST(HardCases, SkippingWhatCannotShowNeverChangesAPixel) {
+    for (const ImageModel model : kModels) {
+        for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+            Random random(seed);
+            FrameInput input = needle_input();
+            input.mannequin_from_probe = random_pose(random);
+            if (seed % 2) input.needle.tip = random.point(80);
+            RenderOptions pruned, all;
+            pruned.model = all.model = model;
+            all.effects = {"all"};
+            pruned.width_px = pruned.height_px = all.width_px = all.height_px = 256;
+            EXPECT_TRUE(draw(phantom_exercise(), pruned, input) ==
+                        draw(phantom_exercise(), all, input))
+                << seed;
         }
     }
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "runtime/imaging/renderer.h"
-#include "runtime/imaging/simd/simd_target.h"
+#include "runtime/workers/thread_host.h"
 #include "support/phantom_bundle.h"
 #include "support/picture.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A bundle that is unpacked as frames need it shows what a bundle that is all there shows, wherever
-// the probe is, whatever moves.
+// A bundle that is unpacked as frames need it shows what a complete bundle shows, wherever the
+// probe is and whatever moves.
 #include "formats/bundle/streamed_bundle.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,8 @@ namespace {
 
 using sonocase::testing::TemporaryFolder;
 
-// What was not unpacked is not there: its records turn everything into label 1 beyond a plane.
+// Blocks that are not unpacked hold nonsense: records that turn everything beyond a plane into
+// label 1.
 StreamedBundle opened(const std::string& path) {
     auto bundle = open_bundle(path);
     EXPECT_TRUE(bundle.has_value());
@@ -79,6 +80,7 @@ TEST(OpenBundle, ReadingAheadChangesNoPixel) {
     const Exercise exercise = phantom_exercise();
     auto expected = Renderer::create(whole, exercise, options);
     options.read_ahead = true;
+    options.host = thread_host();
     auto renderer = Renderer::create(parts, exercise, options);
     ASSERT_TRUE(expected);
     ASSERT_TRUE(renderer);
@@ -92,7 +94,7 @@ TEST(OpenBundle, ReadingAheadChangesNoPixel) {
     }
 }
 
-// The phantom ends within what is read round the plane: a probe at rest finds all of it in the end.
+// The phantom ends within what is read around the plane: a probe at rest ends up with all of it.
 TEST(OpenBundle, ReadsAheadRoundThePlane) {
     const TemporaryFolder folder;
     const std::string path = folder / "phantom.sonocase";
@@ -103,6 +105,7 @@ TEST(OpenBundle, ReadsAheadRoundThePlane) {
     for (const bool ahead : {false, true}) {
         const StreamedBundle parts = opened(path);
         options.read_ahead = ahead;
+        options.host = thread_host();
         auto renderer = Renderer::create(parts, phantom_exercise(), options);
         ASSERT_TRUE(renderer);
         renderer->render({}, pixels);

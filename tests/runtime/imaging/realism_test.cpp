@@ -26,7 +26,7 @@ struct Bench {
     PhysicalScene scene;
     physical::Tables tables;
     PhysicalNoise noise;
-    WorkerPool workers{1};
+    SerialWorkers workers;
     std::vector<float> gain;
     std::unique_ptr<PhysicalFast> renderer;
     PhysicalFrame frame;
@@ -36,9 +36,11 @@ struct Bench {
         geometry = make_scan_geometry(exercise.probe, 192, 512, 512, 512);
         scene = *make_physical_scene(bundle);
         tables = physical::make_tables(exercise.probe, geometry);
-        noise = make_physical_noise(1, 192 + 128);
+        noise = make_physical_noise(scene.textures->normal_levels, 1, 192 + 128);
         gain.assign(512, 0.0f);
-        renderer = std::make_unique<PhysicalFast>(scene, geometry, tables, noise, workers);
+        renderer = std::make_unique<PhysicalFast>(
+            scene, geometry, tables, noise,
+            RenderContext{workers, serial_jobs(), available_simd_targets().front()});
         frame.row_gain_db = gain;
         pixels.resize(512 * 512);
     }

@@ -64,7 +64,7 @@ TEST(ScanGeometry, PictureIsSymmetricSoThatAFlipMirrorsIt) {
 TEST(ScanConversionTable, NamesTheSamplesRoundAPixel) {
     const ScanGeometry g =
         make_scan_geometry(probe_of(ProbeShape::curvilinear), 192, 512, 256, 256);
-    const ScanConversionTable table = make_scan_conversion_table(g, 192);
+    const ScanConversionTable table = make_scan_conversion_table(serial_jobs(), g, 192);
     ASSERT_FALSE(table.runs.empty());
     for (const PixelRun& run : table.runs) {
         for (int c = run.begin; c < run.end; ++c) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A stretch of one block of beams on its way through the stages of beam_sampler.cpp. Each stage is
-// one loop over the rows, so that look-ups of many rows are under way at once and a stage that a
-// stretch does not call for costs one test.
+// one loop over the rows, so that the look-ups of many rows overlap and a stage that a stretch does
+// not need costs one test.
 #pragma once
 
 #include <cstdint>
@@ -26,12 +26,12 @@ struct BeamChunk {
     int beam = 0;             // of the block: the vector's first
 
     ChunkRows<float> x, y, z;              // place in voxels
-    ChunkRows<float> off_x, off_y, off_z;  // from the centre of the voxel asked
+    ChunkRows<float> off_x, off_y, off_z;  // from the centre of the voxel looked up
     ChunkRows<std::int32_t> brick;         // index of its first table word
     ChunkRows<std::int32_t> cell;          // voxel within the brick; negative outside the volume
     ChunkRows<std::int32_t> entry;         // the brick's label word
     ChunkRows<std::int32_t> echo_word;     // the brick's echo word
-    // First where the voxel's value lies in its pool, then the value.
+    // First the index of the voxel's value in its pool, then the value.
     ChunkRows<std::int32_t> label;      // also index of a target's look
     ChunkRows<std::int32_t> record;     // of the voxel's surface; kNoBoundary: none
     ChunkRows<std::int32_t> structure;  // baked echo offset, 1/16 dB
@@ -39,7 +39,7 @@ struct BeamChunk {
     ChunkRows<std::int32_t> scatterers;  // pair of signed bytes in the upper half
     ChunkRows<float> echo_re, echo_im;   // of surfaces
     ChunkRows<float> edge_loss;          // log2 of amplitude per mm
-    ChunkRows<float> facing;             // of the surface met, 1 where none
+    ChunkRows<float> facing;             // of the surface that was met, 1 where there is none
 
     // What the stretch holds.
     bool pooled = false;       // bricks of more than one label

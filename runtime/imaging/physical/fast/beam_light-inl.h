@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effects attenuation, bone_tail and gas_ring_down: the light that is left on each beam, and the
+// Effects attenuation, bone_tail and gas_ring_down: the light that remains on each beam, and the
 // tails behind bone and gas.
 #include "runtime/imaging/simd/simd_math-inl.h"
 //
@@ -36,7 +36,7 @@ HWY_INLINE void fade_tails(D d, const PhysicalBlock& b, BeamLight<D>& t) {
     t.gas = hn::Mul(t.gas, hn::Set(d, b.decay.gas));
 }
 
-// Lines between the probe's face and one of gas.
+// Lines of reverberation between the probe's face and a face of gas.
 template <class D>
 HWY_INLINE hn::Vec<D> reverb_power(D d, const PhysicalBlock& b, float r, BeamLight<D>& t) {
     const auto off = hn::Mul(hn::Sub(hn::Set(d, r), t.next), hn::Set(d, 1 / b.reverb_mm));
@@ -63,8 +63,8 @@ HWY_INLINE hn::Vec<D> tail_power(D d, const PhysicalBlock& b, int k, BeamLight<D
     return power;
 }
 
-// A face of bone or gas lights its tails: of gas from the second sample on, as one alone is a
-// neighbour's that a random look-up brought. above_mm: depth of the sample above.
+// A face of bone or gas lights its tails; gas only from its second sample on, since a single one
+// belongs to a neighbour that the random look-up hit. above_mm: depth of the sample above.
 template <class D, class V, class I>
 HWY_INLINE void light_tails(
     D d, V light_and_gain, V facing, I kind, float above_mm, BeamLight<D>& t) {
@@ -89,7 +89,7 @@ HWY_INLINE void light_tails(
     t.bone_slow = hn::IfThenElse(to_bone, raise(t.bone_slow, slow), t.bone_slow);
     t.bone_floor = hn::IfThenElse(to_bone, raise(t.bone_floor, floor), t.bone_floor);
     t.gas = hn::IfThenElse(to_gas, raise(t.gas, ring), t.gas);
-    // Only a surface that was seen to face the beam is a mirror.
+    // Only a surface whose direction is known is a mirror.
     const auto mirror =
         hn::IfThenElseZero(hn::Lt(facing, hn::Set(d, 1.0f)),
                            hn::Mul(hn::Mul(light_and_gain, facing),
@@ -144,7 +144,7 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
         t.before_that = t.before = hn::And(hn::Load(di, c.look.row(c.rows - 1)), kind_bits);
 }
 
-// kHard: the scene holds bone or gas at all.
+// kHard: the scene contains bone or gas.
 template <bool kHard, class D>
 HWY_NOINLINE void light_chunk(D d, const PhysicalBlock& b, const BeamChunk& c, BeamLight<D>& t) {
     if constexpr (!kHard) {
@@ -159,7 +159,7 @@ HWY_NOINLINE void light_chunk(D d, const PhysicalBlock& b, const BeamChunk& c, B
     }
 }
 
-// From a sample on all beams are dead: only their tails go on.
+// From sample `first` on, all beams are dead: only their tails continue.
 template <class D>
 HWY_INLINE void dark_rows(D d, const PhysicalBlock& b, int beam, int first, BeamLight<D>& t) {
     const hn::RebindToSigned<D> di;

@@ -11,13 +11,13 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 //
-#include "runtime/imaging/simd/simd_math-inl.h"
+#include "runtime/imaging/needle/needle_chord-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 using namespace physical;
 
-// The needle over a sampled block: mirror, shadow and tail. See needle_share() for the chord.
+// The needle over a sampled block: mirror, shadow and tail.
 void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int row_end) {
     const hn::CappedTag<float, kBeamBlock> d;
     const hn::RebindToSigned<decltype(d)> di;
@@ -40,44 +40,15 @@ void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int ro
             const auto light = hn::LoadU(d, b.light + at);
             if (k < row_end) {
                 const auto r = hn::Set(d, b.r[k]);
-                const auto wx = hn::Add(ox, hn::Mul(r, dx)), wz = hn::Add(oz, hn::Mul(r, dz));
-                const auto wy = hn::Set(d, n.wy);
-                const auto u0 =
-                    hn::Add(hn::Add(hn::Mul(wx, hn::Set(d, n.ax)), hn::Set(d, n.wy * n.ay)),
-                            hn::Mul(wz, hn::Set(d, n.az)));
-                auto low = hn::Set(d, -0.5f * n.slab), high = hn::Set(d, 0.5f * n.slab);
-                const auto bb = hn::Sub(wy, hn::Mul(u0, hn::Set(d, n.ay)));
-                const auto px = hn::Sub(wx, hn::Mul(u0, hn::Set(d, n.ax))),
-                           pz = hn::Sub(wz, hn::Mul(u0, hn::Set(d, n.az)));
-                const auto c =
-                    hn::Sub(hn::Add(hn::Add(hn::Mul(px, px), hn::Mul(bb, bb)), hn::Mul(pz, pz)),
-                            hn::Set(d, n.radius * n.radius));
-                auto hit = hn::Le(c, zero);
-                if (n.a > 1e-6f) {
-                    const auto disc = hn::Sub(hn::Mul(bb, bb), hn::Mul(hn::Set(d, n.a), c));
-                    hit = hn::Gt(disc, zero);
-                    const auto root = hn::Sqrt(hn::Max(disc, zero));
-                    low = hn::Max(low, hn::Div(hn::Sub(hn::Neg(bb), root), hn::Set(d, n.a)));
-                    high = hn::Min(high, hn::Div(hn::Sub(root, bb), hn::Set(d, n.a)));
-                }
-                if (std::abs(n.ay) > 1e-6f) {
-                    const auto y0 = hn::Div(hn::Set(d, -n.length) - u0, hn::Set(d, n.ay)),
-                               y1 = hn::Div(hn::Neg(u0), hn::Set(d, n.ay));
-                    low = hn::Max(low, hn::Min(y0, y1));
-                    high = hn::Min(high, hn::Max(y0, y1));
-                } else {
-                    hit =
-                        hn::And(hit, hn::And(hn::Le(u0, zero), hn::Ge(u0, hn::Set(d, -n.length))));
-                }
+                const auto chord =
+                    needle_chord(d, n, hn::Add(ox, hn::Mul(r, dx)), hn::Add(oz, hn::Mul(r, dz)));
                 const auto seen = hn::Min(
-                    hn::IfThenElseZero(
-                        hit, hn::Div(hn::Max(hn::Sub(high, low), zero), hn::Set(d, diameter))),
+                    hn::IfThenElseZero(chord.hit, hn::Div(chord.length_mm, hn::Set(d, diameter))),
                     one);
-                const auto back = hn::Max(hn::Neg(u0), zero);
                 const auto glint = hn::Mul(
                     hn::Set(d, 0.25f),
-                    hn::Max(hn::Sub(one,
-                                    hn::Mul(back, hn::Set(d, static_cast<float>(1 / kTipGlintMm)))),
+                    hn::Max(hn::Sub(one, hn::Mul(chord.from_tip_mm,
+                                                 hn::Set(d, static_cast<float>(1 / kTipGlintMm)))),
                             zero));
                 const auto rough = hn::Set(d, static_cast<float>(kNeedleDiffuse));
                 const auto bright =
@@ -112,11 +83,9 @@ namespace sonocase::runtime {
 
 HWY_EXPORT(needle_physical);
 
-void draw_physical_needle(PhysicalBlock& block,
-                          const NeedleRow& needle,
-                          int row_begin,
-                          int row_end) {
-    HWY_DYNAMIC_DISPATCH(needle_physical)(block, needle, row_begin, row_end);
+void draw_physical_needle(
+    SimdTarget simd, PhysicalBlock& block, const NeedleRow& needle, int row_begin, int row_end) {
+    HWY_DISPATCH_TABLE(needle_physical)[simd.index](block, needle, row_begin, row_end);
 }
 
 }  // namespace sonocase::runtime

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effects contact, breathing, elevation and slice: where each sample of a stretch lies, and the
-// label of the voxel there.
-#include "runtime/imaging/simd/simd_math-inl.h"
+// Effects elevation and slice: where in the slab each sample of a stretch lies, and the label of
+// the voxel there.
+#include "runtime/imaging/physical/fast/beam_walk-inl.h"
 //
 #include "runtime/imaging/physical/fast/beam_chunk.h"
 
@@ -16,20 +16,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 
-// A jumping probe finds nothing in cache, and a look-up that waits holds up all behind it: each
-// stage asks for the lines that a later one will read.
+// A jumping probe finds nothing in the cache, and a look-up that waits holds up all that follow:
+// each stage prefetches the lines that a later one will read.
 template <class T>
 HWY_INLINE void fetch_lanes(const T* pool, const std::int32_t* at, int lanes) {
     for (int lane = 0; lane < lanes; ++lane) hwy::Prefetch(pool + at[lane]);
-}
-
-// Weight of the breathing shift at a row: between the nodes of its field.
-template <class D>
-HWY_INLINE hn::Vec<D> breathing_weight(D d, const PhysicalBlock& b, int beam, int k) {
-    const float* node = b.breathing + (k / kBreathingNode) * b.lines + beam;
-    const auto w0 = hn::LoadU(d, node), w1 = hn::LoadU(d, node + b.lines);
-    const auto part = hn::Set(d, static_cast<float>(k % kBreathingNode) / kBreathingNode);
-    return hn::Add(w0, hn::Mul(hn::Sub(w1, w0), part));
 }
 
 template <class D>
@@ -39,9 +30,7 @@ HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     const int v = c.beam;
     const auto beam = [&](int number)
                           HWY_ATTR { return hn::LoadU(d, b.beams + number * b.lines + v); };
-    const auto ox = beam(kVoxelOrigin), oy = beam(kVoxelOrigin + 1), oz = beam(kVoxelOrigin + 2);
-    const auto vx = beam(kVoxelPerMm), vy = beam(kVoxelPerMm + 1), vz = beam(kVoxelPerMm + 2);
-    const auto gap = beam(kGap);
+    const auto walk = beam_walk(d, b, v, kVoxelOrigin, kVoxelPerMm, b.shift_voxel);
     const auto jitter = hn::Set(d, static_cast<float>(physical::kLookupJitter) / 32);
     const auto jx = hn::Mul(beam(kBeam), jitter), jy = hn::Mul(beam(kBeam + 1), jitter),
                jz = hn::Mul(beam(kBeam + 2), jitter);
@@ -55,16 +44,8 @@ HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
                sz = hn::Set(du, static_cast<std::uint32_t>(b.size.z));
     for (int row = 0; row < c.rows; ++row) {
         const int k = c.first + row;
-        const auto s = hn::Add(hn::Set(d, b.r[k]), hn::Mul(gap, hn::Set(d, b.contact[k])));
-        auto px = hn::Add(ox, hn::Mul(vx, s)), py = hn::Add(oy, hn::Mul(vy, s)),
-             pz = hn::Add(oz, hn::Mul(vz, s));
-        if (b.breathing != nullptr) {
-            const auto w = breathing_weight(d, b, v, k);
-            px = hn::Sub(px, hn::Mul(w, hn::Set(d, b.shift_voxel[0])));
-            py = hn::Sub(py, hn::Mul(w, hn::Set(d, b.shift_voxel[1])));
-            pz = hn::Sub(pz, hn::Mul(w, hn::Set(d, b.shift_voxel[2])));
-        }
-        // The slab's sample, and the voxel asked: a random step away.
+        auto [px, py, pz] = walk.at(d, b, v, k);
+        // The slab's sample, and the voxel that is looked up: a random step away.
         const auto j1 = noise_of(d, b.white + b.elevation_start[k] + v);
         const auto j2 = noise_of(d, b.white + b.lookup_start[k] + v);
         const auto e = hn::Mul(j1, hn::Set(d, b.elevation[k]));
@@ -109,7 +90,7 @@ HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     }
 }
 
-// The words of each sample's brick, and where in the pools its voxel lies.
+// The words of each sample's brick, and the index of its voxel in the pools.
 template <class D>
 HWY_NOINLINE void entry_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     const hn::RebindToSigned<D> di;

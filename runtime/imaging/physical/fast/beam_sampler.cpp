@@ -22,7 +22,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 
-// kHard: the scene holds bone or gas; without, nothing of their tails is compiled in.
+// kHard: the scene contains bone or gas; the other version has no code for their tails.
 template <bool kHard>
 void sample_beams_as(PhysicalBlock& b) {
     using D = hn::CappedTag<float, kBeamBlock>;
@@ -94,8 +94,8 @@ namespace sonocase::runtime {
 
 HWY_EXPORT(sample_beams);
 
-void sample_beam_block(PhysicalBlock& block) {
-    HWY_DYNAMIC_DISPATCH(sample_beams)(block);
+void sample_beam_block(SimdTarget simd, PhysicalBlock& block) {
+    HWY_DISPATCH_TABLE(sample_beams)[simd.index](block);
 }
 
 }  // namespace sonocase::runtime

@@ -4,11 +4,12 @@
 #pragma once
 
 #include "runtime/imaging/physical/fast/physical_kernels.h"
+#include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime {
 
-// Fills echoes, light and, from tail_from on, tail; says what it met. Cost: about 5 ns a sample of
-// one beam with AVX-512.
-void sample_beam_block(PhysicalBlock& block);
+// Fills echoes, light and, from tail_from on, tail; reports what it met. Cost: about 5 ns per
+// sample of one beam with AVX-512.
+void sample_beam_block(SimdTarget simd, PhysicalBlock& block);
 
 }  // namespace sonocase::runtime

@@ -2,7 +2,9 @@
 
 // Effects structure, fine_structure and speckle: the scatterers of a stretch, with the echoes of
 // its surfaces.
-#include "runtime/imaging/physical/fast/beam_place-inl.h"
+#include "runtime/imaging/physical/fast/beam_walk-inl.h"
+//
+#include "runtime/imaging/physical/fast/beam_chunk.h"
 
 #if defined(SONOCASE_BEAM_SCATTER_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SONOCASE_BEAM_SCATTER_INL_H
@@ -14,7 +16,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 
-// Looks of the labels; in most places all beams are in one.
+// Acoustic properties of the labels; in most places all beams are in one.
 template <class D>
 HWY_NOINLINE void look_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
     const hn::RebindToSigned<D> di;
@@ -53,7 +55,8 @@ HWY_NOINLINE void structure_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
     }
 }
 
-// Fibres and septa, 1/16 dB. Label by label: one as a rule, and no lane depends on its neighbours.
+// Fibres and septa, 1/16 dB. Label by label (mostly a single one), so that no lane depends on its
+// neighbours.
 template <class D>
 HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) {
     static_assert(physical::kFineEdge == 64);
@@ -92,24 +95,11 @@ HWY_NOINLINE void speckle_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     using namespace physical;
     const hn::RebindToSigned<D> di;
     const int v = c.beam;
-    const auto beam = [&](int number)
-                          HWY_ATTR { return hn::LoadU(d, b.beams + number * b.lines + v); };
-    const auto ox = beam(kSpeckleOrigin), oy = beam(kSpeckleOrigin + 1),
-               oz = beam(kSpeckleOrigin + 2);
-    const auto vx = beam(kSpecklePerMm), vy = beam(kSpecklePerMm + 1), vz = beam(kSpecklePerMm + 2);
-    const auto gap = beam(kGap);
+    const auto walk = beam_walk(d, b, v, kSpeckleOrigin, kSpecklePerMm, b.shift_speckle);
     const auto mask = hn::Set(di, (1 << kSpeckleLog2) - 1);
     for (int row = 0; row < c.rows; ++row) {
         const int k = c.first + row;
-        const auto s = hn::Add(hn::Set(d, b.r[k]), hn::Mul(gap, hn::Set(d, b.contact[k])));
-        auto x = hn::Add(ox, hn::Mul(vx, s)), y = hn::Add(oy, hn::Mul(vy, s)),
-             z = hn::Add(oz, hn::Mul(vz, s));
-        if (b.breathing != nullptr) {
-            const auto w = breathing_weight(d, b, v, k);
-            x = hn::Sub(x, hn::Mul(w, hn::Set(d, b.shift_speckle[0])));
-            y = hn::Sub(y, hn::Mul(w, hn::Set(d, b.shift_speckle[1])));
-            z = hn::Sub(z, hn::Mul(w, hn::Set(d, b.shift_speckle[2])));
-        }
+        const auto [x, y, z] = walk.at(d, b, v, k);
         // Cells that carry kRoundingBits.
         const auto i = rounded_bits(d, x), j = rounded_bits(d, y), l = rounded_bits(d, z);
         const auto period = [&](auto cell, std::uint32_t factor) HWY_ATTR {
@@ -117,14 +107,14 @@ HWY_NOINLINE void speckle_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
                                         hn::Set(di, kRoundingBits >> kSpeckleLog2));
             return hn::Mul(number, hn::Set(di, static_cast<std::int32_t>(factor)));
         };
-        const auto hash = hn::Xor(period(i, 0x9E3779B1u),
-                                  hn::Xor(period(j, 0x85EBCA77u), period(l, 0xC2B2AE3Du)));
+        const auto hash = hn::Xor(period(i, kSpeckleHashX),
+                                  hn::Xor(period(j, kSpeckleHashY), period(l, kSpeckleHashZ)));
         const auto wi = hn::And(hn::Xor(i, hn::ShiftRight<kShuffleX>(hash)), mask);
         const auto wj = hn::And(hn::Xor(j, hn::ShiftRight<kShuffleY>(hash)), mask);
         const auto wl = hn::And(hn::Xor(l, hn::ShiftRight<kShuffleZ>(hash)), mask);
         const auto at = hn::Or(
             wi, hn::Or(hn::ShiftLeft<kSpeckleLog2>(wj), hn::ShiftLeft<2 * kSpeckleLog2>(wl)));
-        // Two pairs a word: the half that is asked for comes to the top.
+        // Two pairs per word: the half that is wanted is moved to the top.
         const auto word = hn::GatherIndex(di, b.speckle, hn::ShiftRight<1>(at));
         const auto odd = hn::TestBit(at, hn::Set(di, 1));
         hn::Store(hn::IfThenElse(odd, word, hn::ShiftLeft<16>(word)), di, c.scatterers.row(row));

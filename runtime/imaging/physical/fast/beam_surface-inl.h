@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Effects boundaries, pulsation, interfaces and edge_shadow: on which side of the plane in its
-// voxel a sample lies, and what the surface itself sends back and takes away.
+// voxel a sample lies, and what the surface itself reflects and takes away.
 #include "runtime/imaging/simd/simd_math-inl.h"
 //
 #include "formats/volume/boundary_record.h"
@@ -17,7 +17,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 
-// Roughness and glint of surfaces at a row's samples; see PhysicalScene::rough.
+// Roughness and glint of surfaces at a row's samples; see PhysicalTextures::rough.
 template <class D>
 HWY_INLINE hn::Vec<hn::RebindToSigned<D>> rough_at(D d,
                                                    const PhysicalBlock& b,
@@ -59,7 +59,7 @@ HWY_INLINE void clear_surface_row(D d, BeamChunk& c, int row) {
     hn::Store(hn::Set(d, 1.0f), d, c.facing.row(row));
 }
 
-// The records of the voxels asked.
+// The records of the voxels that are looked up.
 template <class D>
 HWY_NOINLINE void record_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
     const hn::RebindToSigned<D> di;
@@ -94,7 +94,7 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
             continue;
         }
         c.surfaces = true;
-        // Normal: octahedron unfolded, as formats/volume/boundary_record.cpp, times 127.
+        // Normal: the octahedron is unfolded as in formats/volume/boundary_record.cpp, times 127.
         auto nu = signed_byte<2>(d, record), nv = signed_byte<3>(d, record);
         const auto nz = hn::Sub(hn::Sub(full, hn::Abs(nu)), hn::Abs(nv));
         const auto fold = hn::Lt(nz, zero);

@@ -31,7 +31,7 @@ HWY_INLINE void target_row(
     const auto own = hn::Load(di, c.label.row(row));
     const auto kind =
         hn::And(hn::ShiftRight<16>(hn::GatherIndex(di, b.looks, own)), hn::Set(di, 7));
-    // Soft tissue gives way, and so does an earlier ball, which lies in soft tissue.
+    // A ball replaces soft tissue, and also an earlier ball, which lies in soft tissue.
     const auto soft = hn::Or(hn::Eq(kind, hn::Set(di, static_cast<std::int32_t>(kPackedSoft))),
                              hn::Gt(own, hn::Set(di, b.label_count - 1)));
     const auto close = hn::And(reached, hn::RebindMask(d, soft));

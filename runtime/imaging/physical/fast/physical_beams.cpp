@@ -3,9 +3,9 @@
 // Model `physical`, first pass: beams into the anatomy, block by block.
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 
+#include "runtime/imaging/host/pass_timer.h"
 #include "runtime/imaging/physical/fast/beam_needle.h"
 #include "runtime/imaging/physical/fast/beam_sampler.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
@@ -16,17 +16,17 @@ using namespace physical;
 
 void PhysicalFast::find_contact(const PhysicalFrame& f) {
     const int lines = geometry_.scanlines;
-    workers_.for_each(lines_ / kBeamBlock, [&](int, int block) {
+    context_.workers.for_each(lines_ / kBeamBlock, [&](int, int block) {
         const int first = block * kBeamBlock;
         find_gaps(scene_, geometry_, f, first, std::min(first + kBeamBlock, lines), raw_gaps_);
     });
-    passes_.beams_in_contact = smooth_gaps(lines, raw_gaps_, gaps_);
+    met_.beams_in_contact = smooth_gaps(lines, raw_gaps_, gaps_);
     if (!f.effects.contact) std::fill(gaps_.begin(), gaps_.end(), 0.0f);
-    passes_.gap_met =
+    met_.gap =
         std::any_of(gaps_.begin(), gaps_.begin() + lines, [](float gap) { return gap != 0.0f; });
 }
 
-void PhysicalFast::place_beams(const PhysicalFrame& f, const BreathingField* breathing, int first) {
+void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
     const ScanGeometry& g = geometry_;
     const Matrix3 turn = speckle_rotation();
     const double inverse_scatter = 1 / tables_.scatter_mm, inverse_voxel = 1 / scene_.voxel_mm;
@@ -52,8 +52,13 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, const BreathingField* bre
         }
         put(kGap, static_cast<double>(gaps_[static_cast<std::size_t>(line)]));
     }
-    if (breathing == nullptr) return;
-    // The weight is smooth over centimetres: every fourth beam, linear in between.
+}
+
+void PhysicalFast::weigh_breathing(const PhysicalFrame& f,
+                                   const BreathingField& breathing,
+                                   int first) {
+    const ScanGeometry& g = geometry_;
+    // The weight is smooth over centimetres: worked out for every fourth beam, linear in between.
     constexpr int kEvery = 4;
     const int nodes = g.samples / kBreathingNode + 2;
     for (int node = 0; node < nodes; ++node) {
@@ -68,7 +73,7 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, const BreathingField* bre
                 r + static_cast<double>(std::max(gaps_[static_cast<std::size_t>(line)], 0.0f)) *
                         tables_.rows[static_cast<std::size_t>(k)].contact;
             const auto right = static_cast<float>(
-                breathing->weight(f.volume_from_probe * Point3{o.x + s * d.x, 0, o.z + s * d.z}));
+                breathing.weight(f.volume_from_probe * Point3{o.x + s * d.x, 0, o.z + s * d.z}));
             if (l > 0) {
                 for (int j = 0; j < kEvery; ++j)
                     row[l - kEvery + j] = left + (right - left) * static_cast<float>(j) / kEvery;
@@ -78,154 +83,194 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, const BreathingField* bre
     }
 }
 
-void PhysicalFast::sample_beams(const PhysicalFrame& f,
-                                const BreathingField& field,
-                                bool keep_all) {
+// Targets that the slab can show.
+void PhysicalFast::choose_targets(const PhysicalFrame& f, bool keep_all) {
+    near_targets_.clear();
+    if (!f.effects.targets) return;
+    // Beyond the slab's reach: four deviations of the thickest row, roughness and the look-up's
+    // reach.
+    const double thick = 4.5 * tables_.rows.back().elevation_mm +
+                         4.5 * tables_.rows.front().elevation_mm + kTargetReachMm + 2 +
+                         norm(f.motion.breathing_mm);
+    const Vector3 normal = f.volume_from_probe.rotation * Vector3{0, 1, 0};
+    const Point3 origin = f.volume_from_probe * Point3{0, 0, 0};
+    for (std::size_t t = 0; t < targets_.size(); ++t) {
+        const Point3 centre = scene_.grid.point_from_voxel(scene_.targets[t].centre_vx);
+        if (keep_all ||
+            std::abs(dot(normal, centre - origin)) < thick + scene_.targets[t].radius_mm)
+            near_targets_.push_back(targets_[t]);
+    }
+}
+
+// The slab's directions and the anatomy's motion.
+void PhysicalFast::set_poses(const PhysicalFrame& f, PhysicalBlock& b) const {
+    const Vector3 across =
+        (1 / scene_.voxel_mm) * (f.volume_from_probe.rotation * Vector3{0, 1, 0});
+    const Vector3 sideways =
+        (kLookupJitter / 32) * (f.volume_from_probe.rotation * Vector3{1, 0, 0});
+    const Vector3 shift = (1 / scene_.voxel_mm) * f.motion.breathing_mm;
+    const Vector3 shift_speckle =
+        (1 / tables_.scatter_mm) * (speckle_rotation() * f.motion.breathing_mm);
+    for (int axis = 0; axis < 3; ++axis) {
+        b.across[axis] = static_cast<float>(across[axis]);
+        b.sideways[axis] = static_cast<float>(sideways[axis]);
+        b.shift_voxel[axis] = static_cast<float>(shift[axis]);
+        b.shift_speckle[axis] = static_cast<float>(shift_speckle[axis]);
+    }
+    b.pulse_mm = f.effects.pulsation ? static_cast<float>(f.motion.pulse_mm) : 0;
+}
+
+// What the kernels look up: volumes, textures, tissues, targets.
+void PhysicalFast::set_tables(const PhysicalFrame& f, PhysicalBlock& b) const {
+    const CaseBundle& bundle = *scene_.bundle;
+    b.table = reinterpret_cast<const std::int32_t*>(scene_.words.data());
+    b.labels = reinterpret_cast<const std::int32_t*>(bundle.label_bricks.pool.data());
+    b.echo = reinterpret_cast<const std::int32_t*>(bundle.echo_offset.pool.data());
+    b.boundary = f.effects.boundaries && scene_.words.has_boundary()
+                     ? reinterpret_cast<const std::int32_t*>(bundle.boundary.pool.data())
+                     : nullptr;
+    b.looks = looks_.data();
+    b.pairs = pairs_word_.data();
+    b.rough = reinterpret_cast<const std::int32_t*>(scene_.textures->rough.data());
+    b.speckle = reinterpret_cast<const std::int32_t*>(scene_.speckle.data());
+    b.fine = f.effects.fine_structure ? scene_.textures->fine.data() : nullptr;
+    b.fine_frames = fine_frames_.data();
+    b.targets = near_targets_.data();
+    b.target_count = static_cast<int>(near_targets_.size());
+    b.size = scene_.grid.size;
+    const Int3 table_blocks = scene_.words.blocks();
+    b.blocks_x = table_blocks.x;
+    b.blocks_xy = table_blocks.x * table_blocks.y;
+    b.block_log2 = scene_.words.edge_log2();
+    b.label_count = scene_.labels();
+    b.voxel_mm = static_cast<float>(scene_.voxel_mm);
+    b.rough_per_voxel = static_cast<float>(scene_.voxel_mm / kRoughVoxelMm);
+    b.dim = dim_.data();
+    b.dim_off = dim_off_.data();
+}
+
+// What all blocks of a frame share.
+PhysicalBlock PhysicalFast::block_of_frame(const PhysicalFrame& f, bool keep_all) const {
+    const ScanGeometry& g = geometry_;
+    PhysicalBlock b;
+    b.lines = lines_;
+    b.samples = g.samples;
+    b.r = r_.data();
+    b.contact = contact_.data();
+    b.elevation = f.effects.elevation ? elevation_.data() : elevation_off_.data();
+    b.interface_scale = interface_scale_.data();
+    b.gain = gain_.data();
+    b.elevation_start = elevation_start_.data();
+    b.lookup_start = lookup_start_.data();
+    set_poses(f, b);
+    set_tables(f, b);
+    b.step_mm = static_cast<float>(g.step_mm);
+    b.dead_light = static_cast<float>(std::exp2(kDeadLog2));
+    const auto decay = [&](double mm) { return static_cast<float>(std::exp(-g.step_mm / mm)); };
+    b.decay = {decay(kBoneTailMm), decay(kBoneTailSlowMm), decay(kBoneFloorMm), decay(kGasTailMm)};
+    b.reverb_mm = static_cast<float>(kReverbWidth * tables_.axial_mm);
+    b.structure = f.effects.structure && scene_.words.has_echo();
+    b.speckled = f.effects.speckle;
+    b.interfaces = f.effects.interfaces;
+    b.edge_shadow = f.effects.edge_shadow;
+    b.attenuation = f.effects.attenuation;
+    b.bone_tail = f.effects.bone_tail;
+    b.gas_tail = f.effects.gas_ring_down;
+    b.keep_all = keep_all;
+    b.hard_scene = scene_.has_hard;
+    b.stride = stride_;
+    return b;
+}
+
+// Beyond the outermost beams the light is mirrored, for the boxes of the aperture.
+void PhysicalFast::mirror_light(int block) {
+    const int lines = geometry_.scanlines;
+    const auto each_row = [&](const auto& work) {
+        for (int k = 0; k < geometry_.samples; ++k)
+            work(light_ + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_);
+    };
+    if (block == 0) {
+        each_row([&](float* light) {
+            for (int j = 0; j < 3; ++j) light[-1 - j] = light[std::min(j, lines - 1)];
+        });
+    }
+    if (block == lines_ / kBeamBlock - 1) {
+        each_row([&](float* light) {
+            for (int j = 0; j < 3; ++j) light[lines + j] = light[std::max(lines - 1 - j, 0)];
+        });
+    }
+}
+
+namespace {
+
+// What the blocks of a frame met, gathered from all threads.
+struct MetByAny {
+    std::atomic<bool> interface {
+        false
+    }, refraction{false}, hard{false}, needle{false}, fine{false}, target{false};
+
+    void add(const PhysicalBlock& b) {
+        if (b.boundary_met) interface.store(true, std::memory_order_relaxed);
+        if (b.refraction_met) refraction.store(true, std::memory_order_relaxed);
+        if (b.hard_met) hard.store(true, std::memory_order_relaxed);
+        if (b.fine_met) fine.store(true, std::memory_order_relaxed);
+        if (b.target_met) target.store(true, std::memory_order_relaxed);
+    }
+};
+
+}  // namespace
+
+double PhysicalFast::sample_beams(const PhysicalFrame& f,
+                                  const BreathingField& breathing,
+                                  bool keep_all) {
     const ScanGeometry& g = geometry_;
     for (int k = 0; k < g.samples; ++k) {
         const auto i = static_cast<std::size_t>(k);
         elevation_start_[i] = noise_start(f.seed, NoiseUse::elevation, 0, k);
         lookup_start_[i] = noise_start(f.seed, NoiseUse::lookup, 0, k);
     }
-    PhysicalBlock base;
-    base.lines = lines_;
-    base.samples = g.samples;
-    base.r = r_.data();
-    base.contact = contact_.data();
-    base.elevation = f.effects.elevation ? elevation_.data() : elevation_off_.data();
-    base.interface_scale = interface_scale_.data();
-    base.gain = gain_.data();
-    const Vector3 across =
-        (1 / scene_.voxel_mm) * (f.volume_from_probe.rotation * Vector3{0, 1, 0});
-    const Vector3 sideways =
-        (kLookupJitter / 32) * (f.volume_from_probe.rotation * Vector3{1, 0, 0});
-    const bool breathes = f.effects.breathing && f.motion.breathes() && !field.empty();
-    const BreathingField* breathing = breathes ? &field : nullptr;
-    const Vector3 shift = (1 / scene_.voxel_mm) * f.motion.breathing_mm;
-    const Vector3 shift_speckle =
-        (1 / tables_.scatter_mm) * (speckle_rotation() * f.motion.breathing_mm);
-    for (int axis = 0; axis < 3; ++axis) {
-        base.across[axis] = static_cast<float>(across[axis]);
-        base.sideways[axis] = static_cast<float>(sideways[axis]);
-        base.shift_voxel[axis] = static_cast<float>(shift[axis]);
-        base.shift_speckle[axis] = static_cast<float>(shift_speckle[axis]);
-    }
-    base.pulse_mm = f.effects.pulsation ? static_cast<float>(f.motion.pulse_mm) : 0;
-    base.elevation_start = elevation_start_.data();
-    base.lookup_start = lookup_start_.data();
-    const CaseBundle& bundle = *scene_.bundle;
-    base.table = reinterpret_cast<const std::int32_t*>(scene_.words.data());
-    base.labels = reinterpret_cast<const std::int32_t*>(bundle.label_bricks.pool.data());
-    base.echo = reinterpret_cast<const std::int32_t*>(bundle.echo_offset.pool.data());
-    base.boundary = f.effects.boundaries && scene_.words.has_boundary()
-                        ? reinterpret_cast<const std::int32_t*>(bundle.boundary.pool.data())
-                        : nullptr;
-    base.looks = looks_.data();
-    base.pairs = pairs_word_.data();
-    base.rough = reinterpret_cast<const std::int32_t*>(scene_.rough.data());
-    base.speckle = reinterpret_cast<const std::int32_t*>(scene_.speckle.data());
-    base.fine = f.effects.fine_structure ? scene_.fine.cubes.data() : nullptr;
-    base.fine_frames = fine_frames_.data();
-    near_targets_.clear();
-    if (f.effects.targets) {
-        // Out of reach of the slab: four deviations of the thickest row, roughness and the
-        // look-up's reach.
-        const double thick = 4.5 * tables_.rows.back().elevation_mm +
-                             4.5 * tables_.rows.front().elevation_mm + kTargetReachMm + 2 +
-                             norm(f.motion.breathing_mm);
-        const Vector3 normal = f.volume_from_probe.rotation * Vector3{0, 1, 0};
-        const Point3 origin = f.volume_from_probe * Point3{0, 0, 0};
-        for (std::size_t t = 0; t < targets_.size(); ++t) {
-            const Point3 centre = scene_.grid.point_from_voxel(scene_.targets[t].centre_vx);
-            if (keep_all ||
-                std::abs(dot(normal, centre - origin)) < thick + scene_.targets[t].radius_mm)
-                near_targets_.push_back(targets_[t]);
-        }
-    }
-    base.targets = near_targets_.data();
-    base.target_count = static_cast<int>(near_targets_.size());
-    base.size = scene_.grid.size;
-    const Int3 table_blocks = scene_.words.blocks();
-    base.blocks_x = table_blocks.x;
-    base.blocks_xy = table_blocks.x * table_blocks.y;
-    base.block_log2 = scene_.words.edge_log2();
-    base.label_count = scene_.labels();
-    base.voxel_mm = static_cast<float>(scene_.voxel_mm);
-    base.rough_per_voxel = static_cast<float>(scene_.voxel_mm / kRoughVoxelMm);
-    base.step_mm = static_cast<float>(g.step_mm);
-    base.dim = dim_.data();
-    base.dim_off = dim_off_.data();
-    base.dead_light = static_cast<float>(std::exp2(kDeadLog2));
-    const auto decay = [&](double mm) { return static_cast<float>(std::exp(-g.step_mm / mm)); };
-    base.decay = {decay(kBoneTailMm), decay(kBoneTailSlowMm), decay(kBoneFloorMm),
-                  decay(kGasTailMm)};
-    base.reverb_mm = static_cast<float>(kReverbWidth * tables_.axial_mm);
-    base.structure = f.effects.structure && scene_.words.has_echo();
-    base.speckled = f.effects.speckle;
-    base.interfaces = f.effects.interfaces;
-    base.edge_shadow = f.effects.edge_shadow;
-    base.attenuation = f.effects.attenuation;
-    base.bone_tail = f.effects.bone_tail;
-    base.gas_tail = f.effects.gas_ring_down;
-    base.keep_all = keep_all;
-    base.hard_scene = scene_.has_hard;
-    base.stride = stride_;
-
+    choose_targets(f, keep_all);
+    const PhysicalBlock base = block_of_frame(f, keep_all);
+    const bool breathes = f.effects.breathing && f.motion.breathes() && !breathing.empty();
     const bool needle = f.effects.needle && f.needle != nullptr;
     const NeedleStrip strip = needle ? NeedleStrip(*f.needle) : NeedleStrip();
-    std::atomic<bool> boundary{false}, refraction{false}, hard{false}, needle_met{false},
-        fine{false}, target{false};
-    std::atomic<std::int64_t> needle_ns{0};
-    const int blocks = lines_ / kBeamBlock;
-    workers_.for_each(blocks, [&](int, int block) {
+    MetByAny met;
+    std::atomic<double> needle_ms{0};
+    context_.workers.for_each(lines_ / kBeamBlock, [&](int, int block) {
         PhysicalBlock b = base;
         const int line = block * kBeamBlock;
-        place_beams(f, breathing, line);
+        place_beams(f, line);
+        if (breathes) weigh_breathing(f, breathing, line);
         b.beams = beams_.data() + line;
         b.white = noise_.white.data() + line;
-        b.breathing = breathing != nullptr ? breathing_.data() + line : nullptr;
+        b.breathing = breathes ? breathing_.data() + line : nullptr;
         b.echoes = echoes_ + kRowMargin + line;
         b.light = light_ + kRowMargin + line;
         b.tail = tail_ + kRowMargin + line;
-        sample_beam_block(b);
-        if (b.boundary_met) boundary.store(true, std::memory_order_relaxed);
-        if (b.refraction_met) refraction.store(true, std::memory_order_relaxed);
-        if (b.hard_met) hard.store(true, std::memory_order_relaxed);
-        if (b.fine_met) fine.store(true, std::memory_order_relaxed);
-        if (b.target_met) target.store(true, std::memory_order_relaxed);
-        if (needle) {
-            NeedleRow row;
-            int k0 = 0, k1 = 0;
-            if (strip.prepare_block(*f.needle, g, line, keep_all, row, k0, k1)) {
-                const auto start = std::chrono::steady_clock::now();
-                draw_physical_needle(b, row, k0, k1);
-                needle_ns.fetch_add((std::chrono::steady_clock::now() - start).count());
-                needle_met.store(true, std::memory_order_relaxed);
-            }
+        sample_beam_block(context_.simd, b);
+        met.add(b);
+        NeedleRow row;
+        int k0 = 0, k1 = 0;
+        if (needle && strip.prepare_block(*f.needle, g, line, keep_all, row, k0, k1)) {
+            PassTimer timer(context_.clock);
+            draw_physical_needle(context_.simd, b, row, k0, k1);
+            needle_ms.fetch_add(timer.lap_ms());
+            met.needle.store(true, std::memory_order_relaxed);
         }
         tail_from_[static_cast<std::size_t>(block)] = b.tail_from;
-        // Beyond the outermost beams the light mirrors, for the aperture's boxes.
-        if (line == 0) {
-            for (int k = 0; k < g.samples; ++k) {
-                float* light = b.light + static_cast<std::ptrdiff_t>(k) * stride_;
-                for (int j = 0; j < 3; ++j) light[-1 - j] = light[std::min(j, g.scanlines - 1)];
-            }
-        }
-        if (block == blocks - 1) {
-            for (int k = 0; k < g.samples; ++k) {
-                float* light = b.light + static_cast<std::ptrdiff_t>(k) * stride_ - line;
-                for (int j = 0; j < 3; ++j)
-                    light[g.scanlines + j] = light[std::max(g.scanlines - 1 - j, 0)];
-            }
-        }
+        mirror_light(block);
     });
-    passes_.boundary_met = boundary.load();
-    passes_.refraction_met = refraction.load();
-    passes_.hard_met = hard.load();
-    passes_.fine_met = fine.load();
-    passes_.target_met = target.load();
-    passes_.needle_met = needle_met.load();
-    passes_.needle_ms = static_cast<double>(needle_ns.load()) * 1e-6 / workers_.threads();
+    met_.breathes = f.motion.breathes();
+    met_.pulses = f.motion.pulse_mm != 0;
+    met_.has_echo = scene_.words.has_echo();
+    met_.interface = met.interface;
+    met_.refraction = met.refraction;
+    met_.hard = met.hard;
+    met_.fine = met.fine;
+    met_.target = met.target;
+    met_.needle_given = f.needle != nullptr;
+    met_.needle = met.needle;
+    return needle_ms.load() / context_.workers.threads();
 }
 
 }  // namespace sonocase::runtime

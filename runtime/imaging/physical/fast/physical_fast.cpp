@@ -3,10 +3,10 @@
 #include "runtime/imaging/physical/fast/physical_fast.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 
+#include "runtime/imaging/host/pass_timer.h"
 #include "runtime/imaging/scan/scan_convert.h"
 
 namespace sonocase::runtime {
@@ -15,13 +15,6 @@ using namespace physical;
 namespace {
 
 constexpr int kSlack = kRowSlack, kMargin = kRowMargin;
-
-double lap_ms(std::chrono::steady_clock::time_point& clock) {
-    const auto now = std::chrono::steady_clock::now();
-    const double ms = std::chrono::duration<double, std::milli>(now - clock).count();
-    clock = now;
-    return ms;
-}
 
 std::int32_t pack_look(const AcousticProperties& look, double frequency_mhz) {
     const double loss = look.attenuation * frequency_mhz * 0.1 * 2 / kDbPerLog2;
@@ -58,15 +51,15 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
                            const ScanGeometry& geometry,
                            const Tables& tables,
                            const PhysicalNoise& noise,
-                           WorkerPool& workers)
-    : scene_(scene), geometry_(geometry), tables_(tables), noise_(noise), workers_(workers) {
+                           const RenderContext& context)
+    : scene_(scene), geometry_(geometry), tables_(tables), noise_(noise), context_(context) {
     const auto samples = static_cast<std::size_t>(geometry.samples);
     lines_ = (geometry.scanlines + kBeamBlock - 1) / kBeamBlock * kBeamBlock;
     stride_ = kMargin + lines_ + kMargin + kSlack;
     pair_stride_ = (lines_ + kSlack - 1) / kSlack * kSlack;
     cells_k_ = (geometry.samples + kHazeCell - 1) / kHazeCell;
     cells_l_ = (geometry.scanlines + kHazeCell - 1) / kHazeCell;
-    conversion_ = make_scan_conversion_table(geometry, pair_stride_);
+    conversion_ = make_scan_conversion_table(context.jobs, geometry, pair_stride_);
     conversion_.offset.resize(conversion_.offset.size() + kSlack);
     conversion_.weight.resize(conversion_.weight.size() + kSlack);
 
@@ -111,7 +104,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     beams_.assign(kBeamNumbers * lines + kSlack, 0.0f);
     breathing_.assign((samples / kBreathingNode + 2) * lines + kSlack, 0.0f);
     const std::size_t area = samples * static_cast<std::size_t>(stride_) + kSlack;
-    // One allocation, rows on cache lines.
+    // One allocation; rows begin on cache lines.
     const std::size_t line_of_floats = 16;
     planes_.assign(4 * area + line_of_floats, 0.0f);
     void* start = planes_.data();
@@ -123,7 +116,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     tail_ = plane + 2 * area;
     power_ = plane + 3 * area;
     tail_from_.assign(lines / kBeamBlock, 0);
-    const auto threads = static_cast<std::size_t>(workers.threads());
+    const auto threads = static_cast<std::size_t>(context.workers.threads());
     work_.assign(threads * 2 * static_cast<std::size_t>(stride_), 0.0f);
     const auto ring_rows = static_cast<std::size_t>(std::max(2 * tables.axial_reach + 1, 3));
     ring_.assign(threads * 2 * ring_rows * static_cast<std::size_t>(stride_), 0.0f);
@@ -149,18 +142,21 @@ void PhysicalFast::render(const PhysicalFrame& f,
                           bool flip,
                           bool keep_all,
                           std::span<std::uint8_t> pixels) {
-    auto clock = std::chrono::steady_clock::now();
-    passes_ = {};
+    const auto time_of = [&](Pass pass) -> double& {
+        return pass_ms_[static_cast<std::size_t>(pass)];
+    };
+    PassTimer timer(context_.clock);
+    met_ = {};
     find_contact(f);
-    passes_.contact_ms = lap_ms(clock);
-    sample_beams(f, breathing, keep_all);
-    passes_.beams_ms = std::max(lap_ms(clock) - passes_.needle_ms, 0.0);
+    time_of(Pass::contact) = timer.lap_ms();
+    time_of(Pass::needle) = sample_beams(f, breathing, keep_all);
+    time_of(Pass::beams) = std::max(timer.lap_ms() - time_of(Pass::needle), 0.0);
     filter_rows(f);
-    passes_.filter_ms = lap_ms(clock);
+    time_of(Pass::filter) = timer.lap_ms();
     make_grey(f);
-    passes_.grey_ms = lap_ms(clock);
-    scan_convert(workers_, conversion_, pairs_, geometry_, flip, pixels);
-    passes_.convert_ms = lap_ms(clock);
+    time_of(Pass::grey) = timer.lap_ms();
+    scan_convert(context_.workers, context_.simd, conversion_, pairs_, geometry_, flip, pixels);
+    time_of(Pass::convert) = timer.lap_ms();
 }
 
 }  // namespace sonocase::runtime

@@ -11,8 +11,8 @@
 
 namespace sonocase::runtime {
 
-// Labels' looks in one word: attenuation (bits 0-15, log2 of amplitude per mm there and back,
-// 1/4096), kind (16-18), fine structure (19), echo (20-31, signed, 1/16 dB).
+// A label's acoustic properties in one word, its "look": attenuation (bits 0-15, log2 of amplitude
+// per mm there and back, 1/4096), kind (16-18), fine structure (19), echo (20-31, signed, 1/16 dB).
 enum PackedKind : std::uint32_t {
     kPackedOutside,
     kPackedSoft,
@@ -40,7 +40,7 @@ enum BeamNumber {
     kBeamNumbers = 16
 };
 
-inline constexpr int kRowSlack = 64;   // behind rows and buffers: the widest vector
+inline constexpr int kRowSlack = 64;   // behind rows and buffers: lanes of the widest vector
 inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 3
 
 inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
@@ -62,14 +62,14 @@ struct PhysicalBlock {
     const std::int8_t* white = nullptr;
     const std::uint32_t *elevation_start = nullptr, *lookup_start = nullptr;
 
-    const float* breathing = nullptr;  // null: still. weight at nodes, `lines` apart
+    const float* breathing = nullptr;  // weight at nodes, `lines` apart; null: nothing moves
     float shift_voxel[3] = {0, 0, 0}, shift_speckle[3] = {0, 0, 0};
     float pulse_mm = 0;
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
     const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr, *speckle = nullptr;
     const std::int8_t* fine = nullptr;   // null: off. Two cubes
-    const float* fine_frames = nullptr;  // ten a label: rows of the frame, offset of its cube
+    const float* fine_frames = nullptr;  // ten per label: rows of the frame, offset of its cube
     const PhysicalTarget* targets = nullptr;
     int target_count = 0;
     Int3 size;
@@ -79,7 +79,7 @@ struct PhysicalBlock {
     float dead_light = 0;
     struct {
         float bone = 0, bone_slow = 0, bone_floor = 0, gas = 0;
-    } decay;                 // of the tails, a sample
+    } decay;                 // of the tails, per sample
     float reverb_mm = 0.5f;  // half the width of a line
     float voxel_mm = 1, rough_per_voxel = 2, step_mm = 0.3f;
     bool structure = true, speckled = true, interfaces = true, edge_shadow = true,
@@ -88,8 +88,9 @@ struct PhysicalBlock {
     bool keep_all = false;
     bool hard_scene = true;  // some label is bone or gas
 
-    // At the block's first beam. Echoes are complex amplitudes of 8 bits' precision each: the upper
-    // halves of two floats in one word, real part on top. What fits in the second cache counts.
+    // At the block's first beam. Echoes are complex amplitudes: the upper halves of two floats (8
+    // bits of precision each) in one word, real part on top, so that a frame fits in the
+    // second-level cache.
     std::int32_t* echoes = nullptr;
     float *light = nullptr, *tail = nullptr;
     int stride = 0;
@@ -128,7 +129,7 @@ struct PhysicalPowerTask {
     const float* axial = nullptr;  // first tap
     int axial_count = 1;
     float gain = 1;
-    float* envelope_sum = nullptr;  // accumulates the envelope; null: not wanted
+    float* envelope_sum = nullptr;  // the envelope is added to it; null: not needed
     float* power = nullptr;
 };
 

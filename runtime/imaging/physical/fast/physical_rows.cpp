@@ -15,21 +15,48 @@ namespace sonocase::runtime {
 using namespace physical;
 
 namespace {
-// Rows that a thread takes at a time.
-constexpr int kCellsAtOnce = 2;  // of haze
+// What a thread takes at a time: rows of cells of the haze, and rows of samples.
+constexpr int kCellsAtOnce = 2;
 constexpr int kGreyRows = 16;
 }  // namespace
+
+// The inputs of a row's filter across the beams.
+void PhysicalFast::fill_row_task(const PhysicalFrame& f, int k, PhysicalRowTask& t) const {
+    const bool tails = f.effects.bone_tail || f.effects.gas_ring_down || f.effects.needle;
+    const int persisted = f.effects.persistence ? kPersistedFrames : 1;
+    const Row& row = tables_.rows[static_cast<std::size_t>(k)];
+    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
+    t.echoes = echoes_ + at;
+    t.light = light_ + at;
+    t.inverse_gain = static_cast<float>(1 / row.gain);
+    t.near_field = static_cast<float>(face_clutter(row, f.effects));
+    t.tail = tails ? tail_ + at : nullptr;
+    t.sample = k;
+    t.clutter_re = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
+    t.clutter_im = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
+    t.noise = static_cast<float>(row.noise / row.gain * std::sqrt(0.5) / 32);
+    t.noise_rows = f.effects.noise ? persisted : 0;
+    for (int j = 0; j < t.noise_rows; ++j) {
+        const std::uint32_t frame = f.frame - static_cast<std::uint32_t>(j);
+        t.noise_re[j] = noise_.fine.data() + noise_start(f.seed, NoiseUse::electronic_re, frame, k);
+        t.noise_im[j] = noise_.fine.data() + noise_start(f.seed, NoiseUse::electronic_im, frame, k);
+        t.noise_weight[j] = f.effects.persistence
+                                ? static_cast<float>(kPersistence[static_cast<std::size_t>(j)])
+                                : 1;
+    }
+    t.lateral = row.lateral.data() + kMaxLateral;
+    t.reach = row.reach;
+}
 
 void PhysicalFast::filter_rows(const PhysicalFrame& f) {
     const ScanGeometry& g = geometry_;
     const int reach = f.effects.point_spread ? tables_.axial_reach : 0;
     const int ring_rows = std::max(2 * tables_.axial_reach + 1, 3);
-    const bool tails = f.effects.bone_tail || f.effects.gas_ring_down || f.effects.needle;
-    const int persisted = f.effects.persistence ? kPersistedFrames : 1;
     static constexpr std::array<float, 1> kOneTap{1.0f};
     const auto haze_level = static_cast<float>(std::pow(10.0, kHazeDb / 20));
     start_rows();
-    workers_.for_each((cells_k_ + kCellsAtOnce - 1) / kCellsAtOnce, [&](int part, int item) {
+    context_.workers.for_each((cells_k_ + kCellsAtOnce - 1) / kCellsAtOnce, [&](int part,
+                                                                                int item) {
         const int begin = item * kCellsAtOnce * kHazeCell;
         const int end = std::min(begin + kCellsAtOnce * kHazeCell, g.samples);
         float* work = work_.data() + static_cast<std::ptrdiff_t>(part) * 2 * stride_;
@@ -47,36 +74,10 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
         row_task.work_re = work + kRowMargin;
         row_task.work_im = work + stride_ + kRowMargin;
         const auto fill = [&](int k) {
-            const Row& row = tables_.rows[static_cast<std::size_t>(k)];
-            const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
-            row_task.echoes = echoes_ + at;
-            row_task.light = light_ + at;
-            row_task.inverse_gain = static_cast<float>(1 / row.gain);
-            row_task.near_field = f.effects.near_field ? static_cast<float>(row.near_field) : 0;
-            row_task.tail = tails ? tail_ + at : nullptr;
-            row_task.sample = k;
-            row_task.clutter_re =
-                noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
-            row_task.clutter_im =
-                noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
-            row_task.noise = static_cast<float>(row.noise / row.gain * std::sqrt(0.5) / 32);
-            row_task.noise_rows = f.effects.noise ? persisted : 0;
-            for (int j = 0; j < row_task.noise_rows; ++j) {
-                const std::uint32_t frame = f.frame - static_cast<std::uint32_t>(j);
-                row_task.noise_re[j] =
-                    noise_.fine.data() + noise_start(f.seed, NoiseUse::electronic_re, frame, k);
-                row_task.noise_im[j] =
-                    noise_.fine.data() + noise_start(f.seed, NoiseUse::electronic_im, frame, k);
-                row_task.noise_weight[j] =
-                    f.effects.persistence
-                        ? static_cast<float>(kPersistence[static_cast<std::size_t>(j)])
-                        : 1;
-            }
-            row_task.lateral = row.lateral.data() + kMaxLateral;
-            row_task.reach = row.reach;
+            fill_row_task(f, k, row_task);
             row_task.out_re = ring_re(k);
             row_task.out_im = ring_im(k);
-            filter_row_across(row_task);
+            filter_row_across(context_.simd, row_task);
         };
         int& next = next_row_[static_cast<std::size_t>(part)];
         if (next != begin) {
@@ -106,7 +107,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
             t.gain = static_cast<float>(row.gain);
             t.power = power_ + at;
-            make_power_row(t);
+            make_power_row(context_.simd, t);
             if (f.effects.haze && (k % kHazeCell == kHazeCell - 1 || k == g.samples - 1))
                 spread_haze(k / kHazeCell, haze_level / static_cast<float>(k % kHazeCell + 1),
                             envelope);
@@ -114,8 +115,8 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
     });
 }
 
-// The mean over cells of a row, `level` times its sum over the cell's samples, spread to both sides
-// and brought back to beams.
+// One row of the haze: the mean envelope over cells (`level` times the sum over a cell's samples),
+// spread to both sides and interpolated back to beams.
 void PhysicalFast::spread_haze(int cell_row, float level, const float* envelope) {
     const int lines = geometry_.scanlines, last = cells_l_ - 1;
     std::array<float, 4096 / kHazeCell + 1> sums, wide{};
@@ -145,12 +146,39 @@ void PhysicalFast::spread_haze(int cell_row, float level, const float* envelope)
     std::fill_n(row + last * kHazeCell + kHalf, kHalf, wide[static_cast<std::size_t>(last)]);
 }
 
+// The inputs of a row's compression.
+void PhysicalFast::fill_grey_task(const PhysicalFrame& f, int k, PhysicalGreyTask& t) const {
+    const double per_db = 255 / f.dynamic_range_db;
+    t.per_log2 = static_cast<float>(per_db * 0.5 * kDbPerLog2);
+    t.power = power_ + static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
+    t.haze_above = nullptr;
+    if (f.effects.haze) {
+        const double at = std::clamp((k + 0.5) / kHazeCell - 0.5, 0.0, cells_k_ - 1.0);
+        const int k0 = std::min(static_cast<int>(at), std::max(cells_k_ - 2, 0)),
+                  k1 = std::min(k0 + 1, cells_k_ - 1);
+        t.haze_above = haze_.data() + static_cast<std::ptrdiff_t>(k0) * stride_;
+        t.haze_below = haze_.data() + static_cast<std::ptrdiff_t>(k1) * stride_;
+        t.haze_mix = static_cast<float>(at - k0);
+        for (int j = 0; j < 2; ++j) {
+            t.haze_re[j] = noise_.streak.data() +
+                           noise_start(f.seed, NoiseUse::haze_re, 0, k / kHazeGrain + j);
+            t.haze_im[j] = noise_.streak.data() +
+                           noise_start(f.seed, NoiseUse::haze_im, 0, k / kHazeGrain + j);
+        }
+        const double mix = static_cast<double>(k % kHazeGrain) / kHazeGrain;
+        const double level = 1 / std::sqrt(mix * mix + (1 - mix) * (1 - mix));
+        t.haze_first = static_cast<float>(level * (1 - mix));
+        t.haze_second = static_cast<float>(level * mix);
+    }
+    t.offset = static_cast<float>(
+        kGreyOfUnit + per_db * static_cast<double>(f.row_gain_db[static_cast<std::size_t>(k)]));
+}
+
 void PhysicalFast::make_grey(const PhysicalFrame& f) {
     const ScanGeometry& g = geometry_;
     const int ring_rows = std::max(2 * tables_.axial_reach + 1, 3);
-    const double per_db = 255 / f.dynamic_range_db;
     start_rows();
-    workers_.for_each((g.samples + kGreyRows - 1) / kGreyRows, [&](int part, int item) {
+    context_.workers.for_each((g.samples + kGreyRows - 1) / kGreyRows, [&](int part, int item) {
         const int begin = item * kGreyRows, end = std::min(begin + kGreyRows, g.samples);
         float* ring = ring_.data() + static_cast<std::ptrdiff_t>(part) * 2 * ring_rows * stride_;
         const auto ring_at = [&](int k) {
@@ -166,37 +194,15 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
         t.scanlines = g.scanlines;
         t.post_filter = f.effects.post_filter;
         t.work = work_.data() + static_cast<std::ptrdiff_t>(part) * 2 * stride_ + kRowMargin;
-        t.per_log2 = static_cast<float>(per_db * 0.5 * kDbPerLog2);
         const auto fill = [&](int k) {
-            t.power = power_ + static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
-            t.haze_above = nullptr;
-            if (f.effects.haze) {
-                const double at = std::clamp((k + 0.5) / kHazeCell - 0.5, 0.0, cells_k_ - 1.0);
-                const int k0 = std::min(static_cast<int>(at), std::max(cells_k_ - 2, 0)),
-                          k1 = std::min(k0 + 1, cells_k_ - 1);
-                t.haze_above = haze_.data() + static_cast<std::ptrdiff_t>(k0) * stride_;
-                t.haze_below = haze_.data() + static_cast<std::ptrdiff_t>(k1) * stride_;
-                t.haze_mix = static_cast<float>(at - k0);
-                for (int j = 0; j < 2; ++j) {
-                    t.haze_re[j] = noise_.streak.data() +
-                                   noise_start(f.seed, NoiseUse::haze_re, 0, k / kHazeGrain + j);
-                    t.haze_im[j] = noise_.streak.data() +
-                                   noise_start(f.seed, NoiseUse::haze_im, 0, k / kHazeGrain + j);
-                }
-                const double mix = static_cast<double>(k % kHazeGrain) / kHazeGrain;
-                const double level = 1 / std::sqrt(mix * mix + (1 - mix) * (1 - mix));
-                t.haze_first = static_cast<float>(level * (1 - mix));
-                t.haze_second = static_cast<float>(level * mix);
-            }
-            t.offset = static_cast<float>(
-                kGreyOfUnit +
-                per_db * static_cast<double>(f.row_gain_db[static_cast<std::size_t>(k)]));
+            fill_grey_task(f, k, t);
             t.out = ring_at(k);
-            make_physical_grey(t);
+            make_physical_grey(context_.simd, t);
         };
         const auto shade = [&](int k) {
             const int above = std::max(k - 1, 0), below = std::min(k + 1, g.samples - 1);
-            make_physical_shade({lines_, ring_at(above), ring_at(k), ring_at(below),
+            make_physical_shade(context_.simd,
+                                {lines_, ring_at(above), ring_at(k), ring_at(below),
                                  f.effects.post_filter, f.effects.grey_map, shade_at(k)});
         };
         // Shade row k needs grey rows k - 1 .. k + 1; pair row k needs shade rows k and k + 1.
@@ -214,7 +220,7 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
                 if (k + 2 < g.samples) fill(k + 2);
                 shade(k + 1);
             }
-            pair_rows(shade_at(k), shade_at(lower), lines_,
+            pair_rows(context_.simd, shade_at(k), shade_at(lower), lines_,
                       pairs_.data() + static_cast<std::ptrdiff_t>(k) * pair_stride_);
         }
     });

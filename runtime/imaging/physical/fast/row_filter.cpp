@@ -110,11 +110,11 @@ namespace sonocase::runtime {
 HWY_EXPORT(filter_across);
 HWY_EXPORT(make_power);
 
-void filter_row_across(const PhysicalRowTask& task) {
-    HWY_DYNAMIC_DISPATCH(filter_across)(task);
+void filter_row_across(SimdTarget simd, const PhysicalRowTask& task) {
+    HWY_DISPATCH_TABLE(filter_across)[simd.index](task);
 }
-void make_power_row(const PhysicalPowerTask& task) {
-    HWY_DYNAMIC_DISPATCH(make_power)(task);
+void make_power_row(SimdTarget simd, const PhysicalPowerTask& task) {
+    HWY_DISPATCH_TABLE(make_power)[simd.index](task);
 }
 
 }  // namespace sonocase::runtime

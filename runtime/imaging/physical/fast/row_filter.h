@@ -4,13 +4,14 @@
 #pragma once
 
 #include "runtime/imaging/physical/fast/physical_kernels.h"
+#include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime {
 
 // Light of the aperture times echoes, point spread across the beams, clutter and noise.
-void filter_row_across(const PhysicalRowTask& task);
+void filter_row_across(SimdTarget simd, const PhysicalRowTask& task);
 
 // Point spread along the beams and gain; the envelope's power.
-void make_power_row(const PhysicalPowerTask& task);
+void make_power_row(SimdTarget simd, const PhysicalPowerTask& task);
 
 }  // namespace sonocase::runtime

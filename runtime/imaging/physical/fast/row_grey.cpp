@@ -85,11 +85,11 @@ namespace sonocase::runtime {
 HWY_EXPORT(make_grey_row);
 HWY_EXPORT(make_shade_row);
 
-void make_physical_grey(const PhysicalGreyTask& task) {
-    HWY_DYNAMIC_DISPATCH(make_grey_row)(task);
+void make_physical_grey(SimdTarget simd, const PhysicalGreyTask& task) {
+    HWY_DISPATCH_TABLE(make_grey_row)[simd.index](task);
 }
-void make_physical_shade(const PhysicalShadeTask& task) {
-    HWY_DYNAMIC_DISPATCH(make_shade_row)(task);
+void make_physical_shade(SimdTarget simd, const PhysicalShadeTask& task) {
+    HWY_DISPATCH_TABLE(make_shade_row)[simd.index](task);
 }
 
 }  // namespace sonocase::runtime

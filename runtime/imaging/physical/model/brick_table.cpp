@@ -3,27 +3,28 @@
 #include "runtime/imaging/physical/model/brick_table.h"
 
 #include <algorithm>
-#include <new>
+#include <string>
+#include <utility>
 
 #ifdef __linux__
 #include <sys/mman.h>
 #endif
 
-#include "runtime/imaging/simd/parallel_halves.h"
+#include "runtime/imaging/host/parallel_halves.h"
 
 namespace sonocase::runtime {
 namespace {
 
-constexpr std::size_t kMostBlocks = 4096;  // a frame looks at each
+constexpr std::size_t kMostBlocks = 4096;  // every frame looks at each of them
 
-// Whether the system shall find pages of 2 MB for it. They serve a jumping probe, which reads from
-// all over the table; where few blocks are filled in they cost a start memory and time.
+// Whether the system shall use pages of 2 MB. They help a jumping probe, which reads all over the
+// table; where few blocks are filled in, they cost memory and time at the start.
 void use_large_pages(void* memory, std::size_t bytes, bool large) {
 #ifdef __linux__
     constexpr std::size_t kPage = 4096;
     const std::size_t skip = (0 - reinterpret_cast<std::uintptr_t>(memory)) % kPage;
     if (bytes < skip + kPage) return;
-    // A system without such pages says no, and nothing is lost.
+    // A system without such pages refuses, and nothing is lost.
     (void)madvise(static_cast<std::uint8_t*>(memory) + skip, (bytes - skip) / kPage * kPage,
                   large ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
 #else
@@ -33,37 +34,44 @@ void use_large_pages(void* memory, std::size_t bytes, bool large) {
 
 }  // namespace
 
-BrickTable::BrickTable(const CaseBundle& bundle)
-    : bundle_(&bundle), bricks_(brick_count(bundle.label_bricks.size)) {
+Result<BrickTable> BrickTable::create(const CaseBundle& bundle) {
+    BrickTable t;
+    t.bundle_ = &bundle;
+    t.bricks_ = brick_count(bundle.label_bricks.size);
     const auto count = [&] {
-        const auto parts = [&](int n) { return (n + (1 << edge_log2_) - 1) >> edge_log2_; };
-        blocks_ = {parts(bricks_.x), parts(bricks_.y), parts(bricks_.z)};
-        return static_cast<std::size_t>(blocks_.x) * static_cast<std::size_t>(blocks_.y) *
-               static_cast<std::size_t>(blocks_.z);
+        const auto parts = [&](int n) { return (n + (1 << t.edge_log2_) - 1) >> t.edge_log2_; };
+        t.blocks_ = {parts(t.bricks_.x), parts(t.bricks_.y), parts(t.bricks_.z)};
+        return static_cast<std::size_t>(t.blocks_.x) * static_cast<std::size_t>(t.blocks_.y) *
+               static_cast<std::size_t>(t.blocks_.z);
     };
-    left_ = count();
-    while (left_ > kMostBlocks && edge_log2_ < 8) {
-        ++edge_log2_;
-        left_ = count();
+    t.left_ = count();
+    while (t.left_ > kMostBlocks && t.edge_log2_ < 8) {
+        ++t.edge_log2_;
+        t.left_ = count();
     }
     const auto same = [&](const auto& volume) {
         return volume.table.size() == bundle.label_bricks.table.size();
     };
-    has_echo_ = same(bundle.echo_offset);
-    has_boundary_ = same(bundle.boundary);
-    there_.assign(left_, 0);
-    bytes_ = sizeof(std::uint32_t) * kWords * (left_ << 3 * edge_log2_);
-    void* memory = std::calloc(bytes_, 1);  // pages that nobody writes to cost nothing
-    if (memory == nullptr) throw std::bad_alloc();
-    words_.reset(static_cast<std::uint32_t*>(memory));
-    use_large_pages(memory, bytes_, false);
+    t.has_echo_ = same(bundle.echo_offset);
+    t.has_boundary_ = same(bundle.boundary);
+    t.is_loaded_.assign(t.left_, 0);
+    t.bytes_ = sizeof(std::uint32_t) * kWords * (t.left_ << 3 * t.edge_log2_);
+    void* memory = std::calloc(t.bytes_, 1);  // pages that are never written cost nothing
+    if (memory == nullptr) {
+        return Error{
+            "no memory for the bricks of the bundle: " + std::to_string(t.bytes_ >> 20) + " MB", "",
+            "close other programs, or build the case with larger voxels"};
+    }
+    t.words_.reset(static_cast<std::uint32_t*>(memory));
+    use_large_pages(memory, t.bytes_, false);
+    return t;
 }
 
-void BrickTable::load_all() {
+void BrickTable::load_all(JobRunner& jobs) {
     use_large_pages(words_.get(), bytes_, true);
     const std::size_t layer =
         static_cast<std::size_t>(blocks_.x) * static_cast<std::size_t>(blocks_.y);
-    parallel_halves(static_cast<std::size_t>(blocks_.z),
+    parallel_halves(jobs, static_cast<std::size_t>(blocks_.z),
                     [&](std::size_t, std::size_t begin, std::size_t end) {
                         std::size_t block = begin * layer;
                         for (int z = static_cast<int>(begin); z < static_cast<int>(end); ++z) {
@@ -72,7 +80,7 @@ void BrickTable::load_all() {
                             }
                         }
                     });
-    std::fill(there_.begin(), there_.end(), std::uint8_t{1});
+    std::fill(is_loaded_.begin(), is_loaded_.end(), std::uint8_t{1});
     left_ = 0;
 }
 

@@ -13,8 +13,11 @@ std::int8_t to_byte(double v) {
 }
 
 // Unit-deviation noise smoothed by a Gaussian of the given width, as bytes of 1/32.
-std::vector<std::int8_t> smoothed_tile(double sigma, std::uint32_t seed, int overhang) {
-    const std::vector<std::int8_t> raw = make_noise_tile(32, seed, 0);
+std::vector<std::int8_t> smoothed_tile(std::span<const double> levels,
+                                       double sigma,
+                                       std::uint32_t seed,
+                                       int overhang) {
+    const std::vector<std::int8_t> raw = make_noise_tile(levels, 32, seed, 0);
     const int reach = static_cast<int>(std::ceil(3 * sigma));
     std::vector<float> taps;
     float power = 0;
@@ -39,9 +42,12 @@ std::vector<std::int8_t> smoothed_tile(double sigma, std::uint32_t seed, int ove
 
 }  // namespace
 
-PhysicalNoise make_physical_noise(std::uint32_t seed, int overhang) {
-    return {smoothed_tile(0.8, seed + 1, overhang), smoothed_tile(2.5, seed + 2, overhang),
-            smoothed_tile(0, seed + 3, overhang)};
+PhysicalNoise make_physical_noise(std::span<const double> levels,
+                                  std::uint32_t seed,
+                                  int overhang) {
+    return {smoothed_tile(levels, 0.8, seed + 1, overhang),
+            smoothed_tile(levels, 2.5, seed + 2, overhang),
+            smoothed_tile(levels, 0, seed + 3, overhang)};
 }
 
 int label_at(const PhysicalScene& s, int i, int j, int k) {
@@ -55,7 +61,7 @@ void find_gaps(const PhysicalScene& scene,
                int first,
                int last,
                std::span<float> raw) {
-    // Of a voxel coordinate within 1e5 and a step: cheaper than a call of floor().
+    // Nearest integer of a number below 1e5: cheaper than a call of floor().
     const auto nearest = [](double v) {
         constexpr int kShift = 1 << 18;
         return static_cast<int>(v + (kShift + 0.5)) - kShift;

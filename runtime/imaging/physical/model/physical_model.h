@@ -1,61 +1,57 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Model `physical`: its constants and the tables that both renderers read. Distances in mm,
-// attenuation in dB/cm/MHz, amplitudes relative to a homogeneous liver. docs/effects.md names the
-// source of each.
+// Model `physical`: the constants that both renderers read. Distances in mm, attenuation in
+// dB/cm/MHz, amplitudes relative to a homogeneous liver. docs/effects.md names the source of each.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <vector>
 
 #include "formats/base/geometry.h"
-#include "formats/exercise/exercise.h"
-#include "runtime/imaging/scan/scan_geometry.h"
 
 namespace sonocase::runtime::physical {
 
 inline constexpr double kDbPerLog2 = 6.020599913279624;  // amplitude: 20 log10(2)
 
-// Contact: a gap of at most kMaxGapMm between face and skin closes under the probe's pressure, and
-// the tissue's shift dies out with depth.
+// Contact: a gap of at most kMaxGapMm between the probe's face and the skin closes under pressure,
+// and the shift of the tissue decays with depth.
 inline constexpr double kMaxGapMm = 25;
 inline constexpr double kGapReachMm = 45;
 inline constexpr double kGapStepMm = 0.5;
 
-// A beam that is this dark (log2 of its amplitude: -96 dB) is taken for dead: it lights nothing
-// more.
+// A beam as dark as this (log2 of its amplitude: -96 dB) counts as dead: it lights nothing below.
 inline constexpr double kDeadLog2 = -16;
 
-// Scatterers: a cube of this edge out of the bundle's speckle. Every period of it in each direction
-// is shuffled by a hash of its place (exclusive or on the cell's coordinates), so that nothing
-// repeats.
+// Scatterers: a cube of edge 2^kSpeckleLog2 out of the bundle's speckle, repeated in each
+// direction. Every repetition is shuffled by a hash of its place (exclusive or on the cell's
+// coordinates), so that no pattern shows twice.
 inline constexpr int kSpeckleLog2 = 6;
-inline std::uint32_t speckle_hash(std::int32_t x,
-                                  std::int32_t y,
-                                  std::int32_t z) {  // cell coordinates
-    return static_cast<std::uint32_t>(x >> kSpeckleLog2) * 0x9E3779B1u ^
-           static_cast<std::uint32_t>(y >> kSpeckleLog2) * 0x85EBCA77u ^
-           static_cast<std::uint32_t>(z >> kSpeckleLog2) * 0xC2B2AE3Du;
+inline constexpr std::uint32_t kSpeckleHashX = 0x9E3779B1u, kSpeckleHashY = 0x85EBCA77u,
+                               kSpeckleHashZ = 0xC2B2AE3Du;
+// x, y, z: of a cell.
+inline std::uint32_t speckle_hash(std::int32_t x, std::int32_t y, std::int32_t z) {
+    return static_cast<std::uint32_t>(x >> kSpeckleLog2) * kSpeckleHashX ^
+           static_cast<std::uint32_t>(y >> kSpeckleLog2) * kSpeckleHashY ^
+           static_cast<std::uint32_t>(z >> kSpeckleLog2) * kSpeckleHashZ;
 }
-inline constexpr int kShuffleX = 8, kShuffleY = 14,
-                     kShuffleZ = 20;  // bits of the hash for each axis
+// First bit of the hash for each axis.
+inline constexpr int kShuffleX = 8, kShuffleY = 14, kShuffleZ = 20;
 
-// Surfaces further than this from a voxel's centre do not reach it.
+// Surfaces further than this from a voxel's centre have no effect in it.
 inline constexpr double kSurfaceReachVx = 2.0;
 
 // Boundary roughness (mm) and the texture that carries it.
 inline constexpr double kRoughnessMm = 0.28;
-inline constexpr int kRoughEdge = 32;  // 128 kB: it stays in the second cache
+inline constexpr int kRoughEdge = 32;  // 128 kB: stays in the second-level cache
 inline constexpr double kRoughVoxelMm = 0.7;
 
-// Interfaces: amplitude 60 R^0.85 with R at most 0.115; share of specular and diffuse by angle.
+// Interfaces: amplitude 60 R^0.85, with the reflection coefficient R at most 0.115; specular and
+// diffuse parts by angle.
 inline constexpr double kInterfaceGain = 60;
 inline constexpr double kInterfacePower = 0.85;
 inline constexpr double kMaxReflection = 0.115;
 
-// Refraction at fluid: a beam that grazes within kEdgeCos of the tangent loses energy along the
-// wall.
+// Refraction at fluid: a beam that grazes the wall, its cosine to the normal below kEdgeCos, loses
+// energy along it.
 inline constexpr double kEdgeCos = 0.42;
 inline constexpr double kEdgeLossLog2PerMm = 0.55;
 inline constexpr double kEdgeReachMm = 1.0;
@@ -66,14 +62,14 @@ inline constexpr double kBoneTail = 7.7, kBoneTailMm = 0.6, kBoneTailSlow = 0.1,
 // What side lobes and reverberation leave in a bone's shadow: 15 to 22 grey in living bone.
 inline constexpr double kBoneFloor = 0.075, kBoneFloorMm = 90;
 inline constexpr double kGasTail = 1.4, kGasTailMm = 18;
-// A smooth face of gas and the probe's throw the pulse to and fro: lines at multiples of its depth
-// (A-lines), each this much of the one before; half a line is this many times the pulse wide.
+// A smooth face of gas and the probe's own reflect the pulse back and forth: lines at multiples of
+// the depth (A-lines), each kReverbLoss of the one before; half a line is kReverbWidth pulses wide.
 inline constexpr double kReverb = 9, kReverbLoss = 0.42, kReverbWidth = 1.4;
-// In fluid the pulse steepens, and its harmonics are lost: attenuation on top of the tissue's own.
-// Without, a full bladder would whiten all that lies behind.
+// In fluid the pulse steepens and its harmonics are lost: attenuation in addition to the fluid's
+// own, dB/cm/MHz. Without it, everything behind a full bladder would be white.
 inline constexpr double kFluidSteepening = 0.22;
 
-// Haze: side lobes and reverberation, this far below the mean envelope nearby.
+// Haze: side lobes and reverberation, relative to the mean envelope nearby.
 inline constexpr double kHazeDb = -24;
 inline constexpr int kHazeCell = 8;   // samples and beams of a cell of the mean
 inline constexpr int kHazeReach = 3;  // cells to each side
@@ -86,17 +82,17 @@ inline constexpr double kMaxNoiseGainDb = 48;
 inline constexpr double kNoiseDb = -70;
 inline constexpr double kGreyOfUnit = 136;
 inline constexpr double kGreyFloor = -25, kGreyCeiling = 290;  // before the post-filter
-inline constexpr double kGreyMap =
-    0.31;  // t - kGreyMap t (1 - t)(1 - 2t): 0.03 sin(2 pi t) without the sine
+// t - kGreyMap t (1 - t)(1 - 2t): close to t - 0.03 sin(2 pi t), without the sine.
+inline constexpr double kGreyMap = 0.31;
 
-// Echo offsets are baked one a voxel: a random step of this many voxels (one deviation) blends
-// them.
+// Echo offsets are baked one per voxel: a random step of this many voxels (one standard deviation)
+// blends them.
 inline constexpr double kLookupJitter = 0.4;
 
 inline constexpr int kMaxLateral = 12;  // taps to each side
 inline constexpr int kMaxAxial = 10;
 
-// Needle: a mirror of steel. Amplitude by the angle between beam and shaft.
+// Needle: a mirror of steel, its echo by the angle between beam and shaft.
 inline constexpr double kNeedleGain = 60;
 inline constexpr double kNeedleDiffuse = 0.035;
 inline constexpr double kNeedleShadowLog2 = 0.9;  // behind a needle that fills the slab
@@ -110,38 +106,14 @@ inline constexpr double kFibreAlongMm = 1.6, kFibreAcrossMm = 0.16;  // a cube's
 inline constexpr double kPennationRad = 0.2;
 inline constexpr double kSeptaAlongMm = 0.8, kSeptaAcrossMm = 0.4;
 
-// Targets of an exercise are balls in the anatomy; their surface is as rough as any.
+// Targets of an exercise are balls in the anatomy; their surface is as rough as that of organs.
 inline constexpr double kTargetReachMm = 2;
 inline constexpr int kMaxTargets = 8;
 
-// What one depth needs, the same for every beam.
-struct Row {
-    double r_mm = 0;
-    double gain = 1;             // TGC, amplitude
-    double contact = 0;          // exp(-r / kGapReachMm)
-    double interface_scale = 1;  // keeps an interface's peak through a filter of unit power
-    double near_field = 0;       // amplitude
-    double noise = 0;            // amplitude of the electronic noise
-    double elevation_mm = 0;     // standard deviation of the beam across the plane
-    int reach = 0;               // lateral taps to each side
-    std::array<float, 2 * kMaxLateral + 1> lateral{};  // centre at kMaxLateral; unit power
-};
-
-struct Tables {
-    std::vector<Row> rows;  // # samples
-    int axial_reach = 0;
-    std::array<float, 2 * kMaxAxial + 1> axial{};  // centre at kMaxAxial; unit power
-    double axial_mm = 0.58;                        // full width at half height
-    double scatter_mm = 0.3;                       // spacing of scatterers
-    double frequency_mhz = 3.5;
-};
-
-// Hides the speckle volume's period: a fixed turn along no special direction.
+// Hides the period of the speckle volume: a fixed rotation about no special direction.
 inline Matrix3 speckle_rotation() {
     return rotation_about(normalized(Vector3{0.36, 0.48, 0.8}), 0.7) *
            rotation_about({0, 0, 1}, 0.55);
 }
-
-Tables make_tables(const Probe& probe, const ScanGeometry& geometry);
 
 }  // namespace sonocase::runtime::physical

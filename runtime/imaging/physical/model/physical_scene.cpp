@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "runtime/imaging/noise/periodic_noise.h"
 #include "runtime/imaging/physical/model/physical_model.h"
 
 namespace sonocase::runtime {
@@ -42,8 +42,8 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
     double reflection =
         std::abs(a.impedance_mrayl - b.impedance_mrayl) / (a.impedance_mrayl + b.impedance_mrayl);
     e.sigma_mm = e.hard ? 0.20 : 0.16;
-    // Between muscles, and between muscle and fat, lies a sheet of connective tissue that the label
-    // volume does not show.
+    // Between muscles, and between muscle and fat, there is a sheet of connective tissue that the
+    // label volume does not show.
     if (is_muscle(a) && is_muscle(b) && la.name != lb.name) {
         reflection = std::max(reflection, 0.04);
         e.sigma_mm = 0.128;
@@ -60,62 +60,65 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
     return e;
 }
 
-std::uint32_t signed_byte(double v) {
-    return static_cast<std::uint32_t>(
-               static_cast<std::int32_t>(std::lround(std::clamp(v, -127.0, 127.0)))) &
-           0xFFu;
-}
-
-std::vector<std::uint32_t> make_rough_surfaces() {
-    const RawVector<float> rough = smooth_periodic_noise(kRoughEdge, 2, 11),
-                           glint = smooth_periodic_noise(kRoughEdge, 2, 12),
-                           phase = smooth_periodic_noise(kRoughEdge, 2, 13);
-    std::vector<std::uint32_t> out(rough.size());
-    for (std::size_t i = 0; i < rough.size(); ++i) {
-        const double p = 0.9 * static_cast<double>(phase[i]);
-        out[i] = signed_byte(32 * static_cast<double>(rough[i])) |
-                 signed_byte(32 * 0.75 * 1.4426950408889634 * static_cast<double>(glint[i])) << 8 |
-                 signed_byte(127 * std::cos(p)) << 16 | signed_byte(127 * std::sin(p)) << 24;
-    }
-    return out;
-}
-
-}  // namespace
-
-const std::vector<std::uint32_t>& rough_surfaces() {
-    static const std::vector<std::uint32_t> rough = make_rough_surfaces();
-    return rough;
-}
-
-Result<PhysicalScene> make_physical_scene(CaseView view, const std::vector<Target>& targets) {
-    PhysicalScene s;
-    const CaseBundle& bundle = *view;
-    s.bundle = &bundle;
-    s.grid = bundle.grid;
-    s.voxel_mm = bundle.grid.spacing_mm.x;
-    if (bundle.labels.empty() || bundle.label_bricks.table.empty()) {
-        return Error{"the bundle holds no label volume", "", "build the case again"};
-    }
-    const int edge = bundle.speckle.edge;
-    if (edge < 8 ||
-        bundle.speckle.voxels.size() != 2 * static_cast<std::size_t>(edge) * edge * edge) {
-        return Error{"the bundle holds no speckle volume", "",
-                     "build the case again, or use --model paper"};
-    }
+// A cube of edge 2^kSpeckleLog2 out of the bundle's speckle, which is repeated or cut.
+std::vector<std::int8_t> speckle_cube(const std::vector<std::int8_t>& voxels, int edge) {
     const auto cube = static_cast<std::size_t>(1 << kSpeckleLog2),
                given = static_cast<std::size_t>(edge);
-    s.speckle.resize(2 * cube * cube * cube);
+    std::vector<std::int8_t> out(2 * cube * cube * cube);
     for (std::size_t z = 0; z < cube; ++z) {
         for (std::size_t y = 0; y < cube; ++y) {
             for (std::size_t x = 0; x < cube; ++x) {
                 const std::size_t from = x % given + given * (y % given + given * (z % given));
                 const std::size_t to = x + cube * (y + cube * z);
-                s.speckle[2 * to] = bundle.speckle.voxels[2 * from];
-                s.speckle[2 * to + 1] = bundle.speckle.voxels[2 * from + 1];
+                out[2 * to] = voxels[2 * from];
+                out[2 * to + 1] = voxels[2 * from + 1];
             }
         }
     }
+    return out;
+}
 
+// What a target that shows is made of.
+struct TargetTissue {
+    AcousticProperties look{-8, 0.6, TissueKind::soft};
+    double wall = 0.5;
+};
+
+TargetTissue tissue_of_target(TargetLook look) {
+    switch (look) {
+        case TargetLook::none:
+        case TargetLook::lesion:
+            break;
+        case TargetLook::marker:
+            return {{12, 0.5, TissueKind::soft}, 12};
+        case TargetLook::abscess:
+            return {{-17, 0.2, TissueKind::fluid}, 4};
+        case TargetLook::cyst:
+        case TargetLook::calyx:
+            return {{-58, 0.02, TissueKind::fluid}, 3};
+    }
+    return {};
+}
+
+void add_targets(const std::vector<Target>& targets, PhysicalScene& s) {
+    for (const Target& t : targets) {
+        if (t.look == TargetLook::none || !(t.radius_mm > 0) || s.targets.size() >= kMaxTargets ||
+            s.looks.size() >= 255)
+            continue;
+        const TargetTissue tissue = tissue_of_target(t.look);
+        TargetBall ball;
+        ball.centre_vx = s.grid.voxel_from_point(t.centre);
+        ball.radius_mm = t.radius_mm;
+        ball.look = static_cast<int>(s.looks.size());
+        ball.wall = tissue.wall;
+        ball.fluid = tissue.look.kind == TissueKind::fluid;
+        s.looks.push_back(tissue.look);
+        s.targets.push_back(ball);
+    }
+}
+
+// Acoustic properties of labels and targets, and the echoes between labels.
+void add_tissues(const CaseBundle& bundle, const std::vector<Target>& targets, PhysicalScene& s) {
     const std::vector<int> tissue_of = tissue_of_label(bundle);
     const Tissue nothing{};
     const auto tissue = [&](std::size_t l) -> const Tissue& {
@@ -130,39 +133,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view, const std::vector<Targe
     s.has_hard = std::any_of(s.looks.begin(), s.looks.end(), [](const AcousticProperties& l) {
         return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
     });
-    for (const Target& t : targets) {
-        if (t.look == TargetLook::none || !(t.radius_mm > 0) || s.targets.size() >= kMaxTargets ||
-            s.looks.size() >= 255)
-            continue;
-        TargetBall ball;
-        ball.centre_vx = s.grid.voxel_from_point(t.centre);
-        ball.radius_mm = t.radius_mm;
-        ball.look = static_cast<int>(s.looks.size());
-        AcousticProperties look{-8, 0.6, TissueKind::soft};
-        ball.wall = 0.5;
-        switch (t.look) {
-            case TargetLook::lesion:
-                break;
-            case TargetLook::marker:
-                look = {12, 0.5, TissueKind::soft};
-                ball.wall = 12;
-                break;
-            case TargetLook::abscess:
-                look = {-17, 0.2, TissueKind::fluid};
-                ball.wall = 4;
-                break;
-            case TargetLook::cyst:
-            case TargetLook::calyx:
-                look = {-58, 0.02, TissueKind::fluid};
-                ball.wall = 3;
-                break;
-            case TargetLook::none:
-                break;
-        }
-        ball.fluid = look.kind == TissueKind::fluid;
-        s.looks.push_back(look);
-        s.targets.push_back(ball);
-    }
+    add_targets(targets, s);
     for (AcousticProperties& look : s.looks) {
         if (look.kind == TissueKind::fluid) look.attenuation += kFluidSteepening;
     }
@@ -174,11 +145,36 @@ Result<PhysicalScene> make_physical_scene(CaseView view, const std::vector<Targe
                     pair_echo(bundle.labels[a], tissue(a), bundle.labels[b], tissue(b));
         }
     }
+}
 
-    s.words = BrickTable(bundle);
-    if (!view.blocks()) s.words.load_all();
-    s.rough = rough_surfaces();
-    s.fine = make_fine_structure(bundle);
+}  // namespace
+
+Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
+                                          const std::vector<Target>& targets,
+                                          const PhysicalSceneOptions& options) {
+    JobRunner& jobs = options.jobs != nullptr ? *options.jobs : serial_jobs();
+    PhysicalScene s;
+    s.bundle = &bundle;
+    s.grid = bundle.grid;
+    s.voxel_mm = bundle.grid.spacing_mm.x;
+    if (bundle.labels.empty() || bundle.label_bricks.table.empty()) {
+        return Error{"the bundle holds no label volume", "", "build the case again"};
+    }
+    const int edge = bundle.speckle.edge;
+    if (edge < 8 ||
+        bundle.speckle.voxels.size() != 2 * static_cast<std::size_t>(edge) * edge * edge) {
+        return Error{"the bundle holds no speckle volume", "",
+                     "build the case again, or use --model paper"};
+    }
+    s.speckle = speckle_cube(bundle.speckle.voxels, edge);
+    add_tissues(bundle, targets, s);
+    Result<BrickTable> words = BrickTable::create(bundle);
+    if (!words) return words.error();
+    s.words = std::move(*words);
+    if (!options.streamed) s.words.load_all(jobs);
+    s.textures = options.textures ? options.textures
+                                  : std::make_shared<const PhysicalTextures>(physical_textures());
+    s.fine = make_fine_structure(bundle, jobs);
     return s;
 }
 

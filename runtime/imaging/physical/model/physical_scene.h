@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What model `physical` needs of a bundle, laid out for the frame loop. Voxel pools are used where
-// they lie in the bundle.
+// What model `physical` needs of a bundle and an exercise, laid out for the frame loop. Voxel pools
+// are used where they lie in the bundle.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
+#include <memory>
 #include <vector>
 
+#include "formats/base/jobs.h"
 #include "formats/base/result.h"
 #include "formats/bundle/streamed_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "runtime/imaging/physical/model/brick_table.h"
 #include "runtime/imaging/physical/model/fine_structure.h"
+#include "runtime/imaging/physical/model/physical_textures.h"
 
 namespace sonocase::runtime {
 
@@ -21,7 +22,7 @@ namespace sonocase::runtime {
 struct PairEcho {
     double amplitude = 0;   // 60 R^0.85; 0: none
     double sigma_mm = 0.2;  // of the reflecting layer
-    double split_mm = 0;    // of two layers, to either side of the surface; 0: one
+    double split_mm = 0;    // > 0: two layers, this far to either side of the surface
     bool hard = false;      // bone or gas on one side
     bool refracts = false;  // fluid on one side
     int pulse = 0;          // +1: the first label swells with the pulse, -1: the second
@@ -33,7 +34,7 @@ struct AcousticProperties {
     TissueKind kind = TissueKind::outside;
 };
 
-// A ball of the exercise, put into the anatomy.
+// A target of the exercise: a ball in the anatomy.
 struct TargetBall {
     Point3 centre_vx;  // voxel coordinates
     double radius_mm = 5;
@@ -47,14 +48,14 @@ struct PhysicalScene {
     Grid grid;
     double voxel_mm = 1;
 
-    // All filled in where all of the bundle is there; else to be asked for what a frame reads.
+    // Complete where the bundle is; otherwise a frame asks for what it reads.
     BrickTable words;
-    std::vector<AcousticProperties> looks;  // # labels
+    std::vector<AcousticProperties> looks;  // # labels, then one per target
     std::vector<PairEcho> pairs;            // # labels^2, [own * # labels + second]
-    bool has_hard = true;  // some label is bone or gas: what plans for scenes without go by
+    bool has_hard = true;  // some label is bone or gas; if none, their kernels are left out
 
-    std::span<const std::uint32_t> rough;  // rough_surfaces()
-    std::vector<std::int8_t> speckle;      // pairs, edge 2^kSpeckleLog2
+    std::shared_ptr<const PhysicalTextures> textures;
+    std::vector<std::int8_t> speckle;  // pairs, edge 2^kSpeckleLog2
     FineStructure fine;
 
     std::vector<TargetBall> targets;
@@ -62,12 +63,18 @@ struct PhysicalScene {
     int labels() const { return static_cast<int>(bundle->labels.size()); }
 };
 
-// Boundary roughness and glint, kRoughEdge^3: byte 0 roughness (/ 32), byte 1 log2 of the glint (/
-// 32), bytes 2 and 3 cosine and sine of its phase (/ 127); all signed. It depends on nothing: made
-// once, by whoever asks first.
-const std::vector<std::uint32_t>& rough_surfaces();
+struct PhysicalSceneOptions {
+    JobRunner* jobs = nullptr;                         // null: one job after the other
+    std::shared_ptr<const PhysicalTextures> textures;  // null: made here
+    // The bundle is unpacked block by block: its tables are filled in as frames need them.
+    bool streamed = false;
+};
 
-// targets: of the exercise; those that only mark a place leave no trace in the tissue.
-Result<PhysicalScene> make_physical_scene(CaseView view, const std::vector<Target>& targets = {});
+// targets: of the exercise; those that only mark a place do not show in the tissue.
+// The bundle must outlive the scene. Errors: a bundle without labels or speckle; too little memory
+// for the tables. Cost: 10 to 50 ms.
+Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
+                                          const std::vector<Target>& targets = {},
+                                          const PhysicalSceneOptions& options = {});
 
 }  // namespace sonocase::runtime

@@ -1,44 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Unpacks on a thread of its own what a frame reads, together with the frame itself, and then what
-// lies round the scan plane, so that the frames of a probe that moves seldom have to.
+// Unpacks, beside the frames, what a frame reads, together with the frame itself, and then what
+// lies around the scan plane, so that the frames of a moving probe seldom have to.
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
-#include <mutex>
-#include <thread>
+#include <memory>
 
+#include "formats/base/mailbox.h"
 #include "formats/bundle/voxel_blocks.h"
 #include "formats/volume/grid.h"
+#include "runtime/imaging/host/background.h"
 #include "runtime/imaging/physical/model/scan_reach.h"
 
 namespace sonocase::runtime {
 
 class ReadAhead {
   public:
-    // blocks must outlive it. Where no thread is to be had, nothing is read ahead.
-    ReadAhead(VoxelBlocks& blocks, const Grid& grid);
-    ~ReadAhead();  // stops
+    // blocks must outlive it.
+    ReadAhead(VoxelBlocks& blocks, const Grid& grid, std::unique_ptr<Background> background);
+    ~ReadAhead();  // stops and waits
     ReadAhead(const ReadAhead&) = delete;
     ReadAhead& operator=(const ReadAhead&) = delete;
 
-    // What a frame is about to ask for; the one before it is left for it. reach must stay where it
-    // is. Neither allocates nor throws, and does not wait for what is read.
+    // Announces what a frame is about to read; takes the place of the frame before, finished or
+    // not. reach must stay where it is. Neither allocates, throws nor waits for the reading.
     void frame(const ScanReach& reach, const Rigid& volume_from_probe, double shift_mm) noexcept;
 
   private:
-    void run() noexcept;
+    struct Frame {
+        const ScanReach* reach = nullptr;
+        Rigid volume_from_probe;
+        double shift_mm = 0;
+    };
+    void read() noexcept;  // on the other thread
 
     VoxelBlocks& blocks_;
     const Grid grid_;
-    std::mutex mutex_;
-    std::condition_variable wake_;
-    const ScanReach* reach_ = nullptr;  // under mutex_, as the pose
-    Rigid volume_from_probe_;
-    double shift_mm_ = 0;
+    Mailbox<Frame> frames_;
     std::atomic<bool> news_{false}, stop_{false};
-    std::thread thread_;
+    const std::unique_ptr<Background> background_;
 };
 
 }  // namespace sonocase::runtime

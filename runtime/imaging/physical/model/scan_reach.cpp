@@ -8,15 +8,15 @@
 namespace sonocase::runtime {
 namespace {
 
-constexpr double kDeviations = 4;  // of the jitter: its noise is bytes of 1/32
+constexpr double kDeviations = 4;  // most of the random step: its noise is bytes of 1/32
 
 }  // namespace
 
 ScanReach::ScanReach(const ScanGeometry& g, const physical::Tables& t, double voxel_mm)
     : fan_(g.fan), radius_mm_(g.radius_mm), half_extent_(g.half_extent) {
-    // A gap to the skin closes: what lies behind it moves up, less with depth.
+    // Where a gap to the skin closes, the tissue behind it moves up, less with depth.
     const double pressed = physical::kMaxGapMm * std::exp(-g.depth_mm / physical::kGapReachMm);
-    // The nearest voxel of a place that jitters.
+    // The random step of a look-up, and half a voxel to each side.
     const double rim = (kDeviations * physical::kLookupJitter + 1) * voxel_mm + 0.1;
     deepest_mm_ = g.depth_mm + pressed + rim;
     for (const physical::Row& row : t.rows)
@@ -49,7 +49,7 @@ bool ScanReach::reaches_along(const View& view, Int3 lower) const noexcept {
     const Point3 c = view.first + (static_cast<double>(lower.x) * view.step[0] +
                                    static_cast<double>(lower.y) * view.step[1] +
                                    static_cast<double>(lower.z) * view.step[2]);
-    // thick_mm_ stands for the jitter in the plane too: it is more.
+    // thick_mm_ bounds the random step in the plane as well.
     const double ball = view.radius_mm + thick_mm_;
     if (!fan_)
         return std::abs(c.x) < half_extent_ + ball && c.z > -ball && c.z < deepest_mm_ + ball;

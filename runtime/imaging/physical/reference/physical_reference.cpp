@@ -3,197 +3,211 @@
 #include "runtime/imaging/physical/reference/physical_reference.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
+
+#include "runtime/imaging/physical/reference/reference_beams.h"
 
 namespace sonocase::runtime {
 namespace {
 
 using namespace physical;
 
+// One value per sample: # samples x scanlines, row by row.
+using Plane = std::vector<double>;
+
+struct ComplexPlane {
+    Plane re, im;
+};
+
+// Beyond the outermost beams their neighbours repeat, mirrored.
 int reflect(int l, int n) {
     if (l < 0) l = -1 - l;
     if (l >= n) l = 2 * n - 1 - l;
     return std::clamp(l, 0, n - 1);
 }
 
-}  // namespace
-
-void render_physical_reference(const PhysicalScene& s,
-                               const ScanGeometry& g,
-                               const Tables& tables,
-                               const PhysicalNoise& noise,
-                               const PhysicalFrame& f,
-                               std::span<std::uint8_t> pixels) {
-    const PhysicalEffects& on = f.effects;
-    const int lines = g.scanlines, samples = g.samples;
-    const auto at = [&](int k, int l) {
-        return static_cast<std::size_t>(k) * static_cast<std::size_t>(lines) +
-               static_cast<std::size_t>(l);
-    };
-    const std::size_t count = static_cast<std::size_t>(samples) * static_cast<std::size_t>(lines);
-    const auto tile = [&](const std::vector<std::int8_t>& t, NoiseUse use, std::uint32_t frame,
-                          int k, int l) {
-        return t[noise_start(f.seed, use, frame, k) + static_cast<std::uint32_t>(l)] / 32.0;
-    };
-
-    // 1. Down each beam: scatterers, interfaces, light that is left, tails.
-    const auto [q_re, q_im, light, tail] = reference_beams(s, g, tables, noise, f);
-
-    // 2. The light is that of the whole aperture: boxes of 5 and 3 beams.
-    std::vector<double> f_re(count), f_im(count);
-    for (int k = 0; k < samples; ++k) {
-        for (int l = 0; l < lines; ++l) {
-            double smooth = 0;
-            constexpr std::array<double, 7> kBoxes{1 / 15.0, 2 / 15.0, 3 / 15.0, 3 / 15.0,
-                                                   3 / 15.0, 2 / 15.0, 1 / 15.0};
-            for (int j = -3; j <= 3; ++j)
-                smooth +=
-                    kBoxes[static_cast<std::size_t>(j + 3)] * light[at(k, reflect(l + j, lines))];
-            f_re[at(k, l)] = q_re[at(k, l)] * smooth;
-            f_im[at(k, l)] = q_im[at(k, l)] * smooth;
-        }
+// work(k, l) for every sample.
+template <class Work>
+void for_samples(const ReferenceInput& in, const Work& work) {
+    for (int k = 0; k < in.geometry.samples; ++k) {
+        for (int l = 0; l < in.geometry.scanlines; ++l) work(k, l);
     }
+}
 
-    // 3. Point spread across the beams.
-    if (on.point_spread) {
-        const std::vector<double> in_re = f_re, in_im = f_im;
-        for (int k = 0; k < samples; ++k) {
-            const Row& row = tables.rows[static_cast<std::size_t>(k)];
-            for (int l = 0; l < lines; ++l) {
-                double re = 0, im = 0;
-                for (int j = -row.reach; j <= row.reach; ++j) {
-                    const double tap =
-                        static_cast<double>(row.lateral[static_cast<std::size_t>(kMaxLateral + j)]);
-                    re += tap * in_re[at(k, reflect(l + j, lines))];
-                    im += tap * in_im[at(k, reflect(l + j, lines))];
-                }
-                f_re[at(k, l)] = re;
-                f_im[at(k, l)] = im;
+// The light is that of the whole aperture: boxes of 5 and 3 beams.
+ComplexPlane light_echoes(const ReferenceInput& in, const BeamSamples& beams) {
+    constexpr std::array<double, 7> kBoxes{1 / 15.0, 2 / 15.0, 3 / 15.0, 3 / 15.0,
+                                           3 / 15.0, 2 / 15.0, 1 / 15.0};
+    ComplexPlane out{Plane(in.count()), Plane(in.count())};
+    for_samples(in, [&](int k, int l) {
+        double smooth = 0;
+        for (int j = -3; j <= 3; ++j)
+            smooth += kBoxes[static_cast<std::size_t>(j + 3)] *
+                      beams.light[in.at(k, reflect(l + j, in.geometry.scanlines))];
+        out.re[in.at(k, l)] = beams.re[in.at(k, l)] * smooth;
+        out.im[in.at(k, l)] = beams.im[in.at(k, l)] * smooth;
+    });
+    return out;
+}
+
+// Point spread across the beams.
+void spread_across(const ReferenceInput& in, ComplexPlane& echoes) {
+    const ComplexPlane from = echoes;
+    for_samples(in, [&](int k, int l) {
+        const Row& row = in.row(k);
+        double re = 0, im = 0;
+        for (int j = -row.reach; j <= row.reach; ++j) {
+            const double tap =
+                static_cast<double>(row.lateral[static_cast<std::size_t>(kMaxLateral + j)]);
+            const std::size_t at = in.at(k, reflect(l + j, in.geometry.scanlines));
+            re += tap * from.re[at];
+            im += tap * from.im[at];
+        }
+        echoes.re[in.at(k, l)] = re;
+        echoes.im[in.at(k, l)] = im;
+    });
+}
+
+// Clutter and electronic noise as they reach the receiver: before the gain and its filter.
+void add_noise(const ReferenceInput& in, const Plane& tail, ComplexPlane& echoes) {
+    const PhysicalEffects& on = in.frame.effects;
+    for_samples(in, [&](int k, int l) {
+        const Row& row = in.row(k);
+        double &re = echoes.re[in.at(k, l)], &im = echoes.im[in.at(k, l)];
+        const double face = face_clutter(row, on);
+        const double clutter = std::sqrt(0.5 * (tail[in.at(k, l)] + face * face)) / row.gain;
+        re += clutter * in.draw(in.noise.streak, NoiseUse::clutter_re, 0, k, l);
+        im += clutter * in.draw(in.noise.streak, NoiseUse::clutter_im, 0, k, l);
+        if (!on.noise) return;
+        double n_re = 0, n_im = 0;
+        for (int j = 0; j < (on.persistence ? kPersistedFrames : 1); ++j) {
+            const double w = on.persistence ? kPersistence[static_cast<std::size_t>(j)] : 1;
+            const std::uint32_t number = in.frame.frame - static_cast<std::uint32_t>(j);
+            n_re += w * in.draw(in.noise.fine, NoiseUse::electronic_re, number, k, l);
+            n_im += w * in.draw(in.noise.fine, NoiseUse::electronic_im, number, k, l);
+        }
+        re += row.noise / row.gain * std::sqrt(0.5) * n_re;
+        im += row.noise / row.gain * std::sqrt(0.5) * n_im;
+    });
+}
+
+// Point spread along the beam, and gain: the power of the envelope.
+Plane envelope_power(const ReferenceInput& in, const ComplexPlane& echoes) {
+    Plane power(in.count());
+    for_samples(in, [&](int k, int l) {
+        const Row& row = in.row(k);
+        double re = echoes.re[in.at(k, l)], im = echoes.im[in.at(k, l)];
+        if (in.frame.effects.point_spread) {
+            re = im = 0;
+            for (int j = -in.tables.axial_reach; j <= in.tables.axial_reach; ++j) {
+                if (k + j < 0 || k + j >= in.geometry.samples) continue;
+                const double tap =
+                    static_cast<double>(in.tables.axial[static_cast<std::size_t>(kMaxAxial + j)]);
+                re += tap * echoes.re[in.at(k + j, l)];
+                im += tap * echoes.im[in.at(k + j, l)];
             }
         }
-    }
+        power[in.at(k, l)] = (re * re + im * im) * row.gain * row.gain;
+    });
+    return power;
+}
 
-    // 4. Clutter and electronic noise, as they reach the receiver: before the gain and its filter.
-    for (int k = 0; k < samples; ++k) {
-        const Row& row = tables.rows[static_cast<std::size_t>(k)];
-        for (int l = 0; l < lines; ++l) {
-            const double near = on.near_field ? row.near_field * row.near_field : 0;
-            const double clutter = std::sqrt(0.5 * (tail[at(k, l)] + near)) / row.gain;
-            f_re[at(k, l)] += clutter * tile(noise.streak, NoiseUse::clutter_re, 0, k, l);
-            f_im[at(k, l)] += clutter * tile(noise.streak, NoiseUse::clutter_im, 0, k, l);
-            if (!on.noise) continue;
-            double n_re = 0, n_im = 0;
-            for (int j = 0; j < (on.persistence ? kPersistedFrames : 1); ++j) {
-                const double w = on.persistence ? kPersistence[static_cast<std::size_t>(j)] : 1;
-                n_re += w * tile(noise.fine, NoiseUse::electronic_re,
-                                 f.frame - static_cast<std::uint32_t>(j), k, l);
-                n_im += w * tile(noise.fine, NoiseUse::electronic_im,
-                                 f.frame - static_cast<std::uint32_t>(j), k, l);
-            }
-            f_re[at(k, l)] += row.noise / row.gain * std::sqrt(0.5) * n_re;
-            f_im[at(k, l)] += row.noise / row.gain * std::sqrt(0.5) * n_im;
-        }
-    }
-
-    // 5. Point spread along the beam, gain; power of the envelope, and its mean nearby for the
-    // haze.
-    std::vector<double> power(count);
-    const int cells_k = (samples + kHazeCell - 1) / kHazeCell,
-              cells_l = (lines + kHazeCell - 1) / kHazeCell;
-    std::vector<double> mean(static_cast<std::size_t>(cells_k * cells_l), 0.0),
-        cell_n(mean.size(), 0.0);
-    for (int k = 0; k < samples; ++k) {
-        const Row& row = tables.rows[static_cast<std::size_t>(k)];
-        for (int l = 0; l < lines; ++l) {
-            double re = f_re[at(k, l)], im = f_im[at(k, l)];
-            if (on.point_spread) {
-                re = im = 0;
-                for (int j = -tables.axial_reach; j <= tables.axial_reach; ++j) {
-                    if (k + j < 0 || k + j >= samples) continue;
-                    const double tap =
-                        static_cast<double>(tables.axial[static_cast<std::size_t>(kMaxAxial + j)]);
-                    re += tap * f_re[at(k + j, l)];
-                    im += tap * f_im[at(k + j, l)];
-                }
-            }
-            power[at(k, l)] = (re * re + im * im) * row.gain * row.gain;
-            const auto cell = static_cast<std::size_t>(k / kHazeCell * cells_l + l / kHazeCell);
-            mean[cell] += std::sqrt(power[at(k, l)]);
-            cell_n[cell] += 1;
-        }
-    }
-    if (on.haze) {
-        std::vector<double> wide(mean.size());
-        for (int ck = 0; ck < cells_k; ++ck) {
-            for (int cl = 0; cl < cells_l; ++cl) {
-                double sum = 0, n = 0;
+// Side lobes and reverberation: the mean envelope nearby, kHazeDb below.
+class Haze {
+  public:
+    Haze(const ReferenceInput& in, const Plane& power)
+        : cells_k_((in.geometry.samples + kHazeCell - 1) / kHazeCell),
+          cells_l_((in.geometry.scanlines + kHazeCell - 1) / kHazeCell),
+          wide_(static_cast<std::size_t>(cells_k_ * cells_l_)) {
+        Plane sum(wide_.size(), 0.0), number(wide_.size(), 0.0);
+        for_samples(in, [&](int k, int l) {
+            const std::size_t cell = at(k / kHazeCell, l / kHazeCell);
+            sum[cell] += std::sqrt(power[in.at(k, l)]);
+            number[cell] += 1;
+        });
+        for (int ck = 0; ck < cells_k_; ++ck) {
+            for (int cl = 0; cl < cells_l_; ++cl) {
+                double s = 0, n = 0;
                 for (int j = std::max(cl - kHazeReach, 0);
-                     j <= std::min(cl + kHazeReach, cells_l - 1); ++j) {
-                    sum += mean[static_cast<std::size_t>(ck * cells_l + j)];
-                    n += cell_n[static_cast<std::size_t>(ck * cells_l + j)];
+                     j <= std::min(cl + kHazeReach, cells_l_ - 1); ++j) {
+                    s += sum[at(ck, j)];
+                    n += number[at(ck, j)];
                 }
-                wide[static_cast<std::size_t>(ck * cells_l + cl)] =
-                    std::pow(10.0, kHazeDb / 20) * sum / n;
-            }
-        }
-        for (int k = 0; k < samples; ++k) {
-            for (int l = 0; l < lines; ++l) {
-                const double ck = std::clamp((k + 0.5) / kHazeCell - 0.5, 0.0, cells_k - 1.0);
-                const double cl = std::clamp((l + 0.5) / kHazeCell - 0.5, 0.0, cells_l - 1.0);
-                const int k0 = std::min(static_cast<int>(ck), std::max(cells_k - 2, 0)),
-                          l0 = std::min(static_cast<int>(cl), std::max(cells_l - 2, 0));
-                const int k1 = std::min(k0 + 1, cells_k - 1), l1 = std::min(l0 + 1, cells_l - 1);
-                const auto w = [&](int a, int b) {
-                    return wide[static_cast<std::size_t>(a * cells_l + b)];
-                };
-                const double haze =
-                    (w(k0, l0) * (1 - (cl - l0)) + w(k0, l1) * (cl - l0)) * (1 - (ck - k0)) +
-                    (w(k1, l0) * (1 - (cl - l0)) + w(k1, l1) * (cl - l0)) * (ck - k0);
-                const double mix = static_cast<double>(k % kHazeGrain) / kHazeGrain;
-                const double unit = 1 / std::sqrt(mix * mix + (1 - mix) * (1 - mix));
-                const auto draw = [&](NoiseUse use) {
-                    return unit * ((1 - mix) * tile(noise.streak, use, 0, k / kHazeGrain, l) +
-                                   mix * tile(noise.streak, use, 0, k / kHazeGrain + 1, l));
-                };
-                const double a = draw(NoiseUse::haze_re), b = draw(NoiseUse::haze_im);
-                power[at(k, l)] += haze * haze * 0.5 * (a * a + b * b);
+                wide_[at(ck, cl)] = std::pow(10.0, kHazeDb / 20) * s / n;
             }
         }
     }
 
-    // 6. Log compression, post-filter, grey map.
-    std::vector<double> grey(count);
-    for (int k = 0; k < samples; ++k) {
-        for (int l = 0; l < lines; ++l) {
-            const double db = 10 * std::log10(power[at(k, l)] + 1e-12) +
-                              static_cast<double>(f.row_gain_db[static_cast<std::size_t>(k)]);
-            grey[at(k, l)] =
-                std::clamp(kGreyOfUnit + 255 * db / f.dynamic_range_db, kGreyFloor, kGreyCeiling);
-        }
-    }
-    if (on.post_filter) {
-        std::vector<double> across(count);
-        for (int k = 0; k < samples; ++k) {
-            for (int l = 0; l < lines; ++l) {
-                across[at(k, l)] = 0.25 * grey[at(k, reflect(l - 1, lines))] +
-                                   0.5 * grey[at(k, l)] + 0.25 * grey[at(k, reflect(l + 1, lines))];
-            }
-        }
-        for (int k = 0; k < samples; ++k) {
-            for (int l = 0; l < lines; ++l) {
-                grey[at(k, l)] = 0.25 * across[at(std::max(k - 1, 0), l)] + 0.5 * across[at(k, l)] +
-                                 0.25 * across[at(std::min(k + 1, samples - 1), l)];
-            }
-        }
-    }
-    std::vector<double> shade(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        double t = std::clamp(grey[i] / 255, 0.0, 1.0);
-        if (on.grey_map) t -= kGreyMap * t * (1 - t) * (1 - 2 * t);
-        shade[i] = std::nearbyint(255 * t);
+    // Amplitude at a sample, between the middles of the cells.
+    double amplitude(int k, int l) const {
+        const double ck = std::clamp((k + 0.5) / kHazeCell - 0.5, 0.0, cells_k_ - 1.0);
+        const double cl = std::clamp((l + 0.5) / kHazeCell - 0.5, 0.0, cells_l_ - 1.0);
+        const int k0 = std::min(static_cast<int>(ck), std::max(cells_k_ - 2, 0)),
+                  l0 = std::min(static_cast<int>(cl), std::max(cells_l_ - 2, 0));
+        const int k1 = std::min(k0 + 1, cells_k_ - 1), l1 = std::min(l0 + 1, cells_l_ - 1);
+        const auto w = [&](int a, int b) { return wide_[at(a, b)]; };
+        return (w(k0, l0) * (1 - (cl - l0)) + w(k0, l1) * (cl - l0)) * (1 - (ck - k0)) +
+               (w(k1, l0) * (1 - (cl - l0)) + w(k1, l1) * (cl - l0)) * (ck - k0);
     }
 
-    // 7. Scan conversion.
+  private:
+    std::size_t at(int ck, int cl) const { return static_cast<std::size_t>(ck * cells_l_ + cl); }
+
+    int cells_k_, cells_l_;
+    Plane wide_;
+};
+
+void add_haze(const ReferenceInput& in, Plane& power) {
+    const Haze haze(in, power);
+    for_samples(in, [&](int k, int l) {
+        const double mix = static_cast<double>(k % kHazeGrain) / kHazeGrain;
+        const double unit = 1 / std::sqrt(mix * mix + (1 - mix) * (1 - mix));
+        const auto draw = [&](NoiseUse use) {
+            return unit * ((1 - mix) * in.draw(in.noise.streak, use, 0, k / kHazeGrain, l) +
+                           mix * in.draw(in.noise.streak, use, 0, k / kHazeGrain + 1, l));
+        };
+        const double a = draw(NoiseUse::haze_re), b = draw(NoiseUse::haze_im);
+        const double h = haze.amplitude(k, l);
+        power[in.at(k, l)] += h * h * 0.5 * (a * a + b * b);
+    });
+}
+
+// Log compression, post-filter and grey map: grey in [0, 255], whole numbers.
+Plane grey_of(const ReferenceInput& in, const Plane& power) {
+    const int lines = in.geometry.scanlines, samples = in.geometry.samples;
+    Plane grey(in.count());
+    for_samples(in, [&](int k, int l) {
+        const double db = 10 * std::log10(power[in.at(k, l)] + 1e-12) +
+                          static_cast<double>(in.frame.row_gain_db[static_cast<std::size_t>(k)]);
+        grey[in.at(k, l)] = std::clamp(kGreyOfUnit + 255 * db / in.frame.dynamic_range_db,
+                                       kGreyFloor, kGreyCeiling);
+    });
+    if (in.frame.effects.post_filter) {
+        Plane across(in.count());
+        for_samples(in, [&](int k, int l) {
+            across[in.at(k, l)] = 0.25 * grey[in.at(k, reflect(l - 1, lines))] +
+                                  0.5 * grey[in.at(k, l)] +
+                                  0.25 * grey[in.at(k, reflect(l + 1, lines))];
+        });
+        for_samples(in, [&](int k, int l) {
+            grey[in.at(k, l)] = 0.25 * across[in.at(std::max(k - 1, 0), l)] +
+                                0.5 * across[in.at(k, l)] +
+                                0.25 * across[in.at(std::min(k + 1, samples - 1), l)];
+        });
+    }
+    for (double& g : grey) {
+        double t = std::clamp(g / 255, 0.0, 1.0);
+        if (in.frame.effects.grey_map) t -= kGreyMap * t * (1 - t) * (1 - 2 * t);
+        g = std::nearbyint(255 * t);
+    }
+    return grey;
+}
+
+void convert(const ReferenceInput& in, const Plane& shade, std::span<std::uint8_t> pixels) {
+    const ScanGeometry& g = in.geometry;
+    const int lines = g.scanlines, samples = g.samples;
     for (int r = 0; r < g.height_px; ++r) {
         for (int c = 0; c < g.width_px; ++c) {
             double line = 0, sample = 0, value = 0;
@@ -203,15 +217,34 @@ void render_physical_reference(const PhysicalScene& s,
                 const int l = std::min(static_cast<int>(line), std::max(lines - 2, 0)),
                           k = std::min(static_cast<int>(sample), std::max(samples - 2, 0));
                 const int l1 = std::min(l + 1, lines - 1), k1 = std::min(k + 1, samples - 1);
-                value = (shade[at(k, l)] * (1 - (line - l)) + shade[at(k, l1)] * (line - l)) *
-                            (1 - (sample - k)) +
-                        (shade[at(k1, l)] * (1 - (line - l)) + shade[at(k1, l1)] * (line - l)) *
-                            (sample - k);
+                value =
+                    (shade[in.at(k, l)] * (1 - (line - l)) + shade[in.at(k, l1)] * (line - l)) *
+                        (1 - (sample - k)) +
+                    (shade[in.at(k1, l)] * (1 - (line - l)) + shade[in.at(k1, l1)] * (line - l)) *
+                        (sample - k);
             }
             pixels[static_cast<std::size_t>(r) * static_cast<std::size_t>(g.width_px) +
                    static_cast<std::size_t>(c)] = static_cast<std::uint8_t>(std::lround(value));
         }
     }
+}
+
+}  // namespace
+
+void render_physical_reference(const PhysicalScene& scene,
+                               const ScanGeometry& geometry,
+                               const Tables& tables,
+                               const PhysicalNoise& noise,
+                               const PhysicalFrame& frame,
+                               std::span<std::uint8_t> pixels) {
+    const ReferenceInput in{scene, geometry, tables, noise, frame};
+    const BeamSamples beams = reference_beams(in);
+    ComplexPlane echoes = light_echoes(in, beams);
+    if (frame.effects.point_spread) spread_across(in, echoes);
+    add_noise(in, beams.tail, echoes);
+    Plane power = envelope_power(in, echoes);
+    if (frame.effects.haze) add_haze(in, power);
+    convert(in, grey_of(in, power), pixels);
 }
 
 }  // namespace sonocase::runtime

@@ -1,25 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The slow renderer of model `physical` works in two halves: down each beam, then across them.
+// The slow, obvious renderer of model `physical`: doubles, one sample after the other, the formula
+// beside each line. It defines what the fast renderer has to show. Cost: some 100 ns per sample and
+// effect; memory for a dozen planes of samples.
 #pragma once
 
-#include <vector>
+#include <cstdint>
+#include <span>
 
 #include "runtime/imaging/physical/model/physical_frame.h"
 
 namespace sonocase::runtime {
 
-// Of every sample, # samples x scanlines, row by row.
-struct BeamSamples {
-    std::vector<double> re, im;  // echoes, as amplitudes under full light
-    std::vector<double> light;   // that is left, there and back
-    std::vector<double> tail;    // power behind bone, gas and needle
-};
-
-BeamSamples reference_beams(const PhysicalScene& scene,
-                            const ScanGeometry& geometry,
-                            const physical::Tables& tables,
-                            const PhysicalNoise& noise,
-                            const PhysicalFrame& frame);
+// pixels: # width * height of the geometry.
+void render_physical_reference(const PhysicalScene& scene,
+                               const ScanGeometry& geometry,
+                               const physical::Tables& tables,
+                               const PhysicalNoise& noise,
+                               const PhysicalFrame& frame,
+                               std::span<std::uint8_t> pixels);
 
 }  // namespace sonocase::runtime

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Pages from an .html file that is embedded in the program: named blocks with placeholders.
+//
+//     <!--begin:row--><tr><td>{{name}}</td></tr><!--end:row-->
+//
+// Blocks do not nest; what stands between them is ignored. Values are inserted as they are: escape
+// text with escaped_html. The template belongs to the program, so that a block or a value that is
+// missing is a mistake of the caller (assert).
+#pragma once
+
+#include <initializer_list>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace sonocase::pipeline {
+
+using HtmlValues = std::initializer_list<std::pair<std::string_view, std::string_view>>;
+
+class HtmlTemplate {
+  public:
+    explicit HtmlTemplate(std::string_view html);  // which must outlive the template
+
+    // The block with every {{key}} replaced by its value.
+    std::string filled(std::string_view block, HtmlValues values) const;
+
+  private:
+    std::map<std::string_view, std::string_view> blocks_;
+};
+
+}  // namespace sonocase::pipeline

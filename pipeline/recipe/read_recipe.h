@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Reading a recipe: scenarios/<name>/case.toml.
+//
+//     name = "real-torso"
+//     preset = "balanced"              # draft | balanced | accurate
+//     exercises = ["liver-biopsy"]     # default: every other .toml beside a case.toml
+//
+//     [inputs]                         # paths: relative to --data, else to the recipe
+//     labels = "ct/labels.nii.gz"
+//     surface = "mannequin/sweep.csv"
+//
+//     [labels]                         # label = tissue, where the built-in table is wrong
+//     [tissues.liver]                  # changes of a built-in tissue, or new ones
+//     [resample]                       # options of a stage; `sonocase build --list-options`
+//     voxel_mm = 1
+//
+// [analytic] in place of [inputs] takes the embedded analytic torso, which needs no file.
+// Order of precedence: preset, recipe, --set. Whatever the recipe does not know is an error that
+// names file, line, key and the nearest valid key.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipeline/stage/recipe.h"
+#include "pipeline/stages/built_in_stages.h"
+
+namespace sonocase::pipeline {
+
+struct RecipeOverrides {
+    std::string data;               // --data
+    std::string preset;             // --preset; empty: the recipe's own
+    std::vector<std::string> sets;  // --set section.key=value
+};
+
+// path   the recipe, or its folder
+// table  the stages whose options the recipe may set; must outlive the recipe
+Result<Recipe> load_recipe(const std::string& path,
+                           const RecipeOverrides& overrides = {},
+                           const StageTable& table = built_in_stages());
+
+// The recipe with the given text; exercises are those given, not files beside it.
+Result<Recipe> parse_recipe(std::string_view text,
+                            const std::string& path,
+                            const RecipeOverrides& overrides,
+                            const std::vector<EmbeddedExercise>* exercises,
+                            const StageTable& table = built_in_stages());
+
+// The demonstration torso, compiled in: needs no file.
+Result<Recipe> embedded_recipe(const RecipeOverrides& overrides = {},
+                               const StageTable& table = built_in_stages());
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The sections of a recipe that say what a case is made of. Faults are kept in the document that
+// the tables belong to (formats/text/toml_reader.h).
+#pragma once
+
+#include <vector>
+
+#include "formats/text/toml_reader.h"
+#include "pipeline/stage/recipe.h"
+
+namespace sonocase::pipeline {
+
+void read_inputs(const TomlTable& table, RecipeInputs& inputs);              // [inputs]
+void read_analytic(const TomlTable& table, RecipeInputs& inputs);            // [analytic]
+void read_labels(const TomlTable& table, std::vector<LabelChoice>& labels);  // [labels]
+// [tissues]: changes those in the list, and adds new ones to it.
+void read_tissues(const TomlTable& table, std::vector<Tissue>& tissues);
+
+}  // namespace sonocase::pipeline

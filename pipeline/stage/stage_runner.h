@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Runs the stages of a case one after the other, each through the cache, and keeps their reports.
+//
+// A stage that is wanted is read from the cache, or run and stored there. Stages before the one
+// that a run stops at are only looked up: the digest of their result is enough for the keys that
+// follow, and the result itself is read when a stage asks for it. A result is freed as soon as no
+// later stage takes it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pipeline/stage/stage_cache.h"
+#include "pipeline/stage/stage_plan.h"
+
+namespace sonocase::pipeline {
+
+// One part of a stage as it ran or was read.
+struct StageRun {
+    StageReport report;  // with the seconds of the run that made the result
+    std::string key;     // in the cache; empty without one
+    bool from_cache = false;
+    std::vector<std::string> cache_notes;  // what happened in the cache: no matter of the result
+};
+
+struct RunnerOptions {
+    std::string cache_folder;       // empty: no cache
+    std::uint64_t cache_bytes = 0;  // bound of the cache; 0: none
+    std::string until;              // the stage to stop at; empty: the last of the plan
+};
+
+class StageRunner {
+  public:
+    // All of them must outlive the runner; options.until must be in the plan.
+    StageRunner(const Recipe& recipe,
+                const std::vector<PlannedStage>& plan,
+                const RunnerOptions& options,
+                const Progress& progress);
+
+    // Errors: those of the stages; a result that is not the one whose digest was promised.
+    Status run();
+
+    std::vector<StageRun> runs;  // of the results that were made or read, in that order
+
+    // Of the stage that run() stopped at.
+    StageValue result() const { return slots_[goal_].value; }
+    const std::string& digest() const { return slots_[goal_].digest; }
+
+  private:
+    struct Slot {
+        StageValue value;    // empty: not needed yet, or no longer
+        std::string digest;  // stands for the value in later keys; empty without a cache
+        std::string key;
+        double begin = 0, share = 0;  // of the whole run's progress
+    };
+
+    bool wanted(std::size_t i) const { return i == goal_ || goal_ + 1 == plan_.size(); }
+    Status look_up_or_obtain(std::size_t i);
+    Status obtain(std::size_t i);
+    Status make(std::size_t i, bool damaged, const Progress& progress);
+    bool read(std::size_t i, bool* damaged);
+    void keep_reports(std::size_t i, double seconds, bool cached, std::vector<std::string> notes);
+    StageInputs inputs_of(std::size_t i);
+    void let_go_after(std::size_t i);
+
+    const Recipe& recipe_;
+    const std::vector<PlannedStage>& plan_;
+    StageCache cache_;
+    const Progress& progress_;
+    std::vector<Slot> slots_;  // # plan
+    std::size_t goal_ = 0;
+    std::vector<bool> needed_;  // # plan: what the goal takes, directly or through others
+    std::vector<std::string> step_warnings_;  // for the next stage's report
+};
+
+}  // namespace sonocase::pipeline

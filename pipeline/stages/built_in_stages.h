@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The stages that cook a case, each described in a file of its own beside this one.
+//
+//     mannequin  import -> surface -> warp -> resample [-> smooth] -> tissues -> texture, structure
+//                                                                                        -> pack
+// mannequin and tissues are steps: they run with the stages that need them.
+#pragma once
+
+#include "pipeline/stage/stage_table.h"
+
+namespace sonocase::pipeline {
+
+// Made once, never changed.
+const StageTable& built_in_stages();
+
+StageDescriptor mannequin_step();
+StageDescriptor import_stage();
+StageDescriptor surface_stage();
+StageDescriptor warp_stage();
+StageDescriptor resample_stage();
+StageDescriptor smooth_stage();
+StageDescriptor tissues_step();
+StageDescriptor texture_stage();
+StageDescriptor structure_stage();
+StageDescriptor pack_stage();
+
+// The table's common options, [case].
+struct CaseOptions {
+    int seed = 1;  // of everything random in a case
+};
+std::uint64_t case_seed(const Recipe& recipe);
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The step "tissues": textures and structure take the tissues and not the labels, so that textures
+// stay in the cache when only voxels change.
+#include "pipeline/stages/case_tissues.h"
+
+#include <algorithm>
+
+#include "formats/base/digest.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/text/nearest_name.h"
+#include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/key_text.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+// The tissues that the palette uses, in the table's order, outside first.
+std::vector<Tissue> used_tissues(const std::vector<Tissue>& all, const std::vector<Label>& labels) {
+    std::vector<Tissue> used;
+    for (const Tissue& tissue : all) {
+        const bool wanted = tissue.name == "outside" ||
+                            std::any_of(labels.begin(), labels.end(), [&](const Label& label) {
+                                return label.tissue == tissue.name;
+                            });
+        if (wanted) used.push_back(tissue);
+    }
+    return used;
+}
+
+Result<StageValue> run(StageInputs& inputs, const Progress&) {
+    const auto labels = inputs.get<LabelFile>("labels");
+    if (!labels) return labels.error();
+    CaseTissues result;
+    result.palette = (*labels)->volume.labels;
+    if (auto status = assign_tissues(inputs.recipe(), result.palette); !status)
+        return status.error();
+    result.tissues = used_tissues(inputs.recipe().tissues, result.palette);
+    return StageValue::of(std::move(result));
+}
+
+std::string palette_text(const std::vector<Label>& palette) {
+    std::string text;
+    for (const Label& label : palette) text += label.name + "=" + label.tissue + "\n";
+    return text;
+}
+
+}  // namespace
+
+Status assign_tissues(const Recipe& recipe, std::vector<Label>& labels) {
+    std::vector<std::string> names, tissues;
+    for (const Label& label : labels) names.push_back(label.name);
+    for (const Tissue& tissue : recipe.tissues) tissues.push_back(tissue.name);
+    const auto known_class = total_segmentator_labels();
+    for (const LabelChoice& choice : recipe.labels) {
+        const std::string where = recipe.path + ":" + std::to_string(choice.line);
+        if (std::find(tissues.begin(), tissues.end(), choice.tissue) == tissues.end())
+            return Error{"unknown tissue '" + choice.tissue + "'", where,
+                         suggest_name(choice.tissue, tissues)};
+        const auto found = std::find(names.begin(), names.end(), choice.label);
+        if (found == names.end()) {
+            if (std::find(known_class.begin(), known_class.end(), choice.label) !=
+                known_class.end())
+                continue;
+            return Error{"label '" + choice.label + "' is not in the label map", where,
+                         suggest_name(choice.label, names)};
+        }
+        labels[static_cast<std::size_t>(found - names.begin())].tissue = choice.tissue;
+    }
+    return Done{};
+}
+
+std::string tissues_text(const std::vector<Tissue>& tissues) {
+    std::string text;
+    for (const Tissue& t : tissues)
+        text += t.name + "|" + t.texture +
+                key_text("", {static_cast<double>(t.kind), t.casts_shadow ? 1.0 : 0.0, t.grey_mean,
+                              t.grey_sd, t.echo_db, t.structure_db, t.attenuation_db_cm_mhz,
+                              t.impedance_mrayl, t.sound_speed_m_s}) +
+                "\n";
+    return text;
+}
+
+StageDescriptor tissues_step() {
+    StageDescriptor step;
+    step.name = "tissues";
+    step.takes = {"labels"};
+    step.provides = "tissues";
+    // Which tissues a case uses is known once its labels exist; the plan takes all of them.
+    step.key_texts = [](const Recipe& recipe, const InputDigests&) {
+        std::vector<std::string> texts{tissues_text(recipe.tissues)};
+        for (const LabelChoice& choice : recipe.labels)
+            texts.push_back(choice.label + "=" + choice.tissue);
+        return texts;
+    };
+    step.run = run;
+    step.digest = [](const StageValue& value) {
+        const CaseTissues& result = value.as<CaseTissues>();
+        return digest_of(tissues_text(result.tissues) + palette_text(result.palette));
+    };
+    return step;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The step "mannequin": the digitised surface, read from its file or made from the analytic torso.
+#include "pipeline/import/surface/surface_file.h"
+#include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/key_text.h"
+#include "pipeline/stages/mannequin_surface.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+Result<StageValue> run(StageInputs& inputs, const Progress&) {
+    auto mannequin = read_mannequin(inputs.recipe());
+    if (!mannequin) return mannequin.error();
+    return StageValue::of(std::move(*mannequin));
+}
+
+// Of the analytic torso, everything that its mannequin can depend on.
+std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
+    const RecipeInputs& in = recipe.inputs;
+    if (!in.analytic) return {key_text(digests.surface, {in.surface_scale})};
+    const AnalyticInput& torso = in.torso;
+    const AnalyticMannequinOptions& made = torso.mannequin;
+    return {
+        key_text("analytic", {torso.body.width_scale, torso.body.depth_scale, torso.body.belly_mm,
+                              made.noise_mm, made.strength, static_cast<double>(made.points),
+                              made.mesh ? 1.0 : 0.0, made.front_only ? 1.0 : 0.0,
+                              static_cast<double>(made.seed), static_cast<double>(torso.body.warp),
+                              static_cast<double>(torso.landmarks), torso.landmark_noise_mm})};
+}
+
+}  // namespace
+
+Result<Mannequin> read_mannequin(const Recipe& recipe) {
+    const RecipeInputs& in = recipe.inputs;
+    Mannequin mannequin;
+    if (in.analytic) {
+        mannequin.surface = analytic_torso_mannequin(in.torso.mannequin, in.torso.body);
+        return mannequin;
+    }
+    SurfaceFileOptions options;
+    options.scale = in.surface_scale;
+    auto surface = import_surface(recipe.resolve(in.surface), options, &mannequin.report);
+    if (!surface) return surface.error();
+    mannequin.surface = std::move(*surface);
+    return mannequin;
+}
+
+Vector3 extent_of(const Surface& surface) {
+    Box3 box;
+    for (const Point3 p : surface.points) box.include(p);
+    return box.extent();
+}
+
+StageDescriptor mannequin_step() {
+    StageDescriptor step;
+    step.name = "mannequin";
+    step.provides = "mannequin";
+    step.key_texts = key_texts;
+    step.run = run;
+    step.warnings = [](const StageValue& value) {
+        std::vector<std::string> warnings;
+        for (const std::string& warning : value.as<Mannequin>().report.warnings)
+            warnings.push_back("surface: " + warning);
+        return warnings;
+    };
+    return step;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// pack: everything that the stages made becomes one bundle. Its result is a PackResult; it is not
+// kept in the cache, since the bundle itself is.
+#include "formats/bundle/stage_files.h"
+#include "formats/container/chunk_file.h"
+#include "pipeline/pack/error_budget.h"
+#include "pipeline/pack/pack_case.h"
+#include "pipeline/registration/skin/skin_surface.h"
+#include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/case_tissues.h"
+#include "pipeline/stages/mannequin_surface.h"
+#include "pipeline/stages/structure_stage.h"
+
+#include <cmath>
+
+namespace sonocase::pipeline {
+namespace {
+
+// What the case's own reports say of its error, beside the figures of the bundle.
+void add_error_budget(const std::vector<StageReport>& reported, StageReport& report) {
+    const ErrorBudget budget = error_budget(reported);
+    for (const BudgetEntry& entry : budget.entries)
+        if (std::isfinite(entry.mm))
+            report.measures.push_back({entry.stage + "_error_mm", entry.mm});
+    report.measures.push_back({"known_error_mm", budget.known_mm});
+}
+
+Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
+    const auto mannequin = inputs.get<Mannequin>("mannequin");
+    const auto skin = inputs.get<SkinSurfaceResult>("skin");
+    const auto registration = inputs.get<Registration>("registration");
+    const auto labels = inputs.get<LabelFile>("labels");
+    const auto used = inputs.get<CaseTissues>("tissues");
+    const auto textures = inputs.get<TextureFile>("textures");
+    const auto structure = inputs.get<EchoOffsets>("structure");
+    if (!mannequin) return mannequin.error();
+    if (!skin) return skin.error();
+    if (!registration) return registration.error();
+    if (!labels) return labels.error();
+    if (!used) return used.error();
+    if (!textures) return textures.error();
+    if (!structure) return structure.error();
+    report_progress(progress, 0, "packing");
+    const Recipe& recipe = inputs.recipe();
+    PackInput input{recipe.name,          recipe.text,      recipe.exercises,
+                    &(*skin)->skin,       *registration,    (*mannequin)->surface,
+                    (*labels)->volume,    (*used)->palette, (*labels)->boundary,
+                    (*structure)->offset, **textures,       (*used)->tissues};
+    auto packed = pack_case(input);
+    if (!packed) return packed.error();
+    add_error_budget(inputs.reported(), packed->report);
+    return StageValue::of(std::move(*packed));
+}
+
+std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
+    std::vector<std::string> texts{std::to_string(kContainerVersion), recipe.name, recipe.text};
+    for (const EmbeddedExercise& exercise : recipe.exercises) {
+        texts.push_back(exercise.name);
+        texts.push_back(exercise.toml);
+    }
+    for (const InputHash& file : digests.files) texts.push_back(file.path + " " + file.digest);
+    return texts;
+}
+
+}  // namespace
+
+StageDescriptor pack_stage() {
+    StageDescriptor stage;
+    stage.name = "pack";
+    stage.version = kPackVersion;
+    stage.takes = {"mannequin", "skin",     "registration", "labels",
+                   "tissues",   "textures", "structure"};
+    stage.provides = "case";
+    stage.key_texts = key_texts;
+    stage.run = run;
+    stage.reports = [](const StageValue& value) {
+        return std::vector<StageReport>{value.as<PackResult>().report};
+    };
+    stage.share = 0.05;
+    stage.cost = {1, 240, 0, 0, 4.5};
+    return stage;
+}
+
+}  // namespace sonocase::pipeline

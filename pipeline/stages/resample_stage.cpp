@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// resample: the patient's labels through the fitted map into cubic voxels in `mannequin`.
+#include "formats/files/registration_file.h"
+#include "formats/registration/registration.h"
+#include "pipeline/export/labels/segmentation_pictures.h"
+#include "pipeline/segmentation/resample_labels.h"
+#include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/label_codec.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using Resample = ResampleOptions;
+
+void add_grid(OptionsOf<Resample>& options) {
+    options
+        .number(
+            "voxel_mm", [](auto& o) { return &o.voxel_mm; }, 0.2, 10, "mm",
+            "edge of the cooked voxels")
+        .sweep({"warp",
+                {"3", "2", "1.5", "1", "0.75"},
+                "surfaces between voxels; memory goes with its cube",
+                "voxels finer than the map's own sampling hold nothing new"})
+        .sweep({"case",
+                {"3", "2", "1.5", "1", "0.75"},
+                "surfaces between voxels",
+                "voxels finer than the fit of the skin is good gain nothing"})
+        .number(
+            "margin_mm", [](auto& o) { return &o.margin_mm; }, 0, 50, "mm",
+            "air kept round the body")
+        .choice(
+            "method", [](auto& o) { return &o.method; }, {"shape", "nearest", "paper"}, "",
+            "how labels go through the map");
+}
+
+void add_shape(OptionsOf<Resample>& options) {
+    options.help_group("Method shape")
+        .number(
+            "sigma_vx", [](auto& o) { return &o.sigma_vx; }, 0, 4, "voxels of the map",
+            "smoothing of the surfaces, standard deviation in the plane")
+        .sweep({"smooth",
+                {"0", "0.5", "1", "1.7", "2", "3"},
+                "steps of the map's voxels",
+                "its cost does not depend on it: too little leaves steps, too much rounds what is "
+                "thin"})
+        .number(
+            "detail_vx", [](auto& o) { return &o.detail_vx; }, 0, 4, "voxels of the map",
+            "smoothing of structures that sigma_vx would wipe out")
+        .number(
+            "sigma_slices", [](auto& o) { return &o.sigma_slices; }, 0, 2, "slices",
+            "smoothing along thick slices; 0: sigma_vx")
+        .number(
+            "volume_iterations", [](auto& o) { return &o.volume_iterations; }, 0, 50, "",
+            "Newton steps that keep each label's volume; 0: not kept")
+        .sweep({"smooth",
+                {"0", "1", "2", "4", "8"},
+                "volume lost by smoothing",
+                "converged after a few steps"})
+        .toggle(
+            "follow_shift", [](auto& o) { return &o.follow_shift; },
+            "blend oblique vessels along their shift")
+        .number(
+            "record_band_vx", [](auto& o) { return &o.record_band_vx; }, 0, 2.6, "voxels",
+            "reach of the boundary records; 0: none")
+        .sweep({"warp",
+                {"0", "0.5", "1", "1.5", "2"},
+                "surfaces inside voxels",
+                "one voxel holds every place that a point can be nearest to; a wider band only "
+                "adds records"})
+        .choice(
+            "block_vx", [](auto& o) { return &o.block_vx; }, {"4", "8", "16"}, "nodes",
+            "edge of the blocks that distances are kept in; affects time and memory alone")
+        .sweep({"warp",
+                {"4", "8", "16"},
+                "time and memory alone",
+                "which labels can win at a point is decided in every cell of a block"})
+        .number(
+            "snap_vx", [](auto& o) { return &o.snap_vx; }, 0, 0.5, "voxels",
+            "most that surfaces move onto quadrics, which are short to store; 0: none")
+        .sweep({"smooth",
+                {"0", "0.03", "0.07", "0.15"},
+                "surfaces inside voxels, against the size of the bundle",
+                "bricks where no quadric is that near are kept as they are"});
+}
+
+void add_paper(OptionsOf<Resample>& options) {
+    options.help_group("Method paper")
+        .number(
+            "k0", [](auto& o) { return &o.level_set.k0; }, 0.001, 100, "1/mm^2",
+            "method paper: K0 of eq. (10)")
+        .number(
+            "iterations", [](auto& o) { return &o.level_set.iterations; }, 1, 1000, "",
+            "method paper: steps of eq. (10)")
+        .toggle(
+            "closest_point", [](auto& o) { return &o.level_set.closest_point; },
+            "method paper: curvature at the nearest surface point");
+}
+
+OptionGroup options() {
+    OptionsOf<Resample> options("resample");
+    add_grid(options);
+    add_shape(options);
+    add_paper(options);
+    return options;
+}
+
+Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
+    const auto ct = inputs.get<LabelFile>("ct_labels");
+    if (!ct) return ct.error();
+    const auto registration = inputs.get<Registration>("registration");
+    if (!registration) return registration.error();
+    auto result = resample_labels({(*ct)->volume, **registration},
+                                  inputs.options<ResampleOptions>("resample"), progress);
+    if (!result) return result.error();
+    return label_value("mannequin", std::move(*result));
+}
+
+StageVerb verb() {
+    StageVerb verb;
+    verb.files = {label_input("ct_labels", "Labels in the ct frame: .labels or any label map"),
+                  {"registration", "--registration", "REG.json", "The fit, as register writes it",
+                   [](const std::string& path) -> Result<StageValue> {
+                       auto registration = load_registration(path);
+                       if (!registration) return registration.error();
+                       return StageValue::of(std::move(*registration));
+                   }}};
+    verb.output_type = "OUT";
+    verb.output_meaning = kLabelOutput;
+    verb.save = [](StageInputs&, const StageValue& value, const std::string& path) {
+        return save_labels(value.as<LabelFile>(), {}, path);
+    };
+    verb.pictures_meaning = "Folder for pictures of before and after in three planes";
+    verb.draw = [](StageInputs& inputs, const StageValue& value,
+                   const std::string& folder) -> Status {
+        const auto ct = inputs.get<LabelFile>("ct_labels");
+        if (!ct) return ct.error();
+        const auto registration = inputs.get<Registration>("registration");
+        if (!registration) return registration.error();
+        const LabelFile& file = value.as<LabelFile>();
+        return write_segmentation_pictures(
+            {(*ct)->volume, *registration, file.volume, file.boundary}, folder);
+    };
+    return verb;
+}
+
+}  // namespace
+
+StageDescriptor resample_stage() {
+    StageDescriptor stage;
+    stage.name = "resample";
+    stage.version = kResampleVersion;
+    stage.summary = "carry labels through the fit into cubic voxels";
+    stage.about = "Carry a label map through the fitted map into cubic voxels, and smooth it";
+    stage.takes = {"ct_labels", "registration"};
+    stage.provides = "labels";
+    stage.options = options();
+    stage.run = run;
+    stage.codec = label_codec();
+    stage.reports = label_reports;
+    stage.share = 0.4;
+    stage.cost = {2, 340, 0, 10, 6};
+    stage.verb = verb();
+    return stage;
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// structure: what lies inside the organs and no label shows, baked into echo offsets.
+#include "pipeline/stages/structure_stage.h"
+
+#include <array>
+#include <string_view>
+
+#include "formats/bundle/stage_files.h"
+#include "formats/container/chunk_file.h"
+#include "formats/text/stage_report_json.h"
+#include "pipeline/anatomy/structure_cells.h"
+#include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/case_tissues.h"
+#include "pipeline/stages/label_codec.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr int kStructureVersion = 2;
+constexpr std::string_view kEchoKind = "ECHO";
+constexpr std::array<std::string_view, 5> kEchoChunks{"size", "table", "uniform", "pool", "report"};
+
+OptionGroup options() {
+    return OptionsOf<BakeStructureOptions>("structure")
+        .toggle(
+            "parenchyma", [](auto& o) { return &o.parenchyma; }, "grain of every soft tissue")
+        .toggle(
+            "liver_vessels", [](auto& o) { return &o.liver_vessels; },
+            "portal and hepatic venous trees in the liver")
+        .toggle(
+            "kidney", [](auto& o) { return &o.kidney; },
+            "cortex, pyramids and sinus fat of the kidneys")
+        .toggle(
+            "muscle_fibres", [](auto& o) { return &o.muscle_fibres; }, "fascicles of the muscles")
+        .toggle(
+            "fat_septa", [](auto& o) { return &o.fat_septa; }, "septa of the fat under the skin")
+        .toggle(
+            "bowel_wall", [](auto& o) { return &o.bowel_wall; },
+            "layers of the bowel's wall, and its contents")
+        .toggle(
+            "fascia", [](auto& o) { return &o.fascia; }, "bright layer between muscle and fat");
+}
+
+Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
+    const auto labels = inputs.get<LabelFile>("labels");
+    if (!labels) return labels.error();
+    const auto used = inputs.get<CaseTissues>("tissues");
+    if (!used) return used.error();
+    BakeStructureOptions options = inputs.options<BakeStructureOptions>("structure");
+    options.seed = case_seed(inputs.recipe());
+    // The same voxels with the tissues of the recipe; one byte per voxel is copied.
+    LabelVolume volume = (*labels)->volume;
+    volume.labels = (*used)->palette;
+    auto result = bake_structure_in_cells(volume, (*used)->tissues, options, progress);
+    if (!result) return result.error();
+    return StageValue::of(EchoOffsets{std::move(result->echo_offset), {result->report}});
+}
+
+Bytes encode(const EchoOffsets& offsets) {
+    const Int3 size = offsets.offset.size;
+    const std::vector<std::int32_t> sizes{size.x, size.y, size.z};
+    std::string text;
+    for (const StageReport& report : without_seconds(offsets.reports))
+        text += stage_report_json(report);
+    const Bytes report(text.begin(), text.end());
+    ChunkWriter writer{std::string(kEchoKind)};
+    writer.add_array("size", true, sizes);
+    writer.add_array("table", true, offsets.offset.table);
+    writer.add_array("uniform", true, offsets.offset.uniform);
+    writer.add_array("pool", true, offsets.offset.pool);
+    writer.add_view("report", true, report);
+    return writer.write();
+}
+
+Result<EchoOffsets> decode(const Bytes& bytes, const std::string& where) {
+    auto reader = ChunkReader::open(bytes, kEchoKind, kEchoChunks, where);
+    if (!reader) return reader.error();
+    EchoOffsets result;
+    auto size = reader->read_array<std::int32_t>("size", 3);
+    if (!size) return size.error();
+    result.offset.size = {(*size)[0], (*size)[1], (*size)[2]};
+    auto table = reader->read_array<std::uint32_t, RawVector<std::uint32_t>>(
+        "table", reader->raw_bytes("table") / 4);
+    if (!table) return table.error();
+    auto uniform = reader->read_array<std::int8_t>("uniform", reader->raw_bytes("uniform"));
+    if (!uniform) return uniform.error();
+    auto pool =
+        reader->read_array<std::int8_t, RawVector<std::int8_t>>("pool", reader->raw_bytes("pool"));
+    if (!pool) return pool.error();
+    result.offset.table = std::move(*table);
+    result.offset.uniform = std::move(*uniform);
+    result.offset.pool = std::move(*pool);
+    auto text = reader->read("report", reader->raw_bytes("report"));
+    if (!text) return text.error();
+    auto report =
+        parse_stage_report({reinterpret_cast<const char*>(text->data()), text->size()}, where);
+    if (!report) return report.error();
+    result.reports = {std::move(*report)};
+    return result;
+}
+
+StageVerb verb() {
+    StageVerb verb;
+    verb.files = {label_input("labels", "Cooked labels, as resample or smooth writes them")};
+    verb.output_type = "OUT.labels";
+    verb.output_meaning = "Where to write the labels with their echo offsets";
+    verb.save = [](StageInputs& inputs, const StageValue& value,
+                   const std::string& path) -> Status {
+        const auto labels = inputs.get<LabelFile>("labels");
+        if (!labels) return labels.error();
+        const EchoOffsets& offsets = value.as<EchoOffsets>();
+        LabelFile file = **labels;
+        file.echo_offset = offsets.offset;
+        file.reports = offsets.reports;
+        return save_labels(file, (*labels)->reports, path);
+    };
+    return verb;
+}
+
+}  // namespace
+
+StageDescriptor structure_stage() {
+    StageDescriptor stage;
+    stage.name = "structure";
+    stage.version = kStructureVersion;
+    stage.summary = "bake structure inside organs into cooked labels";
+    stage.about = "Bake structure inside organs into the echo offsets of cooked labels";
+    stage.takes = {"labels", "tissues"};
+    stage.provides = "structure";
+    stage.options = options();
+    stage.seeded = true;
+    stage.run = run;
+    stage.codec = codec_of<EchoOffsets>(encode, decode);
+    stage.reports = [](const StageValue& value) { return value.as<EchoOffsets>().reports; };
+    stage.share = 0.2;
+    stage.cost = {2, 240, 0, 0, 5};
+    stage.verb = verb();
+    return stage;
+}
+
+}  // namespace sonocase::pipeline

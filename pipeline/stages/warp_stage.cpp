@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// warp: the map from the patient to the mannequin, rigid alignment and warps in one.
+//
+// The analytic torso may take the map that its mannequin was made by, which is exact.
+#include "formats/registration/registration_json.h"
+#include "pipeline/base/plausible_size.h"
+#include "pipeline/registration/landmark_file.h"
+#include "pipeline/registration/register_surfaces.h"
+#include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/key_text.h"
+#include "pipeline/stages/mannequin_surface.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using Fit = RegisterOptions;
+
+void add_align(OptionsOf<Fit>& options) {
+    options.section("align")
+        .help_group("Rigid alignment")
+        .number(
+            "starts", [](auto& o) { return &o.rigid.starts; }, 1, 2000, "",
+            "rotations to start from")
+        .sweep({"register",
+                {"10", "30", "60", "120", "240"},
+                "the chance of a wrong pose",
+                "once one start converges to the right pose, more of them end in the same place"})
+        .number(
+            "offsets", [](auto& o) { return &o.rigid.offsets; }, 1, 20, "",
+            "starts along the long axis for each rotation")
+        .number(
+            "offset_mm", [](auto& o) { return &o.rigid.offset_mm; }, 0, 200, "mm",
+            "distance between those starts")
+        .number(
+            "candidates", [](auto& o) { return &o.rigid.candidates; }, 1, 50, "",
+            "poses handed on to the warp")
+        .number(
+            "cone_rad", [](auto& o) { return &o.rigid.cone_rad; }, 0.05, 3.2, "rad",
+            "largest tilt of the head from inputs.up")
+        .number(
+            "landmark_mm", [](auto& o) { return &o.landmark_mm; }, 0.1, 100, "mm",
+            "standard deviation of a landmark along an axis");
+}
+
+void add_quadratic(OptionsOf<Fit>& options) {
+    options.section("warp")
+        .help_group("Quadratic warp")
+        .number(
+            "trials", [](auto& o) { return &o.ransac.trials; }, 1, 100000, "",
+            "trials of the random consensus")
+        .sweep({"register",
+                {"10", "30", "100", "300"},
+                "the start of the refinement",
+                "the point-to-surface refinement that follows ends in the same place"})
+        .number(
+            "correspondences", [](auto& o) { return &o.ransac.correspondences; }, 10, 200, "",
+            "correspondences of each trial")
+        .number(
+            "match_ratio", [](auto& o) { return &o.ransac.match_ratio; }, 1, 10, "",
+            "T_d of eq. (7)")
+        .number(
+            "constraint_mm", [](auto& o) { return &o.constraint_mm; }, 0, 1000, "mm",
+            "weight of eqs. (4)-(6); 0: from the readings")
+        .number(
+            "strain", [](auto& o) { return &o.strain; }, 0.001, 1, "",
+            "slopes that the map is expected to have")
+        .toggle(
+            "paper", [](auto& o) { return &o.paper_warp; },
+            "stop after the random consensus, eqs. (3)-(9)");
+}
+
+void add_residual(OptionsOf<Fit>& options) {
+    options.help_group("Residual warp")
+        .toggle(
+            "residual", [](auto& o) { return &o.residual_warp; },
+            "B-spline displacement after the quadratic")
+        .number(
+            "spacing_mm", [](auto& o) { return &o.residual.spacing_mm; }, 10, 200, "mm",
+            "spacing of the residual's control points")
+        .sweep({"register",
+                {"80", "60", "40", "30", "20"},
+                "bumps of the skin",
+                "control points closer together than the readings follow their noise"})
+        .number(
+            "bending", [](auto& o) { return &o.residual.bending; }, 1e-09, 10, "",
+            "weight of the residual's bending")
+        .number(
+            "stretching", [](auto& o) { return &o.residual.stretching; }, 0, 10, "",
+            "weight of the residual's stretching")
+        .number(
+            "inside_mm", [](auto& o) { return &o.residual.inside_mm; }, 0, 100, "mm",
+            "most that the residual may move the inside of the body, on average")
+        .number(
+            "fade_mm", [](auto& o) { return &o.residual.fade_mm; }, 1, 500, "mm",
+            "depth at which the residual has faded");
+}
+
+OptionGroup options() {
+    OptionsOf<Fit> options("warp");
+    add_align(options);
+    add_quadratic(options);
+    add_residual(options);
+    return options;
+}
+
+// The hints that the data do not hold: the head's direction, and landmarks.
+Status add_hints(const Recipe& recipe, RegisterOptions& options) {
+    const RecipeInputs& in = recipe.inputs;
+    options.up = in.up;
+    if (!in.landmarks.empty()) {
+        auto landmarks = load_landmarks(recipe.resolve(in.landmarks));
+        if (!landmarks) return landmarks.error();
+        options.landmarks = std::move(*landmarks);
+    }
+    if (in.analytic)
+        for (const AnalyticLandmark& mark : analytic_torso_landmarks(
+                 in.torso.landmarks, in.torso.landmark_noise_mm, in.torso.mannequin, in.torso.body))
+            options.landmarks.push_back({mark.name, mark.ct, mark.mannequin});
+    return Done{};
+}
+
+Registration known_map(const AnalyticInput& torso) {
+    Registration registration = analytic_torso_truth(torso.mannequin.strength, torso.body);
+    StageReport report;
+    report.stage = "warp";
+    report.version = kRegisterVersion;
+    report.warnings = {"the map is the analytic torso's own and was not fitted"};
+    registration.reports = {report};
+    return registration;
+}
+
+Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
+    const Recipe& recipe = inputs.recipe();
+    const auto mannequin = inputs.get<Mannequin>("mannequin");
+    if (!mannequin) return mannequin.error();
+    const auto skin = inputs.get<SkinSurfaceResult>("skin");
+    if (!skin) return skin.error();
+    const Surface& surface = (*mannequin)->surface;
+    const std::string name =
+        recipe.inputs.analytic ? "(analytic)" : recipe.resolve(recipe.inputs.surface);
+    if (const auto error = check_same_unit(extent_of((*skin)->skin), extent_of(surface), name))
+        return *error;
+    if (recipe.inputs.analytic && recipe.inputs.torso.known_map)
+        return StageValue::of(known_map(recipe.inputs.torso));
+    RegisterOptions options = inputs.options<RegisterOptions>("warp");
+    options.seed = case_seed(recipe);
+    if (auto status = add_hints(recipe, options); !status) return status.error();
+    auto fitted = register_surfaces({**skin, surface}, options, progress);
+    if (!fitted) return fitted.error();
+    return StageValue::of(std::move(fitted->registration));
+}
+
+std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
+    const RecipeInputs& in = recipe.inputs;
+    std::string hint;
+    if (in.analytic && in.torso.known_map)
+        hint = "known";
+    else if (in.up)
+        hint = key_text("up", {in.up->x, in.up->y, in.up->z});
+    return {digests.landmarks, hint};
+}
+
+Bytes encode(const Registration& registration) {
+    Registration copy = registration;
+    copy.reports = without_seconds(copy.reports);
+    const std::string text = format_registration(copy);
+    return {text.begin(), text.end()};
+}
+
+Result<Registration> decode(const Bytes& bytes, const std::string& where) {
+    return parse_registration({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, where);
+}
+
+}  // namespace
+
+StageDescriptor warp_stage() {
+    StageDescriptor stage;
+    stage.name = "warp";
+    stage.version = kRegisterVersion;
+    stage.takes = {"skin", "mannequin"};
+    stage.provides = "registration";
+    stage.options = options();
+    stage.seeded = true;
+    stage.key_texts = key_texts;
+    stage.run = run;
+    stage.codec = codec_of<Registration>(encode, decode);
+    stage.reports = [](const StageValue& value) { return value.as<Registration>().reports; };
+    stage.share = 0.18;
+    return stage;
+}
+
+}  // namespace sonocase::pipeline

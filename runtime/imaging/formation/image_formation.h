@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What every image model does for the renderer: it is created from a bundle and an exercise, gets a
+// geometry for each level of accuracy, and then renders frames, quickly or by its reference.
+//
+// To add a model: implement ImageFormation, describe it in an ImageModelInfo, and put that into the
+// list at the top of runtime/imaging/renderer.cpp.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "formats/base/result.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/voxel_blocks.h"
+#include "formats/exercise/exercise.h"
+#include "runtime/imaging/formation/effect_choice.h"
+#include "runtime/imaging/formation/render_context.h"
+#include "runtime/imaging/frame/frame_input.h"
+#include "runtime/imaging/frame/render_options.h"
+#include "runtime/imaging/needle/needle_chord.h"
+#include "runtime/imaging/scan/scan_geometry.h"
+
+namespace sonocase::runtime {
+
+// What a model is created from. Everything referred to outlives the model.
+struct FormationInput {
+    const CaseBundle& bundle;
+    VoxelBlocks* blocks = nullptr;  // what is still to be unpacked; null: the bundle is complete
+    const Exercise& exercise;
+    const RenderOptions& options;
+    const EffectChoice& effects;
+    int scanlines = 0;  // of the finest level
+    RenderContext context;
+};
+
+// A frame as both renderers of a model get it: checked, and in the probe's frame.
+struct FrameRequest {
+    const FrameInput& input;
+    const NeedleShape* needle = nullptr;  // probe frame; null: none
+    std::span<const float> row_gain_db;   // # samples of the level: console gain and TGC sliders
+};
+
+class ImageFormation {
+  public:
+    virtual ~ImageFormation() = default;
+
+    // Prepares one more level of accuracy, finest first. All before the first frame.
+    virtual void add_level(const ScanGeometry& geometry) = 0;
+
+    // pixels: # width * height of the geometry. costs: one per effect, to be filled in. Neither
+    // allocates nor throws.
+    virtual FrameStatus render_fast(int level,
+                                    const FrameRequest& request,
+                                    std::span<std::uint8_t> pixels,
+                                    std::span<EffectCost> costs) = 0;
+    // The same picture by the slow, obvious renderer at level 0; never flipped.
+    virtual void render_reference(const FrameRequest& request,
+                                  std::span<std::uint8_t> pixels,
+                                  std::span<EffectCost> costs) = 0;
+};
+
+// A model before it is created.
+struct ImageModelInfo {
+    int scanlines, samples;                // full accuracy, unless the options say otherwise
+    std::span<const char* const> effects;  // names, in order of execution
+    // Thickness of the slab in which the needle shows, mm; 0: the needle's own.
+    double (*needle_slab_mm)(const Exercise& exercise);
+    Result<std::unique_ptr<ImageFormation>> (*create)(const FormationInput& input);
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What goes into a frame and what is said about it afterwards.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "formats/base/geometry.h"
+
+namespace sonocase::runtime {
+
+// The controls of the machine's console; may change between frames. A value that is not finite
+// counts as neutral.
+struct ImageSettings {
+    double gain_db = 0;
+    double dynamic_range_db = 60;    // clamped to [20, 120]
+    std::array<double, 8> tgc_db{};  // sliders, near to far
+    bool flip_left_right = false;
+};
+
+// A straight needle as drawn: after calibration and bend constraint.
+struct NeedlePose {
+    Point3 tip;         // `mannequin` frame
+    Vector3 direction;  // unit, hub to tip
+};
+
+struct FrameInput {
+    Rigid mannequin_from_probe;
+    bool has_needle = false;
+    NeedlePose needle;
+    double time_s = 0;        // injected; drives breathing and pulsation
+    std::uint32_t frame = 0;  // seeds the noise
+    ImageSettings settings;
+};
+
+enum class FrameStatus : std::uint8_t {
+    rendered,
+    held_bad_pose,  // not finite, mirrored or not orthonormal: the pixels are left as they were
+    no_contact,     // rendered, and the probe does not touch the skin
+};
+
+// What one effect cost in the last frame.
+struct EffectCost {
+    const char* name = "";
+    double ms = 0;
+    bool ran = false;
+    const char* skipped_because = "";  // "" where it ran
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What a renderer is created with.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "runtime/imaging/host/host.h"
+
+namespace sonocase::runtime {
+
+enum class ImageModel { paper, physical };
+enum class RendererKind { fast, reference };
+
+struct PhysicalTextures;  // see make_physical_textures() in renderer.h
+
+struct RenderOptions {
+    ImageModel model = ImageModel::physical;
+    RendererKind kind = RendererKind::fast;
+    int width_px = 512;                        // [1, 8192]
+    int height_px = 512;                       // [1, 8192]
+    int threads = 1;                           // [1, 256], the caller's included; see Host
+    std::vector<std::string> effects{"auto"};  // "auto", "all", "none", NAME or -NAME
+    std::uint32_t seed = 1;
+    // Beams [0, 4096] and samples per beam [0, 8192]; 0 takes the model's own number (paper
+    // 512 x 512, physical 192 x 512).
+    int scanlines = 0;
+    int samples = 0;
+    // Time that a frame shall take; 0: no limit, full accuracy (recordings). Needs host.clock. See
+    // runtime/imaging/accuracy/governor.h.
+    double frame_budget_ms = 0;
+    // A bundle that is unpacked block by block is unpacked by one more thread too, and around the
+    // scan plane, so that the next frames find their blocks. For a probe in somebody's hand; the
+    // pixels are the same. Needs host.make_background.
+    bool read_ahead = false;
+    // Instruction set of the vectorised kernels, one of simd_targets(); "": the best. The pixels
+    // are the same.
+    std::string simd;
+    // Null: made where the model needs them.
+    std::shared_ptr<const PhysicalTextures> textures;
+    Host host;
+};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The effects of model `physical`: their switches and their table. docs/effects.md says what each
+// does, docs/extending.md how to add one.
+#pragma once
+
+#include "runtime/imaging/formation/effect_table.h"
+
+namespace sonocase::runtime {
+
+struct PhysicalEffects {
+    bool contact = true;  // gel gap closed, air gap dark
+    bool breathing = true;
+    bool pulsation = true;
+    bool elevation = true;       // beam thickness across the plane
+    bool boundaries = true;      // sub-voxel planes between labels
+    bool structure = true;       // echo offsets inside organs
+    bool fine_structure = true;  // fibres and septa below the voxel
+    bool targets = true;         // balls of the exercise
+    bool speckle = true;
+    bool interfaces = true;
+    bool edge_shadow = true;
+    bool attenuation = true;
+    bool needle = true;
+    bool bone_tail = true;
+    bool gas_ring_down = true;
+    bool point_spread = true;
+    bool near_field = true;
+    bool noise = true;
+    bool persistence = true;
+    bool haze = true;
+    bool post_filter = true;
+    bool grey_map = true;
+};
+
+// What a frame met.
+struct PhysicalMet {
+    bool gap = false;           // between the probe's face and the skin
+    bool breathes = false;      // the anatomy is shifted
+    bool pulses = false;        // arteries are wider or narrower than at rest
+    bool interface = false;     // a surface between two labels
+    bool has_echo = false;      // the bundle holds echo offsets
+    bool fine = false;          // muscle or fat
+    bool target = false;        // near the slab
+    bool refraction = false;    // a surface of fluid
+    bool hard = false;          // bone or gas
+    bool needle_given = false;  // there is a needle to draw
+    bool needle = false;        // it shows in the slab
+    int beams_in_contact = 0;
+};
+
+namespace physical {
+
+inline const char* no_interface(const PhysicalMet& m) {
+    return m.interface ? "" : "no interface crossed";
+}
+inline const char* nothing_hard(const PhysicalMet& m) {
+    return m.hard ? "" : "no bone or gas crossed";
+}
+
+}  // namespace physical
+
+inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 25> kPhysicalEffects{{
+    {"contact", Pass::contact, 1, 0, 0, &PhysicalEffects::contact,
+     [](const PhysicalMet& m) { return m.gap ? "" : "the probe touches everywhere"; }},
+    {"slice", Pass::beams, 4, 2, 7},
+    {"breathing", Pass::beams, 1, 0, 8, &PhysicalEffects::breathing,
+     [](const PhysicalMet& m) {
+         return m.breathes ? "" : "the scenario does not breathe, or is at rest";
+     }},
+    {"pulsation", Pass::beams, 0.1, 0, 0, &PhysicalEffects::pulsation,
+     [](const PhysicalMet& m) { return m.pulses ? "" : "no pulse"; }},
+    {"elevation", Pass::beams, 0.5, 0, 1, &PhysicalEffects::elevation},
+    {"boundaries", Pass::beams, 3, 3, 12, &PhysicalEffects::boundaries, physical::no_interface},
+    {"structure", Pass::beams, 1.5, 2, 5, &PhysicalEffects::structure,
+     [](const PhysicalMet& m) { return m.has_echo ? "" : "the bundle holds no structure"; }},
+    {"fine_structure", Pass::beams, 1, 1, 1, &PhysicalEffects::fine_structure,
+     [](const PhysicalMet& m) { return m.fine ? "" : "no muscle or fat crossed"; }},
+    {"targets", Pass::beams, 0.5, 1, 4, &PhysicalEffects::targets,
+     [](const PhysicalMet& m) { return m.target ? "" : "no target near the slab"; }},
+    {"speckle", Pass::beams, 2, 1, 2, &PhysicalEffects::speckle},
+    {"interfaces", Pass::beams, 1, 1, 4, &PhysicalEffects::interfaces, physical::no_interface},
+    {"edge_shadow", Pass::beams, 0.3, 0, 0, &PhysicalEffects::edge_shadow,
+     [](const PhysicalMet& m) { return m.refraction ? "" : "no fluid crossed"; }},
+    {"attenuation", Pass::beams, 0.7, 2, 8, &PhysicalEffects::attenuation},
+    {"bone_tail", Pass::beams, 0.2, 0, 4, &PhysicalEffects::bone_tail, physical::nothing_hard},
+    {"gas_ring_down", Pass::beams, 0.2, 0, 4, &PhysicalEffects::gas_ring_down,
+     physical::nothing_hard},
+    {"needle", Pass::needle, 1, 0, 12, &PhysicalEffects::needle,
+     [](const PhysicalMet& m) {
+         return !m.needle_given ? "no needle" : m.needle ? "" : "needle outside the slab";
+     }},
+    {"point_spread", Pass::filter, 5, 0, 0, &PhysicalEffects::point_spread},
+    {"near_field", Pass::filter, 0.7, 0, 2, &PhysicalEffects::near_field},
+    {"noise", Pass::filter, 0.7, 0, 2, &PhysicalEffects::noise},
+    {"persistence", Pass::filter, 0.7, 0, 6, &PhysicalEffects::persistence},
+    {"haze", Pass::grey, 1, 0, 4, &PhysicalEffects::haze},
+    {"compression", Pass::grey, 2, 0, 8},
+    {"post_filter", Pass::grey, 1, 0, 0, &PhysicalEffects::post_filter},
+    {"grey_map", Pass::grey, 0.5, 0, 1, &PhysicalEffects::grey_map},
+    {"scan_conversion", Pass::convert, 1, 1, 7},
+}};
+
+}  // namespace sonocase::runtime

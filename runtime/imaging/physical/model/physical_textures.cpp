@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/physical/model/physical_textures.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/imaging/noise/noise.h"
+#include "runtime/imaging/noise/periodic_noise.h"
+#include "runtime/imaging/physical/model/physical_model.h"
+#include "runtime/imaging/simd/gather_slack.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using namespace physical;
+
+std::uint32_t signed_byte(double v) {
+    return static_cast<std::uint32_t>(
+               static_cast<std::int32_t>(std::lround(std::clamp(v, -127.0, 127.0)))) &
+           0xFFu;
+}
+
+std::vector<std::uint32_t> make_rough_surfaces() {
+    const RawVector<float> rough = smooth_periodic_noise(kRoughEdge, 2, 11),
+                           glint = smooth_periodic_noise(kRoughEdge, 2, 12),
+                           phase = smooth_periodic_noise(kRoughEdge, 2, 13);
+    std::vector<std::uint32_t> out(rough.size());
+    for (std::size_t i = 0; i < rough.size(); ++i) {
+        const double p = 0.9 * static_cast<double>(phase[i]);
+        out[i] = signed_byte(32 * static_cast<double>(rough[i])) |
+                 signed_byte(32 * 0.75 * 1.4426950408889634 * static_cast<double>(glint[i])) << 8 |
+                 signed_byte(127 * std::cos(p)) << 16 | signed_byte(127 * std::sin(p)) << 24;
+    }
+    return out;
+}
+
+// Offsets of mean power 1, in quarter dB. Powers are taken from a table: steps of 1/64 dB from
+// kLeast on.
+void store(const RawVector<float>& db, std::int8_t* out) {
+    constexpr float kLeast = -8, kMost = 24, kSteps = 64;
+    std::vector<std::uint32_t> met(static_cast<std::size_t>((kMost - kLeast) * kSteps) + 1);
+    for (const float v : db)
+        ++met[static_cast<std::size_t>((std::clamp(v, kLeast, kMost) - kLeast) * kSteps + 0.5f)];
+    double power = 0;
+    for (std::size_t i = 0; i < met.size(); ++i)
+        power += met[i] * std::pow(10.0, (kLeast + static_cast<double>(i) / kSteps) / 10);
+    const auto mean = static_cast<float>(10 * std::log10(power / static_cast<double>(db.size())));
+    for (std::size_t i = 0; i < db.size(); ++i) {
+        constexpr float kAbove = 127.5f;  // makes the number positive, so that the cast rounds it
+        const float quarters = std::clamp(4 * (db[i] - mean), -127.0f, 127.0f);
+        out[i] = static_cast<std::int8_t>(static_cast<int>(quarters + kAbove) - 127);
+    }
+}
+
+std::vector<std::int8_t> make_cubes() {
+    const std::size_t cube = static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge;
+    std::vector<std::int8_t> cubes(2 * cube + kGatherSlack);
+    const RawVector<float> a = smooth_periodic_noise(kFineEdge, 2, 21),
+                           b = smooth_periodic_noise(kFineEdge, 5, 22),
+                           c = smooth_periodic_noise(kFineEdge, 5, 23);
+    RawVector<float> db(cube);
+    // Fibres: sparse bright strands on dark ground.
+    for (std::size_t i = 0; i < cube; ++i)
+        db[i] = -5 + 13 * std::clamp(a[i] + 0.3f * c[i] - 0.35f, 0.0f, 1.9f);
+    store(db, cubes.data());
+    // Septa: thin sheets where a smooth field crosses zero, torn here and there.
+    for (std::size_t i = 0; i < cube; ++i) {
+        constexpr float kNothing = 20;  // exp(-20) shows nowhere
+        const float off = b[i] / 0.11f, square = off * off;
+        db[i] = -4;
+        if (square < kNothing)
+            db[i] += 18 * static_cast<float>(std::exp(-static_cast<double>(square))) *
+                     std::clamp(0.45f + 0.7f * c[i], 0.0f, 1.3f);
+    }
+    store(db, cubes.data() + cube);
+    return cubes;
+}
+
+}  // namespace
+
+PhysicalTextures physical_textures() {
+    return {make_rough_surfaces(), make_cubes(), normal_levels()};
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/physical/physical_formation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "runtime/imaging/host/pass_timer.h"
+#include "runtime/imaging/physical/fast/physical_fast.h"
+#include "runtime/imaging/physical/model/read_ahead.h"
+#include "runtime/imaging/physical/model/scan_reach.h"
+#include "runtime/imaging/physical/reference/physical_reference.h"
+
+namespace sonocase::runtime {
+namespace {
+
+class PhysicalFormation final : public ImageFormation {
+  public:
+    PhysicalFormation(PhysicalScene scene, PhysicalNoise noise, const FormationInput& input)
+        : exercise_(input.exercise),
+          scene_(std::move(scene)),
+          noise_(std::move(noise)),
+          blocks_(input.blocks),
+          seed_(input.options.seed),
+          reference_(input.options.kind == RendererKind::reference),
+          keep_all_(input.effects.keep_all),
+          switches_(switches_of<PhysicalEffects>(kPhysicalEffects, input.effects.on)),
+          context_(input.context) {
+        if (exercise_.breathing.amplitude_mm != 0) breathing_ = BreathingField(input.bundle);
+        const auto make_background = input.options.host.make_background;
+        if (input.options.read_ahead && blocks_ != nullptr && !reference_ &&
+            make_background != nullptr)
+            ahead_.emplace(*blocks_, scene_.grid, make_background());
+    }
+
+    void add_level(const ScanGeometry& geometry) override {
+        Level& level = *levels_.emplace_back(std::make_unique<Level>());
+        level.geometry = geometry;
+        level.tables = physical::make_tables(exercise_.probe, geometry);
+        if (reference_) return;
+        level.fast =
+            std::make_unique<PhysicalFast>(scene_, geometry, level.tables, noise_, context_);
+        level.reach = ScanReach(geometry, level.tables, scene_.voxel_mm);
+    }
+
+    FrameStatus render_fast(int level,
+                            const FrameRequest& request,
+                            std::span<std::uint8_t> pixels,
+                            std::span<EffectCost> costs) override {
+        Level& at = *levels_[static_cast<std::size_t>(level)];
+        const PhysicalFrame frame = frame_of(request);
+        if (blocks_ != nullptr) {
+            const double shift_mm = norm(frame.motion.breathing_mm);
+            if (ahead_) ahead_->frame(at.reach, frame.volume_from_probe, shift_mm);
+            at.reach.ensure_loaded(*blocks_, scene_.grid, frame.volume_from_probe, shift_mm);
+            at.reach.ensure_loaded(scene_.words, scene_.grid, frame.volume_from_probe, shift_mm);
+        }
+        at.fast->render(frame, breathing_, request.input.settings.flip_left_right, keep_all_,
+                        pixels);
+        fill_costs(kPhysicalEffects, switches_, &at.fast->met(), at.fast->pass_ms(), costs);
+        return at.fast->met().beams_in_contact == 0 ? FrameStatus::no_contact
+                                                    : FrameStatus::rendered;
+    }
+
+    void render_reference(const FrameRequest& request,
+                          std::span<std::uint8_t> pixels,
+                          std::span<EffectCost> costs) override {
+        PassTimer timer(context_.clock);
+        const Level& at = *levels_.front();
+        render_physical_reference(scene_, at.geometry, at.tables, noise_, frame_of(request),
+                                  pixels);
+        PassTimes pass_ms{};
+        pass_ms[static_cast<std::size_t>(Pass::beams)] = timer.lap_ms();
+        fill_costs<PhysicalEffects, PhysicalMet>(kPhysicalEffects, switches_, nullptr, pass_ms,
+                                                 costs);
+    }
+
+  private:
+    // Stays in place: its renderer, and the thread that reads ahead, look at its members.
+    struct Level {
+        ScanGeometry geometry;
+        physical::Tables tables;
+        ScanReach reach;
+        std::unique_ptr<PhysicalFast> fast;  // null for the reference
+    };
+
+    PhysicalFrame frame_of(const FrameRequest& request) const {
+        const FrameInput& input = request.input;
+        PhysicalFrame frame;
+        frame.volume_from_probe = input.mannequin_from_probe;
+        frame.needle = request.needle;
+        frame.seed = seed_;
+        frame.frame = input.frame;
+        frame.row_gain_db = request.row_gain_db;
+        frame.dynamic_range_db = std::isfinite(input.settings.dynamic_range_db)
+                                     ? std::clamp(input.settings.dynamic_range_db, 20.0, 120.0)
+                                     : 60.0;
+        frame.motion = motion_at(exercise_.breathing, exercise_.pulsation,
+                                 std::isfinite(input.time_s) ? input.time_s : 0);
+        frame.effects = switches_;
+        return frame;
+    }
+
+    const Exercise& exercise_;
+    PhysicalScene scene_;
+    const PhysicalNoise noise_;
+    BreathingField breathing_;
+    VoxelBlocks* const blocks_;
+    const std::uint32_t seed_;
+    const bool reference_, keep_all_;
+    const PhysicalEffects switches_;
+    const RenderContext context_;
+    std::vector<std::unique_ptr<Level>> levels_;
+    std::optional<ReadAhead> ahead_;  // ends before the levels that it looks at
+};
+
+Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
+    constexpr int kNoiseSlack = 128;  // a block of beams and a vector beyond the last beam
+    const std::shared_ptr<const PhysicalTextures> textures =
+        input.options.textures ? input.options.textures : shared_physical_textures();
+    JobRunner& jobs = input.context.jobs;
+    PhysicalNoise noise;
+    std::optional<Result<PhysicalScene>> scene;
+    jobs.run(2, [&](std::size_t job) {
+        if (job == 0) {
+            noise = make_physical_noise(textures->normal_levels, input.options.seed,
+                                        input.scanlines + kNoiseSlack);
+        } else {
+            scene = make_physical_scene(input.bundle, input.exercise.targets,
+                                        {&jobs, textures, input.blocks != nullptr});
+        }
+    });
+    if (!*scene) return scene->error();
+    return std::unique_ptr<ImageFormation>(
+        std::make_unique<PhysicalFormation>(std::move(**scene), std::move(noise), input));
+}
+
+// The slab is the beam's own thickness unless the exercise sets one.
+double needle_slab_mm(const Exercise& exercise) {
+    return exercise.probe.elevation_mm;
+}
+
+constexpr auto kEffectNames = effect_names_of(kPhysicalEffects);
+
+}  // namespace
+
+std::shared_ptr<const PhysicalTextures> shared_physical_textures() {
+    return std::make_shared<const PhysicalTextures>(physical_textures());
+}
+
+const ImageModelInfo kPhysicalModel{192, 512, kEffectNames, needle_slab_mm, create};
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/physical/reference/reference_beams.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/imaging/physical/reference/reference_place.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using namespace physical;
+
+// What one beam carries down from sample to sample.
+struct BeamLight {
+    double log2_light = 0;    // left after the tissue, there and back
+    double needle_light = 0;  // log2 left after the needle
+    double bone = 0, bone_slow = 0, bone_floor = 0, gas = 0, needle_tail = 0;  // tails, amplitudes
+    double reverb = 0, period = 0, next = 0;  // next line: amplitude, mm between lines, its depth
+    TissueKind before = TissueKind::soft, before_that = TissueKind::soft;  // of the samples above
+
+    void fade(double step_mm) {
+        bone *= std::exp(-step_mm / kBoneTailMm);
+        bone_slow *= std::exp(-step_mm / kBoneTailSlowMm);
+        bone_floor *= std::exp(-step_mm / kBoneFloorMm);
+        gas *= std::exp(-step_mm / kGasTailMm);
+        needle_tail *= std::exp(-step_mm / kNeedleTailMm);
+    }
+};
+
+// A sample on its way through the effects.
+struct Sample {
+    const Row& row;
+    Vector3 from_origin{};    // of the volume, mm, before the slab's random step
+    Point3 v{}, looked_up{};  // voxel coordinates: the sample, and the voxel that is asked
+    Place place{};
+    const TargetBall* ball = nullptr;  // whose surface is near
+    double ball_mm = 0, ball_cosine = 0;
+    int look_index = 0;
+    double re = 0, im = 0;  // echo
+    double facing = 1;      // how squarely the beam meets the surface, 1 where there is none
+    double loss = 0;        // log2 of amplitude that this sample takes
+    double here = 0;        // amplitude of the light that arrives
+};
+
+// The scatterers of a sample: a pair of amplitudes out of the shuffled speckle cube.
+void scatter(const ReferenceInput& in, const Matrix3& turn, double amplitude, Sample& p) {
+    const Vector3 c = (1 / in.tables.scatter_mm) * (turn * p.from_origin);
+    const std::int32_t i = nearest_integer(c.x), j = nearest_integer(c.y), m = nearest_integer(c.z);
+    const std::uint32_t hash = speckle_hash(i, j, m);
+    const auto wrap = [&](std::int32_t u, int shift) {
+        return (static_cast<std::uint32_t>(u) ^ hash >> shift) & ((1u << kSpeckleLog2) - 1);
+    };
+    const std::size_t cell =
+        wrap(i, kShuffleX) +
+        ((wrap(j, kShuffleY) + (wrap(m, kShuffleZ) << kSpeckleLog2)) << kSpeckleLog2);
+    const double unit = 1 / (32 * std::sqrt(2.0));
+    p.re = amplitude * in.scene.speckle[2 * cell] * unit;
+    p.im = amplitude * in.scene.speckle[2 * cell + 1] * unit;
+}
+
+// log2 of amplitude that a beam loses in one sample where it grazes a wall of fluid.
+double graze_loss(double cosine, double distance_mm, double step_mm) {
+    const double graze = std::max(1 - cosine / kEdgeCos, 0.0);
+    const double near = std::max(1 - std::abs(distance_mm) / kEdgeReachMm, 0.0);
+    return kEdgeLossLog2PerMm * graze * graze * near * step_mm;
+}
+
+// The surface between two labels: its echo, and what it takes.
+void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p) {
+    const Place& place = p.place;
+    if (place.second < 0) return;
+    const PairEcho& pair =
+        in.scene.pairs[static_cast<std::size_t>(place.own * in.scene.labels() + place.second)];
+    const double cosine = std::abs(dot(place.normal, beam));
+    p.facing = pair.hard ? 0.25 * cosine + 0.75 * std::pow(cosine, 6)
+                         : 0.08 * cosine + 0.92 * std::pow(cosine, 10);
+    if (in.frame.effects.interfaces && pair.amplitude > 0) {
+        const double u = (std::abs(place.distance_mm) - pair.split_mm) / pair.sigma_mm;
+        const double i = pair.amplitude * p.facing * std::exp2(place.rough.log2_glint) *
+                         std::exp(-0.5 * u * u) * p.row.interface_scale;
+        p.re += i * place.rough.re;
+        p.im += i * place.rough.im;
+    }
+    if (in.frame.effects.edge_shadow && pair.refracts)
+        p.loss += graze_loss(cosine, place.distance_mm, in.geometry.step_mm);
+}
+
+// The target whose surface is near, if any: the last one that is. Soft tissue alone gives way to
+// it.
+void find_target(const ReferenceInput& in, Vector3 beam, Sample& p) {
+    const PhysicalScene& s = in.scene;
+    for (const TargetBall& t : s.targets) {
+        const Vector3 from_centre = s.voxel_mm * (p.v - t.centre_vx);
+        const double away = norm(from_centre);
+        if (away - t.radius_mm > kTargetReachMm ||
+            s.looks[static_cast<std::size_t>(p.place.label)].kind != TissueKind::soft)
+            continue;
+        p.ball = &t;
+        p.ball_mm = away - t.radius_mm + kRoughnessMm * roughness_at(s, p.v).shift;
+        p.ball_cosine = std::abs(dot(from_centre, beam)) / std::max(away, 1e-3);
+        if (p.ball_mm < 0) p.look_index = t.look;
+    }
+}
+
+// The surface of a target.
+void meet_target(const ReferenceInput& in, Sample& p) {
+    if (p.ball == nullptr) return;
+    const Roughness rough = roughness_at(in.scene, p.v);
+    if (in.frame.effects.interfaces) {
+        const double u = p.ball_mm / 0.16;
+        const double c2 = p.ball_cosine * p.ball_cosine;
+        const double i = p.ball->wall * (0.08 * p.ball_cosine + 0.92 * c2 * c2 * c2) *
+                         std::exp2(rough.log2_glint) * std::exp(-0.5 * u * u) *
+                         p.row.interface_scale;
+        p.re += i * rough.re;
+        p.im += i * rough.im;
+    }
+    if (in.frame.effects.edge_shadow && p.ball->fluid)
+        p.loss += graze_loss(p.ball_cosine, p.ball_mm, in.geometry.step_mm);
+}
+
+// A face of bone lights its tails; one of gas does so from the second sample on, since a single
+// sample of gas is a neighbour's that the random look-up brought.
+void light_tails(const ReferenceInput& in, TissueKind kind, const Sample& p, BeamLight& t) {
+    const double here = p.here, gain = p.row.gain;
+    if (kind == TissueKind::bone && t.before != TissueKind::bone) {
+        t.bone = std::max(t.bone, kBoneTail * kMaxReflection * p.facing * here * gain);
+        t.bone_slow = std::max(t.bone_slow,
+                               kBoneTailSlow * kBoneTail * kMaxReflection * p.facing * here * gain);
+        t.bone_floor = std::max(t.bone_floor, kBoneFloor * std::min(here * gain, 1.0));
+    }
+    if (kind == TissueKind::gas && t.before == TissueKind::gas &&
+        t.before_that != TissueKind::gas) {
+        t.gas = std::max(t.gas, kGasTail * here * gain);
+        const double mirror = p.facing < 1 ? kReverb * kReverbLoss * p.facing * here * gain : 0;
+        if (mirror > t.reverb) {
+            t.reverb = mirror;
+            t.period = p.row.r_mm - in.geometry.step_mm;
+            t.next = 2 * t.period;
+        }
+    }
+    t.before_that = t.before;
+    t.before = kind;
+}
+
+// Mirror, shadow and tail of the needle.
+void meet_needle(const ReferenceInput& in, PlanePoint o, PlanePoint d, Sample& p, BeamLight& t) {
+    if (!in.frame.effects.needle || in.frame.needle == nullptr) return;
+    const NeedleShape& n = *in.frame.needle;
+    const double r = p.row.r_mm;
+    double back = 0;
+    const double share = needle_share(n, o.x + r * d.x, o.z + r * d.z, back);
+    const double seen = std::min(share * n.slab_mm / (2 * n.radius_mm), 1.0);
+    if (!(seen > 0)) return;
+    const double cosine = n.axis.x * d.x + n.axis.z * d.z;
+    const double mirror = std::pow(std::max(1 - cosine * cosine, 0.0), 6);
+    const double glint = 0.25 * std::max(1 - back / kTipGlintMm, 0.0);
+    const double i = kNeedleGain * seen * (kNeedleDiffuse + (1 - kNeedleDiffuse) * mirror + glint) *
+                     p.row.interface_scale;
+    p.re += i;
+    t.needle_light -=
+        kNeedleShadowLog2 * seen * std::min(in.geometry.step_mm / (2 * n.radius_mm), 1.0);
+    t.needle_tail = std::max(t.needle_tail, kNeedleTail * kNeedleGain * seen *
+                                                (kNeedleDiffuse + mirror) * p.here * p.row.gain);
+}
+
+// Power of the tails at a depth; moves on to the next line of the reverberation.
+double tail_power(const ReferenceInput& in, const Row& row, BeamLight& t) {
+    double power = 0;
+    if (in.frame.effects.bone_tail)
+        power += t.bone * t.bone + t.bone_slow * t.bone_slow + t.bone_floor * t.bone_floor;
+    if (in.frame.effects.gas_ring_down) {
+        const double off = (row.r_mm - t.next) / (kReverbWidth * in.tables.axial_mm);
+        const double line = t.reverb * std::max(1 - off * off, 0.0);
+        power += t.gas * t.gas + line * line;
+        if (off > 1) {
+            t.next += t.period;
+            t.reverb *= kReverbLoss;
+        }
+    }
+    return power + t.needle_tail * t.needle_tail;
+}
+
+// One frame's beams.
+class Beams {
+  public:
+    explicit Beams(const ReferenceInput& input)
+        : in_(input), gaps_(static_cast<std::size_t>(input.geometry.scanlines), 0.0f) {
+        const PhysicalFrame& f = in_.frame;
+        if (f.effects.contact) {
+            std::vector<float> raw(gaps_.size());
+            find_gaps(in_.scene, in_.geometry, f, 0, in_.geometry.scanlines, raw);
+            smooth_gaps(in_.geometry.scanlines, raw, gaps_);
+        }
+        if (f.effects.breathing && f.motion.breathes())
+            breathing_ = BreathingField(*in_.scene.bundle);
+    }
+
+    void trace(int l, BeamSamples& out) const {
+        const ScanGeometry& g = in_.geometry;
+        const PlanePoint o = g.beam_origin(l), d = g.beam_direction(l);
+        const Vector3 beam = in_.frame.volume_from_probe.rotation * Vector3{d.x, 0, d.z};
+        BeamLight t;
+        for (int k = 0; k < g.samples; ++k) {
+            const std::size_t at = in_.at(k, l);
+            t.fade(g.step_mm);
+            if (gaps_[static_cast<std::size_t>(l)] < 0) {  // air: nothing comes back
+                out.light[at] = 0;
+                continue;
+            }
+            Sample p = place_sample(k, l, o, d, beam);
+            if (in_.frame.effects.targets) find_target(in_, beam, p);
+            const AcousticProperties& look =
+                in_.scene.looks[static_cast<std::size_t>(p.look_index)];
+            echo_of_tissue(look, p);
+            meet_surface(in_, beam, p);
+            meet_target(in_, p);
+            const bool dead = t.log2_light < kDeadLog2;
+            p.here = dead ? 0 : std::exp2(t.log2_light);
+            if (dead) p.re = p.im = 0;
+            light_tails(in_, look.kind, p, t);
+            meet_needle(in_, o, d, p, t);
+            out.re[at] = p.re;
+            out.im[at] = p.im;
+            out.light[at] = p.here * std::exp2(t.needle_light);
+            out.tail[at] = tail_power(in_, p.row, t);
+            t.log2_light -= p.loss;
+        }
+    }
+
+  private:
+    // Where sample k of beam l lies, and what is there.
+    Sample place_sample(int k, int l, PlanePoint o, PlanePoint d, Vector3 beam) const {
+        const PhysicalScene& s = in_.scene;
+        const PhysicalFrame& f = in_.frame;
+        Sample p{in_.row(k)};
+        const Vector3 across = f.volume_from_probe.rotation * Vector3{0, 1, 0};
+        const Vector3 sideways = f.volume_from_probe.rotation * Vector3{1, 0, 0};
+        const double gap = static_cast<double>(gaps_[static_cast<std::size_t>(l)]);
+        const double along = p.row.r_mm + gap * p.row.contact;
+        Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
+        if (!breathing_.empty()) x = x - breathing_.weight(x) * f.motion.breathing_mm;
+        p.from_origin = x - s.grid.origin_mm;
+
+        const double jitter = in_.draw(in_.noise.white, NoiseUse::elevation, 0, k, l);
+        const double jitter2 = in_.draw(in_.noise.white, NoiseUse::lookup, 0, k, l);
+        const Point3 slab = f.effects.elevation ? x + (p.row.elevation_mm * jitter) * across : x;
+        p.v = s.grid.voxel_from_point(slab);
+        p.looked_up = s.grid.voxel_from_point(slab + (kLookupJitter * s.voxel_mm) *
+                                                         (jitter2 * sideways + jitter * beam));
+        p.place = place_at(s, f, p.v, p.looked_up);
+        p.look_index = p.place.label;
+        return p;
+    }
+
+    // Echo and attenuation of the tissue itself.
+    void echo_of_tissue(const AcousticProperties& look, Sample& p) const {
+        const PhysicalEffects& on = in_.frame.effects;
+        double echo_db = look.echo_db;
+        if (p.look_index == p.place.label) {
+            if (on.structure) echo_db += echo_offset_db(in_.scene, p.looked_up);
+            if (on.fine_structure) echo_db += fine_offset_db(in_.scene, p.place.label, p.v);
+        }
+        const double amplitude =
+            look.kind == TissueKind::outside ? 0 : std::exp2(echo_db / kDbPerLog2);
+        p.re = amplitude;
+        if (on.speckle) scatter(in_, turn_, amplitude, p);
+        p.loss = on.attenuation ? look.attenuation * in_.tables.frequency_mhz *
+                                      in_.geometry.step_mm * 0.1 * 2 / kDbPerLog2
+                                : 0;
+    }
+
+    const ReferenceInput& in_;
+    std::vector<float> gaps_;  // # scanlines; negative: air
+    BreathingField breathing_;
+    const Matrix3 turn_ = speckle_rotation();
+};
+
+}  // namespace
+
+BeamSamples reference_beams(const ReferenceInput& input) {
+    const std::size_t count = input.count();
+    BeamSamples out{std::vector<double>(count, 0.0), std::vector<double>(count, 0.0),
+                    std::vector<double>(count, 1.0), std::vector<double>(count, 0.0)};
+    const Beams beams(input);
+    for (int l = 0; l < input.geometry.scanlines; ++l) beams.trace(l, out);
+    return out;
+}
+
+}  // namespace sonocase::runtime

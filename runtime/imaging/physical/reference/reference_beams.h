@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The first half of the reference renderer: down each beam, from the probe's face into the anatomy.
+#pragma once
+
+#include <vector>
+
+#include "runtime/imaging/physical/reference/reference_input.h"
+
+namespace sonocase::runtime {
+
+// One value per sample: # samples x scanlines, row by row.
+struct BeamSamples {
+    std::vector<double> re, im;  // echoes, as amplitudes under full light
+    std::vector<double> light;   // amplitude that is left, there and back
+    std::vector<double> tail;    // power behind bone, gas and needle
+};
+
+BeamSamples reference_beams(const ReferenceInput& input);
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/physical/reference/reference_place.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/volume/boundary_record.h"
+
+namespace sonocase::runtime {
+
+using namespace physical;
+
+int nearest_integer(double x) {
+    return static_cast<int>(std::nearbyint(std::clamp(x, -1e6, 1e6)));
+}
+
+double echo_offset_db(const PhysicalScene& s, Point3 v) {
+    const int i = nearest_integer(v.x), j = nearest_integer(v.y), k = nearest_integer(v.z);
+    if (!s.words.has_echo() || !s.grid.contains(i, j, k)) return 0;
+    return s.bundle->echo_offset.at(i, j, k) / 4.0;
+}
+
+double fine_offset_db(const PhysicalScene& s, int label, Point3 v) {
+    if (label >= static_cast<int>(s.fine.frames.size())) return 0;
+    const FineFrame& f = s.fine.frames[static_cast<std::size_t>(label)];
+    if (f.cube < 0) return 0;
+    std::size_t cell = 0;
+    for (int r = 2; r >= 0; --r) {
+        const auto m = [&](int c) {
+            return static_cast<double>(f.cube_from_voxel[static_cast<std::size_t>(3 * r + c)]);
+        };
+        const double u = m(0) * v.x + m(1) * v.y + m(2) * v.z;
+        cell = cell * kFineEdge + static_cast<std::size_t>(nearest_integer(u) & (kFineEdge - 1));
+    }
+    return s.textures
+               ->fine[cell + static_cast<std::size_t>(f.cube) * kFineEdge * kFineEdge * kFineEdge] /
+           4.0;
+}
+
+Roughness roughness_at(const PhysicalScene& s, Point3 v) {
+    const auto wrap = [&](double voxel) {
+        return static_cast<std::size_t>(nearest_integer(voxel * s.voxel_mm / kRoughVoxelMm) &
+                                        (kRoughEdge - 1));
+    };
+    const std::uint32_t bits =
+        s.textures->rough[wrap(v.x) + kRoughEdge * (wrap(v.y) + kRoughEdge * wrap(v.z))];
+    const auto byte = [&](int n) {
+        return static_cast<double>(static_cast<std::int8_t>(bits >> (8 * n) & 0xFF));
+    };
+    return {byte(0) / 32, byte(1) / 32, byte(2) / 127, byte(3) / 127};
+}
+
+Place place_at(const PhysicalScene& s, const PhysicalFrame& f, Point3 v, Point3 near) {
+    Place p;
+    const int i = nearest_integer(near.x), j = nearest_integer(near.y), k = nearest_integer(near.z);
+    p.own = p.label = label_at(s, i, j, k);
+    if (!f.effects.boundaries || !s.words.has_boundary() || !s.grid.contains(i, j, k)) return p;
+    const std::uint32_t bits = s.bundle->boundary.at(i, j, k);
+    if (bits == kNoBoundary || static_cast<int>(bits & 0xFF) >= s.labels()) return p;
+    const BoundaryRecord r = unpack_boundary(bits);
+    if (std::abs(r.distance_vx) > kSurfaceReachVx) return p;
+    p.second = r.second_label;
+    p.normal = r.normal;
+    p.rough = roughness_at(s, v);
+    const Vector3 from_centre{v.x - i, v.y - j, v.z - k};
+    p.distance_mm = (r.distance_vx + dot(r.normal, from_centre)) * s.voxel_mm +
+                    kRoughnessMm * p.rough.shift * (p.own < p.second ? 1 : -1);
+    const PairEcho& pair = s.pairs[static_cast<std::size_t>(p.own * s.labels() + p.second)];
+    p.distance_mm += pair.pulse * f.motion.pulse_mm;
+    if (p.distance_mm < 0) p.label = p.second;
+    return p;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/recipe/read_recipe.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "pipeline/segmentation/resample_labels.h"
+#include "support/paths.h"
+#include "support/temporary_folder.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using testing::TemporaryFolder;
+
+const char* const kGood = R"(name = "x"
+preset = "draft"
+
+[inputs]
+labels = "a.nii"
+surface = "b.ply"
+
+[labels]
+kidney_left = "liver"
+
+[tissues.liver]
+echo_db = 3.5
+
+[resample]
+sigma_vx = 0.5
+)";
+
+Result<Recipe> parse(const std::string& text, const RecipeOverrides& overrides = {}) {
+    const std::vector<EmbeddedExercise> none;
+    return parse_recipe(text, "dir/case.toml", overrides, &none);
+}
+
+std::string with(const std::string& line) {
+    return std::string(kGood) + line + "\n";
+}
+
+const ResampleOptions& resample_of(const Result<Recipe>& recipe) {
+    return recipe->settings.of<ResampleOptions>("resample");
+}
+
+TEST(Recipe, ReadsInputsLabelsTissuesAndOptions) {
+    const auto recipe = parse(kGood);
+    ASSERT_TRUE(recipe.has_value()) << recipe.error().message();
+    EXPECT_EQ(recipe->name, "x");
+    EXPECT_EQ(recipe->inputs.labels, "a.nii");
+    EXPECT_EQ(recipe->labels.size(), 1u);
+    EXPECT_EQ(resample_of(recipe).sigma_vx, 0.5);
+    for (const Tissue& tissue : recipe->tissues)
+        if (tissue.name == "liver") {
+            EXPECT_EQ(tissue.echo_db, 3.5);
+            EXPECT_EQ(tissue.texture, "liver");  // the rest stays as built in
+        }
+}
+
+TEST(Recipe, CommandLineBeatsRecipeAndRecipeBeatsPreset) {
+    RecipeOverrides overrides;
+    EXPECT_EQ(resample_of(parse(kGood)).voxel_mm, 2);  // draft
+    overrides.preset = "balanced";
+    EXPECT_EQ(resample_of(parse(kGood, overrides)).voxel_mm, 1);
+    EXPECT_EQ(resample_of(parse(with("voxel_mm = 3"), overrides)).voxel_mm, 3);
+    overrides.sets = {"resample.voxel_mm=4", "resample.sigma_vx=1.5"};
+    const auto recipe = parse(with("voxel_mm = 3"), overrides);
+    EXPECT_EQ(resample_of(recipe).voxel_mm, 4);
+    EXPECT_EQ(resample_of(recipe).sigma_vx, 1.5);
+}
+
+TEST(Recipe, NewTissueStartsFromAnother) {
+    const auto recipe = parse(with("[tissues.fatty_liver]\nlike = \"liver\"\necho_db = 6"));
+    ASSERT_TRUE(recipe.has_value()) << recipe.error().message();
+    EXPECT_EQ(recipe->tissues.back().name, "fatty_liver");
+    EXPECT_EQ(recipe->tissues.back().echo_db, 6);
+    EXPECT_EQ(recipe->tissues.back().texture, "liver");
+}
+
+TEST(Recipe, EveryFaultNamesFileLineKeyAndWhatWouldDo) {
+    struct Case {
+        const char* line;
+        const char* what;
+        const char* expected;
+    };
+    for (const Case& c : {
+             Case{"voxle_mm = 1", "resample.voxle_mm", "did you mean 'voxel_mm'?"},
+             {"voxel_mm = 99", "99", "0.2 to 10"},
+             {"voxel_mm = \"one\"", "one", "a number"},
+             {"volume_iterations = 1.5", "1.5", "whole number"},
+             {"method = \"shapes\"", "shapes", "did you mean 'shape'?"},
+             {"[smoth]\nx = 1", "smoth", "did you mean 'smooth'?"},
+             {"[tissues.liver2]\necho = 1", "tissues.liver2.echo", "echo_db"},
+             {"[tissues.liver2]\nlike = \"livr\"", "livr", "did you mean 'liver'?"},
+             {"[tissues.liver2]\nkind = \"sofd\"", "sofd", "did you mean 'soft'?"},
+             {"follow_shift = 1", "1", "true or false"},
+         }) {
+        const auto recipe = parse(with(c.line));
+        ASSERT_FALSE(recipe.has_value()) << c.line;
+        const Error& error = recipe.error();
+        EXPECT_TRUE(error.where.starts_with("dir/case.toml:")) << error.message();
+        const int line = std::atoi(error.where.c_str() + std::string("dir/case.toml:").size());
+        EXPECT_GE(line, 16) << error.message();
+        EXPECT_LE(line, 17) << error.message();
+        EXPECT_NE(error.what.find(c.what), std::string::npos) << error.message();
+        EXPECT_NE(error.expected.find(c.expected), std::string::npos) << error.message();
+    }
+}
+
+TEST(Recipe, FaultsOfTheHeadAndOfTheCommandLine) {
+    EXPECT_NE(parse("lables = 1").error().message().find("did you mean 'labels'?"),
+              std::string::npos);
+    EXPECT_NE(parse("preset = \"fast\"").error().message().find("draft"), std::string::npos);
+    EXPECT_NE(parse("[inputs]\nlabels = \"a\"").error().message().find("inputs.surface"),
+              std::string::npos);
+    EXPECT_NE(parse("[inputs]\nsurface = \"a\"").error().message().find("inputs.labels"),
+              std::string::npos);
+    EXPECT_NE(parse("[analytic]\n[inputs]\nlabels = \"a\"").error().message().find("keep one"),
+              std::string::npos);
+    EXPECT_NE(parse("name = ").error().where.find("case.toml:1"), std::string::npos);
+    RecipeOverrides overrides;
+    overrides.sets = {"resample.voxl_mm=1"};
+    EXPECT_NE(parse(kGood, overrides).error().message().find("did you mean 'resample.voxel_mm'?"),
+              std::string::npos);
+    overrides.sets = {"resample"};
+    EXPECT_FALSE(parse(kGood, overrides).has_value());
+    overrides.sets = {};
+    overrides.preset = "acurate";
+    EXPECT_NE(parse(kGood, overrides).error().message().find("accurate"), std::string::npos);
+}
+
+TEST(Recipe, PathsStartFromDataThenFromTheRecipe) {
+    const TemporaryFolder folder;
+    folder.write("data/in_data.nii", "x");
+    folder.write("recipe/beside.nii", "x");
+    Recipe recipe;
+    recipe.folder = folder / "recipe";
+    EXPECT_EQ(recipe.resolve("beside.nii"), folder / "recipe/beside.nii");
+    recipe.data = folder / "data";
+    EXPECT_EQ(recipe.resolve("in_data.nii"), folder / "data/in_data.nii");
+    EXPECT_EQ(recipe.resolve("beside.nii"), folder / "recipe/beside.nii");
+    EXPECT_EQ(recipe.resolve("neither.nii"),
+              folder / "data/neither.nii");  // as the error will name it
+    EXPECT_EQ(recipe.resolve("/abs.nii"), "/abs.nii");
+}
+
+TEST(Recipe, ExercisesBesideTheRecipeAreChecked) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("case.toml", "[analytic]\n");
+    folder.write("b.toml", "name = \"b\"\nframe = \"ct\"\n");
+    folder.write("a.toml", "name = \"a\"\n");
+    auto recipe = load_recipe(path);
+    ASSERT_TRUE(recipe.has_value()) << recipe.error().message();
+    ASSERT_EQ(recipe->exercises.size(), 2u);
+    EXPECT_EQ(recipe->exercises[0].name, "a");
+    folder.write("b.toml", "name = \"b\"\nframe = \"ct\"\ndificulty = 2\n");
+    recipe = load_recipe(path);
+    ASSERT_FALSE(recipe.has_value());
+    EXPECT_NE(recipe.error().message().find("b.toml"), std::string::npos);
+    EXPECT_NE(recipe.error().message().find("3"), std::string::npos) << recipe.error().message();
+    EXPECT_NE(recipe.error().message().find("difficulty"), std::string::npos);
+}
+
+TEST(Recipe, EmbeddedDemoIsTheOneInScenarios) {
+    const auto embedded = embedded_recipe();
+    const auto file = load_recipe(std::string(SONOCASE_SOURCE) + "/scenarios/demo-torso");
+    ASSERT_TRUE(embedded.has_value()) << embedded.error().message();
+    ASSERT_TRUE(file.has_value()) << file.error().message();
+    EXPECT_EQ(embedded->text, file->text);
+    ASSERT_GE(embedded->exercises.size(), 2u);
+    ASSERT_EQ(file->exercises.size(), embedded->exercises.size());
+    for (std::size_t i = 0; i < file->exercises.size(); ++i)
+        EXPECT_EQ(embedded->exercises[i].toml, file->exercises[i].toml);
+}
+
+TEST(Recipe, AnalyticBodiesAndHintsAreNamed) {
+    const auto parse_text = [](const std::string& text) {
+        const std::vector<EmbeddedExercise> none;
+        return parse_recipe(text, "x.toml", {}, &none);
+    };
+    const auto good = parse_text(
+        "exercises = []\n[analytic]\ndepth_scale = 1.1\nbody = \"slender\"\nup = [0, 2, 0]\n"
+        "landmarks = 4\nlandmark_noise_mm = 2\n");
+    ASSERT_TRUE(good.has_value()) << good.error().message();
+    const AnalyticInput& in = good->inputs.torso;
+    EXPECT_EQ(in.body.warp, analytic_body("slender")->warp);
+    EXPECT_EQ(in.body.width_scale, analytic_body("slender")->width_scale);
+    EXPECT_EQ(in.body.depth_scale, 1.1);  // wherever it stands, it changes the named body
+    ASSERT_TRUE(good->inputs.up.has_value());
+    EXPECT_EQ(good->inputs.up->y, 1);
+    EXPECT_EQ(in.landmarks, 4);
+    EXPECT_EQ(in.landmark_noise_mm, 2);
+    const auto bad = parse_text("exercises = []\n[analytic]\nbody = \"slendr\"\n");
+    ASSERT_FALSE(bad.has_value());
+    EXPECT_NE(bad.error().message().find("slender"), std::string::npos) << bad.error().message();
+    EXPECT_NE(bad.error().message().find("x.toml:3"), std::string::npos) << bad.error().message();
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/formation/effect_choice.h"
+
+#include <gtest/gtest.h>
+
+#include "imaging_support.h"
+#include "runtime/imaging/paper/paper_effects.h"
+#include "runtime/imaging/physical/model/physical_effects.h"
+
+namespace sonocase::runtime {
+namespace {
+
+const char* const kOwn[] = {"slice", "noise", "blur"};
+const char* const kOthers[] = {"haze"};
+
+std::vector<bool> chosen(const std::vector<std::string>& names) {
+    const auto choice = choose_effects(names, kOwn, kOthers);
+    EXPECT_TRUE(choice.has_value());
+    return choice->on;
+}
+
+TEST(EffectChoice, NamesTurnOnAndMinusTurnsOff) {
+    const std::vector<bool> all{true, true, true}, none{false, false, false};
+    EXPECT_EQ(chosen({}), all);
+    EXPECT_EQ(chosen({"auto"}), all);
+    EXPECT_EQ(chosen({"all"}), all);
+    EXPECT_EQ(chosen({"none"}), none);
+    EXPECT_EQ(chosen({"noise"}), (std::vector<bool>{false, true, false}));
+    EXPECT_EQ(chosen({"-noise"}), (std::vector<bool>{true, false, true}));
+    EXPECT_EQ(chosen({"auto", "-blur"}), (std::vector<bool>{true, true, false}));
+    EXPECT_EQ(chosen({"noise", "blur", "-blur"}), (std::vector<bool>{false, true, false}));
+}
+
+TEST(EffectChoice, OnlyAllKeepsWhatCannotShow) {
+    const std::vector<std::string> all{"all"}, automatic{"auto"};
+    EXPECT_TRUE(choose_effects(all, kOwn, kOthers)->keep_all);
+    EXPECT_FALSE(choose_effects(automatic, kOwn, kOthers)->keep_all);
+}
+
+TEST(EffectChoice, EffectsOfAnotherModelDoNothingAndUnknownOnesAreErrors) {
+    EXPECT_EQ(chosen({"noise", "haze"}), (std::vector<bool>{false, true, false}));
+    const std::vector<std::string> wrong{"nois"};
+    const auto choice = choose_effects(wrong, kOwn, kOthers);
+    ASSERT_FALSE(choice.has_value());
+    EXPECT_NE(choice.error().message().find("did you mean noise?"), std::string::npos)
+        << choice.error().message();
+}
+
+// Every switch belongs to one row, so that it can be turned off alone.
+template <class Switches, class Table>
+void expect_own_switches(const Table& table) {
+    for (std::size_t i = 0; i < table.size(); ++i) {
+        if (table[i].on == nullptr) continue;
+        std::vector<bool> on(table.size(), true);
+        on[i] = false;
+        const Switches switches = switches_of<Switches>(table, on);
+        for (const auto& entry : table) {
+            if (entry.on != nullptr) {
+                EXPECT_EQ(switches.*entry.on, &entry != &table[i]) << entry.name;
+            }
+        }
+    }
+}
+
+TEST(EffectTables, EverySwitchBelongsToOneRow) {
+    expect_own_switches<PaperEffects>(kPaperEffects);
+    expect_own_switches<PhysicalEffects>(kPhysicalEffects);
+}
+
+TEST(EffectTables, CostsAddUpToTheFrameAndSkippedEffectsSayWhy) {
+    for (const ImageModel model : {ImageModel::paper, ImageModel::physical}) {
+        RenderOptions options;
+        options.model = model;
+        options.width_px = options.height_px = 64;
+        options.effects = {"auto", "-noise"};
+        options.host = thread_host();
+        auto renderer = Renderer::create(phantom(), phantom_exercise(), options);
+        ASSERT_TRUE(renderer.has_value());
+        std::vector<std::uint8_t> pixels(64 * 64);
+        FrameInput input;  // no needle
+        renderer->render(input, pixels);
+        double ms = 0;
+        for (const EffectCost& cost : renderer->costs()) {
+            ms += cost.ms;
+            EXPECT_EQ(cost.ran, *cost.skipped_because == '\0') << cost.name;
+            EXPECT_TRUE(cost.ran || cost.ms == 0) << cost.name;
+            const std::string name = cost.name, why = cost.skipped_because;
+            EXPECT_EQ(why == "switched off", name == "noise") << name;
+            EXPECT_EQ(why == "no needle", name == "needle") << name;
+        }
+        EXPECT_GT(ms, 0);
+        EXPECT_EQ(renderer->costs().size(), effect_names(model).size());
+    }
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
