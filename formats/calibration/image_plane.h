@@ -51,8 +51,8 @@ struct ImagePlane {
     Point3 probe_from_pixel(double u, double v) const;
 };
 
-// Never fails. If the image is mirrored, the frame is turned by half a turn about the depth axis and
-// a warning says so.
+// Never fails. If the image is mirrored, the frame is turned by half a turn about the depth axis
+// and a warning says so.
 ImagePlane fit_image_plane(const ImagePlaneInput& input);
 
 }  // namespace sonocase

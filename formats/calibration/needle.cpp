@@ -67,9 +67,9 @@ void paper_axis(const std::vector<AxisPoint>& points, NeedleFit& out) {
     out.condition = fit.singular[1] > 0 ? fit.singular[0] / fit.singular[1] : INFINITY;
 }
 
-// Line through points of known covariance: Gauss-Newton over two offsets and two tilts; the position
-// of each point along the line is eliminated. Gives the direction, a point on the line and their
-// standard deviations.
+// Line through points of known covariance: Gauss-Newton over two offsets and two tilts; the
+// position of each point along the line is eliminated. Gives the direction, a point on the line and
+// their standard deviations.
 struct WeightedLine {
     Vector3 direction, at;
     double direction_sigma = 0;

@@ -52,8 +52,8 @@ std::vector<bool> rows_in_other_units(const std::vector<Pose>& poses, double* fa
     return marked;
 }
 
-// Marks rows whose orientation is the inverse of their neighbours': the sign of the vector part of a
-// quaternion was lost. Of the two kinds of rows, the rarer is marked.
+// Marks rows whose orientation is the inverse of their neighbours': the sign of the vector part of
+// a quaternion was lost. Of the two kinds of rows, the rarer is marked.
 std::vector<bool> rows_with_inverse_orientation(const std::vector<Pose>& poses) {
     std::vector<bool> marked(poses.size(), false);
     // Only in a continuous recording: between poses taken one by one every jump occurs.

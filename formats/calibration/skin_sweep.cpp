@@ -311,7 +311,8 @@ RigidFit fit_skin_sweep(const Surface& surface,
     }
     out.centroid_from = best.centre;
     const double freedom = std::max(1.0, best.count - static_cast<double>(best.jacobian.unknowns));
-    // The rms lacks the trimmed tail: for normal errors, a tenth trimmed lowers it by about a fifth.
+    // The rms lacks the trimmed tail: for normal errors, a tenth trimmed lowers it by about a
+    // fifth.
     const double widen = 1 + 2.2 * options.trim;
     fill_uncertainty(best.jacobian, best.size,
                      widen * widen * best.rms * best.rms * best.count / freedom, out);

@@ -10,8 +10,8 @@ Status draw_image_picture(const ImagePlaneInput& input,
                           const ImagePlane& plane,
                           const std::string& folder,
                           const std::string& name) {
-    // The letter is written on the probe's body, its foot towards the tissue and its back towards the
-    // mark. In a frame that is mirrored or upside down it is seen mirrored or upside down.
+    // The letter is written on the probe's body, its foot towards the tissue and its back towards
+    // the mark. In a frame that is mirrored or upside down it is seen mirrored or upside down.
     const double sign = plane.lateral_sign;
     const auto panel = [&](const std::string& title, const Rigid& sensor_from_frame) {
         Chart chart{title,

@@ -47,8 +47,8 @@ Chart histogram(std::span<const PoseResidual> residuals) {
     return chart;
 }
 
-// How the tool was held: the tilt of its long axis (towards the tip) from the mean in two directions,
-// and the twist about that axis.
+// How the tool was held: the tilt of its long axis (towards the tip) from the mean in two
+// directions, and the twist about that axis.
 std::vector<Chart> coverage(std::span<const Pose> poses,
                             Vector3 tip,
                             std::span<const PoseResidual> residuals) {

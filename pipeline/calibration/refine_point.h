@@ -2,9 +2,9 @@
 
 // Refinement of the point calibration that allows for noise in orientation as well as in position.
 //
-// The linear fit takes the rotations as exact. If the tilt is small their noise biases it: the swing
-// is overestimated and the tip is drawn towards the position with the smallest residuals. Here each pose may turn by a small
-// rotation w_i, penalised by its expected size:
+// The linear fit takes the rotations as exact. If the tilt is small their noise biases it: the
+// swing is overestimated and the tip is drawn towards the position with the smallest residuals.
+// Here each pose may turn by a small rotation w_i, penalised by its expected size:
 //
 //     min sum |R_i exp(w_i) t + p_i - c|^2 / sigma_p^2 + |w_i|^2 / sigma_r^2
 //

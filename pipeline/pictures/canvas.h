@@ -32,7 +32,8 @@ class Canvas {
               double dash = 0);
     void disc(CanvasPoint centre, double radius, CanvasColour colour);
     // Text as an opacity mask, rows from the bottom up, with its lower left pixel at (x, y). In the
-    // SVG it remains text: anchored at `at`, turned by `degrees`, anchor "start", "middle" or "end".
+    // SVG it remains text: anchored at `at`, turned by `degrees`, anchor "start", "middle" or
+    // "end".
     struct Text {
         std::string text;
         CanvasPoint at;

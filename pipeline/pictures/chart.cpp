@@ -189,8 +189,8 @@ void paint_picture(const Chart& given, Canvas& canvas, double x, double y, int w
     }
 }
 
-// A legend with few, short entries covers the upper right corner of the plot; a longer one is placed
-// beside the plot, and one with long names below it.
+// A legend with few, short entries covers the upper right corner of the plot; a longer one is
+// placed beside the plot, and one with long names below it.
 enum class LegendPlace { inside, beside, below };
 
 LegendPlace place_of(const Legend& legend, int width) {

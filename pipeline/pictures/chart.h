@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Plots for the reports: VTK's charts, drawn on our own canvas, so that no display is needed and the
-// bytes are the same on every machine. Legends fit their words; long ones are drawn outside the plot.
+// Plots for the reports: VTK's charts, drawn on our own canvas, so that no display is needed and
+// the bytes are the same on every machine. Legends fit their words; long ones are drawn outside the
+// plot.
 #pragma once
 
 #include <array>

@@ -2,8 +2,9 @@
 
 // A display for VTK's 3-D windows on machines without one.
 //
-// Debian's VTK renders through X only (no OSMesa, no EGL), and its GLEW refuses a context without X.
-// A build farm has no X server, so a virtual one (Xvfb) is started for as long as pictures are drawn.
+// Debian's VTK renders through X only (no OSMesa, no EGL), and its GLEW refuses a context without
+// X. A build farm has no X server, so a virtual one (Xvfb) is started for as long as pictures are
+// drawn.
 #pragma once
 
 #include <optional>
@@ -17,8 +18,8 @@ namespace sonocase::pipeline {
 // window, so that the windows close first.
 //
 // While an Xvfb runs, the environment variable DISPLAY of this process names it; the previous value
-// is restored at the end. Not thread-safe: no two objects at a time, and no other thread may read the
-// environment meanwhile.
+// is restored at the end. Not thread-safe: no two objects at a time, and no other thread may read
+// the environment meanwhile.
 class OffscreenDisplay {
   public:
     // Uses the display in the environment if it answers, else starts an Xvfb, which takes about

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// How well a map fits the skin to the mannequin: exact distances from the readings to the triangles of
-// the mapped skin, and the share of readings for which they exist.
+// How well a map fits the skin to the mannequin: exact distances from the readings to the triangles
+// of the mapped skin, and the share of readings for which they exist.
 #pragma once
 
 #include <vector>

@@ -12,8 +12,8 @@ namespace sonocase::pipeline {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
-// Candidates are compared after a quadratic of this stiffness, by gaps with this Cauchy scale; a point
-// without a counterpart costs as much as this gap.
+// Candidates are compared after a quadratic of this stiffness, by gaps with this Cauchy scale; a
+// point without a counterpart costs as much as this gap.
 constexpr double kJudgeConstraint_mm = 10, kJudgeScale_mm = 5, kNoCounterpart_mm = 12;
 constexpr double kCloseScore = 1.10;
 
@@ -182,8 +182,8 @@ PoseChoice choose_pose(const FitContext& s,
         choice.runners_up.push_back(described(judged[0], judged[n]));
     }
     warn_of_runners_up(s, &choice);
-    // A mirrored surface (left-handed axes) also fits a symmetric torso: warn only if the mirrored one
-    // fits clearly better.
+    // A mirrored surface (left-handed axes) also fits a symmetric torso: warn only if the mirrored
+    // one fits clearly better.
     const TargetSurface mirror = mirrored(s.target, judged[0].rigid.target_from_skin);
     const JudgedPose other =
         judge(s, mirror, refine_rigid(s.coarse, mirror, judged[0].rigid.target_from_skin, rigid));

@@ -6,10 +6,11 @@
 //   rigid starts -> candidates -> quadratic of each -> the best, its runner-up -> RANSAC and
 //   point-to-surface refinement -> residual warp -> proof, measures, warnings
 //
-// The data do not fully determine the orientation of a torso: upside-down and rolled fits score within
-// a few per cent. Candidates are compared after a quadratic, and points without a counterpart count;
-// a runner-up within 10 % becomes a warning that names the ambiguity and the hint that resolves it.
-// Cost: 1-2 s on two cores for 2,000 readings. Same bytes for any number of threads.
+// The data do not fully determine the orientation of a torso: upside-down and rolled fits score
+// within a few per cent. Candidates are compared after a quadratic, and points without a
+// counterpart count; a runner-up within 10 % becomes a warning that names the ambiguity and the
+// hint that resolves it. Cost: 1-2 s on two cores for 2,000 readings. Same bytes for any number of
+// threads.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// From a rigid pose to the complete map: RANSAC, the point-to-surface quadratic with as much freedom
-// as the data justify, the residual field, and the checks between them.
+// From a rigid pose to the complete map: RANSAC, the point-to-surface quadratic with as much
+// freedom as the data justify, the residual field, and the checks between them.
 #pragma once
 
 #include <string>

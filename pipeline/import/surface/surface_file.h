@@ -19,12 +19,12 @@ struct SurfaceFileOptions {
 // The surface in its own frame, mm.
 //
 // Meshes: polygons are cut into triangles, coincident vertices are merged, triangles are turned so
-// that they agree with their neighbours and are counter-clockwise seen from outside, and each vertex
-// gets the outward area-weighted normal. Mesh files without faces, and clouds, give points only, with
-// normals if the file has them (nx, ny, nz). Clouds: columns x, y, z by header (or tx, ty, tz of a
-// pose table, rows whose status is OK), or the first three; commas, semicolons, tabs or blanks.
-// Readings that are not finite are left out and counted in `report` (stage "surface_file", may be
-// null).
+// that they agree with their neighbours and are counter-clockwise seen from outside, and each
+// vertex gets the outward area-weighted normal. Mesh files without faces, and clouds, give points
+// only, with normals if the file has them (nx, ny, nz). Clouds: columns x, y, z by header (or tx,
+// ty, tz of a pose table, rows whose status is OK), or the first three; commas, semicolons, tabs or
+// blanks. Readings that are not finite are left out and counted in `report` (stage "surface_file",
+// may be null).
 //
 // Errors: no such file, a pipe or a device, unreadable or truncated, and for a torso fewer than 30
 // points or an extent that no torso has in mm.

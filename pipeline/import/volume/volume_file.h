@@ -28,12 +28,13 @@ struct LabelLayers {
     std::vector<std::string> warnings;
 };
 
-// Errors: not a readable volume; a pipe or a device; values that are not whole numbers; more than 256
-// distinct ones (most likely a CT). Cost: one pass; memory: the file's voxels in its own type and
-// one byte each.
+// Errors: not a readable volume; a pipe or a device; values that are not whole numbers; more than
+// 256 distinct ones (most likely a CT). Cost: one pass; memory: the file's voxels in its own type
+// and one byte each.
 Result<LabelLayers> read_label_layers(const std::string& path);
 
-// Bytes of voxels according to the file's header, which is all that is read; 0 if it cannot be read.
+// Bytes of voxels according to the file's header, which is all that is read; 0 if it cannot be
+// read.
 std::uint64_t voxel_bytes_in_header(const std::string& path);
 
 // True for names that read_label_layers takes as a single file.

@@ -218,8 +218,8 @@ std::vector<Piece> pieces_of(const Registration& r) {
     return pieces;
 }
 
-// Whether the residual's grid covers the box. Beyond the grid the displacement is constant across the
-// faces, and the map is not one polynomial per cell.
+// Whether the residual's grid covers the box. Beyond the grid the displacement is constant across
+// the faces, and the map is not one polynomial per cell.
 bool covers(const DisplacementGrid& grid, const Box3& box) {
     if (grid.empty()) return true;
     for (int a = 0; a < 3; ++a) {

@@ -29,17 +29,17 @@ class InverseMap {
     InverseMap& operator=(InverseMap&&) noexcept;
 
     // Double precision, damped Newton until the residual is <= 1e-9 mm (or the rounding of the
-    // coordinates, if that is larger) or 50 steps have passed. *ct is NaN for no_preimage; for outside it
-    // is the preimage beyond the box. Thread-safe.
+    // coordinates, if that is larger) or 50 steps have passed. *ct is NaN for no_preimage; for
+    // outside it is the preimage beyond the box. Thread-safe.
     MapStatus invert(Point3 mannequin, Point3* ct) const;
 
     // `count` points start, start + step, ..., as single-precision arrays; for the volume
     // resampler. Newton's method is run at knots along the row (every 8 points where the map is
     // smooth, up to every point where it is not), with a cubic between them; each interval's cubic
     // is checked against the map and split until the expected error is below 2.5e-4 mm. Coordinates
-    // of points that are not ok are NaN; points that provably have no preimage in the box are marked
-    // outside without a search. The same bytes on every instruction set. Thread-safe. Cost: about
-    // 20 ns per point with a residual field, 10 ns without.
+    // of points that are not ok are NaN; points that provably have no preimage in the box are
+    // marked outside without a search. The same bytes on every instruction set. Thread-safe. Cost:
+    // about 20 ns per point with a residual field, 10 ns without.
     void invert_row(Point3 start,
                     Vector3 step,
                     int count,

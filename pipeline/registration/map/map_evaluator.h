@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Value and Jacobian of a fitted map in one fast evaluation: the quadratic in double, the residual spline
-// in four-lane single precision (its values are a few cm, so that its rounding stays below 1e-5
-// mm). Coordinates are relative to a centre on each side, which keeps them small whatever the
+// Value and Jacobian of a fitted map in one fast evaluation: the quadratic in double, the residual
+// spline in four-lane single precision (its values are a few cm, so that its rounding stays below
+// 1e-5 mm). Coordinates are relative to a centre on each side, which keeps them small whatever the
 // frames are.
 #pragma once
 

@@ -17,7 +17,8 @@ inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 // Rounding of a point that was on the face of the box.
 inline constexpr double kBoxSlack_mm = 1e-6;
 
-// A solved point of a row: its preimage relative to the CT centre, and how that moves along the row.
+// A solved point of a row: its preimage relative to the CT centre, and how that moves along the
+// row.
 struct Knot {
     int index = 0;
     bool solved = false;

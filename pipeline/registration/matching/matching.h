@@ -3,8 +3,8 @@
 // Closest-point matching of the mapped skin f(x) with the mannequin, in both directions: for each
 // reading the closest skin point, and for each skin point the closest place on the mannequin.
 //
-// Both give rows of one form, n . (f(x) - y): x a skin point, y a place on the mannequin, n the mean
-// of the two surfaces' normals. Points beyond a rim have no counterpart and give no row.
+// Both give rows of one form, n . (f(x) - y): x a skin point, y a place on the mannequin, n the
+// mean of the two surfaces' normals. Points beyond a rim have no counterpart and give no row.
 #pragma once
 
 #include <cstdint>

@@ -105,8 +105,8 @@ void rim_from_triangles(TargetSurface& t) {
     }
 }
 
-// Planes through neighbours: normals without sign; lift-offs; and the rim, where more than a third of
-// the directions round a point hold no neighbour.
+// Planes through neighbours: normals without sign; lift-offs; and the rim, where more than a third
+// of the directions round a point hold no neighbour.
 void planes_from_neighbours(TargetSurface& t,
                             const std::vector<std::vector<std::uint32_t>>& near,
                             const TargetOptions& options) {

@@ -119,8 +119,8 @@ void crop(Grid& grid, std::vector<float>& field, Mask& mask, Int3 first, Int3 la
     mask.resize(n);
 }
 
-// Radius of a round field of view that cuts the body, 0 if none does: many voxels of the body's edge
-// then lie on one circle about the middle of the slice.
+// Radius of a round field of view that cuts the body, 0 if none does: many voxels of the body's
+// edge then lie on one circle about the middle of the slice.
 double round_view_radius(const Mask& mask, const Grid& grid) {
     const double rx = 0.5 * grid.size.x * grid.spacing_mm.x,
                  ry = 0.5 * grid.size.y * grid.spacing_mm.y;

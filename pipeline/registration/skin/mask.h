@@ -35,8 +35,8 @@ Disc disc(double radius_x, double radius_y);
 // is cut is not eroded.
 Mask eroded(Slice slice, const Disc& offsets);
 
-// Dilates `seed` by the disc, slice by slice, and keeps what is in `mask`: restores the edge that an
-// erosion removed.
+// Dilates `seed` by the disc, slice by slice, and keeps what is in `mask`: restores the edge that
+// an erosion removed.
 void restore_edge(Mask& seed, const Mask& mask, Int3 size, const Disc& offsets);
 
 // Connected parts of a mask (voxels that share a face).

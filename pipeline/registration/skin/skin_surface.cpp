@@ -114,8 +114,8 @@ void keep_only(const std::vector<std::uint8_t>& keep, Surface* surface) {
     surface->triangles = std::move(triangles);
 }
 
-// Points of the largest connected parts of the mesh: the inner walls of cavities that stayed open in
-// the slices are not skin.
+// Points of the largest connected parts of the mesh: the inner walls of cavities that stayed open
+// in the slices are not skin.
 std::vector<std::uint8_t> largest_part(const Surface& surface) {
     std::vector<std::uint32_t> parent(surface.points.size());
     for (std::size_t i = 0; i < parent.size(); ++i) parent[i] = static_cast<std::uint32_t>(i);

@@ -2,11 +2,11 @@
 
 // The patient's skin, from the label map: sub-voxel points with outward normals and triangles.
 //
-// The body (every label except outside) is averaged onto a grid of about working_mm, cleaned, smoothed
-// by a Gaussian and contoured at one half. What is not skin is left out and counted: faces where the
-// field of view cuts the body (at the grid's faces, at a plane inside a padded grid, or on the circle
-// of a round field of view), remnants of the table, and arms. Cost: one pass over the labels, then
-// 0.1 s for a torso at 3 mm.
+// The body (every label except outside) is averaged onto a grid of about working_mm, cleaned,
+// smoothed by a Gaussian and contoured at one half. What is not skin is left out and counted: faces
+// where the field of view cuts the body (at the grid's faces, at a plane inside a padded grid, or
+// on the circle of a round field of view), remnants of the table, and arms. Cost: one pass over the
+// labels, then 0.1 s for a torso at 3 mm.
 #pragma once
 
 #include <cstdint>

@@ -7,10 +7,10 @@
 //   (7)-(8)  matches: D(v, m) = |v - m| / |v - C(v)| < T_d
 //   (9)  consensus: share of mapped skin points within T_c of a mannequin point
 //
-// Departures. Coordinates are centred and scaled (w = R x / scale, x about the skin's origin), which
-// lowers the condition number from 1e8 to 1e2. The constraint's weight is an option in mm; the
-// paper's rows, in plain mm, have weight 1, and their maps fold. All three dimensions are solved by
-// one QR factorisation.
+// Departures. Coordinates are centred and scaled (w = R x / scale, x about the skin's origin),
+// which lowers the condition number from 1e8 to 1e2. The constraint's weight is an option in mm;
+// the paper's rows, in plain mm, have weight 1, and their maps fold. All three dimensions are
+// solved by one QR factorisation.
 #pragma once
 
 #include <array>

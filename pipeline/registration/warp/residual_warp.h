@@ -6,9 +6,9 @@
 // Minimises the mean squared gap at the skin plus, all in mm^2,
 //     bending  lb 50^4 mean |Hessian d|^2  +  stretching  lm 50^2 mean |grad d|^2
 //     + depth  mu mean min(1, depth / 40)^2 |d|^2
-// over the CT box (depth: over the body). The field fades with depth through the last term; a factor
-// would leave the spline space and invalidate the proof. Not in the paper.
-// Cost: 0.3 s on two cores with a 30 mm grid.
+// over the CT box (depth: over the body). The field fades with depth through the last term; a
+// factor would leave the spline space and invalidate the proof. Not in the paper. Cost: 0.3 s on
+// two cores with a 30 mm grid.
 #pragma once
 
 #include <span>
@@ -29,8 +29,8 @@ struct ResidualOptions {
     double tolerance = 1e-3;      // of the solver
     int skin_queries = 2500;
     double inside_mm = 1.5;  // largest mean displacement inside the body
-    // After each attempt bending doubles if the proof failed, and the depth penalty grows if the inside
-    // moved too far.
+    // After each attempt bending doubles if the proof failed, and the depth penalty grows if the
+    // inside moved too far.
     int attempts = 6;
     double least_gain = 1.15;  // rms before over rms after; a field that gains less is dropped
 };
@@ -45,8 +45,8 @@ struct ResidualReport {
     int iterations = 0;                          // of conjugate gradients
 };
 
-// The field without proof, for comparing poses: sets registration's residual. An existing one on the
-// same grid is the start.
+// The field without proof, for comparing poses: sets registration's residual. An existing one on
+// the same grid is the start.
 struct FieldFit {
     Matches matches;        // after the last solve
     double energy_mm2 = 0;  // bending, stretching and depth together

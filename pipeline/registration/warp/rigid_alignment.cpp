@@ -12,8 +12,8 @@ namespace sonocase::pipeline {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-// A point without a counterpart costs as much as this gap, which is about the gap between two bodies
-// after a rigid alignment: overlap as such is neither rewarded nor penalised.
+// A point without a counterpart costs as much as this gap, which is about the gap between two
+// bodies after a rigid alignment: overlap as such is neither rewarded nor penalised.
 constexpr double kNoCounterpart_mm = 12;
 constexpr double kScoreScale_mm = 10;
 

@@ -7,8 +7,8 @@
 // Departures: starts are spread evenly over all rotations and the seed rotates the whole set; gaps
 // are point-to-plane in both directions with a robust weight, which needs a sixth of the iterations
 // and ends closer; points without a counterpart count in the score, so that sliding off an open,
-// longer or partly swept mannequin does not pay. Several distinct candidates are returned: a torso is
-// nearly a cylinder, and which end is up is decided later, or by a hint.
+// longer or partly swept mannequin does not pay. Several distinct candidates are returned: a torso
+// is nearly a cylinder, and which end is up is decided later, or by a hint.
 #pragma once
 
 #include <cstdint>

@@ -175,7 +175,8 @@ TEST(Quality, OldPoorAndStrangeCalibrationsAreNamed) {
     concern([](Calibration& c) { c.sigma_mm.y = INFINITY; }, "only to inf");
     concern([](Calibration& c) { c.condition = 1e4; }, "hardly determines");
     concern([](Calibration& c) { c.poses = 5; }, "5 readings");
-    concern([](Calibration& c) { c.sensor_from_tool.rotation(0, 0) = 2; }, "not hold a proper rotation");
+    concern([](Calibration& c) { c.sensor_from_tool.rotation(0, 0) = 2; },
+            "not hold a proper rotation");
     concern([](Calibration& c) { c.scale = 0.001; }, "units");
 }
 
