@@ -37,9 +37,9 @@ class ChunkWriter {
     // Bytes that are compressed already; readers take them as they are (ChunkReader::packed()).
     void add_packed(std::string type, bool required, std::vector<std::uint8_t> bytes);
     template <class T, class A>
-    void add_array(std::string type, bool required, const std::vector<T, A>& values) {
+    void add_array(const std::string& type, bool required, const std::vector<T, A>& values) {
         static_assert(std::is_trivially_copyable_v<T>);
-        add_view(std::move(type), required,
+        add_view(type, required,
                  {reinterpret_cast<const std::uint8_t*>(values.data()), values.size() * sizeof(T)});
     }
     // Chunks in the order added. The bytes do not depend on `jobs`.

@@ -175,7 +175,8 @@ NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3) 
     if (now == nullptr) return step;
     const FrontRow* next = nullptr;
     for (const FrontRow& row : table.rows) {
-        if (row.error_mm >= now->error_mm * 0.99) continue;  // less than a hundredth is not worth a step
+        if (row.error_mm >= now->error_mm * 0.99)
+            continue;  // less than a hundredth is not worth a step
         if (next == nullptr || seconds(row) < seconds(*next)) next = &row;
     }
     if (next == nullptr) return step;

@@ -3,14 +3,17 @@
 #include "runtime/display/input_script.h"
 
 #include <cstdlib>
-#include <fstream>
 #include <sstream>
+#include <utility>
+
+#include "formats/files/atomic_file.h"
 
 namespace sonocase::runtime {
 
 Result<InputScript> InputScript::load(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) return Error{"cannot be read", path, "check the path given to --script"};
+    auto content = read_text_file(path);
+    if (!content) return content.error();
+    std::istringstream file(std::move(*content));
     InputScript script;
     int number = 0;
     for (std::string text; std::getline(file, text);) {

@@ -126,8 +126,7 @@ std::map<std::string, Real> slow_scores(const Scene& s) {
     const V slope = v(s.motion.slope_per_mm);
     const auto weight = [&](V p) { return Real(0.7) + dot3(slope, sub(p, v(s.motion.middle))); };
     const auto at_rest = [&](V p, Real t) { return add(p, swing(t), -weight(p)); };
-    // Where a target is: the place that comes to its centre at rest, by Newton's rule along the
-    // swing.
+    // Where a target is: the point whose place at rest is its centre, by Newton's method.
     const auto target_at = [&](const Target& target, Real t) {
         const V rest = v(target.centre), way = swing(t);
         Real step = 0;
