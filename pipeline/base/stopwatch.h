@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Elapsed seconds on a steady clock: the one stopwatch of the pipeline. Reports carry its seconds;
-// results never depend on them.
+// Wall-clock time on a steady clock, for reports.
 #pragma once
 
 #include <chrono>
@@ -10,13 +9,20 @@ namespace sonocase::pipeline {
 
 class Stopwatch {
   public:
-    // Seconds since the object was made.
-    double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    // Since construction or the last lap.
+    double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+    // As seconds(), and starts again from 0.
+    double lap() {
+        const Clock::time_point now = Clock::now();
+        const double elapsed = std::chrono::duration<double>(now - start_).count();
+        start_ = now;
+        return elapsed;
     }
 
   private:
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+    using Clock = std::chrono::steady_clock;
+    Clock::time_point start_ = Clock::now();
 };
 
 }  // namespace sonocase::pipeline
