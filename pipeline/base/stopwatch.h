@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Wall-clock time on a steady clock, for reports.
+// Elapsed seconds on a steady clock, for reports; results never depend on them.
 #pragma once
 
 #include <chrono>
