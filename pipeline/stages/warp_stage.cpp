@@ -23,7 +23,7 @@ void add_align(OptionsOf<Fit>& options) {
             "starts", [](auto& o) { return &o.rigid.starts; }, 1, 2000, "",
             "rotations to start from")
         .sweep({"register",
-                {"10", "30", "60", "120", "240"},
+                {"10", "30", "60", "96", "240"},
                 "the chance of a wrong pose",
                 "once one start converges to the right pose, more of them end in the same place"})
         .number(
