@@ -33,24 +33,5 @@ TEST(VolumeCorrection, KeepVolumesWhereTheWeightVaries) {
     }
 }
 
-// Scattered crumbs push offsets to their largest limit, for which cells far from any surface are
-// read: also cells that lie in a block of a single label.
-TEST(VolumeCorrection, LargestLimitReadsBlocksOfOneLabel) {
-    const LabelVolume ct = sample_labels(cubic_grid(64, 3), 4, [](Point3 p) {
-        if (p.x > 60) return p.y < 0 ? 2 : 0;
-        const auto i = static_cast<int>(std::lround(p.x / 3 + 31.5));
-        const auto j = static_cast<int>(std::lround(p.y / 3 + 31.5));
-        const auto k = static_cast<int>(std::lround(p.z / 3 + 31.5));
-        if (i < 12 && (i % 4 == 0) && (j % 4 == 0) && (k % 4 == 0)) return 3;
-        return p.x < -45 ? 1 : norm(p - Point3{30, 0, 0}) < 20 ? 2 : 0;
-    });
-    LabelField field(ct, {});
-    const VolumeCorrectionReport report = correct_volumes(&field, [](Point3) { return 1.0; });
-    double total = 0;
-    for (std::size_t l = 0; l < 4; ++l) total += report.reached_mm3[l] / report.target_mm3[l];
-    EXPECT_NEAR(std::abs(field.volume_offsets_mm()[3]), 4.5, 1e-4);
-    EXPECT_GT(total, 2.5);
-}
-
 }  // namespace
 }  // namespace sonocase::pipeline
