@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A grey picture on the graphics card.
+// A grey picture as a texture on the graphics card. All calls belong to the thread of the window.
 #pragma once
 
 #include <cstdint>
@@ -27,10 +27,11 @@ class ImageTexture {
   private:
     unsigned texture_ = 0;
     int width_px_ = 0, height_px_ = 0;
-    std::vector<std::uint32_t> rgba_;  // OpenGL ES 3 has no swizzle that WebGL keeps: expanded here
+    std::vector<std::uint32_t> rgba_;  // WebGL lacks the swizzle that would spare this
 };
 
-// For ImDrawList::AddCallback: what follows hides what is under it.
+// For ImDrawList::AddCallback: what is drawn afterwards replaces what is under it, without
+// blending.
 void paint_opaque(const ImDrawList*, const ImDrawCmd*);
 
 }  // namespace sonocase::runtime

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Input from a file, for tests of the window: one command a line.
+// Input from a file, for tests of the window: one command per line.
 //
-//   wait N              N pictures pass
+//   wait N              for N pictures
 //   key NAME [mods]     press and release; mods are shift, ctrl, alt
 //   hold NAME N [mods]  keep it down for N pictures
 //   move X Y            the mouse, in window pixels
@@ -11,7 +11,7 @@
 //   shot FILE           save the window as PNG
 //   loop S              again from the first line until the clock says S seconds
 //   quit
-// Empty lines and lines that start with # do nothing.
+// Empty lines and lines that start with # are ignored.
 #pragma once
 
 #include <string>
@@ -24,11 +24,13 @@ namespace sonocase::runtime {
 
 class InputScript {
   public:
+    // Errors: a file that cannot be read, a line that is not a command.
     static Result<InputScript> load(const std::string& path);
 
+    // False after the last command.
     bool active() const { return next_ < lines_.size() || waiting_ > 0; }
-    // Input of the next picture. `shot` is set to a file to save after it, `quit` when it is over.
-    // now_s: the clock of loop.
+    // The input of the next picture. Sets `shot` to the file in which to save that picture, and
+    // `quit` when the script ends. now_s: the clock of `loop`.
     InjectedInput next(double now_s, std::string& shot, bool& quit);
 
   private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Triangle meshes of probe, needle and targets for the 3-D view.
+// Basic triangle meshes for the models of the 3-D view.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,8 @@ struct Vertex {
     float texture[2];
 };
 
-// A body lofted through rounded rings about z: (z, half width x, half width y), first and last
-// closed. exponent: of the super-ellipse, 2 is round.
+// A ring about z, and a body lofted through rings, closed at the first and the last one.
+// exponent: of the super-ellipse; 2 is an ellipse.
 struct Ring {
     double z, half_x, half_y;
 };

@@ -11,7 +11,7 @@ namespace {
 
 struct Samples {
     Int3 n;
-    std::vector<float> body;  // share of body round each sample, [0, 1]
+    std::vector<float> body;  // share of body around each sample, [0, 1]
     std::size_t index(int i, int j, int k) const {
         return static_cast<std::size_t>(i) +
                static_cast<std::size_t>(n.x) *
@@ -24,7 +24,7 @@ void smooth(Surface& mesh, int passes) {
     std::vector<Vector3> sum(mesh.points.size());
     std::vector<int> count(mesh.points.size());
     for (int pass = 0; pass < passes; ++pass) {
-        // Taubin's pair of steps: the second gives back the volume that the first takes.
+        // Taubin's pair of steps: the second restores the volume that the first removes.
         const double weight = pass % 2 == 0 ? 0.6 : -0.63;
         std::fill(sum.begin(), sum.end(), Vector3{});
         std::fill(count.begin(), count.end(), 0);
@@ -57,7 +57,7 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
     for (int k = 0; k < s.n.z; ++k) {
         for (int j = 0; j < s.n.y; ++j) {
             for (int i = 0; i < s.n.x; ++i) {
-                // Eight look-ups a quarter step off: slanted skin gets slanted, not stepped.
+                // Eight look-ups, each a quarter step off, so that slanted skin has no steps.
                 float share = 0;
                 for (int c = 0; c < 8; ++c) {
                     const auto at = [&](int n, int axis, int side) {
@@ -72,7 +72,7 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
             }
         }
     }
-    // One vertex a cell that the surface passes, at the middle of the crossed edges.
+    // One vertex per cell that the surface passes, in the middle of the crossed edges.
     std::vector<std::int32_t> vertex(s.body.size(), -1);
     for (int k = 0; k + 1 < s.n.z; ++k) {
         for (int j = 0; j + 1 < s.n.y; ++j) {
@@ -102,7 +102,7 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
             }
         }
     }
-    // One quad an edge that the surface crosses, of the four cells round it.
+    // One quad per edge that the surface crosses, between the four cells around it.
     for (int k = 1; k + 1 < s.n.z; ++k) {
         for (int j = 1; j + 1 < s.n.y; ++j) {
             for (int i = 1; i + 1 < s.n.x; ++i) {

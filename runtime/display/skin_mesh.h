@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A light triangle mesh of a bundle's skin for the 3-D view, straight from the labels.
+// A coarse triangle mesh of a bundle's skin for the 3-D view, made from the labels.
 #pragma once
 
 #include "formats/bundle/case_bundle.h"
@@ -8,8 +8,9 @@
 
 namespace sonocase::runtime {
 
-// Surface nets on samples `step_mm` apart, smoothed a little; outward normals, counter-clockwise
-// from outside. Open where the volume ends inside the body. Cost: one look-up a sample.
+// Surface nets on samples `step_mm` apart, slightly smoothed; `mannequin` frame, mm, with outward
+// normals, counter-clockwise from outside. Open where the volume ends inside the body. Cost: eight
+// look-ups per sample.
 Surface skin_mesh(const CaseBundle& bundle, double step_mm);
 
 }  // namespace sonocase::runtime

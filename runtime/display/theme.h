@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Colours, spacing and fonts of the player: a dark console, so that the picture is the brightest
-// thing.
+// Colours, spacing and fonts of the player: dark, so that the ultrasound picture is the brightest
+// part of the screen.
 #pragma once
 
 struct ImFont;
@@ -15,8 +15,9 @@ struct Fonts {
     ImFont* title = nullptr;
 };
 
-// Rebuilds style and fonts for a scale; call between pictures. Fonts come from the system
-// (share/sonocase/fonts, DejaVu, Liberation, Noto); with none of them ImGui's own, enlarged.
+// Makes style and fonts for a scale; to be called between pictures. The fonts are the system's
+// (share/sonocase/fonts, DejaVu, Liberation, Noto), or ImGui's own, enlarged, if it has none of
+// them.
 void apply_theme(float scale);
 const Fonts& fonts();
 

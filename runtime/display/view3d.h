@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The small 3-D view: translucent skin, probe, scan plane with the live picture on it, needle,
-// targets.
+// targets. All calls belong to the thread of the window.
 #pragma once
 
 #include <memory>
@@ -20,18 +20,18 @@ struct View3dInput {
     Rigid mannequin_from_probe;
     Rigid mannequin_from_needle;
     Renderer::Layout layout;
-    double depth_mm = 0;  // shown; may differ from the exercise's
+    double depth_mm = 0;  // of the picture; may differ from the exercise's
     bool flipped = false;
     int image_width_px = 0, image_height_px = 0;
-    unsigned image_texture = 0;  // OpenGL name; 0: a plain plane
-    bool show_targets = true;
-    std::vector<bool> hit;               // # targets
-    std::vector<Point3> target_centres;  // # targets, where they are now; empty: at rest
+    unsigned image_texture = 0;         // OpenGL name; 0: a plain plane
+    std::vector<bool> targets_reached;  // # targets
+    std::vector<Point3>
+        target_centres;  // # targets, `mannequin` frame; empty: as the exercise has them
 };
 
-struct ViewRay {
+struct ViewRay {  // `mannequin` frame
     Point3 start;
-    Vector3 direction;
+    Vector3 direction;  // unit
 };
 
 class View3d {
@@ -41,17 +41,19 @@ class View3d {
     View3d(const View3d&) = delete;
     View3d& operator=(const View3d&) = delete;
 
-    // New skin and new home view: from above the probe's start, its lateral axis to the right.
+    // A new skin. set_exercise() follows.
     void set_case(const CaseBundle& bundle);
+    // New tools, and a new home view: the probe points down, the long axis of the body runs across.
     void set_exercise(const Exercise& exercise);
     Orbit& orbit() { return orbit_; }
     void home() { orbit_ = {}; }
-    // From a tool that is not there: from outside.
+    // Where to look from; from outside if the tool is not there.
     ViewFrom& from() { return from_; }
 
-    // Draws at width x height pixels and returns the texture, for ImGui::Image with v upside down.
+    // Draws at width x height pixels and returns the texture for ImGui::Image, whose v runs
+    // upwards.
     void* draw(int width_px, int height_px, const View3dInput& input);
-    // Through the pixel (x, y) from the top left of the last picture; `mannequin` frame.
+    // The ray through the pixel (x, y), from the top left, of the last picture.
     ViewRay ray(double x_px, double y_px) const;
 
   private:

@@ -3,7 +3,7 @@
 #include "runtime/display/window.h"
 
 #include <epoxy/gl.h>
-// GLFW after the OpenGL loader.
+// GLFW must follow the OpenGL loader.
 #include <GLFW/glfw3.h>
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
@@ -21,14 +21,15 @@
 namespace sonocase::runtime {
 namespace {
 
-std::string g_glfw_error;  // GLFW reports through a plain function
+std::string g_glfw_error;  // GLFW reports to a function without context
 
 void on_glfw_error(int, const char* text) {
     g_glfw_error = text ? text : "";
 }
 
-// Without a graphics card Mesa paints on threads of ours, one a core. One fewer leaves a core to
-// the thread that renders the ultrasound, so that a pose does not wait for panels to be painted.
+// Without a graphics card Mesa paints on threads of this process, one per core. One fewer leaves a
+// core to the thread that renders the ultrasound, so that a pose does not wait until panels are
+// painted.
 void leave_a_core_to_imaging() {
     const unsigned cores = std::thread::hardware_concurrency();
     const std::string painters = std::to_string(std::max(1u, cores - std::min(cores, 1u)));
@@ -167,12 +168,12 @@ void Window::end_frame(bool capture) {
     glfwGetFramebufferSize(impl_->window, &width, &height);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glViewport(0, 0, width, height);
-    // The page's colour: cheaper than a page-sized rectangle where the processor paints.
+    // The page's colour: takes less time than a page-sized rectangle where the processor paints.
     glClearColor(12 / 255.0f, 15 / 255.0f, 19 / 255.0f, 1);
     glClear(GL_COLOR_BUFFER_BIT);
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
     if (capture) {
-        // Before the swap: what the front buffer holds after it is the window system's affair.
+        // Before the swap, after which the content of the buffers is undefined.
         const std::size_t row = static_cast<std::size_t>(width) * 3;
         std::vector<std::uint8_t>& pixels = capture_.pixels;
         pixels.resize(row * static_cast<std::size_t>(height));
@@ -203,11 +204,6 @@ void Window::toggle_full_screen() {
     const GLFWvidmode* mode = glfwGetVideoMode(monitor);
     glfwSetWindowMonitor(impl_->window, monitor, 0, 0, mode->width, mode->height,
                          mode->refreshRate);
-}
-
-std::string Window::opengl_name() const {
-    const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-    return name ? name : "";
 }
 
 int key_code(const std::string& name) {

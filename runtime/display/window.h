@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A window with an OpenGL 3.3 context and Dear ImGui in it. GLFW, OpenGL and ImGui's back ends stay
-// in the .cpp file. Window calls belong to the thread that opened it.
+// in the .cpp file. All calls belong to the thread that opened the window.
 #pragma once
 
 #include <array>
@@ -18,10 +18,10 @@ struct WindowOptions {
     std::string title = "sonocase";
     int width_px = 1280, height_px = 720;
     bool visible = true;
-    double ui_scale = 0;  // 0: the monitor's
+    double ui_scale = 0;  // 0: from the monitor
 };
 
-// Input put in by a script, on top of the real one.
+// Input of a script, in place of the user's.
 struct InjectedInput {
     bool active = false;
     float x = 0, y = 0;
@@ -33,7 +33,7 @@ struct InjectedInput {
 
 class Window {
   public:
-    // Errors: no display, no OpenGL 3.3; each with what to do.
+    // Errors: no display, no OpenGL 3.3; each says what to do.
     static Result<std::unique_ptr<Window>> open(const WindowOptions& options);
     ~Window();
     Window(const Window&) = delete;
@@ -41,11 +41,11 @@ class Window {
 
     bool should_close() const;
     void request_close();
-    // Waits for input, at most until `until_s` from now; 0 does not wait.
+    // Waits for input for at most so long; 0 does not wait.
     void wait_events(double seconds);
-    // Begins and ends one picture; what ImGui is told between the two is shown.
+    // Begin and end one picture; it shows what is drawn with ImGui between the two.
     void begin_frame(const InjectedInput& injected);
-    // capture: takes a copy of the picture for captured().
+    // capture: keeps a copy of the picture for captured().
     void end_frame(bool capture = false);
     // The last captured picture, RGB, rows from the top.
     struct Capture {
@@ -54,11 +54,10 @@ class Window {
     };
     const Capture& captured() const { return capture_; }
 
-    float scale() const { return scale_; }  // of fonts and sizes, re 1280 x 720
+    float scale() const { return scale_; }  // of fonts and sizes; 1 is for 1280 x 720
     void set_scale(float scale);            // takes effect with the next picture
     void toggle_full_screen();
     void set_title(const std::string& title);
-    std::string opengl_name() const;
 
     struct Impl;
 
@@ -69,8 +68,7 @@ class Window {
     Capture capture_;
 };
 
-// Number of a key by its name as scripts and the help page write it ("left", "a", "f1", "space");
-// -1: unknown.
+// The number of a key by its name in scripts ("left", "a", "f1", "space"); -1: unknown.
 int key_code(const std::string& name);
 
 }  // namespace sonocase::runtime

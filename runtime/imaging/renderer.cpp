@@ -159,7 +159,7 @@ Result<Renderer> Renderer::create(CaseView bundle,
     const ImageModelInfo& info = info_of(options.model);
     const bool reference = options.kind == RendererKind::reference;
     JobRunner& jobs = options.host.jobs ? *options.host.jobs : serial_jobs();
-    if (bundle.blocks() && reference) bundle.blocks()->load_all(jobs);
+    if (bundle.blocks() != nullptr && reference) bundle.blocks()->load_all(jobs);
 
     auto impl = std::make_unique<Impl>(exercise, options);
     Impl& m = *impl;
@@ -169,8 +169,7 @@ Result<Renderer> Renderer::create(CaseView bundle,
     const int lines = options.scanlines > 0 ? options.scanlines : info.scanlines;
     const int samples = options.samples > 0 ? options.samples : info.samples;
     Result<std::unique_ptr<ImageFormation>> formation =
-        info.create({*bundle,
-                     bundle.blocks(),
+        info.create({bundle,
                      m.exercise,
                      m.options,
                      m.effects,

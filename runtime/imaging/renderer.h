@@ -27,7 +27,7 @@ class Renderer {
   public:
     // Lays out the bundle for this exercise and these options. The bundle must outlive the
     // renderer. Errors: options out of range, a probe that scans no area, an unknown effect or
-    // instruction set, a bundle without what the model needs. Cost: 10 to 100 ms.
+    // instruction set, a bundle without what the model needs. Cost: some tens of ms.
     static Result<Renderer> create(CaseView bundle,
                                    const Exercise& exercise,
                                    const RenderOptions& options);
@@ -73,7 +73,7 @@ std::vector<std::string> simd_targets();
 
 // The textures of model `physical` that depend on nothing: roughness of surfaces, strands of
 // muscle, septa of fat. Give the same ones to every renderer that is created, or have them made on
-// another thread while a bundle is being read. Cost: 10 to 20 ms.
+// another thread while a bundle is being read. Cost: about 20 ms.
 std::shared_ptr<const PhysicalTextures> make_physical_textures();
 
 }  // namespace sonocase::runtime

@@ -30,11 +30,11 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     app.set_version_flag("--version", facts);
     std::string size, effects;
     app.add_option("bundle", arguments.bundle,
-                   "Case bundle (*.sonocase); none: choose from a list");
+                   "Case bundle (*.sonocase); without one: choose from a list");
     app.add_option("--exercise", arguments.exercise, "Exercise of the bundle; default: its first");
     app.add_option("--tracker", arguments.tracker, tracker_help());
     app.add_option("--calibration", arguments.calibrations,
-                   "Calibration file, also of a lag; may be repeated")
+                   "File of a calibration or a lag; may be repeated")
         ->allow_extra_args(false);
     app.add_flag("--headless", arguments.headless, "No window: render frames and stop")
         ->group("Headless");
@@ -42,7 +42,7 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
                    "Frames to render, spread over the sweep or taken from the recording in order")
         ->check(CLI::Range(1, 100000000))
         ->group("Headless");
-    app.add_option("--size", size, "Picture size WxH, or the window's")->group("Headless");
+    app.add_option("--size", size, "Size WxH of the picture or the window")->group("Headless");
     app.add_option("--out", arguments.out, "Folder for PNG frames")->group("Headless");
     app.add_option("--stats", arguments.stats,
                    "Write times and costs as JSON; - for standard output");
@@ -63,8 +63,8 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         ->check(CLI::Range(16, 4096))
         ->group("Picture");
     app.add_option("--frame-budget", arguments.frame_budget_ms,
-                   "In a window: milliseconds that a frame may take before accuracy is given up; "
-                   "0: never. Recordings are always exact")
+                   "In a window: milliseconds per frame above which accuracy is reduced; "
+                   "0: never reduced. Recordings are always at full accuracy")
         ->check(CLI::Range(0.0, 1000.0))
         ->group("Picture");
     app.add_option("--threads", arguments.threads, "Rendering threads")
@@ -74,8 +74,7 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         "--serve", arguments.serve,
         "OpenIGTLink server [ADDRESS:]PORT that sends IMAGE and TRANSFORM; loopback unless "
         "an address is given");
-    app.add_option("--ui-scale", arguments.ui_scale,
-                   "Size of words and controls, 1 is for 1280x720")
+    app.add_option("--ui-scale", arguments.ui_scale, "Size of text and controls; 1 is for 1280x720")
         ->check(CLI::Range(0.75, 4.0));
     app.add_option("--screenshot", arguments.screenshot, "Save the window's last picture as PNG")
         ->group("Testing");

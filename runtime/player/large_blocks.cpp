@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Memory of 4 MB and more on pages of 2 MB, for the programs that render: a jumping probe reads
-// from all over a bundle, and with pages of 4 kB most look-ups would first have to find their page.
-// Fewer faults while loading come with it. Replaces the global operator new of the program that
-// this file is linked into; small blocks are the C library's as ever.
+// Blocks of 4 MB and more on pages of 2 MB, for the programs that render: a probe that jumps reads
+// from all over a bundle, and with pages of 4 kB most look-ups would miss the address cache (TLB).
+// Loading causes fewer page faults too. Replaces the global operator new of the program that this
+// file is linked into; smaller blocks come from the C library.
 #include <algorithm>
 #include <cstdlib>
 #include <new>
@@ -22,7 +22,7 @@ void* allocate(std::size_t bytes) noexcept {
     if (whole < bytes) return nullptr;
     void* block = std::aligned_alloc(kPage, whole);
 #ifdef __linux__
-    // A system that has no such pages says no, and nothing is lost.
+    // A system without such pages refuses, which is harmless.
     if (block != nullptr) (void)madvise(block, whole, MADV_HUGEPAGE);
 #endif
     return block;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Writes a session while it runs, on a thread of its own. The frame loop hands over a record and
-// never waits; a batch is on the disk within half a second.
+// never waits; what it handed over is on the disk within half a second.
 //
-// Files: FILE.igs.mha, whole at every moment (formats/files/growing_sequence.h), and beside it
-// FILE.frames.igs.mha with the pictures of the moments that matter, which appears with the first of
-// them.
+// Files: FILE.igs.mha, complete at every moment (formats/files/growing_sequence.h), and beside it
+// FILE.frames.igs.mha with the pictures of the moments that matter, made with the first of them.
 #pragma once
 
 #include <array>
@@ -29,32 +28,32 @@ struct RecordedFrame {
     std::int64_t frame = 0;  // FrameInput::frame
     bool probe_ok = false, needle_ok = false;
     Rigid mannequin_from_probe, mannequin_from_needle, mannequin_from_drawn;
-    // Console settings in words where they changed (settings_text.h); empty otherwise.
+    // The console's settings as text (settings_text.h) where they changed; empty otherwise.
     std::array<char, 224> settings{};
 };
 
 struct RecorderStatus {
     std::size_t frames_written = 0;
-    std::size_t frames_dropped = 0;  // the writer was more than a minute behind
-    std::string problem;             // a whole sentence for the trainee; empty: all is well
+    std::size_t frames_dropped = 0;  // lost because the writer was more than a minute behind
+    std::string problem;             // a whole sentence for the trainee; empty: none
 };
 
 class SessionRecorder {
   public:
-    // exercise and labels give names to events; copied.
+    // exercise, labels: name the events; copied. Errors: a file that cannot be created.
     static Result<std::unique_ptr<SessionRecorder>> start(const std::string& path,
                                                           const SessionHeader& header,
                                                           const Exercise& exercise,
                                                           const std::vector<Label>& labels);
-    ~SessionRecorder();  // writes what is left
+    ~SessionRecorder();  // writes the rest
     SessionRecorder(const SessionRecorder&) = delete;
     SessionRecorder& operator=(const SessionRecorder&) = delete;
 
-    // From the frame loop. Never blocks, never allocates; at most 8 events a frame are kept. False
-    // where the writer is so far behind that the frame is lost; status() counts them.
+    // From the frame loop. Never blocks and never allocates; keeps at most 8 events per frame.
+    // False if the writer is so far behind that the frame is lost; status() counts those.
     bool push(const RecordedFrame& frame, std::span<const LiveEvent> events);
-    // Keeps the picture of the frame just pushed: grey, # width * height. The picture is copied;
-    // when two come within the time of a write, the second is left out. `why` is a literal.
+    // Keeps the picture of the frame just pushed: grey, # width_px * height_px, copied. If two come
+    // within the time of a write, the second is left out. `why` is a string literal.
     void push_picture(std::int64_t frame,
                       double time_s,
                       const char* why,
@@ -62,12 +61,12 @@ class SessionRecorder {
                       int height_px,
                       std::span<const std::uint8_t> pixels);
 
-    // Returns when there is room for frames and a picture: for runs faster than life, which may
-    // wait.
+    // Returns when there is room for frames and a picture: for runs faster than real time, which
+    // may wait.
     void wait_for_room();
 
     RecorderStatus status() const;  // for the screen; takes a lock for the time of a copy
-    // Writes what is left and ends the thread. An Error where frames did not reach the disk.
+    // Writes the rest and ends the thread. Error: frames did not reach the disk.
     Status finish();
 
   private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Console settings as the "key=value" words that a recording keeps, and back.
+// The console's settings as the "key=value" text that a recording keeps, and back.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ namespace sonocase::runtime {
 // "gain_db=0 dynamic_range_db=60 tgc_db=0,0,0,0,0,0,0,0 flip=0". Numbers read back as the same
 // doubles.
 std::string settings_text(const ImageSettings& settings);
-// Words that are missing or malformed leave what `settings` held.
+// Keys that are missing or malformed leave their setting unchanged.
 void apply_settings_text(const std::string& text, ImageSettings& settings);
 
 }  // namespace sonocase::runtime

@@ -35,8 +35,8 @@ void MouseTracker::reset() {
     changed_ = true;
     normal_ = -start_beam_;
     lateral_ = frame_along(start_probe_, start_beam_, {1, 0, 0}).rotation.column(0);
-    // A start outside the body or deep inside it is put on the skin, farther and farther along the
-    // beam until the skin is met.
+    // A start outside the body or deep inside it is moved onto the skin: the search along the beam
+    // goes farther until it meets the skin.
     if (put_probe(start_probe_, start_beam_)) return;
     for (double reach : {2 * kReach, 5 * kReach}) {
         if (const auto touch = skin_.project(start_probe_, start_beam_, reach)) {
@@ -50,7 +50,7 @@ void MouseTracker::settle(Point3 near) {
     const Vector3 normal = skin_.normal(near);
     contact_ = near;
     if (norm(normal) > 0.5) {
-        // Half way to the new normal: a ridge of one voxel must not throw the probe about.
+        // Half way to the new normal: a ridge of one voxel must not make the probe jump.
         normal_ = normalized(normal_ + normal);
         if (norm(normal_) < 0.5) normal_ = normal;
     }
@@ -69,7 +69,7 @@ bool MouseTracker::put_probe(Point3 near, Vector3 towards) {
 }
 
 void MouseTracker::slide(double lateral_mm, double elevation_mm) {
-    // In steps shorter than a rib is wide, so that a fast mouse does not jump over a fold.
+    // In steps shorter than the width of a rib, so that a fast mouse does not jump over a fold.
     const double length = std::hypot(lateral_mm, elevation_mm);
     const int steps = std::clamp(static_cast<int>(std::ceil(length / 3)), 1, 200);
     for (int i = 0; i < steps; ++i) {
@@ -77,7 +77,7 @@ void MouseTracker::slide(double lateral_mm, double elevation_mm) {
         const Point3 next =
             contact_ + (1.0 / steps) * (lateral_mm * lateral_ + elevation_mm * elevation);
         const auto touch = skin_.project(next, -normal_, 12);
-        // The edge of the body, or of the volume: stay.
+        // At the edge of the body or of the volume it stays.
         if (!touch || (skin_.at_border(*touch) && !skin_.at_border(contact_))) return;
         settle(*touch);
     }
@@ -128,7 +128,7 @@ bool MouseTracker::place_needle_beside_probe(double offset_mm, bool in_plane) {
     const Vector3 side = probe.rotation.column(in_plane ? 0 : 1);
     const Vector3 beam = probe.rotation.column(2);
     if (!place_needle(contact_ + offset_mm * side, -normal_)) return false;
-    // Towards the middle of the picture at a depth of one and a half offsets: where a hand would
+    // Towards the middle of the picture at a depth of one and a half offsets, where a hand would
     // aim.
     shaft_ = normalized(1.5 * std::abs(offset_mm) * beam - offset_mm * side);
     return true;

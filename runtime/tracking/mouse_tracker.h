@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Mouse and keyboard as a full tracker: a probe that lives on the skin and a needle in the other
-// hand.
+// Mouse and keyboard as a tracker: a probe that stays on the skin, and a needle.
 //
-// The window turns input into the small movements below; nothing here knows of a window, so a
-// script or a test drives it as well. Distances in mm and angles in radians; all in `mannequin`.
+// The window turns input into the small movements below. Nothing here depends on a window, so that
+// a test can move it as well. Distances are in mm and angles in radians; all in `mannequin`.
 #pragma once
 
 #include "formats/exercise/exercise.h"
@@ -15,30 +14,31 @@ namespace sonocase::runtime {
 
 class MouseTracker final : public Tracker {
   public:
-    // The probe starts at the exercise's place, put on the skin, or, where that misses the body, at
-    // the point of the skin nearest above the middle of the bundle.
+    // The probe starts at the exercise's place, moved onto the skin, or, if that misses the body,
+    // at the point of the skin above the middle of the bundle.
     MouseTracker(const Skin& skin, const Exercise& exercise);
 
     bool poll(double now_s, TrackerReading& reading) override;
     TrackerHealth health() const override;
 
-    // Probe. Slides keep the face on the skin and carry the probe's turn along without twisting it.
+    // The probe. Sliding keeps the face on the skin and does not turn the probe about its beam.
     void slide(double lateral_mm, double elevation_mm);
     void rock(double angle_rad);    // in the scan plane, about the elevation axis
     void fan(double angle_rad);     // out of the scan plane, about the lateral axis
     void rotate(double angle_rad);  // about the beam
-    void press(double mm);          // > 0 into the skin; from lifted it first comes down
-    bool put_probe(Point3 near,
-                   Vector3 towards);  // onto the skin on that line; false: no skin there
+    void press(double mm);          // > 0 into the skin; a lifted probe comes down first
+    // Onto the skin where the line from `near` meets it; false: no skin there.
+    bool put_probe(Point3 near, Vector3 towards);
     void reset();
 
-    // Needle. Placed on the skin at a point, it keeps its entry while it is aimed and advanced.
+    // The needle. It is placed on a point of the skin, which stays its entry while it is aimed and
+    // advanced.
     bool place_needle(Point3 near, Vector3 towards);
-    // At the probe's side, `offset_mm` from the middle of the face along x (in plane) or along y.
+    // Beside the probe, `offset_mm` from the middle of the face along x (in plane) or along y.
     bool place_needle_beside_probe(double offset_mm, bool in_plane);
     void aim_needle(double in_plane_rad, double out_of_plane_rad);  // about the probe's y and x
     void advance_needle(double mm);  // > 0 deeper; limited to [-60 mm, the needle's length]
-    void slide_needle(double lateral_mm, double elevation_mm);  // only while it is outside
+    void slide_needle(double lateral_mm, double elevation_mm);  // only while it is not inserted
     void withdraw_needle();                                     // takes it away
 
     bool in_contact() const { return press_mm_ >= 0; }

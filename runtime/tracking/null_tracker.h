@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A tracker that holds one pose: for looking at a bundle with nothing plugged in, and for tests.
+// A tracker that holds one pose, to look at a bundle without a tracker and for tests.
 #pragma once
 
 #include "runtime/tracking/tracker.h"

@@ -20,7 +20,7 @@ void PacedTracker::set_speed(double speed) {
 bool PacedTracker::poll(double now_s, TrackerReading& reading) {
     if (!started_) {
         last_s_ = now_s;
-        TrackerReading first;  // the tracker inside counts from here
+        TrackerReading first;  // the inner tracker's time starts here
         started_ = inner_->poll(0, first);
         if (started_) {
             reading = first;
@@ -31,7 +31,7 @@ bool PacedTracker::poll(double now_s, TrackerReading& reading) {
     inner_s_ += (now_s - last_s_) * speed_ + jump_s_.exchange(0);
     last_s_ = now_s;
     const double duration = inner_->duration_s();
-    // Before the start of a round that goes on for ever lies the end of the round before.
+    // Back from the start is the end, as in a loop.
     if (inner_s_ < 0) inner_s_ = duration > 0 ? duration + std::fmod(inner_s_, duration) : 0;
     at_s_ = duration > 0 ? std::fmod(inner_s_, duration) : 0;
     if (!inner_->poll(inner_s_, reading)) return false;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A recording or script at another speed, and from another place: time runs faster or slower for
-// the tracker inside, or jumps. Set from any thread; poll() from one.
+// A recording or script at another speed, or from another place: for the tracker inside, time runs
+// faster or slower, or jumps. Speed and place are set from any thread; one thread polls.
 #pragma once
 
 #include <atomic>
@@ -13,15 +13,14 @@ namespace sonocase::runtime {
 
 class PacedTracker final : public Tracker {
   public:
-    // inner: a function of time with a length, as a replay or a sweep.
+    // inner: a function of time with an end, such as a replay or a sweep.
     explicit PacedTracker(std::unique_ptr<Tracker> inner);
 
-    void set_speed(double speed);  // [0, 16]; 0 stands still
+    void set_speed(double speed);  // in [0, 16]; 0 stands still
     double speed() const { return speed_.load(); }
-    void jump(double seconds) {
-        jump_s_.fetch_add(seconds);
-    }                                             // forward or back, with the next poll
-    double at_s() const { return at_s_.load(); }  // [0, duration_s()), of the last poll
+    // Forward, or back where seconds < 0, with the next poll.
+    void jump(double seconds) { jump_s_.fetch_add(seconds); }
+    double at_s() const { return at_s_.load(); }  // in [0, duration_s()), at the last poll
 
     bool poll(double now_s, TrackerReading& reading) override;
     TrackerHealth health() const override { return inner_->health(); }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A tracker whose readings are pushed in by whoever has them: the window's mouse, a browser, a
-// test. push() and poll() may be called from two threads, one each.
+// A tracker whose readings come from its owner: the window's mouse, a browser, a test. One thread
+// pushes and one polls.
 #pragma once
 
 #include <functional>

@@ -127,15 +127,15 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
         t = std::fmod(t, duration);
     }
     const auto& probe = recording_.probe;
-    // Half a microsecond of slack: a caller that steps to recorded_time_s(i) must meet row i,
-    // whatever the rounding of its sums.
+    // Half a microsecond of tolerance: a caller that steps to recorded_time_s(i) must get row i,
+    // however its sums are rounded.
     const double when = probe.front().timestamp_s + t + 5e-7;
     const auto later =
         std::upper_bound(probe.begin(), probe.end(), when,
                          [](double time, const Pose& pose) { return time < pose.timestamp_s; });
     const std::size_t i =
         later == probe.begin() ? 0 : static_cast<std::size_t>(later - probe.begin()) - 1;
-    // Laps are counted from the clock, so that the next reading is due when it was taken.
+    // Laps are counted by the clock, so that each reading is due when it was taken.
     const double lap_s = start_s_ + static_cast<double>(lap) * duration;
     const bool has_next = i + 1 < probe.size();
     next_s_ = has_next                ? lap_s + recorded_time_s(static_cast<int>(i) + 1)
@@ -146,7 +146,7 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
     laps_ = lap;
     reading = {};
     reading.sequence = ++sequence_;
-    // It came when it was due, however late it is looked at.
+    // Its time is when it was due, however late it is polled.
     reading.time_s = std::min(lap_s + recorded_time_s(static_cast<int>(i)), now_s);
     reading.device_time_s = probe[i].timestamp_s;
     reading.in_mannequin = recording_.in_mannequin;

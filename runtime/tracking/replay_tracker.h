@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Plays recorded poses of probe and needle back at the times at which they were taken.
+// Replays recorded poses of probe and needle at the times at which they were taken.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ namespace sonocase::runtime {
 
 struct Recording {
     std::string name;          // shown as the device
-    std::vector<Pose> probe;   // times rising; at least one
+    std::vector<Pose> probe;   // times increasing; at least one
     std::vector<Pose> needle;  // matched to the probe by time; may be empty
     bool in_mannequin = false;
 };
@@ -42,7 +42,8 @@ class ReplayTracker final : public Tracker {
 };
 
 // Reads poses to replay. `files` is one CSV of the probe, or two joined by a comma, probe and
-// needle (formats/recording/poses.h), or one IGSIO sequence. Times must rise and be finite.
+// needle (formats/recording/poses.h), or one IGSIO sequence. Times must increase
+// and be finite.
 Result<Recording> load_recording(const std::string& files);
 
 }  // namespace sonocase::runtime

@@ -61,8 +61,8 @@ SweepPose sweep_pose(const Sweep& sweep, double time_s, const Skin* skin) {
         lateral = hermite(keys, i, u, [](const SweepKey& k) { return normalized(k.lateral); });
         pose.has_needle = keys[i].has_needle && keys[i + 1].has_needle;
         if (pose.has_needle) {
-            // Straight, not curved: neighbours may have no needle to take a tangent from, and a
-            // needle is pushed along a line.
+            // Along a straight line: the keys beside these two may have no needle to take a tangent
+            // from, and a needle is pushed straight.
             tip = (1 - u) * as_vector(keys[i].needle_tip) + u * as_vector(keys[i + 1].needle_tip);
             shaft = (1 - u) * normalized(keys[i].needle_direction) +
                     u * normalized(keys[i + 1].needle_direction);

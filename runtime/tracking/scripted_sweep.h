@@ -15,20 +15,20 @@ struct SweepPose {
     Rigid mannequin_from_needle;  // origin at the tip, z from hub to tip
 };
 
-// Pose of a sweep at a time; before the first key and after the last the path stands still.
+// The pose of a sweep at a time; before the first key and after the last one it stands still.
 // Positions follow a cubic Hermite curve with finite-difference tangents through the keys (smooth,
 // and a constant-speed script stays at constant speed); directions are blended the same way and
-// orthonormalised. The needle shows between two keys that both have one. `skin` may be null; with
-// it, a sweep that asks to be snapped has its probe moved along its beam to the skin.
-// Cost: constant but for the skin search; no allocation.
+// orthonormalised. The needle is there between two keys that both have one. `skin` may be null;
+// with it, the probe of a sweep that asks for it is moved along its beam onto the skin.
+// Cost: constant except for the search for the skin; no allocation.
 SweepPose sweep_pose(const Sweep& sweep, double time_s, const Skin* skin);
 
-// Frame with origin at `origin`, z along `z` and x as near to `x_hint` as can be.
+// The frame with its origin at `origin`, z along `z` and x as close to `x_hint` as possible.
 Rigid frame_along(Point3 origin, Vector3 z, Vector3 x_hint);
 
 class ScriptedSweep final : public Tracker {
   public:
-    // loop: begins again when it is over. The bundle behind the skin must outlive the tracker.
+    // loop: starts over when it ends. The bundle behind the skin must outlive the tracker.
     ScriptedSweep(Sweep sweep, const Skin& skin, bool loop)
         : sweep_(std::move(sweep)), skin_(skin), loop_(loop) {}
     bool poll(double now_s, TrackerReading& reading) override;

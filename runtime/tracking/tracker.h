@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The one interface to whatever says where probe and needle are: a device, a recording, a script,
+// The one interface to what measures where probe and needle are: a device, a recording, a script,
 // the mouse. Time is injected: seconds on the session's clock.
 #pragma once
 
@@ -14,10 +14,10 @@ namespace sonocase::runtime {
 
 enum class TrackerPhase : std::uint8_t {
     searching,  // no device yet
-    starting,   // found, being set up
+    starting,   // found and being set up
     streaming,
     ended,   // a recording or a script that is over
-    failed,  // will not come right by itself; `message` says what to do
+    failed,  // needs the user; `message` says what to do
 };
 
 struct TrackerHealth {
@@ -26,31 +26,31 @@ struct TrackerHealth {
     std::string message;  // a whole sentence for the user; empty when all is well
     double rate_hz = 0;   // measured
     std::uint64_t readings = 0;
-    std::uint64_t bad_frames = 0;  // discarded: checksum, length, not a number
+    std::uint64_t bad_frames = 0;  // discarded: wrong checksum or length, not a number
     std::uint64_t connects = 0;
 };
 
 class Tracker {
   public:
     virtual ~Tracker() = default;
-    // Writes the newest reading and returns true, or returns false if there is none newer than the
-    // last one. Never blocks, allocates nothing; for the frame loop.
+    // Writes the newest reading and returns true, or returns false if none is newer than the last
+    // one. Never blocks and allocates nothing; for the frame loop.
     virtual bool poll(double now_s, TrackerReading& reading) = 0;
     virtual TrackerHealth health() const = 0;
-    // Called from the tracker's own thread as soon as poll() has something new. Set before the
-    // first poll; a tracker that is a function of time has no thread and ignores it.
+    // Sets what the tracker's own thread calls as soon as poll() has something new; {} ends that.
+    // A tracker that is a function of time has no thread and ignores it.
     virtual void set_wake(std::function<void()>) {}
-    // Length of a recording or script; negative: unbounded.
+    // Length of a recording or script; negative: without end.
     virtual double duration_s() const { return -1; }
     // Number of readings of a recording; 0: not a recording.
     virtual int recorded_readings() const { return 0; }
     // Time of recorded reading i, from 0 at the first.
     virtual double recorded_time_s(int) const { return 0; }
-    // When the next reading of a recording is due, on the session's clock, after a poll; negative:
+    // When the next reading of a recording is due after a poll, on the session's clock; negative:
     // not known.
     virtual double next_s() const { return -1; }
-    // True for hardware and networks, whose readings carry noise, so that a pose that stays equal
-    // to the last bit means a frozen sensor.
+    // True for hardware and networks. Their readings are noisy, so that a pose that stays equal to
+    // the last bit means a frozen sensor.
     virtual bool is_device() const { return false; }
 };
 

@@ -99,8 +99,12 @@ class BlockCutter {
 
     SurfaceCell read(float x, float y, float z) {
         const LabelField::Position at = field_.locate(x, y, z);
-        field_.scores(at, score_.data());
         SurfaceCell cell{};
+        if (at.candidates == nullptr) {  // beyond the face of a block with a single label
+            insert(0, at.block->labels[0], &cell);
+            return cell;
+        }
+        field_.scores(at, score_.data());
         const std::vector<std::uint8_t>& labels = at.candidates->labels;
         for (std::size_t l = 0; l < labels.size(); ++l) insert(score_[l], labels[l], &cell);
         return cell;

@@ -12,8 +12,7 @@
 #include <span>
 
 #include "formats/base/result.h"
-#include "formats/bundle/case_bundle.h"
-#include "formats/bundle/voxel_blocks.h"
+#include "formats/bundle/streamed_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "runtime/imaging/formation/effect_choice.h"
 #include "runtime/imaging/formation/render_context.h"
@@ -26,8 +25,7 @@ namespace sonocase::runtime {
 
 // What a model is created from. Everything referred to outlives the model.
 struct FormationInput {
-    const CaseBundle& bundle;
-    VoxelBlocks* blocks = nullptr;  // what is still to be unpacked; null: the bundle is complete
+    CaseView bundle;
     const Exercise& exercise;
     const RenderOptions& options;
     const EffectChoice& effects;

@@ -88,7 +88,7 @@ class PaperFormation final : public ImageFormation {
 };
 
 Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
-    Result<PaperScene> scene = make_paper_scene(input.bundle);
+    Result<PaperScene> scene = make_paper_scene(*input.bundle);
     if (!scene) return scene.error();
     return std::unique_ptr<ImageFormation>(
         std::make_unique<PaperFormation>(std::move(*scene), input));

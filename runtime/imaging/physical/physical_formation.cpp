@@ -22,13 +22,13 @@ class PhysicalFormation final : public ImageFormation {
         : exercise_(input.exercise),
           scene_(std::move(scene)),
           noise_(std::move(noise)),
-          blocks_(input.blocks),
+          blocks_(input.bundle.blocks()),
           seed_(input.options.seed),
           reference_(input.options.kind == RendererKind::reference),
           keep_all_(input.effects.keep_all),
           switches_(switches_of<PhysicalEffects>(kPhysicalEffects, input.effects.on)),
           context_(input.context) {
-        if (exercise_.breathing.amplitude_mm != 0) breathing_ = BreathingField(input.bundle);
+        if (exercise_.breathing.amplitude_mm != 0) breathing_ = BreathingField(*input.bundle);
         const auto make_background = input.options.host.make_background;
         if (input.options.read_ahead && blocks_ != nullptr && !reference_ &&
             make_background != nullptr)
@@ -128,8 +128,7 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,
                                         input.scanlines + kNoiseSlack);
         } else {
-            scene = make_physical_scene(input.bundle, input.exercise.targets,
-                                        {&jobs, textures, input.blocks != nullptr});
+            scene = make_physical_scene(input.bundle, input.exercise.targets, {&jobs, textures});
         }
     });
     if (!*scene) return scene->error();

@@ -62,7 +62,7 @@ struct ScanConversionTable {
     std::vector<std::uint16_t> weight;  // low byte across beams, high byte along them
 };
 
-// stride: of a row of beam samples, in values. Cost: 5 ms for 512 x 512 pixels, in two jobs.
+// stride: of a row of beam samples, in values. Cost: 15 ms for 512 x 512 pixels, in two jobs.
 ScanConversionTable make_scan_conversion_table(JobRunner& jobs,
                                                const ScanGeometry& geometry,
                                                int stride);

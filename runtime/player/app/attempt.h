@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // An attempt at the exercise in the window: a session that runs on the scan thread, and what the
-// screen shows of it.
+// screen shows about it.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,7 @@
 
 namespace sonocase::runtime {
 
-// For the screen.
+// What the screen shows.
 struct AttemptView {
     double seconds = 0;
     int insertions = 0, targets_hit = 0;
@@ -29,14 +29,15 @@ class Attempt {
     Attempt(const OpenCase& open, const Exercise& exercise, std::unique_ptr<SessionRun> run)
         : open_(&open), exercise_(exercise), run_(std::move(run)) {}
 
-    // After every live frame, from the thread that renders. width, height: of the picture.
+    // After every live frame, called by the thread that renders. width_px, height_px: of the
+    // picture.
     void observe(const FrameRecord& record,
                  int width_px,
                  int height_px,
                  std::span<const std::uint8_t> pixels);
     AttemptView view() const;
     const std::string& path() const { return run_->path(); }
-    // When no frame comes any more: ends the recording and scores it.
+    // Ends the recording and scores it. No frame may be observed during or after this.
     Result<SessionScore> finish() { return run_->finish(); }
 
   private:
@@ -47,7 +48,7 @@ class Attempt {
     AttemptView view_;
 };
 
-// A new file in the user's sessions folder; "" when there is no such folder.
+// A new file in the user's sessions folder; empty if there is no such folder.
 std::string new_session_path(const std::string& case_name, const std::string& exercise);
 
 }  // namespace sonocase::runtime

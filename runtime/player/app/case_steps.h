@@ -28,7 +28,7 @@ void change_focus(App& app, double by_mm);
 // The side of the square picture, where the command line gives none.
 void fit_image(App& app, int side_px);
 
-// Makes the engine of loaded.image anew. keep_session: session clock and frame numbers go on.
+// Makes a new engine for loaded.image. keep_session: session clock and frame numbers continue.
 void rebuild_engine(App& app, bool keep_session = true);
 
 // Once per picture: reports a part of the bundle that turned out to be damaged.

@@ -118,63 +118,44 @@ void ScanThread::run() {
     }
 }
 
-bool ScanThread::step() {
-    const std::lock_guard lock(mutex_);
-    if (controls_box_.refresh()) {
-        const ScanControls& wanted = controls_box_.value();
-        redraw_ = redraw_ || wanted.frozen != controls_.frozen ||
-                  (wanted.frozen && wanted.cine_back != controls_.cine_back);
-        if (engine_ && !(wanted.assignment == controls_.assignment)) {
-            engine_->set_assignment(wanted.assignment);
-        }
-        controls_ = wanted;
+void ScanThread::take_controls() {
+    if (!controls_box_.refresh()) return;
+    const ScanControls& wanted = controls_box_.value();
+    redraw_ = redraw_ || wanted.frozen != controls_.frozen ||
+              (wanted.frozen && wanted.cine_back != controls_.cine_back);
+    if (engine_ && !(wanted.assignment == controls_.assignment)) {
+        engine_->set_assignment(wanted.assignment);
     }
-    if (!engine_) return false;
-    double now_s = clock_();
-    TrackerReading reading;
-    bool arrived = false, is_device = false;
-    next_reading_s_ = -1;
-    if (tracker_) {
-        is_device = tracker_->is_device();
-        arrived = tracker_->poll(now_s, reading);
-        next_reading_s_ = tracker_->next_s();
-        if (arrived) {
-            reading_ = reading;
-            engine_->observe(reading_, is_device);
-        }
-    }
-    if (controls_.frozen && !redraw_) return false;
-    if (!controls_.frozen && !arrived && !redraw_ && now_s - last_frame_s_ < 0.98 / kIdleRate) {
-        return false;
-    }
-    const bool first = number_ == 0;
-    redraw_ = false;
+    controls_ = wanted;
+}
 
-    ScanFrame& out = frames_.slot();
-    const RenderOptions& options = engine_->render_options();
-    out.width_px = options.width_px;
-    out.height_px = options.height_px;
-    out.pixels.resize(static_cast<std::size_t>(options.width_px) * options.height_px);
-    const double before_s = clock_();
-    out.cine_age_s = 0;
-    const bool again = controls_.frozen && cine_count_ > 0;
-    if (again) {
-        const std::size_t back = std::min<std::size_t>(
-            static_cast<std::size_t>(std::max(controls_.cine_back, 0)), cine_count_ - 1);
-        const std::size_t size = cine_.size();
-        const FrameRecord& newest = cine_[(cine_next_ + size - 1) % size];
-        FrameRecord shown = cine_[(cine_next_ + 2 * size - 1 - back) % size];
-        out.cine_age_s = newest.input.time_s - shown.input.time_s;
-        shown.input.settings = controls_.settings;  // gain and TGC stay live on a frozen picture
-        out.record = shown;
-        out.status = engine_->frame_again(shown, out.pixels);
-    } else {
-        out.status = engine_->frame(now_s, controls_.settings, out.pixels);
-        out.record = engine_->last();
+bool ScanThread::poll_tracker(double now_s) {
+    next_reading_s_ = -1;
+    if (!tracker_) return false;
+    TrackerReading reading;
+    const bool arrived = tracker_->poll(now_s, reading);
+    next_reading_s_ = tracker_->next_s();
+    if (arrived) {
+        reading_ = reading;
+        engine_->observe(reading_, tracker_->is_device());
     }
-    const double after_s = clock_();
-    out.rendered_s = after_s;
-    out.frame_ms = (after_s - before_s) * 1e3;
+    return arrived;
+}
+
+// A frozen picture is rendered again from its record.
+void ScanThread::render_kept(ScanFrame& out) {
+    const std::size_t back = std::min<std::size_t>(
+        static_cast<std::size_t>(std::max(controls_.cine_back, 0)), cine_count_ - 1);
+    const std::size_t size = cine_.size();
+    const FrameRecord& newest = cine_[(cine_next_ + size - 1) % size];
+    FrameRecord shown = cine_[(cine_next_ + 2 * size - 1 - back) % size];
+    out.cine_age_s = newest.input.time_s - shown.input.time_s;
+    shown.input.settings = controls_.settings;  // gain and TGC still work on a frozen picture
+    out.record = shown;
+    out.status = engine_->frame_again(shown, out.pixels);
+}
+
+void ScanThread::describe(ScanFrame& out, double now_s) const {
     out.frozen = controls_.frozen;
     out.reading = reading_;
     out.layout = engine_->renderer().layout();
@@ -186,38 +167,67 @@ bool ScanThread::step() {
     std::copy_n(costs.begin(), out.cost_count, out.costs.begin());
     out.probe_verdict = engine_->probe_verdict(now_s);
     out.needle_verdict = engine_->needle_verdict(now_s);
-    if (!again) {
-        stats_.add(out.frame_ms, costs);
-        stats_.set_accuracy(out.accuracy);
-        if (arrived) pose_to_pixel_.add((after_s - reading_.time_s) * 1e3);
-        if (last_frame_s_ >= 0 && now_s > last_frame_s_) {
-            rate_ += 0.1 * (1 / (now_s - last_frame_s_) - rate_);
-        }
-        if (now_s - cine_last_s_ >= 0.98 / kCineRate) {
-            cine_[cine_next_] = out.record;
-            cine_next_ = (cine_next_ + 1) % cine_.size();
-            cine_count_ = std::min(cine_count_ + 1, cine_.size());
-            cine_last_s_ = now_s;
-        }
-        last_frame_s_ = now_s;
+}
+
+// Statistics and cine loop of a live frame. arrived: with a new reading.
+void ScanThread::count_live(const ScanFrame& out, double now_s, bool arrived) {
+    stats_.add(out.frame_ms, engine_->renderer().costs());
+    stats_.set_accuracy(out.accuracy);
+    if (arrived) pose_to_pixel_.add((out.rendered_s - reading_.time_s) * 1e3);
+    if (last_frame_s_ >= 0 && now_s > last_frame_s_) {
+        rate_ += 0.1 * (1 / (now_s - last_frame_s_) - rate_);
     }
+    if (now_s - cine_last_s_ >= 0.98 / kCineRate) {
+        cine_[cine_next_] = out.record;
+        cine_next_ = (cine_next_ + 1) % cine_.size();
+        cine_count_ = std::min(cine_count_ + 1, cine_.size());
+        cine_last_s_ = now_s;
+    }
+    last_frame_s_ = now_s;
+}
+
+bool ScanThread::step() {
+    const std::lock_guard lock(mutex_);
+    take_controls();
+    if (!engine_) return false;
+    const double now_s = clock_();
+    const bool arrived = poll_tracker(now_s);
+    if (controls_.frozen && !redraw_) return false;
+    if (!controls_.frozen && !arrived && !redraw_ && now_s - last_frame_s_ < 0.98 / kIdleRate) {
+        return false;
+    }
+    redraw_ = false;
+
+    ScanFrame& out = frames_.slot();
+    const RenderOptions& options = engine_->render_options();
+    out.width_px = options.width_px;
+    out.height_px = options.height_px;
+    out.pixels.resize(static_cast<std::size_t>(options.width_px) * options.height_px);
+    out.cine_age_s = 0;
+    const bool live = !controls_.frozen || cine_count_ == 0;
+    const double before_s = clock_();
+    if (live) {
+        out.status = engine_->frame(now_s, controls_.settings, out.pixels);
+        out.record = engine_->last();
+    } else {
+        render_kept(out);
+    }
+    out.rendered_s = clock_();
+    out.frame_ms = (out.rendered_s - before_s) * 1e3;
+    describe(out, now_s);
+    if (live) count_live(out, now_s, arrived);
     out.cine_frames = static_cast<int>(cine_count_);
     out.frames_per_s = rate_;
     // Quantiles walk through a histogram: once every ten frames is enough for a display.
     if (number_ % 10 == 0) {
-        out.pose_to_pixel_median_ms = pose_to_pixel_.quantile(0.5);
-        out.pose_to_pixel_p99_ms = pose_to_pixel_.quantile(0.99);
-    } else {
-        out.pose_to_pixel_median_ms = last_median_ms_;
-        out.pose_to_pixel_p99_ms = last_p99_ms_;
+        median_ms_ = pose_to_pixel_.quantile(0.5);
+        p99_ms_ = pose_to_pixel_.quantile(0.99);
     }
-    last_median_ms_ = out.pose_to_pixel_median_ms;
-    last_p99_ms_ = out.pose_to_pixel_p99_ms;
+    out.pose_to_pixel_median_ms = median_ms_;
+    out.pose_to_pixel_p99_ms = p99_ms_;
+    if (number_ == 0 && start_s_) stats_.set_first_frame_ms((out.rendered_s - *start_s_) * 1e3);
     out.number = ++number_;
-    if (first && start_s_ >= 0) {
-        stats_.set_first_frame_ms((after_s - start_s_) * 1e3);
-    }
-    if (observer_ && !again) observer_(out);
+    if (observer_ && live) observer_(out);
     frames_.publish();
     return true;
 }

@@ -50,11 +50,19 @@ class ScanThread {
     TrackerHealth tracker_health() const;
     // The JSON of --stats, of all frames since the thread started.
     std::string stats_json(const std::string& score_json, const std::string& window_json) const;
-    void set_first_frame_origin_s(double start_s) { start_s_ = start_s; }
+    // When the program started, on the session's clock (before 0), for first_frame_ms of --stats.
+    // Before the first engine.
+    void set_program_start_s(double start_s) { start_s_ = start_s; }
 
   private:
     void run();
-    bool step();  // looks for work once, under the lock; true if it rendered a frame
+    // Looks for work once, under the lock; true if it rendered a frame. Its parts, in order:
+    bool step();
+    void take_controls();
+    bool poll_tracker(double now_s);  // true: a new reading
+    void render_kept(ScanFrame& out);
+    void describe(ScanFrame& out, double now_s) const;
+    void count_live(const ScanFrame& out, double now_s, bool arrived);
     void wake();
 
     SessionClock clock_;
@@ -78,9 +86,9 @@ class ScanThread {
     FrameStats stats_;
     TimeHistogram pose_to_pixel_;
     double next_reading_s_ = -1;  // of a recording
-    double rate_ = 0, last_median_ms_ = 0, last_p99_ms_ = 0;
+    double rate_ = 0, median_ms_ = 0, p99_ms_ = 0;
     std::uint64_t number_ = 0;
-    double start_s_ = -1;
+    std::optional<double> start_s_;
     Mailbox<ScanFrame> frames_;
     std::thread thread_;
 };

@@ -11,8 +11,9 @@ namespace sonocase::runtime {
 namespace {
 
 constexpr double kFitEvery = 0.5;         // seconds
-constexpr std::size_t kMostPoses = 3000;  // a step's; older ones are thinned
-constexpr double kGoodSwing = 0.35;       // about 20 degrees of tilt every way
+constexpr std::size_t kMostPoses = 3000;  // of a step; then every second one is dropped
+constexpr std::size_t kFewestReadings = 10, kFewestSweepReadings = 50;  // for a fit
+constexpr double kGoodTilt = 0.35;  // rad, about 20 degrees of tilt in every direction
 
 std::string number(const char* format, double value) {
     char text[96];
@@ -34,7 +35,7 @@ void keep_last(std::vector<float>& out, const std::vector<PoseResidual>& residua
 
 void show_point(const PointFit& fit, SetupView& view) {
     view.rms_mm = fit.rms_mm;
-    view.coverage = std::clamp(fit.swing.z / kGoodSwing, 0.0, 1.0);
+    view.coverage = std::clamp(fit.swing.z / kGoodTilt, 0.0, 1.0);
     keep_last(view.residuals_mm, fit.residuals);
     if (!fit.determined) {
         view.sentence = fit.problem;
@@ -44,7 +45,7 @@ void show_point(const PointFit& fit, SetupView& view) {
     view.good_enough = fit.inliers >= 30 && view.sigma_mm < 1 && view.coverage > 0.5;
     view.sentence = view.good_enough ? number("Good: the point is known to %.2f mm.", view.sigma_mm)
                     : view.coverage <= 0.5 ? "Tilt it further, in every direction."
-                                           : "Go on: more readings make it surer.";
+                                           : "Continue: more readings make it more certain.";
 }
 
 void show_direction(const DirectionFit& fit, SetupView& view) {
@@ -88,12 +89,11 @@ const char* setup_title(SetupStep step) {
 const char* setup_instruction(SetupStep step) {
     switch (step) {
         case SetupStep::trackers:
-            return "Move the probe, then the needle, and see that the right sensor follows. Choose "
-                   "another one where it does not.";
+            return "Move the probe, then the needle, and check that the right sensor follows. "
+                   "Choose another sensor if it does not.";
         case SetupStep::probe_tip:
             return "Rest the middle of the probe's face on a fixed point, such as a pin, and tilt "
-                   "the "
-                   "probe in every direction for about fifteen seconds.";
+                   "the probe in every direction for about fifteen seconds.";
         case SetupStep::probe_depth:
             return "Slide the probe along a ruler in the direction in which it looks, without "
                    "turning it.";
@@ -101,15 +101,12 @@ const char* setup_instruction(SetupStep step) {
             return "Slide the probe sideways, towards its orientation mark, without turning it.";
         case SetupStep::needle:
             return "Push the needle through a fixed pinhole and tilt it; record this at three "
-                   "depths or "
-                   "more, the last with the tip in the hole.";
+                   "or more depths, the last with the tip in the hole.";
         case SetupStep::mannequin:
             return "Sweep the middle of the probe's face over the mannequin: front, both sides, "
-                   "and as "
-                   "far up and down as it goes.";
+                   "and as far up and down as it goes.";
         case SetupStep::done:
-            return "Put the probe on the mannequin and look whether the picture follows. Then "
-                   "save.";
+            return "Put the probe on the mannequin and check that the picture follows. Then save.";
     }
     return "";
 }
@@ -157,7 +154,7 @@ void SetupGuide::observe(const TrackerReading& reading,
     pose.tracker_from_tool = sensor.world_from_sensor;
     std::vector<Pose>& poses = poses_of(step_);
     poses.push_back(pose);
-    if (poses.size() > kMostPoses) {  // every second one goes: the whole time stays covered
+    if (poses.size() > kMostPoses) {  // every second one is dropped: the whole time stays covered
         for (std::size_t i = 0; 2 * i < poses.size(); ++i) poses[i] = poses[2 * i];
         poses.resize((poses.size() + 1) / 2);
     }
@@ -171,75 +168,96 @@ void SetupGuide::fit() {
     const std::vector<Pose>& poses = poses_of(step_);
     view_.readings = static_cast<int>(poses.size());
     view_.good_enough = false;
-    if (step_ == SetupStep::probe_tip && poses.size() >= 10) {
-        tip_ = fit_point(poses);
-        show_point(tip_, view_);
-    } else if ((step_ == SetupStep::probe_depth || step_ == SetupStep::probe_lateral) &&
-               poses.size() >= 10) {
-        DirectionOptions options;
-        options.tip_mm = tip_.tip_mm;
-        DirectionFit& fit = step_ == SetupStep::probe_depth ? depth_ : lateral_;
-        fit = fit_direction(poses, options);
-        show_direction(fit, view_);
-        if (depth_.determined && lateral_.determined) {
-            frame_ = make_probe_frame(depth_, lateral_);
-            if (!frame_.determined) {
-                view_.good_enough = false;
-                view_.sentence = frame_.problem;
-            }
-        }
-    } else if (step_ == SetupStep::needle) {
-        view_.recordings = static_cast<int>(depths_.size());
-        if (recording_ && poses.size() >= 10) {
-            show_point(fit_point(poses), view_);
-            view_.good_enough = false;
-        }
-        if (!recording_ && depths_.size() >= 2) {
-            needle_ = fit_needle(depths_);
-            view_.rms_mm = needle_.rms_mm;
-            view_.sigma_mm = worst(needle_.tip_sigma_mm);
-            view_.coverage = std::min(1.0, static_cast<double>(depths_.size()) / 3);
-            view_.good_enough = needle_.determined && view_.sigma_mm < 1.5;
-            view_.sentence = !needle_.determined ? needle_.problem
-                             : view_.good_enough
-                                 ? number("Good: the tip is known to %.2f mm.", view_.sigma_mm)
-                                 : "Record another depth.";
-        } else if (!recording_) {
-            view_.sentence = depths_.empty() ? "" : "Record the next depth.";
-        }
-    } else if (step_ == SetupStep::mannequin && poses.size() >= 50) {
-        const Surface& skin = bundle_->mannequin_skin.points.empty() ? bundle_->patient_skin
-                                                                     : bundle_->mannequin_skin;
-        if (!tip_.determined) {
-            view_.sentence = "Calibrate the probe's face first.";
+    switch (step_) {
+        case SetupStep::probe_tip:
+            if (poses.size() < kFewestReadings) return;
+            tip_ = fit_point(poses);
+            show_point(tip_, view_);
             return;
-        }
-        if (skin.points.empty()) {
-            view_.sentence = "This bundle carries no skin to lay the sweep on.";
+        case SetupStep::probe_depth:
+        case SetupStep::probe_lateral:
+            if (poses.size() >= kFewestReadings) fit_probe_direction(poses);
             return;
-        }
-        std::vector<Pose> usable;
-        for (const Pose& pose : poses) {
-            if (pose.ok) usable.push_back(pose);
-        }
-        const std::vector<Point3> trace = tip_trace(usable, tip_.tip_mm);
-        mannequin_ = fit_skin_sweep(skin, trace);
-        view_.rms_mm = mannequin_.rms_mm;
-        Box3 box;
-        for (const Point3& p : trace) box.include(p);
-        const Vector3 extent = box.extent();
-        view_.coverage = std::clamp((extent.x + extent.y + extent.z) / 600, 0.0, 1.0);
-        view_.sigma_mm = mannequin_.determined ? worst(mannequin_.sigma_mm) : -1;
-        view_.residuals_mm.clear();
-        for (double r : mannequin_.residuals_mm)
-            view_.residuals_mm.push_back(static_cast<float>(r));
-        view_.good_enough = mannequin_.determined && mannequin_.rms_mm < 4;
-        view_.sentence =
-            !mannequin_.determined ? mannequin_.problem
-            : view_.good_enough
-                ? number("Good: the sweep lies on the skin within %.1f mm.", mannequin_.rms_mm)
-                : "Sweep more of the mannequin, sides included.";
+        case SetupStep::needle:
+            fit_needle_depths(poses);
+            return;
+        case SetupStep::mannequin:
+            if (poses.size() >= kFewestSweepReadings) fit_mannequin(poses);
+            return;
+        case SetupStep::trackers:
+        case SetupStep::done:
+            return;
     }
+}
+
+void SetupGuide::fit_probe_direction(const std::vector<Pose>& poses) {
+    DirectionOptions options;
+    options.tip_mm = tip_.tip_mm;
+    DirectionFit& fit = step_ == SetupStep::probe_depth ? depth_ : lateral_;
+    fit = fit_direction(poses, options);
+    show_direction(fit, view_);
+    if (!depth_.determined || !lateral_.determined) return;
+    frame_ = make_probe_frame(depth_, lateral_);
+    if (!frame_.determined) {
+        view_.good_enough = false;
+        view_.sentence = frame_.problem;
+    }
+}
+
+// While a depth is recorded its pinhole is fitted, to show the coverage; afterwards all depths.
+void SetupGuide::fit_needle_depths(const std::vector<Pose>& poses) {
+    view_.recordings = static_cast<int>(depths_.size());
+    if (recording_) {
+        if (poses.size() < kFewestReadings) return;
+        show_point(fit_point(poses), view_);
+        view_.good_enough = false;
+        return;
+    }
+    if (depths_.size() < 2) {
+        view_.sentence = depths_.empty() ? "" : "Record the next depth.";
+        return;
+    }
+    needle_ = fit_needle(depths_);
+    view_.rms_mm = needle_.rms_mm;
+    view_.sigma_mm = worst(needle_.tip_sigma_mm);
+    view_.coverage = std::min(1.0, static_cast<double>(depths_.size()) / 3);
+    view_.good_enough = needle_.determined && view_.sigma_mm < 1.5;
+    view_.sentence = !needle_.determined ? needle_.problem
+                     : view_.good_enough
+                         ? number("Good: the tip is known to %.2f mm.", view_.sigma_mm)
+                         : "Record another depth.";
+}
+
+void SetupGuide::fit_mannequin(const std::vector<Pose>& poses) {
+    const Surface& skin =
+        bundle_->mannequin_skin.points.empty() ? bundle_->patient_skin : bundle_->mannequin_skin;
+    if (!tip_.determined) {
+        view_.sentence = "Calibrate the probe's face first.";
+        return;
+    }
+    if (skin.points.empty()) {
+        view_.sentence = "This bundle has no skin to fit the sweep to.";
+        return;
+    }
+    std::vector<Pose> usable;
+    for (const Pose& pose : poses) {
+        if (pose.ok) usable.push_back(pose);
+    }
+    const std::vector<Point3> trace = tip_trace(usable, tip_.tip_mm);
+    mannequin_ = fit_skin_sweep(skin, trace);
+    view_.rms_mm = mannequin_.rms_mm;
+    Box3 box;
+    for (const Point3& p : trace) box.include(p);
+    const Vector3 extent = box.extent();
+    view_.coverage = std::clamp((extent.x + extent.y + extent.z) / 600, 0.0, 1.0);
+    view_.sigma_mm = mannequin_.determined ? worst(mannequin_.sigma_mm) : -1;
+    view_.residuals_mm.clear();
+    for (double r : mannequin_.residuals_mm) view_.residuals_mm.push_back(static_cast<float>(r));
+    view_.good_enough = mannequin_.determined && mannequin_.rms_mm < 4;
+    view_.sentence = !mannequin_.determined ? mannequin_.problem
+                     : view_.good_enough ? number("Good: the sweep fits the skin within %.1f mm.",
+                                                  mannequin_.rms_mm)
+                                         : "Sweep more of the mannequin, including its sides.";
 }
 
 Calibrations SetupGuide::calibrations(const std::string& sensor, const std::string& date) const {

@@ -53,7 +53,7 @@ class SetupGuide {
     bool recording() const { return recording_; }
     void record(bool on);
     void clear_step();
-    // Takes a reading of the tracker while recording. Cost: a fit (10 ms) at most twice a second.
+    // Takes a reading of the tracker while recording. Cost: a fit (10 ms) at most twice per second.
     void observe(const TrackerReading& reading, const SensorAssignment& assignment, double now_s);
 
     const SetupView& view() const { return view_; }
@@ -63,7 +63,10 @@ class SetupGuide {
     bool probe_ready() const { return tip_.determined && frame_.determined; }
 
   private:
-    void fit();
+    void fit();  // the current step again
+    void fit_probe_direction(const std::vector<Pose>& poses);
+    void fit_needle_depths(const std::vector<Pose>& poses);
+    void fit_mannequin(const std::vector<Pose>& poses);
     std::vector<Pose>& poses_of(SetupStep step) { return poses_[static_cast<std::size_t>(step)]; }
 
     const CaseBundle* bundle_;

@@ -3,8 +3,8 @@
 // What the player with a window holds, in four states with one owner each. A panel takes the parts
 // that it shows or changes, never all four.
 //
-//   PlayerState  the run: arguments, settings, clock. Set up by run_window; keys and the settings
-//                panel change the settings.
+//   PlayerState  the run: arguments, settings, clock. Set up by run_window; keys and the guided
+//                set-up change the settings.
 //   CaseState    the open case: bundle, exercise, image, calibrations, and the scan thread with the
 //                engine of all that. Changed by the steps of case_steps.h alone.
 //   ScanState    scanning it: tracker, console, cine, attempt. Changed by tracker_steps.h and

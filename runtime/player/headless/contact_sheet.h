@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// One picture of a whole run: up to twelve frames, evenly spread, at a quarter of their area.
+// One picture of a whole run: up to twelve frames, evenly spread over it, at a quarter of their
+// area.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +15,10 @@ namespace sonocase::runtime {
 
 class ContactSheet {
   public:
-    // Of a run of `frames` frames of width x height pixels; frames >= 1, width and height >= 2.
+    // For a run of `frames` frames of width x height pixels; frames >= 1, width and height >= 2.
     ContactSheet(int frames, int width, int height);
 
-    // Frame i of the run, in any order; those that are not on the sheet cost nothing.
+    // Adds frame i of the run; any order. A frame that is not on the sheet costs nothing.
     void add(int i, std::span<const std::uint8_t> pixels);
 
     Status write(const std::string& path) const;

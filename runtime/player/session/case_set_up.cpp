@@ -4,6 +4,7 @@
 
 #include <new>
 #include <thread>
+#include <utility>
 
 #include "runtime/tracking/factory/make_tracker.h"
 #include "runtime/workers/thread_host.h"

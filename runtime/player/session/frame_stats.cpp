@@ -16,11 +16,24 @@ namespace {
 
 constexpr double kSmallest = 1e-3, kRatio = 1.01;
 
-// Four significant digits: a JSON that people read, and no false precision.
+// Four significant digits, because people read the JSON.
 double rounded(double value) {
     if (value == 0 || !std::isfinite(value)) return 0;
     const double scale = std::pow(10.0, 3 - std::floor(std::log10(std::abs(value))));
     return std::round(value * scale) / scale;
+}
+
+// Memory of this process now; 0 where the system does not report it.
+double resident_mb() {
+#ifdef __linux__
+    if (std::FILE* file = std::fopen("/proc/self/statm", "r")) {
+        unsigned long pages = 0, resident = 0;
+        const int got = std::fscanf(file, "%lu %lu", &pages, &resident);
+        std::fclose(file);
+        if (got == 2) return static_cast<double>(resident) * double(sysconf(_SC_PAGESIZE)) / 1e6;
+    }
+#endif
+    return 0;
 }
 
 }  // namespace
@@ -125,18 +138,6 @@ std::string WindowStats::json() const {
         window[name]["p99"] = rounded(histogram->quantile(0.99));
     }
     return out.dump();
-}
-
-double resident_mb() {
-#ifdef __linux__
-    if (std::FILE* file = std::fopen("/proc/self/statm", "r")) {
-        unsigned long pages = 0, resident = 0;
-        const int got = std::fscanf(file, "%lu %lu", &pages, &resident);
-        std::fclose(file);
-        if (got == 2) return static_cast<double>(resident) * double(sysconf(_SC_PAGESIZE)) / 1e6;
-    }
-#endif
-    return 0;
 }
 
 }  // namespace sonocase::runtime

@@ -13,12 +13,11 @@
 
 namespace sonocase::runtime {
 
-// A histogram with 1 % bins from 1 us to 100 s: any number of samples, no allocation, quantiles to
-// half a bin.
+// A histogram with bins of 1 % from 1 us to 100 s: any number of samples, no allocation, quantiles
+// to half a bin.
 class TimeHistogram {
   public:
     void add(double ms);
-    void clear() { *this = {}; }
     std::uint64_t count() const { return count_; }
     double quantile(double q) const;  // ms; 0 when empty
     double largest() const { return largest_; }
@@ -30,11 +29,12 @@ class TimeHistogram {
     double largest_ = 0;
 };
 
-// What the pictures of a window cost.
+// Times of the pictures of a window.
 class WindowStats {
   public:
-    // between_s: since the picture before; work_ms: panels and drawing commands; show_ms: until the
-    // display had taken it, which on a machine without a graphics card includes the painting.
+    // between_s  since the picture before
+    // work_ms    panels and drawing commands
+    // show_ms    until the display has taken it; without a graphics card this includes the painting
     void add(double between_s, double work_ms, double show_ms);
     // {"window": {"frames", "frames_per_s", "between_ms", "work_ms", "show_ms"}}
     std::string json() const;
@@ -49,14 +49,15 @@ class FrameStats {
     // Effects in order of execution.
     void set_effects(std::span<const EffectCost> costs);
     void add(double frame_ms, std::span<const EffectCost> costs);
-    // What the governor gave up for the frame just added.
+    // The accuracy of the frame just added, which the governor may have reduced.
     void set_accuracy(const Renderer::Accuracy& accuracy);
     void set_first_frame_ms(double ms) { first_frame_ms_ = ms; }
 
     const TimeHistogram& frame_ms() const { return frame_ms_; }
-    // The JSON of --stats. score_json: of a recorded session (formats/scoring/session_score.h); its
-    // entries, "metrics" first, are put in as they are.
-    // window_json: an object whose entries come before those.
+    // The JSON of --stats.
+    // score_json   of a recorded session (formats/scoring/session_score.h); empty: none
+    // window_json  of WindowStats; empty: none
+    // The entries of the window follow those of the frames, those of the score come last.
     std::string json(const std::string& score_json,
                      const TimeHistogram* pose_to_pixel_ms,
                      const std::string& window_json = {}) const;
@@ -74,7 +75,5 @@ class FrameStats {
     std::uint64_t reduced_frames_ = 0;
     std::vector<Effect> effects_;
 };
-
-double resident_mb();  // of this process now; 0 where the system does not say
 
 }  // namespace sonocase::runtime

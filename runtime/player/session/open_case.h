@@ -22,11 +22,11 @@ struct OpenCase {
 };
 
 // Exercises that do not parse are left out and named in `warnings`. On the heap, because renderer
-// and skin point into it. Errors: a file that cannot be read or is no bundle.
+// and skin point into it. Errors: a file that cannot be read or is not a bundle.
 Result<std::unique_ptr<OpenCase>> open_case(const std::string& path);
 
-// An Error once a part of the bundle that was unpacked for a frame made no sense. Constant time, no
-// allocation while all is well; for the frame loop.
+// An Error after a part of the bundle that a frame needed turned out to be damaged. Constant time,
+// without allocation while nothing is damaged; for the frame loop.
 Status bundle_health(const OpenCase& open);
 
 // Index of the exercise of that name, or an Error that lists the names; "" means the first.

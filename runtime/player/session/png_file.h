@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Pictures out as PNG.
+// Writes pictures as PNG files.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,9 @@
 
 namespace sonocase::runtime {
 
-// pixels: # width * height * channels, rows from the top; channels 1 (grey) or 3 (RGB).
-// Written to a temporary name and renamed.
+// pixels    # width * height * channels, rows from the top
+// channels  1 (grey) or 3 (RGB)
+// The file is written under a temporary name and renamed. Errors: it cannot be written.
 Status write_png(const std::string& path,
                  int width,
                  int height,

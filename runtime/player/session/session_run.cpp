@@ -100,7 +100,7 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
                          s.tgc_db != settings_.tgc_db ||
                          s.flip_left_right != settings_.flip_left_right;
     if (changed) {
-        const std::string text = settings_text(s);  // short, and only while a slider moves
+        const std::string text = settings_text(s);  // short, and only while a setting changes
         std::strncpy(frame.settings.data(), text.c_str(), frame.settings.size() - 1);
         settings_ = s;
     }
@@ -128,7 +128,8 @@ Result<SessionScore> SessionRun::finish() {
     SessionScore score =
         score_session(*session, exercise_, anatomy_.get(), open_.bundle->labels, options);
     if (!session->header.trainee.empty()) {
-        // A session that cannot be kept is still a session: the trainee sees its scores, and why.
+        // A session that cannot be added to the book still has scores: the trainee sees them, and
+        // why.
         std::error_code failed;
         const std::string recording = std::filesystem::absolute(path_, failed).string();
         auto book = ProgressBook::open(default_progress_path());

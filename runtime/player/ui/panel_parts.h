@@ -32,8 +32,8 @@ bool coloured_button(unsigned packed, const char* words, float width);
 // printf of one number.
 std::string text(const char* format, double value);
 
-// A window that lies over the page, in its middle at first, with a title bar that closes it. True
-// if its content is to be drawn. end_dialog() follows in any case.
+// A window over the page, first shown in its middle, with a title bar that can close it. True if
+// its content is to be drawn. end_dialog() follows in either case.
 bool begin_dialog(const char* title, bool& open, float width, float height, float scale);
 void end_dialog();
 

@@ -133,7 +133,7 @@ void WindowRun::start_scanning() {
     const double clock_start_s = app_.player.clock_start_s;
     CaseState& loaded = app_.loaded;
     loaded.scan = std::make_unique<ScanThread>(session_clock(clock_start_s));
-    loaded.scan->set_first_frame_origin_s(start_s_ - clock_start_s);
+    loaded.scan->set_program_start_s(start_s_ - clock_start_s);
     loaded.scan->set_calibrations(loaded.calibrations);
     app_.scan.tracker.spec = arguments.tracker.empty() ? "mouse" : arguments.tracker;
     if (arguments.serve.empty()) return;

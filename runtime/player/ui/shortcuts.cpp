@@ -29,14 +29,14 @@ std::span<const Shortcut> shortcuts() {
         {"M  C  F", "measure, clear, flip"},
         {nullptr, "Program"},
         {"B", "start and finish an attempt"},
-        {"F1  Escape", "this help; close what lies on top"},
+        {"F1  Escape", "this help; close what is on top"},
         {"F2  F3", "cases (Up, Down, Enter), set-up"},
         {"F5  F6  F7", "next exercise, image model, tracker; Shift goes back"},
         {"F8  F9  F10  V", "show exercise, tracker, effects, 3-D view"},
         {"O", "3-D view from outside, from the probe, from the needle"},
         {"Shift + ,  Shift + .", "a recording or script slower, faster"},
-        {"Ctrl + ,  Ctrl + .", "a recording or script 5 s back, on"},
-        {"F11  Ctrl + / -  Ctrl + Q", "full screen, size of words, quit"},
+        {"Ctrl + ,  Ctrl + .", "a recording or script 5 s back, forward"},
+        {"F11  Ctrl + / -  Ctrl + Q", "full screen, text size, quit"},
     };
     return kAll;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Every key and mouse gesture of the window with what it does: the help panel and docs/player.md
-// show this one table, and a test holds it against the code that reads the keys.
+// Every key and mouse gesture of the window, and what it does. The help and docs/player.md show
+// this one table, and a test compares it with the code that reads the keys.
 #pragma once
 
 #include <span>

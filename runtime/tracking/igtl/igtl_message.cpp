@@ -42,7 +42,7 @@ std::string text_of(std::span<const std::uint8_t> b, std::size_t at, std::size_t
     return text;
 }
 
-// Twelve floats, column by column. A motion that is not rigid is none of a tracker's.
+// Twelve floats, column by column. Nothing for a motion that is not rigid: no tracker sends one.
 std::optional<Rigid> matrix_at(std::span<const std::uint8_t> b, std::size_t at) {
     Rigid t;
     for (int c = 0; c < 4; ++c) {
@@ -55,7 +55,7 @@ std::optional<Rigid> matrix_at(std::span<const std::uint8_t> b, std::size_t at) 
     if (!(orthonormality_error(t.rotation) < 1e-2) || !(determinant(t.rotation) > 0)) {
         return std::nullopt;
     }
-    t.rotation = nearest_rotation(t.rotation);  // floats of 24 bits are off by 1e-7
+    t.rotation = nearest_rotation(t.rotation);  // single precision is off by 1e-7
     return t;
 }
 
@@ -115,7 +115,7 @@ std::optional<Header> parse_header(std::span<const std::uint8_t> bytes) {
 }
 
 std::vector<NamedPose> parse_poses(const Header& header, std::span<const std::uint8_t> body) {
-    // Versions 2 and 3 put an extended header before the content and metadata behind it.
+    // Versions 2 and 3 put an extended header before the content and metadata after it.
     if (header.version >= 2) {
         if (body.size() < 12) return {};
         const std::size_t extended = big(body, 0, 2), meta = big(body, 2, 2) + big(body, 4, 4);
@@ -212,7 +212,7 @@ MessageReader::Event MessageReader::next() {
         return Event::broken;
     }
     if (!is_ours(header->type)) {
-        // Passed over without keeping it, however long it is.
+        // Skipped without being kept, however long it is.
         header_ = *header;
         body_ = {};
         const std::uint64_t here =

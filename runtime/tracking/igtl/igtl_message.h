@@ -2,11 +2,10 @@
 
 // OpenIGTLink messages, version 1: bytes in, structures out and back; no sockets. Big-endian.
 //
-//     u16 version  char[12] type  char[20] device  u64 time 32.32  u64 body size  u64 CRC-64 of the
-//     body
+//     u16 version  char[12] type  char[20] device  u64 time 32.32  u64 body size  u64 CRC-64
 //
-// Our own codec, because ours has to survive hostile bytes and to listen on loopback alone, and
-// the usual library promises neither. Everything is checked against the bytes at hand.
+// The CRC is of the body. A codec of our own, because it must survive hostile bytes, which the
+// usual library does not promise. Every size is checked against the bytes that came.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +20,8 @@
 namespace sonocase::runtime::igtl {
 
 inline constexpr std::size_t kHeaderSize = 58;
-// The longest body that is read into memory; a longer one of a type that is not ours is skipped as
-// it comes, a longer one of ours ends the connection.
+// The longest body that is read into memory. A longer one ends the connection if its type is one
+// that we read, and is skipped as it comes otherwise.
 inline constexpr std::uint64_t kLargestBody = 1u << 20;
 
 // Polynomial 0x42F0E1EBA9EA3693, start 0, most significant bit first.
@@ -36,15 +35,15 @@ struct Header {
     std::uint64_t body_size = 0;
     std::uint64_t crc = 0;
 };
-// bytes: at least kHeaderSize. Versions 1 to 3 share this header; nothing for others.
+// bytes: at least kHeaderSize. Versions 1 to 3 share this header; nothing for other versions.
 std::optional<Header> parse_header(std::span<const std::uint8_t> bytes);
 
 struct NamedPose {
     std::string name;
     Rigid to_from;  // mm
 };
-// Poses of a TRANSFORM, TDATA, QTDATA, POSITION or QTRANS body; the device's name is that of a
-// single one. Empty: the body does not fit its type, or holds no rigid motion.
+// The poses of a TRANSFORM, TDATA, QTDATA, POSITION or QTRANS body; a single pose has the device's
+// name. Empty: the body does not fit its type, or holds no rigid motion.
 std::vector<NamedPose> parse_poses(const Header& header, std::span<const std::uint8_t> body);
 
 std::vector<std::uint8_t> encode(std::string_view type,
@@ -65,13 +64,13 @@ std::vector<std::uint8_t> encode_image(std::string_view device,
                                        const Rigid& ras_from_image,
                                        std::span<const std::uint8_t> pixels);
 
-// Cuts a byte stream into messages. Unknown types pass as headers with an empty body.
+// Cuts a byte stream into messages. Unknown types are returned as headers with an empty body.
 class MessageReader {
   public:
     enum class Event { need_more, message, bad_crc, broken };
     void add(std::span<const std::uint8_t> bytes);
     // After message: header and body are valid until the next call. broken: the stream cannot be
-    // followed any more (wrong version, impossible size); close it.
+    // followed any further (wrong version, impossible size): close it.
     Event next();
     const Header& header() const { return header_; }
     std::span<const std::uint8_t> body() const { return body_; }

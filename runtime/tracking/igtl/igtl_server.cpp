@@ -12,7 +12,7 @@
 namespace sonocase::runtime {
 namespace {
 
-constexpr std::size_t kMostGuests = 16;
+constexpr std::size_t kMostClients = 16;
 
 std::vector<std::uint8_t> messages_of(const ServedFrame& frame) {
     std::vector<std::uint8_t> out;
@@ -28,7 +28,8 @@ std::vector<std::uint8_t> messages_of(const ServedFrame& frame) {
                                    frame.mannequin_from_needle));
     }
     if (frame.width_px > 0) {
-        // Picture x is the probe's x, picture y its z; the message places the picture's middle.
+        // The picture's x is the probe's x and its y the probe's z; the message places the middle
+        // of the picture.
         const Matrix3 probe_from_image = Matrix3::from_columns({1, 0, 0}, {0, 0, 1}, {0, -1, 0});
         const Point3 middle =
             frame.mannequin_from_probe *
@@ -70,34 +71,34 @@ IgtlServer::~IgtlServer() {
 }
 
 void IgtlServer::run() {
-    std::vector<Guest> guests;
+    std::vector<Client> clients;
     std::array<std::uint8_t, 4096> ignored;
     while (!stop_) {
-        for (Socket newcomer = listener_.accept(guests.empty() ? 0.05 : 0.002); newcomer.open();
+        for (Socket newcomer = listener_.accept(clients.empty() ? 0.05 : 0.002); newcomer.open();
              newcomer = listener_.accept(0)) {
-            if (guests.size() < kMostGuests) guests.push_back({std::move(newcomer), {}, 0});
+            if (clients.size() < kMostClients) clients.push_back({std::move(newcomer), {}, 0});
         }
-        if (box_.refresh() && !guests.empty()) {
+        if (box_.refresh() && !clients.empty()) {
             const std::vector<std::uint8_t> messages = messages_of(box_.value());
-            for (Guest& guest : guests) {
-                // Whole messages only: what has begun is finished before newer ones are taken.
-                if (guest.at < guest.unsent.size()) continue;
-                guest.unsent = messages;
-                guest.at = 0;
+            for (Client& client : clients) {
+                // Whole messages only: one that has begun is finished before a newer one is taken.
+                if (client.at < client.unsent.size()) continue;
+                client.unsent = messages;
+                client.at = 0;
             }
         }
-        for (Guest& guest : guests) {
-            // What a guest says (requests, status) is not needed and not kept.
-            const long heard = guest.socket.read(ignored, 0);
+        for (Client& client : clients) {
+            // What a client sends (requests, status) is not needed and not kept.
+            const long heard = client.socket.read(ignored, 0);
             long sent = 0;
-            if (heard >= 0 && guest.at < guest.unsent.size()) {
-                sent = guest.socket.write(std::span(guest.unsent).subspan(guest.at));
-                if (sent > 0) guest.at += static_cast<std::size_t>(sent);
+            if (heard >= 0 && client.at < client.unsent.size()) {
+                sent = client.socket.write(std::span(client.unsent).subspan(client.at));
+                if (sent > 0) client.at += static_cast<std::size_t>(sent);
             }
-            if (heard < 0 || sent < 0) guest.socket.close();
+            if (heard < 0 || sent < 0) client.socket.close();
         }
-        std::erase_if(guests, [](const Guest& guest) { return !guest.socket.open(); });
-        guests_ = static_cast<int>(guests.size());
+        std::erase_if(clients, [](const Client& client) { return !client.socket.open(); });
+        clients_ = static_cast<int>(clients.size());
     }
 }
 

@@ -3,7 +3,8 @@
 // Sends the picture and the tools to programs that connect (3D Slicer, PLUS), over OpenIGTLink:
 //   IMAGE      Ultrasound            placed in `mannequin`
 //   TRANSFORM  ProbeToMannequin, NeedleToMannequin
-// The frame loop hands a frame over and never waits; a slow or silent guest loses frames, not time.
+// The frame loop hands a frame over and never waits; a slow or silent client misses frames and
+// delays nobody.
 #pragma once
 
 #include <atomic>
@@ -40,13 +41,13 @@ class IgtlServer {
     static Result<std::unique_ptr<IgtlServer>> start(const std::string& address_and_port);
 
     int port() const { return listener_.port(); }
-    int guests() const { return guests_.load(); }
-    // From the frame loop: fill slot(), publish(). Allocates only when the picture's size grows.
+    int clients() const { return clients_.load(); }
+    // From the frame loop: fill slot(), then publish(). Allocates only when the picture grows.
     ServedFrame& slot() { return box_.slot(); }
     void publish() { box_.publish(); }
 
   private:
-    struct Guest {
+    struct Client {
         Socket socket;
         std::vector<std::uint8_t> unsent;
         std::size_t at = 0;
@@ -57,7 +58,7 @@ class IgtlServer {
     Socket listener_;
     Mailbox<ServedFrame> box_;
     std::atomic<bool> stop_{false};
-    std::atomic<int> guests_{0};
+    std::atomic<int> clients_{0};
     std::thread thread_;
 };
 

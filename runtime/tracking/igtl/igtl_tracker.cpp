@@ -65,28 +65,28 @@ void IgtlTracker::set_wake(std::function<void()> wake) {
     wake_ = std::move(wake);
 }
 
-void IgtlTracker::say(TrackerPhase phase, const std::string& message) {
+void IgtlTracker::set_health(TrackerPhase phase, const std::string& message) {
     const std::lock_guard lock(mutex_);
     health_.phase = phase;
     health_.message = message;
 }
 
 void IgtlTracker::run() {
-    say(TrackerPhase::searching,
-        options_.listening
-            ? "Waiting for a program that sends poses to port " + std::to_string(port()) + "."
-            : "Looking for a server.");
+    set_health(TrackerPhase::searching, options_.listening
+                                            ? "Waiting for a program that sends poses to port " +
+                                                  std::to_string(port()) + "."
+                                            : "Looking for a server.");
     while (!stop_) {
         if (options_.listening) {
-            Socket guest = listener_.accept(0.1);
-            if (guest.open()) converse(std::move(guest));
+            Socket client = listener_.accept(0.1);
+            if (client.open()) converse(std::move(client));
             continue;
         }
         Result<Socket> socket = Socket::connect(options_.host, options_.port, 1.0);
         if (socket) {
             converse(std::move(*socket));
         } else {
-            say(TrackerPhase::searching, socket.error().message() + ".");
+            set_health(TrackerPhase::searching, socket.error().message() + ".");
         }
         for (double slept = 0; slept < options_.retry_s && !stop_; slept += 0.02) {
             std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -95,7 +95,7 @@ void IgtlTracker::run() {
 }
 
 void IgtlTracker::converse(Socket socket) {
-    say(TrackerPhase::starting, "Connected; no pose has come yet.");
+    set_health(TrackerPhase::starting, "Connected; no pose has come yet.");
     {
         const std::lock_guard lock(mutex_);
         ++health_.connects;
@@ -111,13 +111,13 @@ void IgtlTracker::converse(Socket socket) {
         const long n = socket.read(buffer, 0.1);
         if (n < 0) break;
         if (n == 0) {
-            // Asked for TDATA once it is quiet: some servers stream only on request.
+            // Some servers stream only on request: once it is silent, it is asked for TDATA.
             if (clock_() - heard_s > options_.silence_s) {
                 ended = "The connection fell silent.";
                 break;
             }
             if (options_.listening) {
-                // One guest at a time speaks; a newcomer takes over from a silent one.
+                // One client at a time is heard; a new one takes over from a silent one.
                 if (clock_() - heard_s > 0.5) {
                     Socket newcomer = listener_.accept(0);
                     if (newcomer.open()) {
@@ -163,7 +163,7 @@ void IgtlTracker::converse(Socket socket) {
         }
         if (!socket.open()) break;
     }
-    say(TrackerPhase::searching, ended);
+    set_health(TrackerPhase::searching, ended);
 }
 
 int IgtlTracker::sensor_of(const std::string& name) {
@@ -178,7 +178,7 @@ int IgtlTracker::sensor_of(const std::string& name) {
         return i;
     };
     if (wanted >= 0 && names_[static_cast<std::size_t>(wanted)].empty()) return take_place(wanted);
-    // The named places are kept free for their tools.
+    // The sensors of named tools are kept free for them.
     for (int i = 2; i < kMaxSensors; ++i) {
         if (names_[static_cast<std::size_t>(i)].empty()) return take_place(i);
     }

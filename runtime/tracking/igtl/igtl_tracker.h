@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Poses over OpenIGTLink: from a server such as PLUS (client), or from whoever connects
-// (listening).
+// Poses over OpenIGTLink: from a server such as PLUS, to which it connects, or from a program that
+// connects to it (listening).
 #pragma once
 
 #include <atomic>
@@ -24,12 +24,12 @@ struct IgtlTrackerOptions {
     int port = 18944;
     bool listening = false;
     double retry_s = 0.5;
-    double silence_s = 5;  // a connection without a byte for so long is opened again
+    double silence_s = 5;  // a connection on which no byte came for so long is opened again
 };
 
-// A device's name tells the tool: one that begins with Probe, Transducer or Image is the probe, one
-// that begins with Needle or Stylus the needle, others take the next free sensors in order. A name
-// that ends in ToMannequin carries a tool in `mannequin`.
+// A device's name says which tool it is: one that begins with Probe, Transducer or Image is the
+// probe, one that begins with Needle or Stylus the needle; others take the next free sensors in
+// order. The pose of a name that ends in ToMannequin is that of the tool in `mannequin`.
 class IgtlTracker final : public Tracker {
   public:
     static Result<std::unique_ptr<Tracker>> start(const IgtlTrackerOptions& options,
@@ -47,7 +47,7 @@ class IgtlTracker final : public Tracker {
     void converse(Socket socket);
     void take(const std::vector<igtl::NamedPose>& poses, double device_time_s);
     int sensor_of(const std::string& name);
-    void say(TrackerPhase phase, const std::string& message);
+    void set_health(TrackerPhase phase, const std::string& message);
 
     IgtlTrackerOptions options_;
     SessionClock clock_;
@@ -55,7 +55,7 @@ class IgtlTracker final : public Tracker {
     std::atomic<bool> stop_{false};
     Mailbox<TrackerReading> box_;
     TrackerReading reading_;
-    std::vector<std::string> names_;  // of the sensors; "" where free
+    std::vector<std::string> names_;  // of the sensors; empty: free
     mutable std::mutex mutex_;
     TrackerHealth health_;
     std::function<void()> wake_;

@@ -25,7 +25,7 @@ bool wait_for(int descriptor, short what, double timeout_s) {
 void prepare(int descriptor) {
     ::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL, 0) | O_NONBLOCK);
     ::fcntl(descriptor, F_SETFD, FD_CLOEXEC);
-    const int on = 1;  // a pose must not wait for the next one to fill a packet
+    const int on = 1;  // send a pose at once: it must not wait until a packet is full
     ::setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Numbers out of and into device bytes, little-endian.
+// Reads and appends numbers in a device's bytes, little-endian.
 #pragma once
 
 #include <bit>
@@ -10,7 +10,7 @@
 
 namespace sonocase::runtime {
 
-// The caller checks that offset + size lies within the bytes.
+// The caller makes sure that the number is within the bytes.
 inline std::uint16_t u16_le(std::span<const std::uint8_t> b, std::size_t at) {
     return static_cast<std::uint16_t>(b[at] | b[at + 1] << 8);
 }

@@ -21,7 +21,7 @@ constexpr std::array<UsbId, 3> kIds = {{
 }};
 constexpr double kTimeout = 0.5;
 constexpr int kSockets = 4;
-constexpr int kErrorEvery = 60;  // readings between two looks at the error byte
+constexpr int kErrorEvery = 60;  // readings between two requests of the error byte
 
 class GuidanceDriver final : public UsbDriver {
   public:
@@ -79,7 +79,7 @@ Status GuidanceDriver::start(UsbPipe& pipe, const UsbTrackerOptions& options, st
     const Error silent{"The tracker does not answer", "", "switch it off and on"};
     pipe.clear_halt();
     std::size_t got = 0;
-    pipe.read(buffer_, got, 0.05);  // what an earlier session left
+    pipe.read(buffer_, got, 0.05);  // sent for an earlier session
     const std::uint8_t configure[] = {0x50, 0x32, 0x01};
     if (pipe.write(configure, kTimeout) != UsbOutcome::ok) return silent;
     std::this_thread::sleep_for(std::chrono::milliseconds(600));
@@ -115,7 +115,7 @@ Status GuidanceDriver::start(UsbPipe& pipe, const UsbTrackerOptions& options, st
         return Error{"No sensor is connected to the tracker", "",
                      "plug the probe's and the needle's sensors in"};
     }
-    // The device measures at up to 255 Hz; it is polled at that rate.
+    // The device measures at up to 255 Hz.
     const double rate = std::clamp(options.rate_hz, 20.0, 240.0);
     const auto word = static_cast<unsigned>(rate * 256);
     const std::uint8_t set_rate[] = {0x50, 0x07, static_cast<std::uint8_t>(word & 0xFF),

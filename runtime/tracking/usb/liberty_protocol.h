@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Polhemus Liberty and Patriot on the wire: records out of a byte stream, no USB. Little-endian;
-// see docs/trackers.md.
+// The protocol of Polhemus Liberty and Patriot: records out of bytes, without USB. Little-endian,
+// positions in centimetres as the driver sets them up.
 //
 //     "LY" u8 station u8 command u8 error u8 reserved u16 size   then size bytes
 //     u32 ms, u32 frame, i32 distortion, f32 x y z, f32 quaternion w x y z
@@ -9,9 +9,9 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "runtime/tracking/tracker.h"
+#include "runtime/tracking/usb/byte_stream.h"
 
 namespace sonocase::runtime::liberty {
 
@@ -23,19 +23,16 @@ struct Record {
     SensorReading reading;
 };
 
-// Cuts the stream into records; what is none is skipped and counted, one stretch once.
+// Cuts the bytes of the device into records; what is not one is skipped and counted.
 class RecordReader {
   public:
-    void add(std::span<const std::uint8_t> bytes);
-    bool next(Record& record);
-    void clear() { buffer_.clear(), at_ = 0; }
-    std::uint64_t bad_frames() const { return bad_; }
+    void add(std::span<const std::uint8_t> bytes) { stream_.add(bytes); }
+    bool next(Record& record);  // false: no further whole record
+    void clear() { stream_.clear(); }
+    std::uint64_t bad_frames() const { return stream_.bad_stretches(); }
 
   private:
-    std::vector<std::uint8_t> buffer_;
-    std::size_t at_ = 0;
-    std::uint64_t bad_ = 0;
-    bool in_sync_ = true;
+    ByteStream stream_;
 };
 
 }  // namespace sonocase::runtime::liberty

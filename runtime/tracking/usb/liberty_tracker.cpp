@@ -39,7 +39,7 @@ class LibertyDriver final : public UsbDriver {
     std::array<std::uint8_t, 4096> buffer_{};
     TrackerReading building_;
     std::uint32_t frame_ = 0;
-    int top_station_ = 0;  // highest seen in the last whole frame
+    int top_station_ = 0;  // highest of the last whole frame; 0: not known yet
     bool open_ = false;    // building_ holds stations of frame_
 };
 
@@ -48,9 +48,9 @@ Status LibertyDriver::start(UsbPipe& pipe, const UsbTrackerOptions& options, std
     open_ = false;
     top_station_ = 0;
     pipe.clear_halt();
-    const Error deaf{"The tracker takes no command", "", "switch it off and on"};
-    if (!send(pipe, "p")) return deaf;
-    for (int i = 0; i < 8; ++i) {  // what an earlier session left
+    const Error refused{"The tracker does not accept commands", "", "switch it off and on"};
+    if (!send(pipe, "p")) return refused;
+    for (int i = 0; i < 8; ++i) {  // sent for an earlier session
         std::size_t got = 0;
         if (pipe.read(buffer_, got, 0.05) != UsbOutcome::ok) break;
     }
@@ -59,7 +59,7 @@ Status LibertyDriver::start(UsbPipe& pipe, const UsbTrackerOptions& options, std
     for (const char* command :
          {"f1\r", "O*,8,9,11,3,7\r", kHemispheres[static_cast<std::size_t>(options.hemisphere)],
           "U1\r", "c\r"}) {
-        if (!send(pipe, command)) return deaf;
+        if (!send(pipe, command)) return refused;
     }
     return Done{};
 }
@@ -78,7 +78,7 @@ bool LibertyDriver::read(UsbPipe& pipe, TrackerReading& reading, UsbOutcome& out
     };
     liberty::Record record;
     while (records_.next(record)) {
-        if (open_ && record.frame != frame_) {  // a station fell silent: the frame is what came
+        if (open_ && record.frame != frame_) {  // a station fell silent: the frame has what came
             top_station_ = building_.sensor_count;
             hand_over();
         }

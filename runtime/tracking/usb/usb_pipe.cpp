@@ -32,11 +32,11 @@ UsbOutcome outcome_of(int code) {
 }
 
 unsigned milliseconds(double seconds) {
-    // libusb takes 0 for "for ever".
+    // To libusb 0 means to wait without limit.
     return seconds <= 0.001 ? 1u : static_cast<unsigned>(seconds * 1000);
 }
 
-// First bulk endpoints of interface 0; zeros where there are none.
+// The first bulk endpoints of interface 0; those given stay, and zeros stay if there are none.
 void find_endpoints(libusb_device* device, std::uint8_t& in, std::uint8_t& out, int& packet) {
     libusb_config_descriptor* config = nullptr;
     if (libusb_get_active_config_descriptor(device, &config) != 0 &&
@@ -135,6 +135,86 @@ Result<std::unique_ptr<UsbBus>> UsbBus::open() {
 
 UsbBus::~UsbBus() = default;
 
+namespace {
+
+// What of a family of devices is plugged in.
+struct Found {
+    int count = 0;                    // of devices in the list of ids
+    libusb_device* chosen = nullptr;  // the first that works; else one that needs firmware
+    UsbId id;                         // of `chosen`
+    std::string relative;  // "vendor:product" of another device of the maker; may be empty
+};
+
+Found find_devices(std::span<libusb_device*> devices, std::span<const UsbId> ids) {
+    Found found;
+    for (libusb_device* device : devices) {
+        libusb_device_descriptor descriptor;
+        if (libusb_get_device_descriptor(device, &descriptor) != 0) continue;
+        bool known = false;
+        for (const UsbId& id : ids) {
+            if (id.vendor != descriptor.idVendor || id.product != descriptor.idProduct) continue;
+            known = true;
+            ++found.count;
+            if (!found.chosen || (found.id.needs_firmware && !id.needs_firmware)) {
+                found.chosen = device;
+                found.id = id;
+            }
+        }
+        if (!known && descriptor.idVendor == ids.front().vendor) {
+            char text[16];
+            std::snprintf(text, sizeof text, "%04x:%04x", descriptor.idVendor,
+                          descriptor.idProduct);
+            found.relative = text;
+        }
+    }
+    return found;
+}
+
+Error not_found(const std::string& family, const std::string& relative) {
+    if (relative.empty())
+        return {"No " + family + " is plugged in", "", "plug it in and switch it on"};
+    return {
+        "A device of the same maker (" + relative + ") is plugged in, but it is not a " + family,
+        "", "choose another tracker, or plug the " + family + " in"};
+}
+
+// Opens and claims a device.
+Result<std::unique_ptr<UsbPipe::Impl>> open_device(libusb_device* device, const UsbId& id) {
+    auto impl = std::make_unique<UsbPipe::Impl>();
+    impl->id = id;
+    impl->place = place_of(device);
+    const std::string which = std::string("The ") + id.name + " at " + impl->place;
+    const int opened = libusb_open(device, &impl->handle);
+    if (opened != 0) impl->handle = nullptr;
+    if (opened == LIBUSB_ERROR_ACCESS) {
+        return Error{"No permission for the " + std::string(id.name) + " at " + impl->place, "",
+                     "install the rule 60-sonocase-trackers.rules in /etc/udev/rules.d, run "
+                     "udevadm control --reload, then replug it"};
+    }
+    if (opened != 0) {
+        return Error{
+            which + " cannot be opened: " + libusb_strerror(static_cast<libusb_error>(opened)), "",
+            "replug it"};
+    }
+    if (libusb_kernel_driver_active(impl->handle, 0) == 1)
+        libusb_detach_kernel_driver(impl->handle, 0);
+    const int claimed = libusb_claim_interface(impl->handle, 0);
+    impl->in = id.endpoint_in;
+    impl->out = id.endpoint_out;
+    find_endpoints(device, impl->in, impl->out, impl->packet);
+    if (impl->packet <= 0) impl->packet = 64;
+    if (claimed != 0) {
+        return Error{which + (claimed == LIBUSB_ERROR_BUSY ? " is in use by another program"
+                                                           : " cannot be claimed"),
+                     "", "close the other program, or replug it"};
+    }
+    if (impl->in == 0 || impl->out == 0)
+        return Error{which + " has no bulk endpoints", "", "check that it is the device it says"};
+    return impl;
+}
+
+}  // namespace
+
 Result<std::unique_ptr<UsbPipe>> UsbBus::connect(std::span<const UsbId> ids, int& found) {
     found = 0;
     libusb_device** list = nullptr;
@@ -142,80 +222,19 @@ Result<std::unique_ptr<UsbPipe>> UsbBus::connect(std::span<const UsbId> ids, int
     if (count < 0) {
         return Error{"the USB devices cannot be listed", "", "check that /dev/bus/usb is readable"};
     }
-    const std::string family = ids.front().name;
-    std::string relative;
-    libusb_device* chosen = nullptr;
-    UsbId chosen_id;
-    for (ssize_t i = 0; i < count; ++i) {
-        libusb_device_descriptor descriptor;
-        if (libusb_get_device_descriptor(list[i], &descriptor) != 0) continue;
-        bool known = false;
-        for (const UsbId& id : ids) {
-            if (id.vendor != descriptor.idVendor || id.product != descriptor.idProduct) continue;
-            known = true;
-            ++found;
-            if (!chosen || (chosen_id.needs_firmware && !id.needs_firmware)) {
-                chosen = list[i];
-                chosen_id = id;
-            }
-        }
-        if (!known && descriptor.idVendor == ids.front().vendor) {
-            char text[16];
-            std::snprintf(text, sizeof text, "%04x:%04x", descriptor.idVendor,
-                          descriptor.idProduct);
-            relative = text;
-        }
-    }
-    Result<std::unique_ptr<UsbPipe>> result =
-        Error{"No " + family + " is plugged in", "", "plug it in and switch it on"};
-    if (!chosen) {
-        if (!relative.empty()) {
-            result = Error{
-                "A device of the same maker (" + relative + ") is plugged in, and is no " + family,
-                "", "choose another tracker, or plug the " + family + " in"};
-        }
-    } else if (chosen_id.needs_firmware) {
-        result = Error{std::string("The ") + chosen_id.name + " at " + place_of(chosen) +
+    const Found seen = find_devices({list, static_cast<std::size_t>(count)}, ids);
+    found = seen.count;
+    Result<std::unique_ptr<UsbPipe>> result = not_found(ids.front().name, seen.relative);
+    if (seen.chosen && seen.id.needs_firmware) {
+        result = Error{std::string("The ") + seen.id.name + " at " + place_of(seen.chosen) +
                            " waits for its firmware",
                        "", "load it with the maker's program, then replug it"};
-    } else {
-        auto impl = std::make_unique<UsbPipe::Impl>();
-        impl->id = chosen_id;
-        impl->place = place_of(chosen);
-        const int opened = libusb_open(chosen, &impl->handle);
-        int claimed = 0;
-        if (opened == 0) {
-            if (libusb_kernel_driver_active(impl->handle, 0) == 1) {
-                libusb_detach_kernel_driver(impl->handle, 0);
-            }
-            claimed = libusb_claim_interface(impl->handle, 0);
-        }
-        impl->in = chosen_id.endpoint_in;
-        impl->out = chosen_id.endpoint_out;
-        find_endpoints(chosen, impl->in, impl->out, impl->packet);
-        if (impl->packet <= 0) impl->packet = 64;
-        const std::string which = std::string("The ") + chosen_id.name + " at " + impl->place;
-        if (opened == LIBUSB_ERROR_ACCESS) {
-            impl->handle = nullptr;
-            result = Error{
-                "No permission for the " + std::string(chosen_id.name) + " at " + impl->place, "",
-                "install the rule 60-sonocase-trackers.rules in /etc/udev/rules.d, run "
-                "udevadm control --reload, then replug it"};
-        } else if (opened != 0) {
-            impl->handle = nullptr;
-            result = Error{
-                which + " cannot be opened: " + libusb_strerror(static_cast<libusb_error>(opened)),
-                "", "replug it"};
-        } else if (claimed != 0) {
-            result = Error{which + (claimed == LIBUSB_ERROR_BUSY ? " is in use by another program"
-                                                                 : " cannot be claimed"),
-                           "", "close the other program, or replug it"};
-        } else if (impl->in == 0 || impl->out == 0) {
-            result =
-                Error{which + " has no bulk endpoints", "", "check that it is the device it says"};
-        } else {
-            result = std::unique_ptr<UsbPipe>(new UsbPipe(std::move(impl)));
-        }
+    } else if (seen.chosen) {
+        auto opened = open_device(seen.chosen, seen.id);
+        if (opened)
+            result = std::unique_ptr<UsbPipe>(new UsbPipe(std::move(*opened)));
+        else
+            result = opened.error();
     }
     libusb_free_device_list(list, 1);
     return result;

@@ -16,8 +16,9 @@ namespace sonocase::runtime {
 struct UsbId {
     std::uint16_t vendor = 0, product = 0;
     const char* name = "";
-    bool needs_firmware = false;  // enumerates, and can do nothing before an upload
-    std::uint8_t endpoint_in = 0, endpoint_out = 0;  // 0: the first bulk ones of the descriptors
+    bool needs_firmware = false;  // is listed, but does nothing until firmware is uploaded
+    std::uint8_t endpoint_in = 0,
+                 endpoint_out = 0;  // 0: the first bulk ones that the device describes
 };
 
 enum class UsbOutcome { ok, timeout, stalled, gone, failed };
@@ -28,10 +29,11 @@ class UsbPipe {
     UsbPipe(const UsbPipe&) = delete;
     UsbPipe& operator=(const UsbPipe&) = delete;
 
-    // Every byte or an error. A zero-length packet follows a full last packet, or the device waits.
+    // Writes every byte or reports why not. A zero-length packet follows a full last packet,
+    // because the device would wait otherwise.
     UsbOutcome write(std::span<const std::uint8_t> bytes, double timeout_s);
-    // What comes within the time; `got` may be above 0 with any outcome. The buffer must be a
-    // multiple of 1024 bytes, so that no packet overflows it.
+    // Reads what comes within the time; `got` may be above 0 with any outcome. The buffer's size
+    // must be a multiple of 1024 bytes, so that no packet overflows it.
     UsbOutcome read(std::span<std::uint8_t> buffer, std::size_t& got, double timeout_s);
     UsbOutcome clear_halt();
     const UsbId& id() const;
@@ -45,7 +47,7 @@ class UsbPipe {
     std::unique_ptr<Impl> impl_;
 };
 
-// libusb's view of what is plugged in.
+// The devices that are plugged in.
 class UsbBus {
   public:
     static Result<std::unique_ptr<UsbBus>> open();
@@ -53,9 +55,9 @@ class UsbBus {
     UsbBus(const UsbBus&) = delete;
     UsbBus& operator=(const UsbBus&) = delete;
 
-    // Opens and claims the first device of the list. `found` counts those plugged in. Errors are
-    // whole sentences: none there, needs firmware, a relative that is not supported, no permission,
-    // in use.
+    // Opens and claims the first device whose id is in the list. `found` counts those plugged in.
+    // Errors are whole sentences: none is plugged in, firmware is missing, another device of the
+    // maker that is not supported, no permission, in use.
     Result<std::unique_ptr<UsbPipe>> connect(std::span<const UsbId> ids, int& found);
 
     struct Impl;

@@ -43,14 +43,14 @@ void UsbTracker::set_wake(std::function<void()> wake) {
     wake_ = std::move(wake);
 }
 
-void UsbTracker::say(TrackerPhase phase, const std::string& message) {
+void UsbTracker::set_health(TrackerPhase phase, const std::string& message) {
     const std::lock_guard lock(mutex_);
     health_.phase = phase;
     health_.message = message;
 }
 
 void UsbTracker::pause(double seconds) {
-    // In short naps, so that a stop is not kept waiting.
+    // In short sleeps, so that the destructor does not wait long.
     for (double slept = 0; slept < seconds && !stop_; slept += 0.02) {
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
@@ -59,7 +59,7 @@ void UsbTracker::pause(double seconds) {
 void UsbTracker::run() {
     Result<std::unique_ptr<UsbBus>> bus = UsbBus::open();
     if (!bus) {
-        say(TrackerPhase::failed, bus.error().message() + ".");
+        set_health(TrackerPhase::failed, bus.error().message() + ".");
         return;
     }
     while (!stop_) {
@@ -68,14 +68,15 @@ void UsbTracker::run() {
         if (!pipe) {
             const Error& error = pipe.error();
             if (found == 0 && unplugged_) {
-                // Said again: a look between the unplug and its announcement may have said else.
-                say(TrackerPhase::searching, kUnplugged);
+                // Reported again: a search between the unplugging and its announcement may have
+                // reported something else.
+                set_health(TrackerPhase::searching, kUnplugged);
                 pause(options_.retry_s);
                 continue;
             }
-            // Found and unusable is worse than not there; both come right when the user acts.
-            say(found > 0 ? TrackerPhase::failed : TrackerPhase::searching,
-                error.what + "; " + error.expected + ".");
+            // Found but not usable is worse than absent; the user can mend both.
+            set_health(found > 0 ? TrackerPhase::failed : TrackerPhase::searching,
+                       error.what + "; " + error.expected + ".");
             pause(options_.retry_s);
             continue;
         }
@@ -84,13 +85,13 @@ void UsbTracker::run() {
         note_ = found > 1 ? "Two are plugged in; the one at " + (*pipe)->place() +
                                 " is used. Unplug the other to be sure."
                           : "";
-        // What was said of a device that fell silent stands until a reading comes.
-        say(TrackerPhase::starting, silent_ ? std::string(kSilent) : note_);
+        // The message about a device that fell silent stays until a reading comes.
+        set_health(TrackerPhase::starting, silent_ ? std::string(kSilent) : note_);
         std::string name = (*pipe)->id().name;
         const Status started = driver_->start(**pipe, options_, name);
         if (!started) {
-            say(TrackerPhase::starting,
-                started.error().what + "; " + started.error().expected + ".");
+            set_health(TrackerPhase::starting,
+                       started.error().what + "; " + started.error().expected + ".");
             pause(options_.retry_s);
             continue;
         }
@@ -129,8 +130,7 @@ void UsbTracker::stream(UsbPipe& pipe) {
             if (warning != health_.message) health_.message = warning.empty() ? note_ : warning;
             const double period = now_s - last_s;
             if (period > 0) {
-                // Over about a hundred readings; the transfers' own jitter is not the device's
-                // rate.
+                // Averaged over about a hundred readings, because transfers come with jitter.
                 mean_period_s_ += (mean_period_s_ > 0 ? 0.02 : 1) * (period - mean_period_s_);
                 health_.rate_hz = 1 / mean_period_s_;
             }
@@ -140,7 +140,7 @@ void UsbTracker::stream(UsbPipe& pipe) {
         if (outcome == UsbOutcome::ok || outcome == UsbOutcome::timeout) {
             if (now_s - last_s > options_.silence_s) {
                 silent_ = true;
-                say(TrackerPhase::starting, kSilent);
+                set_health(TrackerPhase::starting, kSilent);
                 return;
             }
             continue;
@@ -151,10 +151,10 @@ void UsbTracker::stream(UsbPipe& pipe) {
             continue;
         }
         unplugged_ = outcome == UsbOutcome::gone;
-        say(TrackerPhase::searching,
-            outcome == UsbOutcome::gone
-                ? kUnplugged
-                : "The connection to the tracker broke; it is being opened again.");
+        set_health(TrackerPhase::searching,
+                   outcome == UsbOutcome::gone
+                       ? kUnplugged
+                       : "The connection to the tracker broke; it is being opened again.");
         return;
     }
     driver_->stop(pipe);

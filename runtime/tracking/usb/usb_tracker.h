@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A USB tracker on a thread of its own: waits for the device, starts it, hands over readings, and
-// begins again when it is unplugged. What differs between makers is a UsbDriver.
+// begins again after it was unplugged. What differs between makers is a UsbDriver.
 #pragma once
 
 #include <atomic>
@@ -24,23 +24,23 @@ enum class Hemisphere : std::uint8_t { plus_x, minus_x, plus_y, minus_y, plus_z,
 
 struct UsbTrackerOptions {
     Hemisphere hemisphere = Hemisphere::plus_x;
-    double rate_hz = 240;    // the nearest that the device has
-    double retry_s = 0.5;    // between looks for a device
-    double silence_s = 1.0;  // without a reading before it is started anew
+    double rate_hz = 240;    // the device uses the nearest that it has
+    double retry_s = 0.5;    // between two searches for the device
+    double silence_s = 1.0;  // without a reading until it is started again
 };
 
 class UsbDriver {
   public:
     virtual ~UsbDriver() = default;
-    virtual std::span<const UsbId> ids() const = 0;  // the first names the family
-    // Brings a device from any state to streaming. `name` becomes what is shown.
+    virtual std::span<const UsbId> ids() const = 0;  // the first one's name is the family's
+    // Brings a device from any state to streaming. `name`, as shown to the user, may be extended.
     virtual Status start(UsbPipe& pipe, const UsbTrackerOptions& options, std::string& name) = 0;
-    // Waits up to 0.1 s for a reading; true with ok when there is one. Anything but ok and timeout
-    // ends the connection, except stalled, which is cleared and gone on from.
+    // Waits up to 0.1 s for a reading; true, with ok, when one came. Outcomes other than ok and
+    // timeout end the connection, except stalled, which the caller clears before it reads on.
     virtual bool read(UsbPipe& pipe, TrackerReading& reading, UsbOutcome& outcome) = 0;
     virtual void stop(UsbPipe& pipe) = 0;
     virtual std::uint64_t bad_frames() const = 0;
-    virtual std::string warning() const { return {}; }  // a sentence, or nothing
+    virtual std::string warning() const { return {}; }  // a sentence; empty: none
 };
 
 class UsbTracker final : public Tracker {
@@ -57,7 +57,7 @@ class UsbTracker final : public Tracker {
   private:
     void run();
     void stream(UsbPipe& pipe);
-    void say(TrackerPhase phase, const std::string& message);
+    void set_health(TrackerPhase phase, const std::string& message);
     void pause(double seconds);
 
     std::unique_ptr<UsbDriver> driver_;
@@ -67,9 +67,9 @@ class UsbTracker final : public Tracker {
     Mailbox<TrackerReading> box_;
     mutable std::mutex mutex_;
     TrackerHealth health_;
-    std::string note_;        // two alike
-    bool unplugged_ = false;  // and not back yet
-    bool silent_ = false;     // started again since the last reading
+    std::string note_;        // a sentence when two devices are plugged in
+    bool unplugged_ = false;  // and not plugged in again yet
+    bool silent_ = false;     // was started again after silence, no reading since
     double mean_period_s_ = 0;
     std::function<void()> wake_;
     std::thread thread_;

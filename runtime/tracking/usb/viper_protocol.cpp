@@ -45,32 +45,20 @@ std::vector<std::uint8_t> encode(std::uint32_t command,
     return out;
 }
 
-void FrameReader::add(std::span<const std::uint8_t> bytes) {
-    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(at_));
-    at_ = 0;
-    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
-}
-
 bool FrameReader::next(Frame& frame) {
-    while (buffer_.size() - at_ >= kHead) {
-        const std::span<const std::uint8_t> b(buffer_.data() + at_, buffer_.size() - at_);
+    for (auto b = stream_.rest(); b.size() >= kHead; b = stream_.rest()) {
         const std::uint32_t size = u32_le(b, 4);
-        bool whole = is_preamble(b) && size >= 4 && size <= kLargestSize;
-        if (whole && b.size() < kHead + size) return false;
-        if (whole) {
-            const std::size_t end = kHead + size - 4;
-            whole = u32_le(b, end) == crc16(b.first(end));
-            if (whole) {
-                frame.kind = b[3] == 'P' ? Frame::Kind::position : Frame::Kind::reply;
-                frame.body.assign(b.begin() + kHead, b.begin() + static_cast<std::ptrdiff_t>(end));
-                at_ += kHead + size;
-                in_sync_ = true;
-                return true;
-            }
+        const bool plausible = is_preamble(b) && size >= 4 && size <= kLargestSize;
+        if (plausible && b.size() < kHead + size) return false;
+        const std::size_t end = plausible ? kHead + size - 4 : 0;  // of the body
+        if (!plausible || u32_le(b, end) != crc16(b.first(end))) {
+            stream_.skip();
+            continue;
         }
-        if (in_sync_) ++bad_;  // one bad stretch counts once, however long
-        in_sync_ = false;
-        ++at_;
+        frame.kind = b[3] == 'P' ? Frame::Kind::position : Frame::Kind::reply;
+        frame.body.assign(b.begin() + kHead, b.begin() + static_cast<std::ptrdiff_t>(end));
+        stream_.take(kHead + size);
+        return true;
     }
     return false;
 }
@@ -125,7 +113,8 @@ bool parse_positions(std::span<const std::uint8_t> body,
         out.world_from_sensor.translation = {scale * v[0], scale * v[1], scale * v[2]};
         const double length = std::sqrt(v[3] * v[3] + v[4] * v[4] + v[5] * v[5] + v[6] * v[6]);
         if (orientation_unit == 2) {
-            // Far from one is no rotation: an all-zero quaternion marks a pose that was not solved.
+            // Far from unit length it is not a rotation: the device sends zeros for a pose that it
+            // could not solve.
             const bool unit = std::abs(length - 1) < 0.05;
             if (unit) {
                 out.world_from_sensor.rotation = rotation_from_quaternion({v[3], v[4], v[5], v[6]});

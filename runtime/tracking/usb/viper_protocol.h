@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Polhemus Viper on the wire: frames in and out, no USB. Little-endian; see docs/trackers.md.
+// The protocol of the Polhemus Viper: frames in and out, without USB. Little-endian.
 //
 //     preamble[4]  u32 size of what follows  body  u32 CRC-16/ARC of all before it
 #pragma once
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "runtime/tracking/tracker.h"
+#include "runtime/tracking/usb/byte_stream.h"
 
 namespace sonocase::runtime::viper {
 
@@ -40,20 +41,17 @@ struct Frame {
     std::vector<std::uint8_t> body;  // without preamble, size and CRC
 };
 
-// Cuts a byte stream into frames, however the transfers split or merge them. What does not begin
-// with a preamble, has an impossible size or a wrong CRC is skipped byte by byte and counted.
+// Cuts the bytes of the device into frames. What does not begin with a preamble, has an impossible
+// size or a wrong CRC is skipped byte by byte and counted.
 class FrameReader {
   public:
-    void add(std::span<const std::uint8_t> bytes);
-    bool next(Frame& frame);
-    void clear() { buffer_.clear(), at_ = 0; }
-    std::uint64_t bad_frames() const { return bad_; }
+    void add(std::span<const std::uint8_t> bytes) { stream_.add(bytes); }
+    bool next(Frame& frame);  // false: no further whole frame
+    void clear() { stream_.clear(); }
+    std::uint64_t bad_frames() const { return stream_.bad_stretches(); }
 
   private:
-    std::vector<std::uint8_t> buffer_;
-    std::size_t at_ = 0;
-    std::uint64_t bad_ = 0;
-    bool in_sync_ = true;
+    ByteStream stream_;
 };
 
 struct Reply {
@@ -61,11 +59,11 @@ struct Reply {
     std::span<const std::uint8_t> payload;
 };
 bool parse_reply(std::span<const std::uint8_t> body, Reply& reply);
-// Sentence of a NAK's payload.
+// What a NAK's payload says, to follow "The Viper refuses command 7: ".
 std::string nak_text(std::span<const std::uint8_t> payload);
 
-// Position body to a reading, positions in cm and quaternions as the driver asks for them. Sensor n
-// of the device is place n of the reading. Returns false when the sizes disagree.
+// Reads the body of a position frame, in any of the device's units. Sensor n of the device becomes
+// sensor n of the reading. Returns false when the sizes disagree.
 bool parse_positions(std::span<const std::uint8_t> body,
                      TrackerReading& reading,
                      std::uint32_t& frame);

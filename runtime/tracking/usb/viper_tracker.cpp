@@ -24,7 +24,7 @@ class ViperDriver final : public UsbDriver {
     void stop(UsbPipe& pipe) override {
         pipe.write(viper::encode(viper::kContinuousPno, viper::kReset), 0.1);
     }
-    std::uint64_t bad_frames() const override { return frames_.bad_frames() + misfits_; }
+    std::uint64_t bad_frames() const override { return frames_.bad_frames() + bad_sizes_; }
 
   private:
     Status ask(UsbPipe& pipe,
@@ -37,7 +37,7 @@ class ViperDriver final : public UsbDriver {
     viper::FrameReader frames_;
     viper::Frame frame_;
     std::array<std::uint8_t, 4096> buffer_{};
-    std::uint64_t misfits_ = 0;
+    std::uint64_t bad_sizes_ = 0;
     double period_s_ = 1 / 240.0;
 };
 
@@ -51,7 +51,7 @@ Status ViperDriver::ask(UsbPipe& pipe,
     for (int attempt = 0; attempt < 4; ++attempt) {
         if (pipe.write(viper::encode(command, action, arg1, 0, payload), kReplyTime) !=
             UsbOutcome::ok) {
-            return Error{"The Viper takes no command", "", "switch it off and on"};
+            return Error{"The Viper does not accept commands", "", "switch it off and on"};
         }
         bool not_ready = false;
         const auto until =
@@ -64,7 +64,7 @@ Status ViperDriver::ask(UsbPipe& pipe,
                 viper::Reply reply;
                 if (frame_.kind != viper::Frame::Kind::reply ||
                     !viper::parse_reply(frame_.body, reply) || reply.command != command) {
-                    continue;  // what an earlier session left on its way
+                    continue;  // sent for an earlier session
                 }
                 if (reply.action == viper::kNak) {
                     not_ready = reply.payload.size() >= 4 && u32_le(reply.payload, 0) == 1;
@@ -87,8 +87,8 @@ Status ViperDriver::ask(UsbPipe& pipe,
 Status ViperDriver::start(UsbPipe& pipe, const UsbTrackerOptions& options, std::string& name) {
     frames_.clear();
     pipe.clear_halt();
-    // A device that streams already is told to stop before anything is asked of it; one that does
-    // not answers with a NAK or not at all, and either is fine.
+    // A device that streams already must stop before it is asked anything; one that does not
+    // stream answers with a NAK or not at all, and both are harmless.
     pipe.write(viper::encode(viper::kContinuousPno, viper::kReset), kReplyTime);
     for (int i = 0; i < 8; ++i) {
         std::size_t got = 0;
@@ -131,7 +131,7 @@ bool ViperDriver::read(UsbPipe& pipe, TrackerReading& reading, UsbOutcome& outco
             std::uint32_t number = 0;
             TrackerReading fresh = reading;
             if (!viper::parse_positions(frame_.body, fresh, number)) {
-                ++misfits_;
+                ++bad_sizes_;
                 continue;
             }
             reading = fresh;

@@ -1,5 +1,4 @@
-// A tracker that leads the probe round a circle and back: a function of time, with no thread of its
-// own.
+// A tracker that leads the probe once round a circle: a function of time, without a thread.
 #pragma once
 
 #include <cmath>

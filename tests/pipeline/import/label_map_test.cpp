@@ -324,7 +324,9 @@ TEST(ImportLabelMapRefuses, FoldersThatHoldAPipe) {
     folder.write("slices/a.dcm", "no DICOM");
     ASSERT_EQ(mkfifo((folder / "slices/b.dcm").c_str(), 0600), 0);
     expect_refused(import_label_map(folder / "slices"), "b.dcm", "is a named pipe");
-    folder.write("masks/a.nii", testing::nifti_bytes(ras_volume()));
+    TinyVolume mask = ras_volume();
+    for (auto& voxel : mask.voxels) voxel = voxel != 0;
+    folder.write("masks/a.nii", testing::nifti_bytes(mask));
     ASSERT_EQ(mkfifo((folder / "masks/b.nii").c_str(), 0600), 0);
     expect_refused(import_label_map(folder / "masks"), "b.nii", "is a named pipe");
 }

@@ -9,7 +9,7 @@
 namespace sonocase::runtime {
 namespace {
 
-// In the camera's frame: x right, y up, what is seen has negative z.
+// In the camera's frame x is right and y up; what is in view has negative z.
 Point3 seen(const Rigid& mannequin_from_camera, Point3 p) {
     return inverse(mannequin_from_camera) * p;
 }
@@ -27,7 +27,7 @@ TEST(Camera, FromTheProbeThePictureIsBeforeItAndTheRightWayRound) {
         const Point3 mark = seen(camera, probe * Point3{30, 0, 50});
         EXPECT_LT(face.z, 0);
         EXPECT_LT(deep.z, 0);
-        EXPECT_GT(face.y, deep.y);  // depth goes down
+        EXPECT_GT(face.y, deep.y);  // depth runs downwards
         EXPECT_GT(mark.x, 10);      // the mark's side is on the right
     }
 }

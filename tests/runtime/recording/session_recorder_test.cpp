@@ -87,7 +87,7 @@ TEST(SessionRecorder, WritesFramesEventsSettingsAndPictures) {
     EXPECT_EQ(pictures->frames[0].number, 100);
 }
 
-// The trainer's process dies at any moment; its clock runs as in life, at 500 frames a second.
+// The process is killed at any moment; its clock runs in real time, at 500 frames per second.
 TEST(SessionRecorder, KilledWhileItRunsLosesAtMostTheLastSecond) {
     const TemporaryFolder folder(/*in_memory=*/true);
     testing::Random random(5);

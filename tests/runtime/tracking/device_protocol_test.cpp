@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The wire forms of the USB trackers, against vectors and against damage.
+// The protocols of the USB trackers, with known bytes and with damaged ones.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -108,7 +108,7 @@ TEST(Viper, DropsAFrameWithAnyByteDamagedAndTakesTheNext) {
         damaged[i] ^= 0x10;
         viper::FrameReader reader;
         reader.add(damaged);
-        for (int n = 0; n < 20; ++n) reader.add(after);  // enough to outlast a size that grew
+        for (int n = 0; n < 20; ++n) reader.add(after);  // enough for a size that grew
         viper::Frame frame;
         int frames = 0;
         while (reader.next(frame)) {

@@ -35,7 +35,8 @@ TEST_F(MouseOnCylinder, KeepsContactNormalAndRadiusAllTheWayRound) {
         EXPECT_GT(dot(beam(), -out), 0.97) << i;
         EXPECT_LT(orthonormality_error(mouse_.mannequin_from_probe().rotation), 1e-9);
     }
-    // 400 mm is more than a lap of 377 mm: it went round and did not drift along the axis.
+    // 400 mm is more than the circumference of 377 mm: it went round and did not drift along the
+    // axis.
     EXPECT_LT(std::abs(face().y), 15);
 }
 
@@ -44,7 +45,7 @@ TEST_F(MouseOnCylinder, StopsAtTheEdgeOfTheBody) {
     EXPECT_LE(std::abs(face().y), 81);
     EXPECT_GT(std::abs(face().y), 60);
     EXPECT_NEAR(std::hypot(face().x, face().z), 59, 2.5);
-    EXPECT_GT(dot(beam(), {0, 0, -1}), 0.95);  // the cut is no skin to lean on
+    EXPECT_GT(dot(beam(), {0, 0, -1}), 0.95);  // the cut face is not skin
 }
 
 TEST_F(MouseOnCylinder, TurnsAboutTheFace) {
@@ -55,7 +56,7 @@ TEST_F(MouseOnCylinder, TurnsAboutTheFace) {
     EXPECT_LT(distance(face(), before), 1e-9);
     EXPECT_NEAR(std::acos(dot(beam(), {0, 0, -1})), std::acos(std::cos(0.3) * std::cos(0.2)), 0.1);
     for (int i = 0; i < 100; ++i) mouse_.rock(0.3);
-    EXPECT_GT(dot(beam(), {0, 0, -1}), 0);  // limited short of lying down
+    EXPECT_GT(dot(beam(), {0, 0, -1}), 0);  // the tilt is limited
 }
 
 TEST_F(MouseOnCylinder, LiftsOffAndComesBack) {
@@ -87,7 +88,7 @@ TEST_F(MouseOnCylinder, NeedleKeepsItsEntryWhileAimedAndAdvanced) {
     EXPECT_EQ(mouse_.needle_entry(), entry);
     const Rigid needle = mouse_.mannequin_from_needle();
     EXPECT_NEAR(distance(needle * Point3{0, 0, 0}, entry), 40, 1e-9);
-    EXPECT_NEAR(distance(needle * Point3{0, 0, -40}, entry), 0, 1e-9);  // z runs hub to tip
+    EXPECT_NEAR(distance(needle * Point3{0, 0, -40}, entry), 0, 1e-9);  // z runs from hub to tip
     mouse_.slide_needle(10, 0);
     EXPECT_EQ(mouse_.needle_entry(), entry);  // not sideways through tissue
     mouse_.advance_needle(1e6);

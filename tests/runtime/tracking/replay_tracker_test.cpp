@@ -42,7 +42,7 @@ TEST(ReplayTracker, ACalibratedLagBringsTheNeedleToItsOwnMoment) {
     const sonocase::testing::TemporaryFolder folder;
     std::string probe = "frame,timestamp_s,status,tx,ty,tz,r00,r01,r02,r10,r11,r12,r20,r21,r22\n",
                 needle = probe;
-    for (int i = 0; i < 40; ++i) {  // both move together; the needle is told of 0.15 s late
+    for (int i = 0; i < 40; ++i) {  // both move together; the needle's readings come 0.15 s late
         const std::string rest = ",0,0,1,0,0,0,1,0,0,0,1\n";
         const double t = 0.05 * i;
         probe += std::to_string(i) + "," + std::to_string(t) + ",OK," + std::to_string(i) + rest;
@@ -73,7 +73,7 @@ TEST(PacedTracker, RunsSlowerFasterStandsStillAndJumps) {
     EXPECT_EQ(paced.duration_s(), paced.recorded_time_s(100));
     ASSERT_TRUE(paced.poll(5, reading));
     EXPECT_EQ(x(), 0);
-    EXPECT_TRUE(paced.poll(6.02, reading));  // as fast as life
+    EXPECT_TRUE(paced.poll(6.02, reading));  // in real time
     EXPECT_EQ(x(), 10);
     EXPECT_NEAR(reading.time_s, 6, 1e-9);  // when it was due
     paced.set_speed(0.25);
@@ -88,7 +88,7 @@ TEST(PacedTracker, RunsSlowerFasterStandsStillAndJumps) {
     EXPECT_TRUE(paced.poll(101, reading));
     EXPECT_EQ(x(), 25);
     EXPECT_NEAR(paced.at_s(), 2.52, 1e-9);
-    paced.jump(-5);  // past the start: the end of the round before
+    paced.jump(-5);  // past the start: from the end
     EXPECT_TRUE(paced.poll(102, reading));
     EXPECT_EQ(x(), 75);
     paced.set_speed(NAN);

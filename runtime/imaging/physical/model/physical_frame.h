@@ -35,7 +35,8 @@ struct PhysicalNoise {
     std::vector<std::int8_t> streak;  // clutter: many beams wide
     std::vector<std::int8_t> white;   // each beam its own: where in the slab a sample lies
 };
-// normal_levels: of PhysicalTextures. overhang: beams, and what a kernel reads beyond them.
+// normal_levels: of PhysicalTextures. overhang: beams, and what a kernel reads beyond them. Cost: 3
+// ms.
 PhysicalNoise make_physical_noise(std::span<const double> normal_levels,
                                   std::uint32_t seed,
                                   int overhang);

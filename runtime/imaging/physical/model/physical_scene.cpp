@@ -149,9 +149,10 @@ void add_tissues(const CaseBundle& bundle, const std::vector<Target>& targets, P
 
 }  // namespace
 
-Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
+Result<PhysicalScene> make_physical_scene(CaseView view,
                                           const std::vector<Target>& targets,
                                           const PhysicalSceneOptions& options) {
+    const CaseBundle& bundle = *view;
     JobRunner& jobs = options.jobs != nullptr ? *options.jobs : serial_jobs();
     PhysicalScene s;
     s.bundle = &bundle;
@@ -171,7 +172,7 @@ Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
     Result<BrickTable> words = BrickTable::create(bundle);
     if (!words) return words.error();
     s.words = std::move(*words);
-    if (!options.streamed) s.words.load_all(jobs);
+    if (view.blocks() == nullptr) s.words.load_all(jobs);
     s.textures = options.textures ? options.textures
                                   : std::make_shared<const PhysicalTextures>(physical_textures());
     s.fine = make_fine_structure(bundle, jobs);

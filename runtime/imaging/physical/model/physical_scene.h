@@ -66,14 +66,12 @@ struct PhysicalScene {
 struct PhysicalSceneOptions {
     JobRunner* jobs = nullptr;                         // null: one job after the other
     std::shared_ptr<const PhysicalTextures> textures;  // null: made here
-    // The bundle is unpacked block by block: its tables are filled in as frames need them.
-    bool streamed = false;
 };
 
 // targets: of the exercise; those that only mark a place do not show in the tissue.
 // The bundle must outlive the scene. Errors: a bundle without labels or speckle; too little memory
-// for the tables. Cost: 10 to 50 ms.
-Result<PhysicalScene> make_physical_scene(const CaseBundle& bundle,
+// for the tables. Cost: some tens of ms for a torso at 1 mm.
+Result<PhysicalScene> make_physical_scene(CaseView view,
                                           const std::vector<Target>& targets = {},
                                           const PhysicalSceneOptions& options = {});
 

@@ -19,7 +19,7 @@ struct PhysicalTextures {
     std::vector<double> normal_levels;  // for tiles of noise
 };
 
-// Cost: 10 to 20 ms, one thread.
+// Cost: about 20 ms on one thread.
 PhysicalTextures physical_textures();
 
 }  // namespace sonocase::runtime

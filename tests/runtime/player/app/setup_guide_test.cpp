@@ -45,7 +45,7 @@ class User {
 
 TEST(SetupGuide, FindsAllThreeCalibrations) {
     CaseBundle bundle = sonocase::testing::small_case();
-    for (int i = 0; i < 72; ++i) {  // the cylinder's skin, a point every 5 mm
+    for (int i = 0; i < 72; ++i) {  // the cylinder's skin, one point every 5 mm
         for (int j = 0; j < 31; ++j) {
             const double angle = i * 0.0872664626;
             const Vector3 out{std::cos(angle), 0, std::sin(angle)};
@@ -93,7 +93,7 @@ TEST(SetupGuide, FindsAllThreeCalibrations) {
     guide.go_to(SetupStep::mannequin);
     guide.record(true);
     for (int i = 0; i < 900; ++i) {
-        // Past the middle on one side only: a whole cylinder turns about itself unseen.
+        // Past the middle on one side only: on a whole cylinder, turns about its axis do not show.
         const double angle = user.random().uniform(0.2, 2.9), y = user.random().uniform(-70, 70);
         const Point3 p{60 * std::cos(angle), y, 60 * std::sin(angle)};
         const Point3 world = user.world_from_mannequin * p;
@@ -116,8 +116,8 @@ TEST(SetupGuide, FindsAllThreeCalibrations) {
     EXPECT_GT(dot(found.needle->sensor_from_tool.rotation.column(2),
                   user.sensor_from_needle.rotation.column(2)),
               std::cos(0.01));
-    // A cylinder's sweep cannot tell turns about its axis; either the guide says so, or what it
-    // found lies on the skin.
+    // A sweep of a cylinder does not determine turns about its axis; either the guide says so, or
+    // what it found is on the skin.
     if (found.mannequin) {
         EXPECT_LT(found.mannequin->rms_mm, 2);
     } else {

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace sonocase {
+namespace sonocase::runtime {
 namespace {
 
 struct Outcome {
@@ -32,12 +32,12 @@ Outcome watch(double plain_s, double drawing_s, double seconds) {
     return out;
 }
 
-TEST(ViewPace, CheapDrawingsComeWithEverySecondPicture) {
+TEST(ViewPace, FastDrawingsComeWithEverySecondPicture) {
     const Outcome r = watch(1.0 / 60, 0, 10);
     EXPECT_NEAR(r.drawings, r.pictures / 2, 2);
 }
 
-TEST(ViewPace, DearDrawingsTakeASeventhOfTheTime) {
+TEST(ViewPace, SlowDrawingsTakeASeventhOfTheTime) {
     const Outcome r = watch(0.012, 0.06, 10);
     EXPECT_NEAR(r.drawings * 0.06 / 10, 0.15, 0.03);
 }
@@ -52,4 +52,4 @@ TEST(ViewPace, DrawsAtOnce) {
 }
 
 }  // namespace
-}  // namespace sonocase
+}  // namespace sonocase::runtime

@@ -100,8 +100,8 @@ TEST_F(Headless, WarnsOfAnOldAndPoorCalibrationAndGoesOn) {
 }
 
 TEST_F(Headless, ReplaysEveryRowInOrderAndAppliesCalibrations) {
-    // The same path twice: once as it is, once seen by a tracker elsewhere through a sensor that is
-    // mounted off the probe. Calibrated, the pictures are the same.
+    // The same path twice: once in `mannequin`, once as a tracker elsewhere sees it with a sensor
+    // mounted beside the probe. With calibrations, the pictures are the same.
     const Rigid world_from_mannequin{rotation_about({0, 0, 1}, 0.7), {100, 20, -30}};
     const Rigid sensor_from_probe{rotation_about({1, 0, 0}, -0.4), {3, 8, 40}};
     const double scale = 1.03;
@@ -139,8 +139,8 @@ TEST_F(Headless, ReplaysEveryRowInOrderAndAppliesCalibrations) {
     ASSERT_EQ(b.status, 0) << b.error;
     EXPECT_EQ(nlohmann::json::parse(a.out)["frames"], 5);
     EXPECT_NE(read_text(folder_ / "a/frame_00000.png"), read_text(folder_ / "a/frame_00004.png"));
-    // CSV keeps nine digits of rotation: a pixel here and there may fall on the other side of a
-    // voxel, so the files are compared by size and the first by most of its bytes.
+    // CSV keeps nine digits of rotation, so that a few pixels may fall into the next voxel: the
+    // files are compared by size, and the first one by most of its bytes.
     for (const char* frame : {"/frame_00000.png", "/frame_00004.png"}) {
         EXPECT_NEAR(double(read_text(folder_ / "a" + frame).size()),
                     double(read_text(folder_ / "b" + frame).size()), 100);
@@ -159,7 +159,7 @@ TEST_F(Headless, RecordsASessionAndScoresIt) {
     ASSERT_TRUE(stats["insertions"].is_array());
     EXPECT_EQ(stats["insertions"].size(), 1u);
     EXPECT_EQ(read_text(record).substr(0, 18), "ObjectType = Image");
-    // What was recorded plays again, probe and needle at the same places: the same pictures.
+    // The recording replays with probe and needle at the same places: the same pictures.
     const CommandResult first =
         play(bundle_ + " --headless --model paper --size 96x96 --frames 60 --out " +
              (folder_ / "first"));

@@ -76,7 +76,7 @@ TEST(FrameStats, NamesWhatTheGovernorDropped) {
     EXPECT_EQ(accuracy["dropped_beams"], 64);
     EXPECT_EQ(accuracy["dropped_samples"], 128);
     EXPECT_EQ(accuracy["reduced_frames"], 1);
-    // Without a budget nothing can be dropped, and nothing is said.
+    // Without a budget nothing can be dropped, and nothing is reported.
     FrameStats full;
     full.add(5, {});
     full.set_accuracy({0, 1, 192, 512, 192, 512});

@@ -31,7 +31,7 @@ ScanEngine engine_of(const OpenCase& open) {
     return std::move(*engine);
 }
 
-// Hands that tremble: probe and needle about the middle of the skin, in `mannequin`.
+// Trembling hands: probe and needle about the middle of the skin, in `mannequin`.
 TrackerReading reading_at(int i, testing::Random& random) {
     TrackerReading r;
     r.sequence = static_cast<std::uint64_t>(i) + 1;
@@ -62,7 +62,7 @@ TEST(SessionRun, AReplayGivesTheSamePixelsToTheLastBit) {
     std::vector<std::uint8_t> pixels(128 * 128);
     {
         ScanEngine engine = engine_of(*open);
-        // Whatever went on before the session must not matter.
+        // What happened before the session must not matter.
         testing::Random random(1);
         for (int i = 0; i < 7; ++i) {
             engine.observe(reading_at(40 + i, random), false);

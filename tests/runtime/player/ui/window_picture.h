@@ -57,7 +57,7 @@ struct Picture {
     }
 };
 
-// Width 0 where there is no such picture.
+// A picture of width 0 if the file cannot be read.
 inline Picture load_picture(const std::string& path) {
     Picture picture;
     png_image image{};

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Every panel against its kept picture, at 1280 x 720 and at four times the pixels.
-//     SONOCASE_RENEW_PICTURES=1 build/release/bin/runtime_window_test
-//     --gtest_filter='WindowPictures.*'
-// writes tests/golden/window/ anew; look at what it wrote.
+// Every panel compared with its kept picture, at 1280 x 720 and at 3840 x 2160.
+//     SONOCASE_RENEW_PICTURES=1 build/release/bin/runtime_window_test \
+//         --gtest_filter='WindowPictures.*'
+// writes the pictures of tests/golden/window/ again; look at them afterwards.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -25,7 +25,7 @@ using sonocase::testing::Picture;
 const char* const kPanels[] = {"panels", "frozen",      "help", "setup",
                                "scores", "needle_view", "cases"};
 
-// The tour, the mouse moves scaled to the window.
+// A tour of all panels.
 std::string script(const std::string& folder) {
     const auto shot = [&](const char* name) { return "shot " + folder + "/" + name + ".png\n"; };
     return "wait 12\nkey n\nhold w 20\nwait 8\n" + shot("panels") + "key o\nkey o\nwait 4\n" +
@@ -35,13 +35,13 @@ std::string script(const std::string& folder) {
            "key escape\nkey f2\nwait 4\n" + shot("cases") + "quit\n";
 }
 
-// Kept are means of 4 x 4 pixels (12 x 12 of the large window): edges of letters, which differ from
-// one font renderer to the next, and speckle, which differs from one frame to the next, average
-// out; a panel, a heading, a colour or a row that is not where it was does not. Times, rates and
-// scores change a few blocks in every run.
+// The kept pictures are means of 4 x 4 pixels (12 x 12 of the large window). The edges of letters,
+// which differ between font renderers, and speckle, which differs between frames, average out; a
+// panel, a heading, a colour or a row that has moved does not. Times, rates and scores change a few
+// blocks in every run.
 constexpr double kMeanLevels = 4;       // of all blocks: noise of 20 levels / 4, and less elsewhere
-constexpr int kChangedLevels = 40;      // a block that shows something else ...
-constexpr double kChangedShare = 0.03;  // ... of which there may be so many: numbers, the noise
+constexpr int kChangedLevels = 40;      // of a block that shows something else ...
+constexpr double kChangedShare = 0.03;  // ... and how many of these may differ: numbers, noise
 
 TEST(WindowPictures, EveryPanelLooksAsKeptAtBothSizes) {
     if (!std::filesystem::exists("/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf"))
@@ -54,7 +54,7 @@ TEST(WindowPictures, EveryPanelLooksAsKeptAtBothSizes) {
     } windows[] = {{"1280x720", "1280x720", "1", 4}, {"3840x2160", "3840x2160", "3", 12}};
     for (const auto& window : windows) {
         const sonocase::testing::TemporaryFolder folder;
-        // The list of cases shows folder and size: the same in every run.
+        // The list of cases shows folder and size, which must be the same in every run.
         const std::string place = folder / "home";
         std::filesystem::create_directories(place);
         ASSERT_TRUE(save_bundle(sonocase::testing::small_case(), place + "/cylinder.sonocase"));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The window under a virtual display, driven by injected input: every panel opened, an exercise
-// attempted, pictures taken and looked into.
+// The window on a virtual display, driven by injected input: opens every panel, attempts an
+// exercise, takes pictures and checks them.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -88,6 +88,7 @@ TEST_F(WindowOnVirtualDisplay, PlaysAnExerciseFromInjectedInput) {
     EXPECT_LT(lifted.mean(500, 250, 750, 500), 0.5 * start.mean(500, 250, 750, 500));
     const auto stats = nlohmann::json::parse(sonocase::testing::read_text(folder_ / "stats.json"));
     EXPECT_GT(stats["frames"].get<int>(), 10);
+    EXPECT_GT(stats["first_frame_ms"].get<double>(), 0);
     EXPECT_TRUE(std::filesystem::exists(folder_ / "config/sonocase/player.json"));
     int sessions = 0;
     for (const auto& entry :
@@ -145,7 +146,7 @@ TEST_F(WindowOnVirtualDisplay, WithoutOpenGl33SaysSoInOneLine) {
     EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
 }
 
-// The help lists every key that the window reads, and docs/player.md every line of the help.
+// The help lists every key that the window reads, and docs/player.md has every line of the help.
 TEST(Shortcuts, EveryKeyOfTheWindowIsInTheHelpAndEveryLineOfItInTheDocument) {
     const std::string source =
         sonocase::testing::read_text(SONOCASE_SOURCE "/runtime/player/ui/keys.cpp");

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The other end of an OpenIGTLink connection, built on Debian's library alone.
-//     igtl_peer serve PORT N      server: sends N rounds of TRANSFORM, TDATA, QTDATA, POSITION,
-//     STATUS igtl_peer send PORT N       client: sends N TRANSFORMs to a listening player igtl_peer
-//     follow PORT N     client: receives until N images came; prints what it saw
+// The other end of an OpenIGTLink connection, built with Debian's library only.
+//     igtl_peer serve PORT N   server: sends N rounds of TRANSFORM, TDATA, QTDATA, POSITION, STATUS
+//     igtl_peer send PORT N    client: sends N TRANSFORMs to a listening player
+//     igtl_peer follow PORT N  client: receives until N images came; prints what it saw
 #include <igtlClientSocket.h>
 #include <igtlImageMessage.h>
 #include <igtlMessageHeader.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// OpenIGTLink: the codec by itself, then both ways against Debian's library in another process, and
-// against peers that mean harm.
+// OpenIGTLink: the codec by itself, then both directions with Debian's library in another process,
+// and with hostile peers.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -78,7 +78,7 @@ TEST(IgtlMessage, TransformComesBack) {
         const auto poses = igtl::parse_poses(reader.header(), reader.body());
         ASSERT_EQ(poses.size(), 1u);
         EXPECT_EQ(poses[0].name, "ProbeToTracker");
-        // Floats of 24 bits.
+        // Single precision.
         EXPECT_LT(norm(poses[0].to_from.translation - pose.translation), 1e-4);
         EXPECT_LT(rotation_angle(transpose(poses[0].to_from.rotation) * pose.rotation), 1e-6);
     }
@@ -200,9 +200,9 @@ TEST(IgtlTracker, ConnectsAgainAfterTheServerWentAway) {
     ASSERT_TRUE(server);
     auto tracker = start_tracker(server->port(), false);
     for (int round = 0; round < 3; ++round) {
-        Socket guest = server->accept(15);
-        ASSERT_TRUE(guest.open()) << round;
-        guest.write(igtl::encode_transform("ProbeToTracker", 1, {}));
+        Socket client = server->accept(15);
+        ASSERT_TRUE(client.open()) << round;
+        client.write(igtl::encode_transform("ProbeToTracker", 1, {}));
         const auto readings = static_cast<std::uint64_t>(round + 1);
         ASSERT_TRUE(tracker.eventually([&] { return tracker->health().readings >= readings; }));
     }
@@ -254,7 +254,7 @@ TEST(IgtlServer, IsFollowedByAClientOfTheLibrary) {
     EXPECT_GE(seen["transforms"].get<int>(), 8);
 }
 
-// What a listening tracker must survive; after each the next honest client is served.
+// What a listening tracker must survive; after each of these it serves the next good client.
 TEST(IgtlTracker, SurvivesHostilePeers) {
     auto tracker = start_tracker(0, true);
     const int port = static_cast<IgtlTracker&>(*tracker).port();
@@ -293,8 +293,8 @@ TEST(IgtlServer, SurvivesAThousandConnects) {
         ASSERT_TRUE(socket) << i << " " << socket.error().message();
         if (i % 3 == 0) socket->write(Bytes(100, 0xFF));
     }
-    Event never;  // guests come and go unannounced
-    EXPECT_TRUE(eventually(never, [&] { return (*server)->guests() == 0; }));
+    Event never;  // the server does not notify when clients come and go
+    EXPECT_TRUE(eventually(never, [&] { return (*server)->clients() == 0; }));
     auto tracker = start_tracker(0, true);
     for (int i = 0; i < 200; ++i) {
         Result<Socket> socket =

@@ -3,7 +3,7 @@
 #include "runtime/tracking/usb/emulated_device.h"
 
 #include <umockdev-1.0/umockdev.h>
-// ioctl.h before the usbdevice_fs numbers that are built from it.
+// ioctl.h must precede usbdevice_fs.h, whose numbers are built from it.
 #include <linux/capability.h>
 #include <linux/usbdevice_fs.h>
 #include <poll.h>
@@ -31,7 +31,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// The firmware's clock: fine against the 4 ms between two readings of a real device.
+// The firmware's clock: short compared with the 4 ms between two readings of a real device.
 constexpr double kTickS = 0.0002;
 
 class EmulatedDevice final : public DevicePort {
@@ -65,7 +65,7 @@ class EmulatedDevice final : public DevicePort {
         }
     }
 
-    // One look; true when the device has just been taken away.
+    // Runs once; true when the device has just been unplugged.
     bool tick() {
         bool take_away = false;
         {
@@ -95,7 +95,7 @@ class EmulatedDevice final : public DevicePort {
         umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
     }
 
-    // DevicePort, with the lock held.
+    // DevicePort; called with the lock held.
     void send(const Bytes& transfer) override { replies_.push_back({transfer, 0}); }
     void stall() override { replies_.push_back({{}, -EPIPE}); }
     void unplug() override {
@@ -151,7 +151,7 @@ class EmulatedDevice final : public DevicePort {
         ready_.push_back(urb);
     }
 
-    // An answer longer than the host's buffer goes on in the next transfer, as packets would.
+    // An answer longer than the host's buffer continues in the next transfer, as packets would.
     void pump() {
         while (!in_.empty() && !replies_.empty()) {
             UMockdevIoctlData* urb = in_.front();
@@ -271,7 +271,7 @@ class EmulatedDevice final : public DevicePort {
                 if (gone_) return complete(-1, ENODEV);
                 if (reap_) return complete(-1, EAGAIN);
                 // Held and answered within a millisecond: poll() on the node is always ready, and
-                // an answer at once would have the host spin.
+                // the host would spin if the answer came at once.
                 reap_ = static_cast<UMockdevIoctlClient*>(g_object_ref(client));
                 reap_since_ = Clock::now();
                 return TRUE;
@@ -312,14 +312,14 @@ ClientResult run_with_device(const DeviceSpec& spec,
     if (::pipe(pipe_ends) != 0) std::abort();
     const pid_t child = ::fork();
     if (child == 0) {
-        // Root may open what nobody may: the program goes without that right.
+        // Root may open any file: the program gives up that right.
         if (spec.no_permission) {
             ::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE);
             ::prctl(PR_CAPBSET_DROP, CAP_DAC_READ_SEARCH);
         }
         ::dup2(pipe_ends[1], STDOUT_FILENO);
         ::close(pipe_ends[0]);
-        const char* before = std::getenv("SONOCASE_PRELOAD");  // a sanitizer's runtime comes first
+        const char* before = std::getenv("SONOCASE_PRELOAD");  // a sanitizer's runtime goes first
         const std::string preload =
             (before && *before ? std::string(before) + ":" : "") + "libumockdev-preload.so.0";
         ::setenv("LD_PRELOAD", preload.c_str(), 1);

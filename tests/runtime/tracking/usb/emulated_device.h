@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A USB device that is not there, under an unmodified libusb in another process: umockdev gives
-// that process a /sys and a /dev, and what it asks of the kernel is answered here. The process that
-// plays the device must run under umockdev-wrapper. See docs/usb-emulation.md.
+// An emulated USB device for an unmodified libusb in another process: umockdev gives that process a
+// /sys and a /dev, and its requests to the kernel are answered here. The process that emulates the
+// device must run under umockdev-wrapper.
 #pragma once
 
 #include <atomic>
@@ -31,16 +31,16 @@ class Firmware {
   public:
     virtual ~Firmware() = default;
     virtual void on_out(const Bytes& transfer, DevicePort& port) = 0;
-    // About every 0.2 ms, with seconds since the device was made.
+    // Called about every 0.2 ms, with the seconds since the device was made.
     virtual void on_tick(double now_s, DevicePort& port) = 0;
 };
 
 struct DeviceSpec {
     std::uint16_t vendor = 0, product = 0;
     std::uint8_t endpoint_in = 0x81, endpoint_out = 0x02;
-    bool second_alike = false;   // another of the same plugged in beside it
+    bool second_alike = false;   // another one of the same kind is plugged in too
     bool no_permission = false;  // its node cannot be opened
-    double replug_after_s = -1;  // plugged in again so long after an unplug; fresh firmware
+    double replug_after_s = -1;  // from unplugging to plugging in again; < 0: never
 };
 
 struct ClientResult {
@@ -48,8 +48,8 @@ struct ClientResult {
     std::string out;  // what it printed
 };
 
-// Plugs the device in, runs the program to its end with the device, and unplugs it. make_firmware
-// is called for every plug-in.
+// Plugs the device in, runs the program to its end, and unplugs the device. make_firmware is called
+// each time that it is plugged in.
 ClientResult run_with_device(const DeviceSpec& spec,
                              const std::function<std::unique_ptr<Firmware>()>& make_firmware,
                              const std::vector<std::string>& command);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Runs one tracker of the player for a while and prints what it saw as JSON: the other side of the
+// Runs one tracker of the player for a while and prints what it saw as JSON, for the tests with
 // emulated devices.
-//     tracker_client SPEC SECONDS [READINGS]   stops early after so many readings
+//     tracker_client SPEC SECONDS [READINGS]   ends early after so many readings
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
