@@ -66,14 +66,11 @@ Bytes encode(const TextureFile& file) {
     TextureFile copy = file;
     copy.reports = without_seconds(copy.reports);
     ThreadJobs jobs;
-    ThreadJobs jobs;
     return write_texture_file(copy, jobs);
 }
 
 Result<TextureFile> decode(const Bytes& bytes, const std::string& where) {
-    ThreadJobs jobs;
-    ThreadJobs jobs;
-    return read_texture_file(bytes, where, jobs);
+    return read_texture_file(bytes, where);
 }
 
 }  // namespace
