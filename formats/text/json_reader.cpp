@@ -204,7 +204,7 @@ bool parse_json(std::string_view text, Json& out, JsonFault& fault) {
     if (out.is_discarded()) {
         std::string what = parse_error_of(text);
         const std::size_t start = what.find("parse error");
-        what = start == std::string::npos ? "is no JSON" : what.substr(start);
+        what = start == std::string::npos ? "is not JSON" : what.substr(start);
         std::replace(what.begin(), what.end(), '\n', ' ');
         fault.error = Error{what, fault.where, "JSON is expected"};
         return false;

@@ -34,7 +34,7 @@ Result<std::vector<Landmark>> parse_landmarks(std::string_view csv, const std::s
         }
         first = false;
         if (numbers < 6) {
-            return Error{"landmark '" + row.cells[0] + "' has a coordinate that is no number", at,
+            return Error{"landmark '" + row.cells[0] + "' has a coordinate that is not a number", at,
                          expected};
         }
         landmarks.push_back(

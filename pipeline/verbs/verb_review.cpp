@@ -104,7 +104,7 @@ int verb_score(int argc, char** argv) {
     add_common_options(app, common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     const auto axis = axis_of(a.axis);
-    if (!axis) return wrong_usage("score", "--needle-axis is no direction x,y,z");
+    if (!axis) return wrong_usage("score", "--needle-axis is not a direction x,y,z");
     const auto sequence = load_recording_file(a.session);
     if (!sequence) return fail("score", sequence.error());
     SessionNames names = guess_names(*sequence);

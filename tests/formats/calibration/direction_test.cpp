@@ -132,7 +132,7 @@ TEST(Direction, FrameIsOrthonormalAndKeepsTheBetterAxis) {
     const double error = 90 * kDegree - shared.raw_angle_rad;
     EXPECT_NEAR(angle(shared.sensor_from_probe.column(2), depth.direction), error / 2, 1e-12);
     EXPECT_NEAR(angle(shared.sensor_from_probe.column(0), lateral.direction), error / 2, 1e-12);
-    // The same sweep twice is no frame.
+    // the same sweep twice is not a frame.
     EXPECT_FALSE(make_probe_frame(depth, depth).determined);
 }
 

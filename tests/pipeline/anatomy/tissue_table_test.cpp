@@ -63,7 +63,7 @@ TEST(TissueTable, UnknownLabelTakesTheDefaultAndSaysSo) {
     EXPECT_FALSE(choice.known);
     EXPECT_EQ(choice.tissue, "soft_tissue");
     EXPECT_FALSE(tissue_for_label("").known);
-    // a word inside another word is no match
+    // a word inside another word does not match
     EXPECT_FALSE(tissue_for_label("hipster").known);
 }
 

@@ -269,7 +269,7 @@ TEST(CookCase, WrongLabelsAndTissuesOfTheRecipeNameTheLine) {
     ASSERT_FALSE(tissue.has_value());
     EXPECT_EQ(tissue.error().message(),
               "coarse.toml:14: unknown tissue 'livre'; did you mean 'liver'?");
-    // A class of TotalSegmentator that this patient lacks is no fault.
+    // A class of TotalSegmentator that this patient lacks is not a fault.
     EXPECT_TRUE(
         cook_case(*coarse_recipe("[labels]\nbrain = \"liver\"\n"), shared_cache()).has_value());
 }

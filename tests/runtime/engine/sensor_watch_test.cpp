@@ -64,7 +64,7 @@ TEST(SensorWatch, TellsLostFromStale) {
     watch.observe(lost, 0, true);
     EXPECT_EQ(watch.verdict(0.1), SensorVerdict::lost);
     EXPECT_EQ(watch.verdict(1), SensorVerdict::stale);
-    // The first pose after a start without one is no jump.
+    // The first pose after a start without one is not a jump.
     watch.observe(at(500), 1.1, true);
     EXPECT_EQ(watch.verdict(1.1), SensorVerdict::fine);
 }
