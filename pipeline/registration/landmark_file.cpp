@@ -34,8 +34,8 @@ Result<std::vector<Landmark>> parse_landmarks(std::string_view csv, const std::s
         }
         first = false;
         if (numbers < 6) {
-            return Error{"landmark '" + row.cells[0] + "' has a coordinate that is not a number", at,
-                         expected};
+            return Error{"landmark '" + row.cells[0] + "' has a coordinate that is not a number",
+                         at, expected};
         }
         landmarks.push_back(
             {row.cells[0], {value[0], value[1], value[2]}, {value[3], value[4], value[5]}});
