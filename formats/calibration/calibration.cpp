@@ -41,13 +41,7 @@ Result<Calibration> parse_calibration(std::string_view json, const std::string& 
     JsonFault fault{where, {}};
     if (!detail::parse_json(json, value, fault)) return *fault.error;
     JsonObject object(value, "", fault);
-    if (object.text("format") != kFormat) {
-        object.complain("format", "is not '" + std::string(kFormat) + "'",
-                        "give a file made by sonocase calibrate");
-    }
-    if (object.integer("version", 0, INT32_MAX) > kVersion) {
-        object.complain("version", "is newer than this program", "update it or calibrate again");
-    }
+    detail::expect_format(object, kFormat, kVersion, "calibrate");
     Calibration c;
     c.kind = object.text("kind");
     if (c.kind != "probe" && c.kind != "needle" && c.kind != "mannequin") {

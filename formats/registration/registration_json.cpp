@@ -91,13 +91,7 @@ Result<Registration> parse_registration(std::string_view json, const std::string
     JsonFault fault{where, {}};
     if (!detail::parse_json(json, value, fault)) return *fault.error;
     JsonObject object(value, "", fault);
-    if (object.text("format") != kFormat) {
-        object.complain("format", "is not '" + std::string(kFormat) + "'",
-                        "give a file made by sonocase register");
-    }
-    if (object.integer("version", 0, INT32_MAX) > kVersion) {
-        object.complain("version", "is newer than this program", "update it or register again");
-    }
+    detail::expect_format(object, kFormat, kVersion, "register");
     Registration registration;
     registration.mannequin_from_ct = detail::rigid_from(object.object("mannequin_from_ct"));
     JsonObject quadratic = object.object("quadratic");

@@ -199,6 +199,16 @@ std::vector<JsonObject> JsonObject::objects(const char* key) {
     return out;
 }
 
+void expect_format(JsonObject& object, const char* format, int version, const std::string& verb) {
+    if (object.text("format") != format) {
+        object.complain("format", "is not '" + std::string(format) + "'",
+                        "give a file made by sonocase " + verb);
+    }
+    if (object.integer("version", 0, INT32_MAX) > version) {
+        object.complain("version", "is newer than this program", "update it or " + verb + " again");
+    }
+}
+
 bool parse_json(std::string_view text, Json& out, JsonFault& fault) {
     out = Json::parse(text.begin(), text.end(), nullptr, false);
     if (out.is_discarded()) {
