@@ -144,7 +144,7 @@ void flush_folder_of(const std::string& path) {
 
 }  // namespace
 
-Status expect_regular_file(const std::string& path) {
+Status expect_regular_file(const std::string& path, const std::string& expected) {
     struct stat status {};
     if (::stat(path.c_str(), &status) != 0)
         return system_error("cannot open", errno, path, "check that it may be read");
@@ -153,7 +153,7 @@ Status expect_regular_file(const std::string& path) {
                        : S_ISFIFO(status.st_mode) ? "is a pipe"
                        : S_ISSOCK(status.st_mode) ? "is a socket"
                                                   : "is a device";
-    if (what != nullptr) return Error{what, path, "expected a file"};
+    if (what != nullptr) return Error{what, path, expected};
     return Done{};
 }
 

@@ -25,7 +25,8 @@ Result<std::string> read_text_file(const std::string& path);
 // An error, in one line, unless `path` leads to a regular file: a folder, a device (/dev/zero never
 // ends), a pipe (opening one waits for its writer) or a socket. For readers that hand the path to a
 // library. /dev/stdin is accepted when the shell connects it to a file.
-Status expect_regular_file(const std::string& path);
+Status expect_regular_file(const std::string& path,
+                           const std::string& expected = "expected a file");
 
 // Writes under a temporary name in the same folder, flushes to disk and renames over `path`;
 // creates missing folders. On failure nothing is left behind and `path` keeps its old content.

@@ -68,8 +68,8 @@ class JsonObject {
     JsonFault* fault_;
 };
 
-// Complains unless the object's "format" is `format` and its "version" at most `version`. `verb` made
-// such files, "calibrate"; the complaint says to use it again.
+// Complains unless the object's "format" is `format` and its "version" at most `version`. `verb`
+// makes such files, as "calibrate" does; the complaint says to use it again.
 void expect_format(JsonObject& object, const char* format, int version, const std::string& verb);
 // Parses text into `out`; false, with a fault, when it is not a JSON object.
 bool parse_json(std::string_view text, Json& out, JsonFault& fault);

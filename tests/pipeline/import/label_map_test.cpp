@@ -285,7 +285,7 @@ TEST(ImportLabelMapRefuses, PipesAndDevicesWithoutOpeningThem) {
          {"a.nii", "a.nii.gz", "a.nrrd", "a.nhdr", "a.mha", "a.mhd", "a.labels"}) {
         const std::string pipe = folder / name;
         ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-        expect_refused(import_label_map(pipe), pipe, "is a named pipe");
+        expect_refused(import_label_map(pipe), pipe, "is a pipe");
         if (is_volume_file_name(pipe)) {
             EXPECT_EQ(voxel_bytes_in_header(pipe), 0u);
         }
