@@ -305,7 +305,7 @@ TEST(ImportLabelMapRefuses, PipesAndDevicesThatAHeaderRefersTo) {
     const std::string nrrd =
         "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4 4 4\nencoding: raw\ndata file: ";
     for (const auto& [data, what] :
-         {std::pair{"pipe.raw", "is a named pipe"}, std::pair{"zero.raw", "is a device"}}) {
+         {std::pair{"pipe.raw", "is a pipe"}, std::pair{"zero.raw", "is a device"}}) {
         for (const auto& [name, head] :
              {std::pair{"h.mhd", meta}, std::pair{"h.nhdr", nrrd}, std::pair{"h.nrrd", nrrd}}) {
             const std::string path = folder.write(name, head + data + "\n");
@@ -323,12 +323,12 @@ TEST(ImportLabelMapRefuses, FoldersThatHoldAPipe) {
     const TemporaryFolder folder;
     folder.write("slices/a.dcm", "no DICOM");
     ASSERT_EQ(mkfifo((folder / "slices/b.dcm").c_str(), 0600), 0);
-    expect_refused(import_label_map(folder / "slices"), "b.dcm", "is a named pipe");
+    expect_refused(import_label_map(folder / "slices"), "b.dcm", "is a pipe");
     TinyVolume mask = ras_volume();
     for (auto& voxel : mask.voxels) voxel = voxel != 0;
     folder.write("masks/a.nii", testing::nifti_bytes(mask));
     ASSERT_EQ(mkfifo((folder / "masks/b.nii").c_str(), 0600), 0);
-    expect_refused(import_label_map(folder / "masks"), "b.nii", "is a named pipe");
+    expect_refused(import_label_map(folder / "masks"), "b.nii", "is a pipe");
 }
 
 TEST(ImportLabelMapRefuses, EveryTruncationOfEveryFormat) {
