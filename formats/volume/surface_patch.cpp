@@ -272,7 +272,8 @@ std::vector<SurfacePatch> fit_patches(const BrickLabels& labels,
         fit.solve(c);
         for (int i = 0; i < kPatchCoefficients; ++i) {
             const double unit = (i == 0 ? 32.0 : i < 4 ? 64.0 : 128.0) / step;
-            const double most = 32767 / step;
+            const int most_steps = 32767 / step;  // whole steps that 16 bits hold
+            const double most = most_steps;
             patch.c[static_cast<std::size_t>(i)] =
                 static_cast<std::int16_t>(step * std::lround(std::clamp(unit * c[i], -most, most)));
         }
