@@ -28,9 +28,9 @@ constexpr std::uint32_t kLevels = 4096;  // equally likely values
 }  // namespace
 
 std::vector<double> normal_levels() {
-    std::vector<double> upper(kLevels / 2);
-    for (std::uint32_t i = 0; i < kLevels / 2; ++i)
-        upper[i] = inverse_normal((kLevels / 2 + i + 0.5) / kLevels);
+    constexpr std::uint32_t half = kLevels / 2;
+    std::vector<double> upper(half);
+    for (std::uint32_t i = 0; i < half; ++i) upper[i] = inverse_normal((half + i + 0.5) / kLevels);
     return upper;
 }
 

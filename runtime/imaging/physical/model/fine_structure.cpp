@@ -112,9 +112,10 @@ LabelMoments moments_of_labels(const CaseBundle& bundle, const Kinds& kinds, Job
                         ? labels.uniform[entry & ~kUniformBrick]
                         : labels.pool[static_cast<std::size_t>(entry) * kBrickVoxels + 42];
                 if (kinds.cube[label] != kFibres && !kinds.spine[label]) continue;
-                add(moments[label], Vector3{4.0 * static_cast<double>(index % row),
-                                            4.0 * static_cast<double>(index % layer / row),
-                                            4.0 * static_cast<double>(index / layer)});
+                const std::size_t i = index % row, j = index % layer / row, k = index / layer;
+                add(moments[label],
+                    Vector3{4.0 * static_cast<double>(i), 4.0 * static_cast<double>(j),
+                            4.0 * static_cast<double>(k)});
             }
         });
     // Sums of whole numbers: the same however they are divided.
