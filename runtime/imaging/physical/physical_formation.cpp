@@ -124,11 +124,11 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
     PhysicalNoise noise;
     std::optional<Result<PhysicalScene>> scene;
     jobs.run(2, [&](std::size_t job) {
-        if (job == 0) {
+        if (job == 0) {  // the longer one, on the caller's thread, whose memory it keeps
+            scene = make_physical_scene(input.bundle, input.exercise.targets, {&jobs, textures});
+        } else {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,
                                         input.scanlines + kNoiseSlack);
-        } else {
-            scene = make_physical_scene(input.bundle, input.exercise.targets, {&jobs, textures});
         }
     });
     if (!*scene) return scene->error();
