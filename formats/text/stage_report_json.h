@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Stage reports as JSON: manifests and registrations hold a list of them, a --report file holds
-// one.
+// Stage reports as JSON, their measures in an object of their own: manifests and registrations hold
+// a list of them, the stage cache single ones. A --report file is another form, with the measures
+// beside the other keys (pipeline/command_line).
 #pragma once
 
 #include <string>
@@ -14,7 +15,6 @@
 
 namespace sonocase {
 
-// A report as --report writes it.
 std::string stage_report_json(const StageReport& report);
 Result<StageReport> parse_stage_report(std::string_view json, const std::string& where);
 

@@ -18,7 +18,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json json_of(const StageReport& report) {
+// A --report file: each measure is a key beside the others.
+Json flat_json(const StageReport& report) {
     Json json;
     json["stage"] = report.stage;
     json["version"] = report.version;
@@ -157,7 +158,7 @@ Progress ProgressBar::progress() {
 }
 
 std::string report_json(const StageReport& report) {
-    return json_of(report).dump(2) + "\n";
+    return flat_json(report).dump(2) + "\n";
 }
 
 Status write_report(const CommonOptions& options, const StageReport& report) {

@@ -7,11 +7,10 @@
 #include <cassert>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <optional>
 
+#include "formats/files/atomic_file.h"
 #include "pipeline/base/counter_random.h"
 #include "pipeline/base/delimited_text.h"
 #include "pipeline/base/parallel.h"
@@ -63,13 +62,12 @@ const StandIn* stand_in_for(const std::string& texture) {
 Result<std::map<std::string, std::vector<std::string>>> read_patch_table(
     const std::string& folder) {
     const std::filesystem::path path = std::filesystem::path(folder) / "patches.csv";
-    std::ifstream in(path);
-    if (!in) {
-        return Error{"no patches.csv", folder,
+    const Result<std::string> text = read_text_file(path.string());
+    if (!text) {
+        return Error{"no patches.csv: " + text.error().what, folder,
                      "expected a table with the columns file and class beside the patches"};
     }
-    const std::vector<TextRow> rows =
-        split_rows(std::string(std::istreambuf_iterator<char>(in), {}));
+    const std::vector<TextRow> rows = split_rows(*text);
     const std::vector<std::string> header =
         rows.empty() ? std::vector<std::string>() : rows[0].cells;
     const auto file =

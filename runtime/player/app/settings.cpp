@@ -4,9 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "formats/files/atomic_file.h"
 #include "runtime/player/app/bundle_list.h"
@@ -37,11 +36,14 @@ void limit(double& value, double low, double high) {
 Settings load_settings(const std::string& path, std::string& warning) {
     Settings s;
     warning.clear();
-    std::ifstream file(path, std::ios::binary);
-    if (!file) return s;
-    std::stringstream text;
-    text << file.rdbuf();
-    const json in = json::parse(text.str(), nullptr, false);
+    std::error_code code;
+    if (!std::filesystem::exists(path, code)) return s;
+    const Result<std::string> text = read_text_file(path);
+    if (!text) {
+        warning = text.error().message() + "; the settings start from their defaults.";
+        return s;
+    }
+    const json in = json::parse(*text, nullptr, false);
     if (!in.is_object()) {
         warning = path + ": not readable as JSON; the settings start from their defaults.";
         return s;
