@@ -62,6 +62,12 @@ Vector3 combine(const DisplacementGrid& grid,
     return sum;
 }
 
+// Offset from the map's centre in its scale.
+Vector3 scaled(const QuadraticMap& map, Point3 p) {
+    return {(p.x - map.centre_mm.x) / map.scale_mm, (p.y - map.centre_mm.y) / map.scale_mm,
+            (p.z - map.centre_mm.z) / map.scale_mm};
+}
+
 }  // namespace
 
 QuadraticMap QuadraticMap::from_rigid(const Rigid& to_from, Point3 centre_mm, double scale_mm) {
@@ -79,9 +85,7 @@ QuadraticMap QuadraticMap::from_rigid(const Rigid& to_from, Point3 centre_mm, do
 }
 
 Point3 map_point(const QuadraticMap& map, Point3 p) {
-    const double u = (p.x - map.centre_mm.x) / map.scale_mm;
-    const double v = (p.y - map.centre_mm.y) / map.scale_mm;
-    const double w = (p.z - map.centre_mm.z) / map.scale_mm;
+    const auto [u, v, w] = scaled(map, p);
     Point3 out;
     for (int r = 0; r < 3; ++r) {
         const auto& k = map.coefficients[static_cast<std::size_t>(r)];
@@ -92,9 +96,7 @@ Point3 map_point(const QuadraticMap& map, Point3 p) {
 }
 
 Matrix3 jacobian(const QuadraticMap& map, Point3 p) {
-    const double u = (p.x - map.centre_mm.x) / map.scale_mm;
-    const double v = (p.y - map.centre_mm.y) / map.scale_mm;
-    const double w = (p.z - map.centre_mm.z) / map.scale_mm;
+    const auto [u, v, w] = scaled(map, p);
     Matrix3 j;
     for (int r = 0; r < 3; ++r) {
         const auto& k = map.coefficients[static_cast<std::size_t>(r)];

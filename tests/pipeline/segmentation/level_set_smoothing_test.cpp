@@ -12,10 +12,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-using sonocase::testing::count_label;
-using sonocase::testing::cubic_grid;
-using sonocase::testing::norm_of;
-using sonocase::testing::sample_labels;
+using namespace sonocase::testing;  // shapes and maps of known answer
 
 LabelVolume sphere(double radius, int edge = 32) {
     return sample_labels(cubic_grid(edge), 2,

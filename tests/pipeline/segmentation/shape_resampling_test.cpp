@@ -17,13 +17,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-using sonocase::testing::count_label;
-using sonocase::testing::cubic_grid;
-using sonocase::testing::norm_of;
-using sonocase::testing::Random;
-using sonocase::testing::rigid_registration;
-using sonocase::testing::sample_labels;
-using sonocase::testing::thick_grid;
+using namespace sonocase::testing;  // shapes and maps of known answer
 
 double percentile(std::vector<double> values, double part) {
     std::sort(values.begin(), values.end());

@@ -17,12 +17,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-using sonocase::testing::count_label;
-using sonocase::testing::cubic_grid;
-using sonocase::testing::norm_of;
-using sonocase::testing::Random;
-using sonocase::testing::rigid_registration;
-using sonocase::testing::sample_labels;
+using namespace sonocase::testing;  // shapes and maps of known answer
 
 // A ball in a ball, cut by a plane, and a tube: organs, an edge and a vessel.
 ResampleResult torso(double snap_vx) {

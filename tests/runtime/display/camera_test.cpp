@@ -14,14 +14,17 @@ Point3 seen(const Rigid& mannequin_from_camera, Point3 p) {
     return inverse(mannequin_from_camera) * p;
 }
 
+void expect_right_handed(const Rigid& r) {
+    EXPECT_NEAR(dot(cross(r.rotation.column(0), r.rotation.column(1)), r.rotation.column(2)), 1,
+                1e-12);
+}
+
 TEST(Camera, FromTheProbeThePictureIsBeforeItAndTheRightWayRound) {
     sonocase::testing::Random random(3);
     for (int i = 0; i < 50; ++i) {
         const Rigid probe = random.rigid(300);
         const Rigid camera = mannequin_from_probe_camera(probe);
-        EXPECT_NEAR(dot(cross(camera.rotation.column(0), camera.rotation.column(1)),
-                        camera.rotation.column(2)),
-                    1, 1e-12);
+        expect_right_handed(camera);
         const Point3 face = seen(camera, probe * Point3{0, 0, 0});
         const Point3 deep = seen(camera, probe * Point3{0, 0, 100});
         const Point3 mark = seen(camera, probe * Point3{30, 0, 50});
@@ -37,9 +40,7 @@ TEST(Camera, FromTheNeedleTheTipIsBeforeItAndTheWayGoesAhead) {
     for (int i = 0; i < 50; ++i) {
         const Rigid needle = random.rigid(300);
         const Rigid camera = mannequin_from_needle_camera(needle);
-        EXPECT_NEAR(dot(cross(camera.rotation.column(0), camera.rotation.column(1)),
-                        camera.rotation.column(2)),
-                    1, 1e-12);
+        expect_right_handed(camera);
         const Point3 tip = seen(camera, needle * Point3{0, 0, 0});
         const Point3 ahead = seen(camera, needle * Point3{0, 0, 60});
         EXPECT_LT(tip.z, -50);

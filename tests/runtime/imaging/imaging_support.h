@@ -70,4 +70,16 @@ inline Rigid random_pose(Random& random) {
     return {turn, {random.uniform(-20, 20), random.uniform(-10, 10), random.uniform(-4, 4)}};
 }
 
+// A random pose with a needle near its plane.
+inline FrameInput random_input(Random& random, std::uint32_t frame) {
+    FrameInput input = needle_input();
+    input.mannequin_from_probe = random_pose(random);
+    input.needle.tip =
+        input.mannequin_from_probe *
+        Point3{random.uniform(-20, 20), random.uniform(-1, 1), random.uniform(20, 90)};
+    input.needle.direction = random.direction();
+    input.frame = frame;
+    return input;
+}
+
 }  // namespace sonocase::runtime

@@ -52,13 +52,7 @@ TEST(PaperModel, BeamSpaceAgreesWithTheLiteralRendererEffectByEffect) {
 TEST(PaperModel, AgreementHoldsOverRandomPosesAndProbes) {
     for (std::uint64_t seed = 1; seed <= 6; ++seed) {
         Random random(seed);
-        FrameInput input = needle_input();
-        input.mannequin_from_probe = random_pose(random);
-        input.needle.tip =
-            input.mannequin_from_probe *
-            Point3{random.uniform(-20, 20), random.uniform(-1, 1), random.uniform(20, 90)};
-        input.needle.direction = random.direction();
-        input.frame = static_cast<std::uint32_t>(seed);
+        FrameInput input = random_input(random, static_cast<std::uint32_t>(seed));
         input.settings.gain_db = random.uniform(-3, 3);
         Exercise exercise = phantom_exercise();
         exercise.probe.shape = static_cast<ProbeShape>(seed % 3);

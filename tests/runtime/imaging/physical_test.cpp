@@ -81,13 +81,7 @@ TEST(PhysicalModel, AgreementHoldsOverRandomPosesProbesAndBundles) {
     const CaseBundle other = Phantom(plain).bundle();
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
         Random random(seed);
-        FrameInput input = needle_input();
-        input.mannequin_from_probe = random_pose(random);
-        input.needle.tip =
-            input.mannequin_from_probe *
-            Point3{random.uniform(-20, 20), random.uniform(-1, 1), random.uniform(20, 90)};
-        input.needle.direction = random.direction();
-        input.frame = static_cast<std::uint32_t>(seed);
+        FrameInput input = random_input(random, static_cast<std::uint32_t>(seed));
         input.settings.gain_db = random.uniform(-6, 6);
         input.settings.dynamic_range_db = random.uniform(40, 80);
         Exercise exercise = seed % 4 == 3 ? phantom_linear_exercise() : phantom_exercise();

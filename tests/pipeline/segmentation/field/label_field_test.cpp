@@ -15,11 +15,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-using sonocase::testing::cubic_grid;
-using sonocase::testing::norm_of;
-using sonocase::testing::Random;
-using sonocase::testing::sample_labels;
-using sonocase::testing::thick_grid;
+using namespace sonocase::testing;  // shapes and maps of known answer
 
 // Balls in a ball, one of them in two layers, and a rod one voxel thick: three to five labels at
 // many places.

@@ -15,12 +15,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-using sonocase::testing::count_label;
-using sonocase::testing::cubic_grid;
-using sonocase::testing::norm_of;
-using sonocase::testing::Random;
-using sonocase::testing::rigid_registration;
-using sonocase::testing::sample_labels;
+using namespace sonocase::testing;  // shapes and maps of known answer
 
 TEST(CookedGrid, HoldsTheWarpedBodyAndNotMuchMore) {
     const std::uint64_t seed = 3;
