@@ -6,22 +6,13 @@
 #include <cassert>
 #include <cmath>
 
+#include "formats/base/falling_exponential.h"
 #include "runtime/imaging/press/press_law.h"
 
 namespace sonocase::runtime::press {
 namespace {
 
 constexpr double kSideFade_mm = 20;
-
-// e^-q for q >= 0 by halvings, squared back: plain arithmetic, the same on every platform; relative
-// error 1e-7.
-double fading(double q) {
-    if (q > 60) return 0;
-    const double x = -q / 256;
-    double e = 1 + x * (1 + x / 2 * (1 + x / 3 * (1 + x / 4)));
-    for (int i = 0; i < 8; ++i) e *= e;
-    return e;
-}
 
 // A plane of numbers under the columns, between them; row may be a fraction.
 template <int kHeight>
@@ -122,8 +113,8 @@ Point3 PressField::pull_back(Point3 pressed) const {
             const double skin = skin_mm(face_, work_->samples, p.lateral_mm + shift.lateral_mm);
             const double below = std::max(0.0, depth_mm + shift.depth_mm - skin);
             const double w = fade_width_mm(face_.half_height_mm, below);
-            share = fading(y2 / (2 * w * w));
-            sideways = fading(y2 / (2 * w * w * kLateralFade * kLateralFade));
+            share = falling_exponential(y2 / (2 * w * w));
+            sideways = falling_exponential(y2 / (2 * w * w * kLateralFade * kLateralFade));
             end_mm = depth_mm + (1 - share) * shift.depth_mm;
         };
         double low = p.depth_mm - kReach_mm, high = p.depth_mm + 2 * kReach_mm, end = 0;
