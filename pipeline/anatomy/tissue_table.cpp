@@ -73,6 +73,10 @@ const std::vector<Tissue>& table() {
          "speed " S3 "; echo, attenuation, impedance (a)"},
         {"blood", kFluid, false, "fluid", 15, 5, -30, 0, 0.15, 1.61, 1570,
          "attenuation " S1 "; impedance, speed (a); lumen grey 0 to 58 in example images"},
+        // Blood whose vessel a recipe names: the label's own name may not say it.
+        {"vein", kFluid, false, "fluid", 15, 5, -30, 0, 0.15, 1.61, 1570, "as blood"},
+        {"artery", kFluid, false, "fluid", 15, 5, -30, 0, 0.15, 1.61, 1570, "as blood"},
+        {"thrombus", kSoft, false, "gland", 62, 14, -11, 1.5, 0.25, 1.63, 1580, "all (a)"},
         {"urine", kFluid, false, "fluid", 6, 3, -60, 0, 0.01, 1.52, 1500,
          "water " S1 " 0.0022; all (a)"},
         {"bile", kFluid, false, "fluid", 8, 3, -60, 0, 0.01, 1.52, 1500,

@@ -10,6 +10,7 @@
 
 #include "formats/exercise/exercise.h"
 #include "formats/files/atomic_file.h"
+#include "formats/volume/tissue_mechanics.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -75,6 +76,29 @@ std::string budget_text(const ErrorBudget& budget, const NextStep& next) {
             line("  next: %s, from %.2f to %.2f mm on the synthetic bodies for %.0f s more",
                  next.settings.c_str(), next.error_from_mm, next.error_to_mm, next.more_seconds);
     return text;
+}
+
+// Of a label and not of a tissue: veins and arteries may share one.
+TissueMechanics label_mechanics(const CaseBundle& bundle, std::size_t label) {
+    for (const Tissue& tissue : bundle.tissues)
+        if (tissue.name == bundle.labels[label].tissue)
+            return mechanics_of(tissue, bundle.labels[label].name);
+    return {};
+}
+
+Json mechanics_json(const TissueMechanics& m) {
+    return {{"stiffness_kpa", m.stiffness_kpa},
+            {"drains", m.drains},
+            {"puncture_n", m.puncture_n},
+            {"rigid", m.rigid}};
+}
+
+std::string mechanics_text(const TissueMechanics& m) {
+    std::array<char, 64> text{};
+    if (m.rigid) return "   rigid";
+    std::snprintf(text.data(), text.size(), "%8.4g%8.4g%s", m.stiffness_kpa, m.puncture_n,
+                  m.drains ? "  drains" : "");
+    return text.data();
 }
 
 Json tissue_json(const Tissue& tissue) {
@@ -164,6 +188,7 @@ std::string inspection_json(const CaseBundle& bundle, const Inspection& inspecti
         json["labels"].push_back({{"index", i},
                                   {"name", bundle.labels[i].name},
                                   {"tissue", bundle.labels[i].tissue},
+                                  {"mechanics", mechanics_json(label_mechanics(bundle, i))},
                                   {"volume_ml", volumes.ml[i]}});
     json["tissues"] = Json::array();
     for (const Tissue& tissue : bundle.tissues) json["tissues"].push_back(tissue_json(tissue));
@@ -210,10 +235,12 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
                  grid.origin_mm.y, grid.origin_mm.z);
     text += line("  surfaces   patient %zu points, mannequin %zu points",
                  bundle.patient_skin.points.size(), bundle.mannequin_skin.points.size());
-    text += line("\nlabels (%zu)%28s%16s", bundle.labels.size() - 1, "tissue", "ml");
+    text +=
+        line("\nlabels (%zu)%28s%27s%8s%8s", bundle.labels.size() - 1, "tissue", "ml", "kPa", "N");
     for (std::size_t i = 1; i < bundle.labels.size(); ++i)
-        text += line("  %3zu  %-32s %-22s %10.2f", i, bundle.labels[i].name.c_str(),
-                     bundle.labels[i].tissue.c_str(), volumes.ml[i]);
+        text += line("  %3zu  %-32s %-22s %10.2f%s", i, bundle.labels[i].name.c_str(),
+                     bundle.labels[i].tissue.c_str(), volumes.ml[i],
+                     mechanics_text(label_mechanics(bundle, i)).c_str());
     text += line("\ntissues (%zu)              echo dB  dB/cm/MHz  MRayl  kind     texture",
                  bundle.tissues.size() - 1);
     for (std::size_t i = 1; i < bundle.tissues.size(); ++i) {

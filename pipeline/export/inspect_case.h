@@ -32,7 +32,8 @@ struct Inspection {
 };
 
 // {"case", "producer", "bytes", "digest", "grid": {"size", "voxel_mm", "origin_mm"}, "labels":
-// [{"index", "name", "tissue", "volume_ml"}], "tissues": [...], "stages": [{"name", "version",
+// [{"index", "name", "tissue", "mechanics": {"stiffness_kpa", "drains", "puncture_n", "rigid"},
+// "volume_ml"}], "tissues": [...], "stages": [{"name", "version",
 // "seconds", "errors": {measure: value}, "warnings"}], "error_budget": {"entries": [{"stage",
 // "cause", "mm" or null, "basis"}], "known_mm", "next": null or {"settings", "error_from_mm",
 // "error_to_mm", "more_seconds"}}, "exercises", "inputs", "surfaces", "textures", "has"}.

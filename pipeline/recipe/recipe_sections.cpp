@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "formats/volume/tissue_mechanics.h"
+
 namespace sonocase::pipeline {
 namespace {
 
@@ -18,6 +20,17 @@ Tissue* find_tissue(std::vector<Tissue>& tissues, const std::string& name) {
     return found == tissues.end() ? nullptr : &*found;
 }
 
+// Figures that the recipe leaves out stay as built in, for a tissue whose label says nothing.
+void read_mechanics(const TomlTable& table, Tissue& tissue) {
+    TissueMechanics m = mechanics_of(tissue, "");
+    bool given =
+        table.number("stiffness_kpa", m.stiffness_kpa, kLeastStiffnessKpa, kGreatestStiffnessKpa);
+    given |= table.flag("drains", m.drains);
+    given |= table.number("puncture_n", m.puncture_n, 0, kGreatestPunctureN);
+    given |= table.flag("rigid", m.rigid);
+    if (given) tissue.mechanics = m;
+}
+
 void read_tissue(const TomlTable& table, const std::string& name, std::vector<Tissue>& tissues) {
     const Tissue* start = find_tissue(tissues, name);
     if (start == nullptr) start = find_tissue(tissues, "soft_tissue");
@@ -26,7 +39,11 @@ void read_tissue(const TomlTable& table, const std::string& name, std::vector<Ti
     std::vector<std::string> names;
     for (const Tissue& known : tissues) names.push_back(known.name);
     std::string like;
-    if (table.text("like", like, names)) tissue = *find_tissue(tissues, like);
+    if (table.text("like", like, names)) {
+        tissue = *find_tissue(tissues, like);
+        // A vein by another name stays one: blood alone is told apart by its labels.
+        if (like != "blood") tissue.mechanics = mechanics_of(tissue, "");
+    }
     tissue.name = name;
     if (const auto kind = table.choice("kind", {"outside", "soft", "fluid", "gas", "bone"}))
         tissue.kind = static_cast<TissueKind>(*kind);
@@ -40,6 +57,7 @@ void read_tissue(const TomlTable& table, const std::string& name, std::vector<Ti
     table.number("attenuation_db_cm_mhz", tissue.attenuation_db_cm_mhz, 0, 100);
     table.number("impedance_mrayl", tissue.impedance_mrayl, 0, 20);
     table.number("sound_speed_m_s", tissue.sound_speed_m_s, 100, 6000);
+    read_mechanics(table, tissue);
     table.finish();
     if (Tissue* known = find_tissue(tissues, name))
         *known = tissue;

@@ -40,6 +40,14 @@ Result<StageValue> run(StageInputs& inputs, const Progress&) {
     return StageValue::of(std::move(result));
 }
 
+// Empty for a tissue without figures of its own, whose bundle holds none either.
+std::string mechanics_text(const Tissue& tissue) {
+    if (!tissue.mechanics) return {};
+    const TissueMechanics& m = *tissue.mechanics;
+    return key_text("mechanics",
+                    {m.stiffness_kpa, m.drains ? 1.0 : 0.0, m.puncture_n, m.rigid ? 1.0 : 0.0});
+}
+
 std::string palette_text(const std::vector<Label>& palette) {
     std::string text;
     for (const Label& label : palette) text += label.name + "=" + label.tissue + "\n";
@@ -78,7 +86,7 @@ std::string tissues_text(const std::vector<Tissue>& tissues) {
                 key_text("", {static_cast<double>(t.kind), t.casts_shadow ? 1.0 : 0.0, t.grey_mean,
                               t.grey_sd, t.echo_db, t.structure_db, t.attenuation_db_cm_mhz,
                               t.impedance_mrayl, t.sound_speed_m_s}) +
-                "\n";
+                mechanics_text(t) + "\n";
     return text;
 }
 

@@ -10,6 +10,30 @@ namespace {
 
 constexpr const char* kTissueKinds[] = {"outside", "soft", "fluid", "gas", "bone"};
 
+// Written only where a recipe gave figures: the others come from the table of the program that
+// reads, and bundles without them stay as they were, byte for byte.
+Json json_of(const TissueMechanics& m) {
+    Json out = Json::object();
+    out["stiffness_kpa"] = m.stiffness_kpa;
+    out["drains"] = m.drains;
+    out["puncture_n"] = m.puncture_n;
+    out["rigid"] = m.rigid;
+    return out;
+}
+
+TissueMechanics mechanics_from(JsonObject object) {
+    TissueMechanics m;
+    m.stiffness_kpa = object.number("stiffness_kpa");
+    m.drains = object.flag_or("drains", false);
+    m.puncture_n = object.number_or("puncture_n", m.puncture_n);
+    m.rigid = object.flag_or("rigid", false);
+    if (!(m.stiffness_kpa >= kLeastStiffnessKpa && m.stiffness_kpa <= kGreatestStiffnessKpa))
+        object.complain("stiffness_kpa", "is out of range", "0.05 to 10000 kPa");
+    if (!(m.puncture_n >= 0 && m.puncture_n <= kGreatestPunctureN))
+        object.complain("puncture_n", "is out of range", "0 to 100 N");
+    return m;
+}
+
 }  // namespace
 
 Json json_of(const Grid& grid) {
@@ -104,6 +128,7 @@ Json json_of(const std::vector<Tissue>& tissues) {
         item["impedance_mrayl"] = t.impedance_mrayl;
         item["sound_speed_m_s"] = t.sound_speed_m_s;
         item["source"] = t.source;
+        if (t.mechanics) item["mechanics"] = json_of(*t.mechanics);
         out.push_back(std::move(item));
     }
     return out;
@@ -133,6 +158,7 @@ std::vector<Tissue> tissues_from(JsonObject& object, const char* key) {
         t.impedance_mrayl = item.number_or("impedance_mrayl", t.impedance_mrayl);
         t.sound_speed_m_s = item.number_or("sound_speed_m_s", t.sound_speed_m_s);
         t.source = item.text_or("source", "");
+        if (item.has("mechanics")) t.mechanics = mechanics_from(item.object("mechanics"));
         tissues.push_back(std::move(t));
     }
     return tissues;

@@ -62,6 +62,7 @@ void expect_same(const CaseBundle& a, const CaseBundle& b) {
         EXPECT_EQ(s.casts_shadow, t.casts_shadow);
         EXPECT_EQ(s.texture, t.texture);
         EXPECT_EQ(s.source, t.source);
+        EXPECT_EQ(s.mechanics, t.mechanics);
         EXPECT_EQ(std::tie(s.grey_mean, s.grey_sd, s.echo_db, s.structure_db,
                            s.attenuation_db_cm_mhz, s.impedance_mrayl, s.sound_speed_m_s),
                   std::tie(t.grey_mean, t.grey_sd, t.echo_db, t.structure_db,
@@ -312,6 +313,38 @@ TEST(CaseBundle, ContentsThatWouldBreakTheRendererAreRefused) {
     b = tiny_case();
     b.labels.clear();
     expect_refused(b, "1 to 255");
+}
+
+std::string manifest_with(const std::string& mechanics) {
+    return R"({"grid":{"size":[1,1,1],"spacing_mm":[1,1,1],"origin_mm":[0,0,0],)"
+           R"("direction":[1,0,0,0,1,0,0,0,1]},"labels":[{"name":"o","tissue":"t"}],)"
+           R"("tissues":[{"name":"t","kind":"soft","mechanics":)" +
+           mechanics + R"(}],"textures":[],"speckle_edge":0})";
+}
+
+TEST(CaseBundle, ATissuesMechanicsComeBackAndImpossibleOnesAreRefusedByName) {
+    CaseBundle bundle = tiny_case();
+    const Bytes without = write_bundle(bundle);
+    bundle.tissues[1].mechanics = TissueMechanics{0.6, true, 0.4, false};
+    const auto back = read_bundle(write_bundle(bundle), "a");
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(bundle, *back);
+    // Where no recipe gave figures nothing is written: older bundles keep their bytes.
+    const std::string text(without.begin(), without.end());
+    EXPECT_EQ(text.find("stiffness"), std::string::npos);
+    for (const char* bad :
+         {R"({"stiffness_kpa":0})", R"({"stiffness_kpa":null})", R"({"stiffness_kpa":-3})",
+          R"({"stiffness_kpa":1e5})", R"({"drains":true})", R"({"stiffness_kpa":"soft"})",
+          R"({"stiffness_kpa":8,"puncture_n":-1})", R"({"stiffness_kpa":8,"puncture_n":101})",
+          "[]"}) {
+        const std::string manifest = manifest_with(bad);
+        ChunkWriter writer("CASE");
+        writer.add("manifest", true, Bytes(manifest.begin(), manifest.end()));
+        const auto refused = read_bundle(writer.write(), "bad");
+        ASSERT_FALSE(refused) << bad;
+        EXPECT_NE(refused.error().message().find("mechanics"), std::string::npos)
+            << refused.error().message();
+    }
 }
 
 TEST(CaseBundle, RandomBytesInAManifestNeverCrash) {

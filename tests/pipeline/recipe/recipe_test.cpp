@@ -80,6 +80,23 @@ TEST(Recipe, NewTissueStartsFromAnother) {
     EXPECT_EQ(recipe->tissues.back().texture, "liver");
 }
 
+TEST(Recipe, MechanicsStartFromTheTissueAndAreAbsentWhereNothingIsSaid) {
+    const auto of = [](const std::string& text) {
+        const auto recipe = parse(with(text));
+        EXPECT_TRUE(recipe) << recipe.error().message();
+        return recipe->tissues.back();
+    };
+    EXPECT_EQ(of("[tissues.firm]\nlike = \"liver\"\nstiffness_kpa = 20").mechanics,
+              (TissueMechanics{20, false, 0.1, false}));
+    EXPECT_EQ(of("[tissues.fatty_liver]\nlike = \"liver\"").mechanics,
+              (TissueMechanics{6, false, 0.1, false}));
+    EXPECT_EQ(of("[tissues.graft]\nlike = \"vein\"\npuncture_n = 2").mechanics,
+              (TissueMechanics{0.6, true, 2, false}));
+    EXPECT_EQ(of("[tissues.plain]\necho_db = 1").mechanics, std::nullopt);
+    const auto recipe = parse(kGood);
+    for (const Tissue& tissue : recipe->tissues) EXPECT_FALSE(tissue.mechanics) << tissue.name;
+}
+
 TEST(Recipe, EveryFaultNamesFileLineKeyAndWhatWouldDo) {
     struct Case {
         const char* line;
@@ -96,6 +113,10 @@ TEST(Recipe, EveryFaultNamesFileLineKeyAndWhatWouldDo) {
              {"[tissues.liver2]\necho = 1", "tissues.liver2.echo", "echo_db"},
              {"[tissues.liver2]\nlike = \"livr\"", "livr", "did you mean 'liver'?"},
              {"[tissues.liver2]\nkind = \"sofd\"", "sofd", "did you mean 'soft'?"},
+             {"[tissues.liver2]\nstiffness_kpa = 0", "stiffness_kpa", "0.05 to 10000"},
+             {"[tissues.liver2]\nstiffness_kpa = nan", "stiffness_kpa", "0.05 to 10000"},
+             {"[tissues.liver2]\npuncture_n = -1", "puncture_n", "0 to 100"},
+             {"[tissues.liver2]\ndrains = 1", "drains", "true or false"},
              {"follow_shift = 1", "1", "true or false"},
          }) {
         const auto recipe = parse(with(c.line));

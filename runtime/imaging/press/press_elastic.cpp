@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/press/press_elastic.h"
+
+#include <algorithm>
+#include <array>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "press_elastic.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// After them: included again for each instruction set.
+#include "runtime/imaging/press/press_law-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace sonocase::runtime::press::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// At most 16 lanes, so that the columns are a whole number of groups.
+using Lanes = hn::CappedTag<float, 16>;
+
+// One number per column, added up by halves: the same order for any number of lanes.
+float sum_columns(std::array<float, kColumns>& each) {
+    for (std::size_t half = kColumns / 2; half >= 3; half /= 2)
+        for (std::size_t i = 0; i < half; ++i) each[i] += each[i + half];
+    return (each[0] + each[1]) + each[2];
+}
+
+// 1 / (E B) of every part of a row.
+void set_compliance(const PressSamples& s, const PressFace& face, PressElastic& w) {
+    const Lanes d;
+    const auto one = hn::Set(d, 1.0f);
+    const auto inverse_a2 =
+        hn::Set(d, static_cast<float>(1 / (face.half_height_mm * face.half_height_mm)));
+    for (int j = 0; j < kFineRows; ++j) {
+        const double t = row_middle(j / kParts);
+        const auto inverse_t2 = hn::Set(d, static_cast<float>(1 / (t * t)));
+        for_columns(d, [&](int i) HWY_ATTR {
+            const auto b2 = hn::Div(one, hn::Add(inverse_a2, hn::LoadU(d, s.edge.data() + i)));
+            const auto tissue = hn::Sub(one, hn::LoadU(d, s.drains.row(j) + i));
+            const auto bracket = hn::Add(one, hn::Mul(tissue, hn::Mul(b2, inverse_t2)));
+            hn::StoreU(hn::Div(one, hn::Mul(hn::LoadU(d, s.stiffness_kpa.row(j) + i), bracket)), d,
+                       w.compliance.row(j) + i);
+        });
+    }
+}
+
+// Couplings beside each other and to the foundation, which are the same in every increment.
+void set_couplings(const PressSamples& s, const PressFace& face, PressElastic& w) {
+    const Lanes d;
+    const double h = column_width_mm(face);
+    std::array<float, kRows> beside{}, below{};
+    for (int k = 0; k < kRows; ++k) {
+        const double t = row_middle(k), width = field_width_mm(face.half_height_mm, t);
+        const double spread = face.radius_mm > 0 ? 1 + t / face.radius_mm : 1;
+        // Half of a cell's share for the node above it and half for the one below; half of the sum
+        // of two columns.
+        beside[static_cast<std::size_t>(k)] =
+            static_cast<float>(0.25 * width * kShear * row_height(k) / (h * spread));
+        below[static_cast<std::size_t>(k)] =
+            static_cast<float>(0.5 * kFoundation / width * row_height(k) * h * spread);
+    }
+    for (int k = 0; k < kRows; ++k) {
+        const int above = std::max(k - 1, 0);
+        const float share = k == 0 ? 0.0f : 1.0f;
+        const auto beside_here = hn::Set(d, beside[static_cast<std::size_t>(k)]);
+        const auto beside_above = hn::Set(d, share * beside[static_cast<std::size_t>(above)]);
+        const auto below_here = hn::Set(d, below[static_cast<std::size_t>(k)]);
+        const auto below_above = hn::Set(d, share * below[static_cast<std::size_t>(above)]);
+        for_columns(d, [&](int i) HWY_ATTR {
+            const auto here = hn::LoadU(d, s.lateral_kpa.row(k) + i);
+            const auto up = hn::LoadU(d, s.lateral_kpa.row(above) + i);
+            const auto pair = hn::Add(here, hn::LoadU(d, s.lateral_kpa.row(k) + i + 1));
+            const auto up_pair = hn::Add(up, hn::LoadU(d, s.lateral_kpa.row(above) + i + 1));
+            hn::StoreU(hn::Add(hn::Mul(beside_here, pair), hn::Mul(beside_above, up_pair)), d,
+                       w.right.row(k) + i);
+            hn::StoreU(hn::Add(hn::Mul(below_here, here), hn::Mul(below_above, up)), d,
+                       w.ground.row(k) + i);
+        });
+        w.right.row(k)[kColumns - 1] = 0;
+    }
+    for (int i = 0; i < kColumns; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        for (int k = 0; k < kRows; ++k)
+            w.free.row(k)[i] = k < s.fixed_row[at] && !(k == 0 && s.touching[at]) ? 1.0f : 0.0f;
+    }
+}
+
+// Modulus of every row at the stress reached: a row is its parts in series. Then the pivots of each
+// column by itself.
+void set_moduli(const PressSamples& s, const PressFace& face, PressElastic& w) {
+    const Lanes d;
+    const auto one = hn::Set(d, 1.0f), quarter = hn::Set(d, 1.0f / kParts);
+    for (int k = 0; k < kRows; ++k) {
+        const double t = row_middle(k), spread = face.radius_mm > 0 ? 1 + t / face.radius_mm : 1;
+        const auto scale =
+            hn::Set(d, static_cast<float>(field_width_mm(face.half_height_mm, t) *
+                                          column_width_mm(face) * spread / row_height(k)));
+        for_columns(d, [&](int i) HWY_ATTR {
+            const auto stress = hn::LoadU(d, w.stress_kpa.row(k) + i);
+            auto yielding = hn::Zero(d);
+            for (int j = k * kParts; j < (k + 1) * kParts; ++j) {
+                const auto compliance = hn::LoadU(d, w.compliance.row(j) + i);
+                const auto strain = hn::Mul(stress, compliance);
+                auto slope = tissue_stretch(d, strain).slope;
+                if (s.lumen[static_cast<std::size_t>(j)])
+                    slope = mix(d, slope, lumen_stretch(d, strain).slope,
+                                hn::LoadU(d, s.drains.row(j) + i));
+                yielding = hn::Add(yielding, hn::Mul(slope, compliance));
+            }
+            hn::StoreU(hn::Div(scale, hn::Mul(yielding, quarter)), d, w.down.row(k) + i);
+        });
+    }
+    for (int k = 0; k < kRows; ++k)
+        for_columns(d, [&](int i) HWY_ATTR {
+            const auto right = hn::LoadU(d, w.right.row(k) + i);
+            const auto left = hn::LoadU(d, w.right.row(k) + i - 1);
+            auto pivot = hn::Add(hn::Add(hn::LoadU(d, w.down.row(k) + i), hn::Add(left, right)),
+                                 hn::LoadU(d, w.ground.row(k) + i));
+            if (k > 0) {
+                const auto up = hn::LoadU(d, w.down.row(k - 1) + i);
+                const auto both = hn::Mul(up, hn::LoadU(d, w.free.row(k - 1) + i));
+                pivot = hn::Sub(hn::Add(pivot, up),
+                                hn::Mul(hn::Mul(both, up), hn::LoadU(d, w.pivot.row(k - 1) + i)));
+            }
+            hn::StoreU(hn::Div(one, pivot), d, w.pivot.row(k) + i);
+        });
+}
+
+// out = A v, where it moves; returns v . A v.
+float apply(const PressElastic& w, const Plane<kRows + 1>& v, Plane<kRows>& out) {
+    const Lanes d;
+    std::array<float, kColumns> each{};
+    for_columns(d, [&](int i) HWY_ATTR {
+        auto sum = hn::Zero(d);
+        for (int k = 0; k < kRows; ++k) {
+            const float* row = v.row(k) + i;
+            const auto here = hn::LoadU(d, row);
+            const auto right =
+                hn::Mul(hn::LoadU(d, w.right.row(k) + i), hn::Sub(here, hn::LoadU(d, row + 1)));
+            const auto left =
+                hn::Mul(hn::LoadU(d, w.right.row(k) + i - 1), hn::Sub(here, hn::LoadU(d, row - 1)));
+            const auto down = hn::Mul(hn::LoadU(d, w.down.row(k) + i),
+                                      hn::Sub(here, hn::LoadU(d, v.row(k + 1) + i)));
+            auto force = hn::Add(hn::Add(right, left),
+                                 hn::Add(down, hn::Mul(hn::LoadU(d, w.ground.row(k) + i), here)));
+            if (k > 0)
+                force = hn::Add(force, hn::Mul(hn::LoadU(d, w.down.row(k - 1) + i),
+                                               hn::Sub(here, hn::LoadU(d, v.row(k - 1) + i))));
+            force = hn::Mul(force, hn::LoadU(d, w.free.row(k) + i));
+            hn::StoreU(force, d, out.row(k) + i);
+            sum = hn::Add(sum, hn::Mul(force, here));
+        }
+        hn::StoreU(sum, d, each.data() + i);
+    });
+    return sum_columns(each);
+}
+
+// relaxed = the residual with every column solved by itself; returns residual . relaxed.
+float relax(PressElastic& w) {
+    const Lanes d;
+    for (int k = 0; k < kRows; ++k)
+        for_columns(d, [&](int i) HWY_ATTR {
+            auto force = hn::LoadU(d, w.residual.row(k) + i);
+            if (k > 0)
+                force = hn::Add(force, hn::Mul(hn::LoadU(d, w.down.row(k - 1) + i),
+                                               hn::LoadU(d, w.relaxed.row(k - 1) + i)));
+            hn::StoreU(hn::Mul(hn::Mul(force, hn::LoadU(d, w.pivot.row(k) + i)),
+                               hn::LoadU(d, w.free.row(k) + i)),
+                       d, w.relaxed.row(k) + i);
+        });
+    std::array<float, kColumns> each{};
+    for (int k = kRows - 1; k >= 0; --k)
+        for_columns(d, [&](int i) HWY_ATTR {
+            auto value = hn::LoadU(d, w.relaxed.row(k) + i);
+            if (k + 1 < kRows) {
+                const auto pull = hn::Mul(hn::LoadU(d, w.down.row(k) + i),
+                                          hn::LoadU(d, w.relaxed.row(k + 1) + i));
+                value = hn::Add(value, hn::Mul(hn::Mul(pull, hn::LoadU(d, w.pivot.row(k) + i)),
+                                               hn::LoadU(d, w.free.row(k) + i)));
+                hn::StoreU(value, d, w.relaxed.row(k) + i);
+            }
+            const auto sum = hn::LoadU(d, each.data() + i);
+            hn::StoreU(hn::Add(sum, hn::Mul(value, hn::LoadU(d, w.residual.row(k) + i))), d,
+                       each.data() + i);
+        });
+    return sum_columns(each);
+}
+
+// to = to + scale * by
+template <int kTo, int kBy>
+HWY_INLINE void add_scaled(Plane<kTo>& to, float scale, const Plane<kBy>& by) {
+    const Lanes d;
+    const auto s = hn::Set(d, scale);
+    for (int k = 0; k < kRows; ++k)
+        for_columns(d, [&](int i) HWY_ATTR {
+            hn::StoreU(
+                hn::Add(hn::LoadU(d, to.row(k) + i), hn::Mul(s, hn::LoadU(d, by.row(k) + i))), d,
+                to.row(k) + i);
+        });
+}
+
+void solve_increment(int iterations, PressElastic& w) {
+    const Lanes d;
+    (void)apply(w, w.shift, w.residual);
+    for (int k = 0; k < kRows; ++k)
+        for_columns(d, [&](int i) HWY_ATTR {
+            hn::StoreU(hn::Neg(hn::LoadU(d, w.residual.row(k) + i)), d, w.residual.row(k) + i);
+            hn::StoreU(hn::Zero(d), d, w.search.row(k) + i);
+        });
+    float before = 0;
+    for (int n = 0; n < iterations; ++n) {
+        const float now = relax(w);
+        if (!(now > 1e-12f)) return;
+        const float keep = n == 0 ? 0.0f : now / before;
+        before = now;
+        const auto kept = hn::Set(d, keep);
+        for (int k = 0; k < kRows; ++k)
+            for_columns(d, [&](int i) HWY_ATTR {
+                hn::StoreU(hn::Add(hn::LoadU(d, w.relaxed.row(k) + i),
+                                   hn::Mul(kept, hn::LoadU(d, w.search.row(k) + i))),
+                           d, w.search.row(k) + i);
+            });
+        const float curvature = apply(w, w.search, w.product);
+        if (!(curvature > 0)) return;
+        add_scaled(w.shift, now / curvature, w.search);
+        add_scaled(w.residual, -(now / curvature), w.product);
+        ++w.iterations_done;
+    }
+}
+
+// The stress that the increment's strain adds at the moduli it was solved with.
+void add_stress(const PressFace& face, PressElastic& w) {
+    const Lanes d;
+    for (int k = 0; k < kRows; ++k) {
+        const double t = row_middle(k), spread = face.radius_mm > 0 ? 1 + t / face.radius_mm : 1;
+        const auto scale =
+            hn::Set(d, static_cast<float>(1 / (field_width_mm(face.half_height_mm, t) *
+                                               column_width_mm(face) * spread)));
+        for_columns(d, [&](int i) HWY_ATTR {
+            const auto squeeze =
+                hn::Sub(hn::LoadU(d, w.shift.row(k) + i), hn::LoadU(d, w.shift.row(k + 1) + i));
+            const auto added = hn::Mul(hn::Mul(hn::LoadU(d, w.down.row(k) + i), scale), squeeze);
+            hn::StoreU(hn::Add(hn::LoadU(d, w.stress_kpa.row(k) + i), added), d,
+                       w.stress_kpa.row(k) + i);
+        });
+    }
+}
+
+void solve(const PressSamples& s,
+           const PressFace& face,
+           const PressSolveOptions& options,
+           PressElastic& w) {
+    set_compliance(s, face, w);
+    set_couplings(s, face, w);
+    w.stress_kpa.values.fill(0);
+    w.shift.values.fill(0);
+    w.iterations_done = 0;
+    for (int i = 0; i < kColumns; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        if (s.touching[at])
+            w.shift.row(0)[i] = s.pressed_mm[at] / static_cast<float>(options.increments);
+    }
+    for (int n = 0; n < options.increments; ++n) {
+        set_moduli(s, face, w);
+        solve_increment(n == 0 ? options.first_iterations : options.iterations, w);
+        add_stress(face, w);
+    }
+}
+
+}  // namespace sonocase::runtime::press::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace sonocase::runtime::press {
+
+HWY_EXPORT(solve);
+
+void solve_press(SimdTarget simd,
+                 const PressSamples& samples,
+                 const PressFace& face,
+                 const PressSolveOptions& options,
+                 PressElastic& work) {
+    HWY_DISPATCH_TABLE(solve)[simd.index](samples, face, options, work);
+}
+
+}  // namespace sonocase::runtime::press
+#endif

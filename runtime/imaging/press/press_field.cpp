@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/press/press_field.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "formats/base/falling_exponential.h"
+#include "runtime/imaging/press/press_law.h"
+
+namespace sonocase::runtime::press {
+namespace {
+
+constexpr double kSideFade_mm = 20;
+
+// A plane of numbers under the columns, between them; row may be a fraction.
+template <int kHeight>
+double between(const Plane<kHeight>& plane, double column, double row) {
+    const double x = std::clamp(column, 0.0, kColumns - 1.0);
+    const double r = std::clamp(row, 0.0, kHeight - 1.0);
+    const int i = std::min(static_cast<int>(x), kColumns - 2);
+    const int m = std::min(static_cast<int>(r), kHeight - 2);
+    const float *upper = plane.row(m) + i, *lower = plane.row(m + 1) + i;
+    const double across = x - i;
+    const double above = upper[0] + across * (double{upper[1]} - upper[0]);
+    const double below = lower[0] + across * (double{lower[1]} - lower[0]);
+    return above + (r - m) * (below - above);
+}
+
+double column_of(const PressFace& face, double lateral_mm) {
+    return lateral_mm / column_width_mm(face) + (kColumns - 1) / 2.0;
+}
+
+// Of a pressed place in the plane, to where it lies at rest.
+struct Shift {
+    double lateral_mm = 0, depth_mm = 0;
+};
+
+Shift shift_at(const PressFace& face, const PressTable& table, BeamPoint p) {
+    const double row = p.depth_mm / kTableStep_mm;
+    const double column = column_of(face, p.lateral_mm);
+    // Beside the columns and below the table the shift fades.
+    const double past =
+        std::max(std::abs(column - (kColumns - 1) / 2.0) - (kColumns - 1) / 2.0, 0.0);
+    const double beyond = std::max(0.0, row - (kTableRows - 1)) * kTableStep_mm;
+    const double share = std::max(0.0, 1 - past * column_width_mm(face) / kSideFade_mm) *
+                         std::max(0.0, 1 - beyond / kSideFade_mm);
+    const double lateral = -share * between(table.bulge_mm, column, row / kBulgeEvery);
+    const double there = column_of(face, p.lateral_mm + lateral);
+    const double depth = std::clamp(row, 0.0, kTableRows - 1.0) * kTableStep_mm;
+    return {lateral, share * (between(table.rest_mm, there, row) - depth)};
+}
+
+// Depth of the resting skin from the face.
+double skin_mm(const PressFace& face, const PressSamples& samples, double lateral_mm) {
+    const double x =
+        std::clamp(lateral_mm / column_width_mm(face) + (kColumns - 1) / 2.0, 0.0, kColumns - 1.0);
+    const auto i = static_cast<std::size_t>(std::min(static_cast<int>(x), kColumns - 2));
+    const double left = samples.pressed_mm[i], right = samples.pressed_mm[i + 1];
+    return -(left + (x - static_cast<double>(i)) * (right - left));
+}
+
+}  // namespace
+
+PressField::PressField(const PressFace& face) : face_(face), work_(std::make_unique<Work>()) {
+    assert(face.half_width_mm > 0 && face.half_height_mm > 0 && face.radius_mm >= 0);
+}
+
+void PressField::lift() {
+    state_ = {};
+}
+
+bool PressField::press(SimdTarget simd, const PressScene& scene, const PressOptions& options) {
+    assert(options.solve.increments >= 1 && options.stiffness_scale > 0);
+    state_ = {};
+    sample_tissue(scene, face_, options.stiffness_scale, work_->samples);
+    const PressSamples& samples = work_->samples;
+    state_.excess_mm = std::max(0.0, samples.excess_mm);
+    state_.out_of_reach = samples.out_of_reach;
+    if (!samples.any_touch) return false;
+    solve_press(simd, samples, face_, options.solve, work_->elastic);
+    stretch_columns(simd, samples, face_, work_->elastic, work_->columns);
+    build_table(simd, samples, face_, work_->columns, work_->table);
+    int touching = 0;
+    for (std::size_t i = 0; i < kColumns; ++i) {
+        if (!samples.touching[i]) continue;
+        ++touching;
+        state_.deepest_mm = std::max(state_.deepest_mm, double{samples.pressed_mm[i]});
+    }
+    state_.pressed = true;
+    state_.force_n = work_->columns.force_n;
+    const double area_mm2 = touching * column_width_mm(face_) * 2 * face_.half_height_mm;
+    state_.pressure_kpa = 1e3 * state_.force_n / area_mm2;
+    state_.least_determinant = work_->table.least_determinant;
+    return true;
+}
+
+Point3 PressField::pull_back(Point3 pressed) const {
+    if (!state_.pressed) return pressed;
+    // The face stands where bone holds it.
+    Point3 held = pressed;
+    held.z += state_.excess_mm;
+    const BeamPoint p = beam_point(face_, held);
+    // Off the plane the shift of the tissue is the plane's, faded. Rest depth rises with pressed
+    // depth, so the depth in the plane whose faded shift ends here is found by halving.
+    const double y2 = pressed.y * pressed.y;
+    Shift shift = shift_at(face_, work_->table, p);
+    double share = 1, sideways = 1;
+    if (y2 > 0) {
+        const auto faded = [&](double depth_mm, double& end_mm) {
+            shift = shift_at(face_, work_->table, {p.lateral_mm, depth_mm});
+            const double skin = skin_mm(face_, work_->samples, p.lateral_mm + shift.lateral_mm);
+            const double below = std::max(0.0, depth_mm + shift.depth_mm - skin);
+            const double w = fade_width_mm(face_.half_height_mm, below);
+            share = falling_exponential(y2 / (2 * w * w));
+            sideways = falling_exponential(y2 / (2 * w * w * kLateralFade * kLateralFade));
+            end_mm = depth_mm + (1 - share) * shift.depth_mm;
+        };
+        double low = p.depth_mm - kReach_mm, high = p.depth_mm + 2 * kReach_mm, end = 0;
+        for (int n = 0; n < 40; ++n) {
+            const double middle = 0.5 * (low + high);
+            faded(middle, end);
+            (end < p.depth_mm ? low : high) = middle;
+        }
+    }
+    const BeamPoint rest{p.lateral_mm + sideways * shift.lateral_mm,
+                         p.depth_mm + share * shift.depth_mm};
+    Point3 out = probe_point(face_, rest, pressed.y);
+    out.z -= state_.excess_mm;
+    return out;
+}
+
+bool PressField::closed(Point3 rest) const {
+    if (!state_.pressed) return false;
+    rest.z += state_.excess_mm;
+    const BeamPoint p = beam_point(face_, rest);
+    const double column = std::clamp(column_of(face_, p.lateral_mm), 0.0, kColumns - 1.0);
+    const double below = p.depth_mm - skin_mm(face_, work_->samples, p.lateral_mm);
+    const auto part = std::upper_bound(kFineEdge.begin(), kFineEdge.end(), below);
+    const int j = std::clamp(static_cast<int>(part - kFineEdge.begin()) - 1, 0, kFineRows - 1);
+    // A round lumen reaches less far up and down beside its middle: look two parts around.
+    constexpr int kAround = 2;
+    const int i = std::min(static_cast<int>(column), kColumns - 2);
+    for (int n = std::max(0, j - kAround); n <= std::min(kFineRows - 1, j + kAround); ++n)
+        for (int c = i; c <= i + 1; ++c) {
+            const float share = work_->samples.drains.row(n)[c];
+            const float open = share * static_cast<float>(kClosed) + (1 - share);
+            if (share >= 0.5f && work_->columns.stretch.row(n)[c] < open) return true;
+        }
+    return false;
+}
+
+Point3 PressField::push_forward(Point3 rest) const {
+    if (!state_.pressed) return rest;
+    // A damped Newton iteration on the pull-back, whose Jacobian is taken by differences in the
+    // plane: the map is one to one and piecewise smooth.
+    Point3 at = rest;
+    constexpr double kStep_mm = 1e-3;
+    double error = 1e9;
+    for (int n = 0; n < 40 && error > 1e-5; ++n) {
+        const Point3 here = pull_back(at);
+        const double ex = rest.x - here.x, ez = rest.z - here.z;
+        error = std::sqrt(ex * ex + ez * ez);
+        const Point3 px = pull_back({at.x + kStep_mm, at.y, at.z});
+        const Point3 pz = pull_back({at.x, at.y, at.z + kStep_mm});
+        const double a = (px.x - here.x) / kStep_mm, b = (pz.x - here.x) / kStep_mm;
+        const double c = (px.z - here.z) / kStep_mm, d = (pz.z - here.z) / kStep_mm;
+        const double det = std::max(a * d - b * c, 1e-3);
+        double dx = (d * ex - b * ez) / det, dz = (a * ez - c * ex) / det;
+        double length = std::sqrt(dx * dx + dz * dz);
+        const double most = std::max(2 * error, 1e-4);
+        const double scale = length > most ? most / length : 1;
+        double best = error;
+        for (double t = scale; t > scale / 64; t /= 2) {
+            const Point3 tried{at.x + t * dx, at.y, at.z + t * dz};
+            const Point3 there = pull_back(tried);
+            const double fx = rest.x - there.x, fz = rest.z - there.z;
+            const double e = std::sqrt(fx * fx + fz * fz);
+            if (e < best) {
+                best = e;
+                at = tried;
+                break;
+            }
+        }
+        if (best >= error) break;
+        error = best;
+    }
+    return at;
+}
+
+}  // namespace sonocase::runtime::press

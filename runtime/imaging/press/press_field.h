@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Tissue that yields to the probe: where the tissue that the picture shows lies at rest.
+//
+//     PressField field(face);
+//     if (field.press(simd, scene)) rest = field.pull_back(place);
+//
+// Solved afresh from the pose alone: no history, so that lifting the probe gives the picture of
+// before, and a jump of the pose leaves no trace. Points are in the frame `probe` of the pose; the
+// face may lie anywhere, 200 mm inside the body or in the air. Nothing is allocated after the
+// constructor. Source, accuracy and limits: docs/deformation.md.
+#pragma once
+
+#include <memory>
+
+#include "runtime/imaging/press/press_table.h"
+
+namespace sonocase::runtime::press {
+
+struct PressOptions {
+    PressSolveOptions solve;
+    double stiffness_scale = 1;  // of every tissue, > 0: a firm body or a soft one
+};
+
+struct PressState {
+    bool pressed = false;         // else nothing moves, and the field is the identity
+    double force_n = 0;           // on the whole face
+    double pressure_kpa = 0;      // over the part of it that touches
+    double excess_mm = 0;         // by how much bone held the probe back, along z
+    double deepest_mm = 0;        // greatest pressed depth, after the excess
+    bool out_of_reach = false;    // more than 30 mm inside the body: as if 30
+    float least_determinant = 1;  // of the map from the picture to the tissue: never 0 or less
+};
+
+class PressField {
+  public:
+    explicit PressField(const PressFace& face);
+
+    // True when something is pressed. Cost: 0.2 ms with AVX2; where nothing touches, the look-up of
+    // the skin and the columns.
+    bool press(SimdTarget simd, const PressScene& scene, const PressOptions& options = {});
+    void lift();  // nothing is pressed
+
+    const PressState& state() const { return state_; }
+    const PressFace& face() const { return face_; }
+    const PressTable& table() const { return work_->table; }
+    const PressSamples& samples() const { return work_->samples; }
+    const PressColumns& columns() const { return work_->columns; }
+
+    // Where the tissue that lies at `pressed` now lies at rest, in the frame of the pose as it was
+    // given, also where bone holds the face back. Continuous everywhere: beside the
+    // table the shift fades over 20 mm, across the plane as press_law.h says.
+    Point3 pull_back(Point3 pressed) const;
+    // Where the tissue that lies at `rest` is now: the inverse to 1e-4 mm. Cost: 40 pull-backs.
+    Point3 push_forward(Point3 rest) const;
+
+    // True where `rest`, a place in a draining lumen, lies between walls that touch: the lumen's
+    // stretch is below 0.2 there or in the column beside it. A picture shows the wall instead, also
+    // where a lumen is too small for the columns to close it without a rest.
+    bool closed(Point3 rest) const;
+
+  private:
+    struct Work {
+        PressSamples samples;
+        PressElastic elastic;
+        PressColumns columns;
+        PressTable table;
+    };
+    PressFace face_;
+    std::unique_ptr<Work> work_;
+    PressState state_;
+};
+
+}  // namespace sonocase::runtime::press
