@@ -15,8 +15,23 @@ Json json_of(const StageReport& report) {
     Json measures = Json::object();
     for (const Measure& m : report.measures) measures[m.name] = json_number(m.value);
     out["measures"] = std::move(measures);
+    // Absent where a stage has none, so that the files of most stages stay as they were.
+    for (const Note& note : report.notes) out["notes"][note.name] = note.text;
+    for (const MeasureGroup& group : report.groups) {
+        Json values = Json::object();
+        for (const Measure& m : group.values) values[m.name] = json_number(m.value);
+        out["groups"][group.name] = std::move(values);
+    }
     out["warnings"] = report.warnings;
     return out;
+}
+
+std::vector<Measure> measures_from(JsonObject object) {
+    std::vector<Measure> measures;
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (const std::string& name : object.keys())
+        measures.push_back({name, object.number_or(name.c_str(), nan)});
+    return measures;
 }
 
 StageReport report_from(JsonObject object) {
@@ -25,11 +40,16 @@ StageReport report_from(JsonObject object) {
     report.version = static_cast<int>(object.integer_or("version", 1, 0, 1000000));
     report.seconds = object.has("seconds") ? object.number("seconds") : 0;
     report.warnings = object.texts_or_none("warnings");
-    if (!object.has("measures")) return report;
-    JsonObject measures = object.object("measures");
-    for (const std::string& name : measures.keys()) {
-        const double nan = std::numeric_limits<double>::quiet_NaN();
-        report.measures.push_back({name, measures.number_or(name.c_str(), nan)});
+    if (object.has("measures")) report.measures = measures_from(object.object("measures"));
+    if (object.has("notes")) {
+        JsonObject notes = object.object("notes");
+        for (const std::string& name : notes.keys())
+            report.notes.push_back({name, notes.text(name.c_str())});
+    }
+    if (object.has("groups")) {
+        JsonObject groups = object.object("groups");
+        for (const std::string& name : groups.keys())
+            report.groups.push_back({name, measures_from(groups.object(name.c_str()))});
     }
     return report;
 }

@@ -25,6 +25,11 @@ Json flat_json(const StageReport& report) {
     json["version"] = report.version;
     json["seconds"] = report.seconds;
     for (const Measure& measure : report.measures) json[measure.name] = measure.value;
+    for (const Note& note : report.notes) json[note.name] = note.text;
+    for (const MeasureGroup& group : report.groups) {
+        json[group.name] = Json::object();
+        for (const Measure& value : group.values) json[group.name][value.name] = value.value;
+    }
     json["warnings"] = report.warnings;
     return json;
 }

@@ -38,6 +38,9 @@ Json stage_json(const StageReport& stage, double seconds) {
         json["seconds"] = nullptr;
     json["errors"] = Json::object();
     for (const Measure& measure : stage.measures) json["errors"][measure.name] = measure.value;
+    for (const Note& note : stage.notes) json["notes"][note.name] = note.text;
+    for (const MeasureGroup& group : stage.groups)
+        for (const Measure& value : group.values) json[group.name][value.name] = value.value;
     json["warnings"] = stage.warnings;
     return json;
 }
@@ -263,6 +266,12 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
         all_known = all_known && seconds >= 0;
         for (const Measure& measure : stage.measures)
             text += line("      %-28s %.6g", measure.name.c_str(), measure.value);
+        for (const Note& note : stage.notes) text += "      " + note.name + ": " + note.text + "\n";
+        for (const MeasureGroup& group : stage.groups) {
+            text += line("      %s", group.name.c_str());
+            for (const Measure& value : group.values)
+                text += line("        %-26s %.3f", value.name.c_str(), value.value);
+        }
         for (const std::string& warning : stage.warnings)
             text += "      warning: " + warning + "\n";
     }

@@ -2,6 +2,7 @@
 
 #include "pipeline/registration/fit_context.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace sonocase::pipeline {
@@ -28,12 +29,67 @@ std::vector<Point3> points_inside(const SkinModel& skin, const Box3& box) {
     return inside;
 }
 
+// What the landmarks say of the open side: > 0 that it is the patient's back, < 0 the front. Each
+// that lies clearly in front of or behind the middle of both bodies has a say.
+double vote_of_landmarks(const FitContext& s) {
+    Box3 skin, readings;
+    for (Point3 p : s.fine.points) skin.include(p);
+    for (std::uint32_t i : s.readings) readings.include(s.target.points[i]);
+    const double half_depth = 0.5 * skin.extent().y;
+    double lowest = INFINITY, highest = -INFINITY;
+    for (std::uint32_t i : s.readings) {
+        const double along = dot(s.open_side.direction, s.target.points[i] - Point3{});
+        lowest = std::min(lowest, along);
+        highest = std::max(highest, along);
+    }
+    double vote = 0;
+    for (const PoseHints::Place& mark : s.hints.landmarks) {
+        const double front = (mark.skin.y - skin.centre().y) / half_depth;
+        const double towards_hole = dot(s.open_side.direction, mark.target - Point3{});
+        // The readings end near the middle of the body, where the hole begins.
+        const double from_hole = (highest - towards_hole) / std::max(1.0, highest - lowest);
+        if (std::abs(front) > 0.4 && (from_hole > 0.6 || from_hole < 0.1))
+            vote += front * (from_hole > 0.6 ? 1 : -1);
+    }
+    return vote;
+}
+
+void decide_open_side(const std::string& wanted, FitContext* s) {
+    s->open_side = find_open_side(s->target, s->hints.up);
+    s->open_side_is = "none";
+    if (wanted == "none") {
+        s->open_side_why = "the recipe wants no open side to be considered";
+        return;
+    }
+    if (!s->open_side.open() && wanted == "auto") {
+        s->open_side_why = s->open_side.weight_mm2() > 0 || s->open_side.size > 0.15
+                               ? "the sweep is open towards a flank, which says nothing of the back"
+                               : "the sweep is closed";
+        return;
+    }
+    const double vote = vote_of_landmarks(*s);
+    if (wanted != "auto") {
+        s->open_side_is = wanted;
+        s->open_side_why = "the recipe says so";
+    } else if (vote < 0) {
+        s->open_side_is = "front";
+        s->open_side_why = "the landmarks say so";
+    } else {
+        s->open_side_is = "back";
+        s->open_side_why =
+            vote > 0 ? "the landmarks say so" : "a patient on a table lies on it (--open-side)";
+    }
+    s->hints.back = s->open_side_is == "back" ? s->open_side.direction : -s->open_side.direction;
+    s->hints.back_weight_mm2 = std::max(s->open_side.weight_mm2(), wanted == "auto" ? 0.0 : 300.0);
+}
+
 }  // namespace
 
 Result<FitContext> prepare_fit(const RegisterInput& input, const RegisterOptions& options) {
     Result<TargetSurface> target = prepare_target(input.mannequin, options.target);
     if (!target) return target.error();
-    FitContext s{input.skin, std::move(*target), {}, {}, {}, {}, {}, {}, {}};
+    FitContext s{input.skin, std::move(*target), {}, {}, {}, {}, {}, {}, {}, {},
+                 {},         input.labels,       {}};
     const Point3 origin = input.skin.box.centre();
     s.fine = thin_skin(input.skin.skin, input.skin.on_rim, origin, kFineSkin_mm);
     s.coarse = thin_skin(input.skin.skin, input.skin.on_rim, origin, kCoarseSkin_mm);
@@ -59,6 +115,7 @@ Result<FitContext> prepare_fit(const RegisterInput& input, const RegisterOptions
         s.hints.landmarks.push_back({a, b});
         s.landmarks.push_back({a, b});
     }
+    decide_open_side(options.open_side, &s);
     s.inside = points_inside(s.coarse, s.box);
     return s;
 }

@@ -3,8 +3,10 @@
 // What the stages of one registration share: both surfaces prepared, the hints checked.
 #pragma once
 
+#include <string>
 #include <vector>
 
+#include "pipeline/registration/open_side.h"
 #include "pipeline/registration/register_surfaces.h"
 
 namespace sonocase::pipeline {
@@ -17,6 +19,10 @@ struct FitContext {
     PoseHints hints;
     std::vector<Correspondence> landmarks;
     std::vector<std::uint32_t> readings;  // all but lift-offs
+    OpenSide open_side;
+    std::string open_side_is;   // "back", "front" or "none": which side of the patient that is
+    std::string open_side_why;  // in words
+    const LabelVolume* labels = nullptr;  // null: not known
     std::vector<Point3> inside;  // of the body, where the organs are; ct, relative to the origin
 };
 

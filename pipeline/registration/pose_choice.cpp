@@ -68,7 +68,7 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
     const Matches& matches = fit.matches;
     const double gaps = 0.5 * mean(matches.from_target, matches.target_queries) +
                         0.5 * mean(matches.from_skin, matches.skin_queries);
-    double hints = 0;
+    double hints = s.hints.back_cost_mm2(rigid.target_from_skin);
     for (const Correspondence& c : s.landmarks) {
         const Vector3 r = map_point(judged.quadratic, c.skin) - c.place;
         hints += s.hints.landmark_weight * std::min(dot(r, r), 60.0 * 60.0);

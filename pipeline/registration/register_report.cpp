@@ -25,6 +25,15 @@ void add_target(StageReport& report, const TargetSurface& t) {
     report.measures.push_back({"reading_spacing_mm", t.spacing_mm});
 }
 
+void add_organs(StageReport& report, const std::vector<OrganChange>& organs) {
+    MeasureGroup volume{"volume_change", {}}, shape{"shape_change", {}};
+    for (const OrganChange& c : organs) {
+        volume.values.push_back({c.label, c.volume_ratio});
+        shape.values.push_back({c.label, c.shape_change});
+    }
+    report.groups = {std::move(volume), std::move(shape)};
+}
+
 void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure& fit) {
     const TargetSurface& t = s.target;
     if (t.not_finite > 0) {
@@ -91,6 +100,8 @@ StageReport align_report(const FitContext& s,
     add_fit(report, "rigid", fit);
     report.measures.push_back({"pose_score_mm", choice.best.score_mm});
     report.measures.push_back({"mirror_score_mm", choice.mirror_score_mm});
+    report.measures.push_back({"open_side_size", s.open_side.size});
+    report.notes = {{"open_side", s.open_side_is}, {"open_side_reason", s.open_side_why}};
     if (!choice.runners_up.empty()) {
         const RunnerUp& r = choice.runners_up.front();
         report.measures.push_back({"runner_up_score_mm", r.score_mm});
@@ -134,6 +145,13 @@ StageReport warp_report(const FitContext& s,
     report.measures.push_back(
         {"residual_interior_move_mm", w.residual.used ? w.residual.inside_mm : 0.0});
     report.measures.push_back({"residual_iterations", static_cast<double>(w.residual.iterations)});
+    report.measures.push_back({"least_minor", w.one_to_one.least_minor()});
+    report.measures.push_back({"elastic_stiffness", w.stiffness});
+    report.measures.push_back({"elastic_refits", static_cast<double>(w.elastic_refits)});
+    report.measures.push_back({"elastic_strain_mm2", w.elastic.strain_mm2});
+    report.measures.push_back({"elastic_iterations", static_cast<double>(w.elastic.iterations)});
+    report.notes = {{"path", w.path}, {"path_reason", w.reason}};
+    if (!w.organs.empty()) add_organs(report, w.organs);
     report.warnings = w.warnings;
     warn_of_readings(report, s, w.fit);
     warn_of_landmarks(report, options, w);

@@ -50,6 +50,7 @@ Result<RegisterResult> warp_surfaces(const RegisterInput& input,
     result.rigid_fit = w.rigid_fit;
     result.quadratic_fit = w.quadratic_fit;
     result.fit = w.fit;
+    result.organs = w.organs;
     result.report = warp_report(*s, w, options, seconds_since(start));
     result.registration.reports = {result.report};
     return result;
@@ -72,6 +73,8 @@ Result<RegisterResult> register_surfaces(const RegisterInput& input,
     result.report.stage = "register";
     result.report.measures.insert(result.report.measures.end(), align_stage.measures.begin(),
                                   align_stage.measures.end());
+    result.report.notes.insert(result.report.notes.end(), align_stage.notes.begin(),
+                               align_stage.notes.end());
     result.report.warnings.insert(result.report.warnings.begin(), align_stage.warnings.begin(),
                                   align_stage.warnings.end());
     result.report.measures.push_back({"align_seconds", align_stage.seconds});

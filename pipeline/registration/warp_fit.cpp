@@ -7,6 +7,7 @@
 
 #include "pipeline/base/line_text.h"
 #include "pipeline/registration/map/fold_proof.h"
+#include "pipeline/registration/path_choice.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -129,6 +130,7 @@ WarpFit fit_warp(const FitContext& s,
     w.least_det = w.registration.min_det_jacobian = proof.least_bound;
     w.sampled_det = proof.least_sample;
     w.fit = w.residual.used ? measure_fit(s.skin, s.target, w.registration) : w.quadratic_fit;
+    choose_path(s, options, progress, &w);
     report_progress(progress, 0.95, "measuring");
     if (!(w.least_det > kLeastDetJacobian)) {
         w.warnings.push_back(

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pipeline/registration/fit_context.h"
+#include "pipeline/registration/map/one_to_one_proof.h"
 
 namespace sonocase::pipeline {
 
@@ -20,6 +21,12 @@ struct WarpFit {
     bool kept_rigid = false;  // the quadratic did not explain left-out patches better
     double least_det = 1, sampled_det = 1;
     ResidualReport residual;
+    std::string path = "quadratic", reason;  // "quadratic", "residual" or "elastic", and why
+    ElasticFit elastic;
+    int elastic_refits = 0;  // stiffer ones, after the first
+    double stiffness = 0;    // of the elastic warp; 0: it was not tried
+    OneToOneProof one_to_one;
+    std::vector<OrganChange> organs;  // empty without labels
     FitMeasure rigid_fit, quadratic_fit, fit;
     double residual_mean_mm = 0;  // at the skin
     std::vector<std::string> warnings;

@@ -9,6 +9,7 @@
 #include "pipeline/registration/register_surfaces.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/key_text.h"
+#include "pipeline/stages/label_codec.h"
 #include "pipeline/stages/mannequin_surface.h"
 
 namespace sonocase::pipeline {
@@ -40,7 +41,10 @@ void add_align(OptionsOf<Fit>& options) {
             "largest tilt of the head from inputs.up")
         .number(
             "landmark_mm", [](auto& o) { return &o.landmark_mm; }, 0.1, 100, "mm",
-            "standard deviation of a landmark along an axis");
+            "standard deviation of a landmark along an axis")
+        .choice(
+            "open_side", [](auto& o) { return &o.open_side; }, {"auto", "back", "front", "none"},
+            "", "side of the patient that the open side of the sweep is; auto: the back");
 }
 
 void add_quadratic(OptionsOf<Fit>& options) {
@@ -75,6 +79,9 @@ void add_residual(OptionsOf<Fit>& options) {
         .toggle(
             "residual", [](auto& o) { return &o.residual_warp; },
             "B-spline displacement after the quadratic")
+        .choice(
+            "path", [](auto& o) { return &o.path; }, {"auto", "residual", "elastic"}, "",
+            "auto: the elastic warp where the residual warp does not suffice")
         .number(
             "spacing_mm", [](auto& o) { return &o.residual.spacing_mm; }, 10, 200, "mm",
             "spacing of the residual's control points")
@@ -96,11 +103,29 @@ void add_residual(OptionsOf<Fit>& options) {
             "depth at which the residual has faded");
 }
 
+void add_elastic(OptionsOf<Fit>& options) {
+    options.help_group("Elastic warp")
+        .number(
+            "stiffness", [](auto& o) { return &o.elastic.stiffness; }, 0.01, 100, "",
+            "of all tissues; 0.33 follows the readings closer, 1 keeps organs")
+        .sweep({"elastic",
+                {"3", "1", "0.33", "0.1"},
+                "organs that change in volume, against readings that are not reached",
+                "stiffer tissues take no more time"})
+        .number(
+            "rounds", [](auto& o) { return &o.elastic.rounds; }, 1, 100, "",
+            "rounds of matching of the elastic warp")
+        .number(
+            "cg_iterations", [](auto& o) { return &o.elastic.iterations; }, 1, 1000, "",
+            "conjugate gradients in each of those rounds");
+}
+
 OptionGroup options() {
     OptionsOf<Fit> options("warp");
     add_align(options);
     add_quadratic(options);
     add_residual(options);
+    add_elastic(options);
     return options;
 }
 
@@ -146,7 +171,10 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     RegisterOptions options = inputs.options<RegisterOptions>("warp");
     options.seed = case_seed(recipe);
     if (auto status = add_hints(recipe, options); !status) return status.error();
-    auto fitted = register_surfaces({**skin, surface}, options, progress);
+    // The tissues decide how the inside follows; the known map above does without them.
+    const auto ct = inputs.get<LabelFile>("ct_labels");
+    if (!ct) return ct.error();
+    auto fitted = register_surfaces({**skin, surface, &(*ct)->volume}, options, progress);
     if (!fitted) return fitted.error();
     return StageValue::of(std::move(fitted->registration));
 }
@@ -178,7 +206,7 @@ StageDescriptor warp_stage() {
     StageDescriptor stage;
     stage.name = "warp";
     stage.version = kRegisterVersion;
-    stage.takes = {"skin", "mannequin"};
+    stage.takes = {"ct_labels", "skin", "mannequin"};
     stage.provides = "registration";
     stage.options = options();
     stage.seeded = true;

@@ -101,6 +101,7 @@ Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Pr
         return error;
     }
     inputs.skin = std::move(*skin);
+    inputs.labels = std::move(labels->labels);
     inputs.warnings.insert(inputs.warnings.end(), inputs.skin.report.warnings.begin(),
                            inputs.skin.report.warnings.end());
     return inputs;

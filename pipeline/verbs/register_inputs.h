@@ -25,6 +25,7 @@ void add_register_options(CLI::App& app, RegisterArguments& arguments);
 
 // Label map, skin and mannequin as read, hints parsed; with the warnings of all of them.
 struct RegisterInputs {
+    LabelVolume labels;
     SkinSurfaceResult skin;
     Surface mannequin;
     RegisterOptions options;

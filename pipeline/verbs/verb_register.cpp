@@ -114,20 +114,21 @@ int verb_register(int argc, char** argv) {
         true,
         "Where to write the registration",
         [](const RegisterInputs& in, const Registration&, const Progress& progress) {
-            return register_surfaces({in.skin, in.mannequin}, in.options, progress);
+            return register_surfaces({in.skin, in.mannequin, &in.labels}, in.options, progress);
         }};
     return run_fit_verb(verb, argc, argv);
 }
 
 int verb_align(int argc, char** argv) {
-    const FitVerb verb{"align",
-                       "Find the rigid motion that lays the patient's skin on the mannequin",
-                       false,
-                       false,
-                       "Where to write the rigid registration",
-                       [](const RegisterInputs& in, const Registration&, const Progress& progress) {
-                           return align_surfaces({in.skin, in.mannequin}, in.options, progress);
-                       }};
+    const FitVerb verb{
+        "align",
+        "Find the rigid motion that lays the patient's skin on the mannequin",
+        false,
+        false,
+        "Where to write the rigid registration",
+        [](const RegisterInputs& in, const Registration&, const Progress& progress) {
+            return align_surfaces({in.skin, in.mannequin, &in.labels}, in.options, progress);
+        }};
     return run_fit_verb(verb, argc, argv);
 }
 
@@ -139,8 +140,8 @@ int verb_warp(int argc, char** argv) {
         false,
         "Where to write the registration",
         [](const RegisterInputs& in, const Registration& rigid, const Progress& progress) {
-            return warp_surfaces({in.skin, in.mannequin}, rigid.mannequin_from_ct, in.options,
-                                 progress);
+            return warp_surfaces({in.skin, in.mannequin, &in.labels}, rigid.mannequin_from_ct,
+                                 in.options, progress);
         }};
     return run_fit_verb(verb, argc, argv);
 }

@@ -2,7 +2,6 @@
 
 #include "pipeline/registration/map/fold_proof.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -10,224 +9,29 @@
 #include <vector>
 
 #include "pipeline/base/parallel.h"
+#include "pipeline/registration/map/map_pieces.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-constexpr int kMostNodes = 9;
 constexpr int kDeepestCut = 4;
 constexpr double kLoose = 0.01;  // a bound closer than this to the least sample is not refined
 
-// From values at nodes in [0, 1] to Bernstein coefficients of the same polynomial.
-struct BernsteinForm {
-    explicit BernsteinForm(int degree) : nodes(degree + 1) {
-        Eigen::MatrixXd values(nodes, nodes);
-        for (int i = 0; i < nodes; ++i) {
-            // Chebyshev nodes stretched to the ends: well conditioned, and corners are sampled.
-            node[i] = 0.5 - 0.5 * std::cos(3.14159265358979323846 * i / degree);
-            double choose = 1;
-            for (int j = 0; j <= degree; ++j) {
-                values(i, j) = choose * std::pow(node[i], j) * std::pow(1 - node[i], degree - j);
-                choose = choose * (degree - j) / (j + 1);
-            }
-        }
-        const Eigen::MatrixXd back = values.fullPivLu().inverse();
-        for (int i = 0; i < nodes; ++i) {
-            double row = 0;
-            for (int j = 0; j < nodes; ++j) {
-                matrix[i][j] = back(i, j);
-                row += std::abs(back(i, j));
-            }
-            growth = std::max(growth, row);
-        }
+FoldProof prove_piece(const Registration& r, const BernsteinForm& form, const Piece& piece) {
+    std::vector<double> det;
+    for (const Matrix3& j : jacobians_at_nodes(r, form, piece)) det.push_back(determinant(j));
+    FoldProof proof;
+    double largest = 0;
+    proof.least_sample = det[0];
+    for (double d : det) {
+        proof.least_sample = std::min(proof.least_sample, d);
+        largest = std::max(largest, std::abs(d));
     }
-    int nodes;
-    double node[kMostNodes] = {};
-    double matrix[kMostNodes][kMostNodes] = {};
-    double growth = 0;  // largest sum of magnitudes in a row
-};
-
-// Values and slopes (per mm) of the four splines of a cell at fraction t.
-void spline_basis(double t, double spacing_mm, double value[4], double slope[4]) {
-    const double s = 1 - t;
-    value[0] = s * s * s / 6;
-    value[1] = (3 * t * t * t - 6 * t * t + 4) / 6;
-    value[2] = (3 * s * s * s - 6 * s * s + 4) / 6;
-    value[3] = t * t * t / 6;
-    slope[0] = -s * s / (2 * spacing_mm);
-    slope[1] = (3 * t * t - 4 * t) / (2 * spacing_mm);
-    slope[2] = -(3 * s * s - 4 * s) / (2 * spacing_mm);
-    slope[3] = t * t / (2 * spacing_mm);
-}
-
-// Part of the box in which the map is one polynomial.
-struct Piece {
-    Int3 cell;  // of the spline; not used without one
-    Box3 box;   // ct
-};
-
-class Prover {
-  public:
-    explicit Prover(const Registration& r) : r_(r), form_(r.residual.empty() ? 3 : 8) {}
-
-    FoldProof prove(const Piece& piece) const {
-        std::vector<double> det = samples(piece);
-        FoldProof proof;
-        double largest = 0;
-        proof.least_sample = det[0];
-        for (double d : det) {
-            proof.least_sample = std::min(proof.least_sample, d);
-            largest = std::max(largest, std::abs(d));
-        }
-        const int n = form_.nodes;
-        const auto along = [&](int stride, int a, int b) {
-            double line[kMostNodes];
-            double* at = det.data() + a + b;
-            for (int i = 0; i < n; ++i) line[i] = at[i * stride];
-            for (int i = 0; i < n; ++i) {
-                double sum = 0;
-                for (int j = 0; j < n; ++j) sum += form_.matrix[i][j] * line[j];
-                at[i * stride] = sum;
-            }
-        };
-        for (int b = 0; b < n; ++b) {
-            for (int a = 0; a < n; ++a) {
-                along(1, a * n, b * n * n);
-            }
-        }
-        for (int b = 0; b < n; ++b) {
-            for (int a = 0; a < n; ++a) along(n, a, b * n * n);
-        }
-        for (int b = 0; b < n; ++b) {
-            for (int a = 0; a < n; ++a) along(n * n, a, b * n);
-        }
-        const double least = *std::min_element(det.begin(), det.end());
-        const double rounding = 64 * std::numeric_limits<double>::epsilon() * largest *
-                                form_.growth * form_.growth * form_.growth;
-        proof.least_bound =
-            std::isfinite(least) ? least - rounding : -std::numeric_limits<double>::infinity();
-        return proof;
-    }
-
-  private:
-    std::vector<double> samples(const Piece& piece) const {
-        const int n = form_.nodes;
-        std::vector<double> det(static_cast<std::size_t>(n) * static_cast<std::size_t>(n) *
-                                static_cast<std::size_t>(n));
-        double at[3][kMostNodes];
-        for (int a = 0; a < 3; ++a) {
-            for (int i = 0; i < n; ++i) {
-                const double t = form_.node[i];
-                at[a][i] = (1 - t) * piece.box.lower[a] + t * piece.box.upper[a];
-            }
-        }
-        const DisplacementGrid& grid = r_.residual;
-        if (grid.empty()) {
-            std::size_t m = 0;
-            for (int k = 0; k < n; ++k) {
-                for (int j = 0; j < n; ++j) {
-                    for (int i = 0; i < n; ++i, ++m) {
-                        det[m] =
-                            determinant(jacobian(r_.quadratic, {at[0][i], at[1][j], at[2][k]}));
-                    }
-                }
-            }
-            return det;
-        }
-        double value[3][kMostNodes][4], slope[3][kMostNodes][4];
-        for (int a = 0; a < 3; ++a) {
-            for (int i = 0; i < n; ++i) {
-                const double t = (at[a][i] - grid.origin_mm[a]) / grid.spacing_mm - piece.cell[a];
-                spline_basis(t, grid.spacing_mm, value[a][i], slope[a][i]);
-            }
-        }
-        // Contract along z and y, then along x: planes, lines, points.
-        const std::size_t row = static_cast<std::size_t>(grid.size.x);
-        const std::size_t slice = row * static_cast<std::size_t>(grid.size.y);
-        const Vector3* first = grid.control_mm.data() + static_cast<std::size_t>(piece.cell.x) +
-                               row * static_cast<std::size_t>(piece.cell.y) +
-                               slice * static_cast<std::size_t>(piece.cell.z);
-        for (int k = 0; k < n; ++k) {
-            Vector3 plane[4][4], plane_z[4][4];
-            for (std::size_t b = 0; b < 4; ++b) {
-                for (std::size_t a = 0; a < 4; ++a) {
-                    Vector3 v, s;
-                    for (std::size_t c = 0; c < 4; ++c) {
-                        const Vector3 p = first[a + row * b + slice * c];
-                        v = v + value[2][k][c] * p;
-                        s = s + slope[2][k][c] * p;
-                    }
-                    plane[b][a] = v;
-                    plane_z[b][a] = s;
-                }
-            }
-            for (int j = 0; j < n; ++j) {
-                Vector3 line[4], line_y[4], line_z[4];
-                for (std::size_t a = 0; a < 4; ++a) {
-                    for (std::size_t b = 0; b < 4; ++b) {
-                        line[a] = line[a] + value[1][j][b] * plane[b][a];
-                        line_y[a] = line_y[a] + slope[1][j][b] * plane[b][a];
-                        line_z[a] = line_z[a] + value[1][j][b] * plane_z[b][a];
-                    }
-                }
-                for (int i = 0; i < n; ++i) {
-                    Matrix3 m = jacobian(r_.quadratic, {at[0][i], at[1][j], at[2][k]});
-                    Vector3 dx, dy, dz;
-                    for (std::size_t a = 0; a < 4; ++a) {
-                        dx = dx + slope[0][i][a] * line[a];
-                        dy = dy + value[0][i][a] * line_y[a];
-                        dz = dz + value[0][i][a] * line_z[a];
-                    }
-                    for (int r = 0; r < 3; ++r) {
-                        m(r, 0) += dx[r];
-                        m(r, 1) += dy[r];
-                        m(r, 2) += dz[r];
-                    }
-                    det[static_cast<std::size_t>(i + n * (j + n * k))] = determinant(m);
-                }
-            }
-        }
-        return det;
-    }
-
-    const Registration& r_;
-    BernsteinForm form_;
-};
-
-std::vector<Piece> pieces_of(const Registration& r) {
-    const DisplacementGrid& grid = r.residual;
-    if (grid.empty()) return {{{0, 0, 0}, r.ct_box}};
-    std::vector<Piece> pieces;
-    const Int3 cells{grid.size.x - 3, grid.size.y - 3, grid.size.z - 3};
-    for (int k = 0; k < cells.z; ++k) {
-        for (int j = 0; j < cells.y; ++j) {
-            for (int i = 0; i < cells.x; ++i) {
-                Piece piece{{i, j, k}, {}};
-                bool empty = false;
-                for (int a = 0; a < 3; ++a) {
-                    const int c = piece.cell[a];
-                    const double low = grid.origin_mm[a] + c * grid.spacing_mm;
-                    piece.box.lower[a] = std::max(low, r.ct_box.lower[a]);
-                    piece.box.upper[a] = std::min(low + grid.spacing_mm, r.ct_box.upper[a]);
-                    empty = empty || piece.box.lower[a] > piece.box.upper[a];
-                }
-                if (!empty) pieces.push_back(piece);
-            }
-        }
-    }
-    return pieces;
-}
-
-// Whether the residual's grid covers the box. Beyond the grid the displacement is constant across
-// the faces, and the map is not one polynomial per cell.
-bool covers(const DisplacementGrid& grid, const Box3& box) {
-    if (grid.empty()) return true;
-    for (int a = 0; a < 3; ++a) {
-        const double low = grid.origin_mm[a], high = low + (grid.size[a] - 3) * grid.spacing_mm;
-        const double slack = 1e-9 * (std::abs(low) + std::abs(high) + 1);
-        if (low > box.lower[a] + slack || high < box.upper[a] - slack) return false;
-    }
-    return true;
+    form.coefficients_from_values(det.data());
+    const double least = *std::min_element(det.begin(), det.end());
+    proof.least_bound = std::isfinite(least) ? least - form.rounding(largest)
+                                             : -std::numeric_limits<double>::infinity();
+    return proof;
 }
 
 }  // namespace
@@ -237,13 +41,14 @@ FoldProof prove_no_fold(const Registration& registration) {
     FoldProof whole;
     whole.least_bound = whole.least_sample = -std::numeric_limits<double>::infinity();
     if (!covers(registration.residual, registration.ct_box)) return whole;
-    const Prover prover(registration);
+    const BernsteinForm form(registration.residual.empty() ? 3 : 8);
     std::vector<Piece> pieces = pieces_of(registration);
     whole.least_bound = whole.least_sample = std::numeric_limits<double>::infinity();
     for (int depth = 0; !pieces.empty(); ++depth) {
         std::vector<FoldProof> proofs(pieces.size());
         parallel_for(pieces.size(), 8, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) proofs[i] = prover.prove(pieces[i]);
+            for (std::size_t i = begin; i < end; ++i)
+                proofs[i] = prove_piece(registration, form, pieces[i]);
         });
         for (const FoldProof& p : proofs) {
             whole.least_sample = std::min(whole.least_sample, p.least_sample);
@@ -254,14 +59,7 @@ FoldProof prove_no_fold(const Registration& registration) {
                 whole.least_bound = std::min(whole.least_bound, proofs[i].least_bound);
                 continue;
             }
-            const Point3 middle = pieces[i].box.centre();
-            for (int corner = 0; corner < 8; ++corner) {
-                Piece part = pieces[i];
-                for (int a = 0; a < 3; ++a) {
-                    ((corner >> a & 1) ? part.box.lower : part.box.upper)[a] = middle[a];
-                }
-                loose.push_back(part);
-            }
+            append_eighths(pieces[i], loose);
         }
         pieces = std::move(loose);
     }

@@ -15,18 +15,6 @@ namespace {
 
 using Lanes = SplinePenalty::Lanes;
 
-DisplacementGrid grid_over(const Box3& box, double spacing_mm) {
-    DisplacementGrid grid;
-    grid.spacing_mm = spacing_mm;
-    const Vector3 e = box.extent();
-    for (int a = 0; a < 3; ++a) {
-        const int cells = std::max(1, static_cast<int>(std::ceil(e[a] / spacing_mm)));
-        grid.size[a] = cells + 3;
-        grid.origin_mm[a] = box.lower[a] - 0.5 * (cells * spacing_mm - e[a]);
-    }
-    return grid;
-}
-
 // Penalty rows for the inside of the body, by depth below the skin.
 void add_depth_penalty(const SkinModel& skin,
                        const Box3& box,

@@ -321,8 +321,14 @@ std::vector<RigidCandidate> align_rigid_candidates(const SkinModel& skin,
     return distinct(std::move(best), std::max(options.candidates, 1));
 }
 
+double PoseHints::back_cost_mm2(const Rigid& pose) const {
+    if (!back) return 0;
+    const Vector3 r = pose.rotation.column(1) + *back;  // the back is at -y
+    return back_weight_mm2 * dot(r, r);
+}
+
 double PoseHints::cost_mm2(const Rigid& pose) const {
-    double cost = 0;
+    double cost = back_cost_mm2(pose);
     for (const Place& place : landmarks) {
         const Vector3 r = pose * place.skin - place.target;
         cost += landmark_weight * std::min(dot(r, r), 60.0 * 60.0);

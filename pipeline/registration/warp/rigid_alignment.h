@@ -32,7 +32,10 @@ struct PoseHints {
     double up_weight_mm2 = 300;
     // Of each squared distance, against the mean squared gap.
     double landmark_weight = 0.02;
+    std::optional<Vector3> back;  // where the patient's back (skin -y) lies on the mannequin; unit
+    double back_weight_mm2 = 0;   // of |back of the pose - back|^2
 
+    double back_cost_mm2(const Rigid& pose) const;
     double cost_mm2(const Rigid& pose) const;  // distances beyond 60 mm count as 60
 };
 

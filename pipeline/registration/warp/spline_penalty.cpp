@@ -52,6 +52,18 @@ Gram gram(int controls, int derivative) {
 
 }  // namespace
 
+DisplacementGrid grid_over(const Box3& box, double spacing_mm) {
+    DisplacementGrid grid;
+    grid.spacing_mm = spacing_mm;
+    const Vector3 e = box.extent();
+    for (int a = 0; a < 3; ++a) {
+        const int cells = std::max(1, static_cast<int>(std::ceil(e[a] / spacing_mm)));
+        grid.size[a] = cells + 3;
+        grid.origin_mm[a] = box.lower[a] - 0.5 * (cells * spacing_mm - e[a]);
+    }
+    return grid;
+}
+
 SplineFootprint spline_footprint(const DisplacementGrid& grid, Point3 p) {
     SplineFootprint f;
     std::array<double, 4> w[3];

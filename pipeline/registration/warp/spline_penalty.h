@@ -10,6 +10,9 @@
 
 namespace sonocase::pipeline {
 
+// The grid without control points whose cells cover a box, centred on it.
+DisplacementGrid grid_over(const Box3& box, double spacing_mm);
+
 // The splines that are not zero at a point: index of the first control point, and 64 weights, x
 // fastest.
 struct SplineFootprint {

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/registration/elastic/elastic_rows.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/base/parallel.h"
+#include "pipeline/registration/elastic/natural_log.h"
+#include "pipeline/registration/map/map_evaluator.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr double kEdge_mm = 8;
+constexpr double kLeastCosine = 0.3;
+constexpr std::size_t kBlocks = 4;  // of rows, each summed by itself: fixed, whatever the threads
+constexpr Lanes kZero = {0, 0, 0, 0};
+
+Lanes lanes_of(Vector3 v) {
+    return Lanes{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), 0};
+}
+
+Vector3 vector_of(Lanes v) {
+    return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
+}
+
+std::vector<std::uint8_t> points_near_edge(const SkinModel& skin) {
+    std::vector<std::uint8_t> near(skin.on_rim);
+    std::vector<Point3> edge;
+    for (std::size_t i = 0; i < skin.points.size(); ++i) {
+        if (skin.on_rim[i]) edge.push_back(skin.points[i]);
+    }
+    if (edge.empty()) return near;
+    const PointIndex index(edge);
+    for (std::size_t i = 0; i < skin.points.size(); ++i) {
+        double d2 = 0;
+        index.nearest(skin.points[i], &d2);
+        if (d2 < kEdge_mm * kEdge_mm) near[i] = 1;
+    }
+    return near;
+}
+
+struct MappedPoints {
+    std::vector<Point3> points;  // relative to the target's origin
+    std::vector<Vector3> normals;
+};
+
+MappedPoints map_points(const SkinModel& skin, const TargetSurface& target, const Registration& r) {
+    const MapEvaluator evaluate(r);
+    const Vector3 shift_in = skin.origin - evaluate.ct_centre();
+    const Vector3 shift_out = evaluate.mannequin_centre() - target.origin;
+    MappedPoints mapped;
+    mapped.points.resize(skin.points.size());
+    mapped.normals.resize(skin.points.size());
+    parallel_for(skin.points.size(), 512, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const MapSample s = evaluate((skin.points[i] - Point3{}) + shift_in);
+            mapped.points[i] = Point3{} + (s.value + shift_out);
+            // The cofactor of J carries normals.
+            const Vector3 x = s.jacobian.column(0), y = s.jacobian.column(1),
+                          z = s.jacobian.column(2), n = skin.normals[i];
+            mapped.normals[i] =
+                normalized(n.x * cross(y, z) + n.y * cross(z, x) + n.z * cross(x, y));
+        }
+    });
+    return mapped;
+}
+
+// A pair of points that may be counterparts.
+struct Pair {
+    std::uint32_t skin = 0, reading = 0;
+    double gap_mm = 0;
+    bool found = false;
+};
+
+}  // namespace
+
+ElasticRows::ElasticRows(const SkinModel& skin,
+                         const TargetSurface& target,
+                         std::vector<std::uint32_t> readings,
+                         std::span<const Correspondence> landmarks,
+                         double landmark_weight,
+                         const DisplacementGrid& grid)
+    : skin_(skin),
+      target_(target),
+      readings_(std::move(readings)),
+      landmarks_(landmarks.begin(), landmarks.end()),
+      landmark_weight_(landmark_weight),
+      near_edge_(points_near_edge(skin)) {
+    grid_.size = grid.size;
+    grid_.origin_mm = grid.origin_mm;
+    grid_.spacing_mm = grid.spacing_mm;
+    for (int n = 0; n < 64; ++n) offset_[static_cast<std::size_t>(n)] = footprint_offset(grid_, n);
+}
+
+void ElasticRows::add_row(std::uint32_t skin, Vector3 normal, double gap_mm, double weight) {
+    Row row;
+    row.at = spline_footprint(grid_, skin_.origin + (skin_.points[skin] - Point3{}));
+    row.normal = normal;
+    row.gap_mm = gap_mm;
+    row.weight = weight;
+    const double root = std::sqrt(weight / (1 + gap_mm * gap_mm / (loss_mm_ * loss_mm_)));
+    row.scaled = lanes_of(root * normal);
+    rows_.push_back(row);
+}
+
+void ElasticRows::match(const Registration& map, const GapOptions& options) {
+    const MappedPoints mapped = map_points(skin_, target_, map);
+    const PointIndex index(mapped.points);
+    const double farthest2 = options.farthest_mm * options.farthest_mm;
+    loss_mm_ = options.loss_mm;
+    std::vector<Pair> pairs(readings_.size());
+    parallel_for(pairs.size(), 128, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n) {
+            const std::uint32_t j = readings_[n];
+            double d2 = 0;
+            const std::uint32_t i = index.nearest(target_.points[j], &d2);
+            if (d2 > farthest2 || near_edge_[i]) continue;
+            if (dot(mapped.normals[i], target_.normals[j]) < kLeastCosine) continue;
+            const double gap = dot(mapped.normals[i], mapped.points[i] - target_.points[j]);
+            const double aside = std::sqrt(std::max(0.0, d2 - gap * gap));
+            if (aside > std::max(8.0, 0.7 * std::abs(gap) + 4)) continue;
+            pairs[n] = {i, j, gap, true};
+        }
+    });
+    rows_.clear();
+    const auto count = [&] {
+        return std::max<double>(
+            1, static_cast<double>(std::count_if(pairs.begin(), pairs.end(),
+                                                 [](const Pair& p) { return p.found; })));
+    };
+    double weight = 1 / count();
+    for (const Pair& p : pairs) {
+        if (p.found) add_row(p.skin, mapped.normals[p.skin], p.gap_mm, weight);
+    }
+    from_readings_ = rows_.size();
+    pairs.assign((skin_.points.size() + options.skin_stride - 1) / options.skin_stride, {});
+    parallel_for(pairs.size(), 128, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n) {
+            const auto i = static_cast<std::uint32_t>(n * options.skin_stride);
+            if (near_edge_[i]) continue;
+            double d2 = 0;
+            const std::uint32_t j = target_.index.nearest(mapped.points[i], &d2);
+            if (d2 > farthest2 || target_.lifted[j]) continue;
+            if (dot(mapped.normals[i], target_.normals[j]) < kLeastCosine) continue;
+            const double gap = dot(target_.normals[j], mapped.points[i] - target_.points[j]);
+            const double aside = std::sqrt(std::max(0.0, d2 - gap * gap));
+            if (aside > (target_.on_rim[j] ? 0.35 : 1.0) * 1.2 * target_.spacing_mm) continue;
+            pairs[n] = {i, j, gap, true};
+        }
+    });
+    weight = options.skin_weight / count();
+    for (const Pair& p : pairs) {
+        if (p.found) add_row(p.skin, target_.normals[p.reading], p.gap_mm, weight);
+    }
+    marks_.clear();
+    for (const Correspondence& c : landmarks_) {
+        const Point3 ct = skin_.origin + (c.skin - Point3{});
+        const Point3 place = target_.origin + (c.place - Point3{});
+        marks_.push_back({spline_footprint(grid_, ct), mannequin_from_ct(map, ct) - place, {}});
+    }
+}
+
+void ElasticRows::project(std::span<const Lanes> along) {
+    const auto at = [&](const SplineFootprint& f) {
+        Lanes sum = kZero;
+        for (std::size_t w = 0; w < 64; ++w) sum += f.weight[w] * along[f.first + offset_[w]];
+        return vector_of(sum);
+    };
+    for (Row& row : rows_) row.along_mm = dot(row.normal, at(row.at));
+    for (Mark& mark : marks_) mark.along = at(mark.at);
+}
+
+double ElasticRows::energy(double step) const {
+    const double scale2 = loss_mm_ * loss_mm_;
+    double sum = 0;
+    for (const Row& row : rows_) {
+        const double gap = row.gap_mm + step * row.along_mm;
+        sum += row.weight * scale2 * natural_log(1 + gap * gap / scale2);
+    }
+    for (const Mark& mark : marks_) {
+        const Vector3 off = mark.offset + step * mark.along;
+        sum += landmark_weight_ * dot(off, off);
+    }
+    return sum;
+}
+
+void ElasticRows::add_gradient(std::span<Lanes> gradient, std::span<Lanes> diagonal) const {
+    const double scale2 = loss_mm_ * loss_mm_;
+    for (const Row& row : rows_) {
+        const double pull = row.weight * row.gap_mm / (1 + row.gap_mm * row.gap_mm / scale2);
+        const Lanes g = lanes_of(pull * row.normal);
+        for (std::size_t w = 0; w < 64; ++w) {
+            const float f = row.at.weight[w];
+            gradient[row.at.first + offset_[w]] += f * g;
+            diagonal[row.at.first + offset_[w]] += f * f * row.scaled * row.scaled;
+        }
+    }
+    const float lm = static_cast<float>(landmark_weight_);
+    for (const Mark& mark : marks_) {
+        const Lanes g = lanes_of(landmark_weight_ * mark.offset);
+        for (std::size_t w = 0; w < 64; ++w) {
+            const float f = mark.at.weight[w];
+            gradient[mark.at.first + offset_[w]] += f * g;
+            diagonal[mark.at.first + offset_[w]] += f * f * lm * Lanes{1, 1, 1, 0};
+        }
+    }
+}
+
+void ElasticRows::add_curvature(std::span<const Lanes> in, std::span<Lanes> out) const {
+    sums_.resize(kBlocks);
+    parallel_for(kBlocks, 1, [&](std::size_t first, std::size_t last) {
+        for (std::size_t block = first; block < last; ++block) {
+            std::vector<Lanes>& sum = sums_[block];
+            sum.assign(out.size(), kZero);
+            const std::size_t end = rows_.size() * (block + 1) / kBlocks;
+            for (std::size_t n = rows_.size() * block / kBlocks; n < end; ++n) {
+                const Row& row = rows_[n];
+                const Lanes* from = in.data() + row.at.first;
+                Lanes at = kZero;
+                for (std::size_t w = 0; w < 64; ++w) at += row.at.weight[w] * from[offset_[w]];
+                const Lanes along = at * row.scaled;
+                const Lanes push = ((along[0] + along[1]) + along[2]) * row.scaled;
+                Lanes* to = sum.data() + row.at.first;
+                for (std::size_t w = 0; w < 64; ++w) to[offset_[w]] += row.at.weight[w] * push;
+            }
+        }
+    });
+    for (const std::vector<Lanes>& sum : sums_) {
+        for (std::size_t i = 0; i < out.size(); ++i) out[i] += sum[i];
+    }
+    const float lm = static_cast<float>(landmark_weight_);
+    for (const Mark& mark : marks_) {
+        Lanes at = kZero;
+        for (std::size_t w = 0; w < 64; ++w)
+            at += mark.at.weight[w] * in[mark.at.first + offset_[w]];
+        for (std::size_t w = 0; w < 64; ++w)
+            out[mark.at.first + offset_[w]] += lm * mark.at.weight[w] * at;
+    }
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The gaps between the mapped skin and the mannequin, and the landmarks, as rows on a displacement.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "formats/registration/registration.h"
+#include "pipeline/registration/elastic/spline_lattice.h"
+#include "pipeline/registration/matching/matching.h"
+#include "pipeline/registration/warp/quadratic_warp.h"
+
+namespace sonocase::pipeline {
+
+struct GapOptions {
+    double farthest_mm = 30;      // points farther apart are not matched
+    double loss_mm = 2.5;         // Cauchy scale
+    double skin_weight = 0.1;     // of skin to reading; reading to skin has 1
+    std::size_t skin_stride = 1;  // every n-th skin point is matched
+};
+
+// Rows weight * loss^2 log(1 + gap^2 / loss^2) with gap = gap_mm + normal . (d - d_now), and
+// weight |offset + d - d_now|^2 for landmarks.
+class ElasticRows {
+  public:
+    // skin      as the fit uses it; a point within 8 mm of an open edge has no counterpart
+    // readings  of the target
+    ElasticRows(const SkinModel& skin,
+                const TargetSurface& target,
+                std::vector<std::uint32_t> readings,
+                std::span<const Correspondence> landmarks,
+                double landmark_weight,
+                const DisplacementGrid& grid);
+
+    // Matches anew. Reading to skin: the nearest mapped skin point, along its mapped normal; skin
+    // to reading: the nearest reading, along its normal.
+    void match(const Registration& map, const GapOptions& options);
+
+    struct Value {
+        double energy_mm2 = 0;
+    };
+    double energy(double step) const;  // after `step` times the displacement given to project()
+    void project(std::span<const Lanes> along);
+    // Half of the gradient, and the diagonal of the half Hessian, added to.
+    void add_gradient(std::span<Lanes> gradient, std::span<Lanes> diagonal) const;
+    // out += half Hessian times in.
+    void add_curvature(std::span<const Lanes> in, std::span<Lanes> out) const;
+
+    std::size_t from_readings() const { return from_readings_; }
+    std::size_t from_skin() const { return rows_.size() - from_readings_; }
+
+  private:
+    struct Row {
+        SplineFootprint at;
+        Vector3 normal;
+        double gap_mm, weight;
+        double along_mm = 0;  // normal . of what project() was given
+        Lanes scaled = {};    // normal times the root of the row's curvature
+    };
+    struct Mark {
+        SplineFootprint at;
+        Vector3 offset;  // from its place
+        Vector3 along;
+    };
+    void add_row(std::uint32_t skin, Vector3 normal, double gap_mm, double weight);
+
+    const SkinModel& skin_;
+    const TargetSurface& target_;
+    std::vector<std::uint32_t> readings_;
+    std::vector<Correspondence> landmarks_;
+    double landmark_weight_;
+    DisplacementGrid grid_;  // without control points
+    std::array<std::size_t, 64> offset_;
+    std::vector<std::uint8_t> near_edge_;  // # skin points
+    std::vector<Row> rows_;
+    std::vector<Mark> marks_;
+    std::size_t from_readings_ = 0;
+    double loss_mm_ = 1;
+    mutable std::vector<std::vector<Lanes>> sums_;  // of each block of rows
+};
+
+}  // namespace sonocase::pipeline
