@@ -18,6 +18,7 @@
 #include "runtime/imaging/physical/fast/beam_scatter-inl.h"
 #include "runtime/imaging/physical/fast/beam_surface-inl.h"
 #include "runtime/imaging/physical/fast/beam_target-inl.h"
+#include "runtime/imaging/physical/fast/beam_wall-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
@@ -66,6 +67,7 @@ void sample_beams_as(PhysicalBlock& b) {
             if (b.target_count > 0 && target_chunk(d, b, c)) b.target_met = true;
             look_chunk(d, b, c);
             if (b.structure) structure_chunk(d, b, c);
+            if (b.wall != nullptr && k < b.wall->rows) wall_chunk(d, b, c);
             if (b.speckled) speckle_chunk(d, b, c);
             scatter_chunk(d, b, c);
             light_chunk<kHard>(d, b, c, light);

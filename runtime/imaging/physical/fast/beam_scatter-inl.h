@@ -55,8 +55,11 @@ HWY_NOINLINE void structure_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
     }
 }
 
-// Fibres and septa, 1/16 dB. Label by label (mostly a single one), so that no lane depends on its
-// neighbours.
+constexpr float kParenchymaOffset = static_cast<float>(
+    physical::kParenchymaCube * physical::kFineEdge * physical::kFineEdge * physical::kFineEdge);
+
+// Fibres, septa and parenchyma, 1/16 dB. Label by label (mostly a single one), so that no lane
+// depends on its neighbours.
 template <class D>
 HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) {
     static_assert(physical::kFineEdge == 64);
@@ -84,7 +87,7 @@ HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) 
         sum = hn::IfThenElse(mine, hn::ShiftLeft<2>(hn::ShiftRight<24>(hn::ShiftLeft<24>(word))),
                              sum);
         left = hn::AndNot(mine, left);
-        b.fine_met = true;
+        (m[9] == kParenchymaOffset ? b.parenchyma_met : b.fine_met) = true;
     }
     return sum;
 }

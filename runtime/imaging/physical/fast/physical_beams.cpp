@@ -102,6 +102,16 @@ void PhysicalFast::choose_targets(const PhysicalFrame& f, bool keep_all) {
     }
 }
 
+// Looks of the tissues as the frame's effects want them.
+void PhysicalFast::choose_looks(const PhysicalFrame& f) {
+    frame_looks_ = f.effects.wall ? looks_wall_ : looks_;
+    for (std::size_t l = 0; l < scene_.fine.frames.size(); ++l) {
+        const bool parenchyma = scene_.fine.frames[l].cube == kParenchymaCube;
+        if (!(parenchyma ? f.effects.parenchyma : f.effects.fine_structure))
+            frame_looks_[l] &= ~kLookFine;
+    }
+}
+
 // The slab's directions and the anatomy's motion.
 void PhysicalFast::set_poses(const PhysicalFrame& f, PhysicalBlock& b) const {
     const Vector3 across =
@@ -129,11 +139,12 @@ void PhysicalFast::set_tables(const PhysicalFrame& f, PhysicalBlock& b) const {
     b.boundary = f.effects.boundaries && scene_.words.has_boundary()
                      ? reinterpret_cast<const std::int32_t*>(bundle.boundary.pool.data())
                      : nullptr;
-    b.looks = looks_.data();
+    b.looks = frame_looks_.data();
     b.pairs = pairs_word_.data();
     b.rough = reinterpret_cast<const std::int32_t*>(scene_.textures->rough.data());
     b.speckle = reinterpret_cast<const std::int32_t*>(scene_.speckle.data());
-    b.fine = f.effects.fine_structure ? scene_.textures->fine.data() : nullptr;
+    b.fine =
+        f.effects.fine_structure || f.effects.parenchyma ? scene_.textures->fine.data() : nullptr;
     b.fine_frames = fine_frames_.data();
     b.targets = near_targets_.data();
     b.target_count = static_cast<int>(near_targets_.size());
@@ -207,13 +218,16 @@ namespace {
 struct MetByAny {
     std::atomic<bool> interface {
         false
-    }, refraction{false}, hard{false}, needle{false}, fine{false}, target{false};
+    }, refraction{false}, hard{false}, needle{false}, fine{false}, target{false}, wall{false},
+        parenchyma{false};
 
     void add(const PhysicalBlock& b) {
         if (b.boundary_met) interface.store(true, std::memory_order_relaxed);
         if (b.refraction_met) refraction.store(true, std::memory_order_relaxed);
         if (b.hard_met) hard.store(true, std::memory_order_relaxed);
         if (b.fine_met) fine.store(true, std::memory_order_relaxed);
+        if (b.parenchyma_met) parenchyma.store(true, std::memory_order_relaxed);
+        if (b.wall_met) wall.store(true, std::memory_order_relaxed);
         if (b.target_met) target.store(true, std::memory_order_relaxed);
     }
 };
@@ -230,6 +244,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         lookup_start_[i] = noise_start(f.seed, NoiseUse::lookup, 0, k);
     }
     choose_targets(f, keep_all);
+    choose_looks(f);
     const PhysicalBlock base = block_of_frame(f, keep_all);
     const bool breathes = f.effects.breathing && f.motion.breathes() && !breathing.empty();
     const bool needle = f.effects.needle && f.needle != nullptr;
@@ -247,6 +262,11 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         b.echoes = echoes_ + kRowMargin + line;
         b.light = light_ + kRowMargin + line;
         b.tail = tail_ + kRowMargin + line;
+        PhysicalWall wall;
+        if (f.effects.wall && !scene_.layers.empty()) {
+            place_wall(f, breathes ? &breathing : nullptr, keep_all, line, wall);
+            b.wall = &wall;
+        }
         sample_beam_block(context_.simd, b);
         met.add(b);
         NeedleRow row;
@@ -268,6 +288,8 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     met_.hard = met.hard;
     met_.fine = met.fine;
     met_.target = met.target;
+    met_.wall = met.wall;
+    met_.parenchyma = met.parenchyma;
     met_.needle_given = f.needle != nullptr;
     met_.needle = met.needle;
     return needle_ms.load() / context_.workers.threads();

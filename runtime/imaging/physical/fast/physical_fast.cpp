@@ -66,6 +66,12 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     for (const AcousticProperties& look : scene.looks)
         looks_.push_back(pack_look(look, tables.frequency_mhz));
     looks_.resize(256, 0);
+    looks_wall_ = looks_;
+    for (std::size_t l = 0; l < scene.looks.size(); ++l) {
+        AcousticProperties look = scene.looks[l];
+        look.echo_db += look.wall_db;
+        looks_wall_[l] = pack_look(look, tables.frequency_mhz);
+    }
     dim_off_.assign(256, 1.0f);
     for (const std::int32_t look : looks_)
         dim_.push_back(static_cast<float>(std::exp2(-(look & 0xFFFF) / 4096.0 * geometry.step_mm)));
@@ -74,6 +80,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
         const FineFrame& frame = scene.fine.frames[l];
         if (frame.cube < 0) continue;
         looks_[l] |= kLookFine;
+        looks_wall_[l] |= kLookFine;
         std::copy(frame.cube_from_voxel.begin(), frame.cube_from_voxel.end(),
                   fine_frames_.begin() + static_cast<std::ptrdiff_t>(10 * l));
         fine_frames_[10 * l + 9] =
@@ -84,6 +91,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
                             static_cast<float>(t.centre_vx.z), static_cast<float>(t.radius_mm),
                             t.look, static_cast<float>(t.wall), t.fluid});
     }
+    frame_looks_ = looks_;
     near_targets_.reserve(targets_.size());
     for (const PairEcho& pair : scene.pairs) pairs_word_.push_back(pack_pair(pair));
     for (const Row& row : tables.rows) {
@@ -103,6 +111,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     gaps_.assign(lines + kSlack, 0.0f);
     beams_.assign(kBeamNumbers * lines + kSlack, 0.0f);
     breathing_.assign((samples / kBreathingNode + 2) * lines + kSlack, 0.0f);
+    prepare_wall(tables);
     const std::size_t area = samples * static_cast<std::size_t>(stride_) + kSlack;
     // One allocation; rows begin on cache lines.
     const std::size_t line_of_floats = 16;

@@ -44,6 +44,17 @@ inline constexpr int kRowSlack = 64;   // behind rows and buffers: lanes of the 
 inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 3
 
 inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
+inline constexpr int kWallMostRows = 32;   // samples between nodes of the wall, at most
+
+// Effect wall: distances at nodes, `lines` of the block apart, and the tables of sheets.
+struct PhysicalWall {
+    const float *depth = nullptr, *above = nullptr, *strength = nullptr;
+    const std::uint8_t* active = nullptr;  // per row of nodes: something shows below it
+    const float *outer = nullptr, *inner = nullptr;
+    int outer_size = 0, inner_size = 0;
+    int every = 1, rows = 0;        // samples between nodes; samples that can show a sheet
+    float per_row = 1, per_mm = 1;  // one over samples, and over mm, between nodes
+};
 
 struct PhysicalTarget {
     float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels
@@ -68,8 +79,9 @@ struct PhysicalBlock {
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
     const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr, *speckle = nullptr;
-    const std::int8_t* fine = nullptr;   // null: off. Two cubes
+    const std::int8_t* fine = nullptr;   // null: off. Three cubes
     const float* fine_frames = nullptr;  // ten per label: rows of the frame, offset of its cube
+    const PhysicalWall* wall = nullptr;  // null: off
     const PhysicalTarget* targets = nullptr;
     int target_count = 0;
     Int3 size;
@@ -96,7 +108,7 @@ struct PhysicalBlock {
     int stride = 0;
     int tail_from = 0;  // out: first sample with a tail; samples if none
     bool boundary_met = false, refraction_met = false, hard_met = false, fine_met = false,
-         target_met = false;  // out
+         target_met = false, wall_met = false, parenchyma_met = false;  // out
 };
 
 // A row's filter across the beams, and the noise that reaches the receiver with it.

@@ -105,6 +105,9 @@ inline constexpr int kFineEdge = 64;
 inline constexpr double kFibreAlongMm = 1.6, kFibreAcrossMm = 0.16;  // a cube's voxel
 inline constexpr double kPennationRad = 0.2;
 inline constexpr double kSeptaAlongMm = 0.8, kSeptaAcrossMm = 0.4;
+// Parenchyma: a third cube, a voxel of it the same in all directions.
+inline constexpr int kParenchymaCube = 2;
+inline constexpr double kParenchymaMm = 1.3;
 
 // Targets of an exercise are balls in the anatomy; their surface is as rough as that of organs.
 inline constexpr double kTargetReachMm = 2;

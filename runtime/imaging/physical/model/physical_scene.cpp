@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "runtime/imaging/physical/model/physical_model.h"
+#include "runtime/imaging/physical/model/wall_sheets.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -127,8 +128,9 @@ void add_tissues(const CaseBundle& bundle, const std::vector<Target>& targets, P
     const std::size_t count = bundle.labels.size();
     for (std::size_t l = 0; l < count; ++l) {
         const Tissue& t = tissue(l);
-        s.looks.push_back(
-            {t.echo_db, t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind});
+        s.looks.push_back({t.echo_db, t.attenuation_db_cm_mhz,
+                           l == 0 ? TissueKind::outside : t.kind,
+                           t.name == "skin" ? kWallSkinDb : 0});
     }
     s.has_hard = std::any_of(s.looks.begin(), s.looks.end(), [](const AcousticProperties& l) {
         return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
@@ -176,6 +178,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.textures = options.textures ? options.textures
                                   : std::make_shared<const PhysicalTextures>(physical_textures());
     s.fine = make_fine_structure(bundle, jobs);
+    s.layers = make_tissue_layers(bundle, jobs);
     return s;
 }
 

@@ -15,6 +15,7 @@
 #include "runtime/imaging/physical/model/brick_table.h"
 #include "runtime/imaging/physical/model/fine_structure.h"
 #include "runtime/imaging/physical/model/physical_textures.h"
+#include "runtime/imaging/physical/model/tissue_layers.h"
 
 namespace sonocase::runtime {
 
@@ -32,6 +33,7 @@ struct AcousticProperties {
     double echo_db = 0;
     double attenuation = 0;  // dB/cm/MHz
     TissueKind kind = TissueKind::outside;
+    double wall_db = 0;  // added to echo_db by effect wall, whose sheets draw the skin
 };
 
 // A target of the exercise: a ball in the anatomy.
@@ -57,6 +59,7 @@ struct PhysicalScene {
     std::shared_ptr<const PhysicalTextures> textures;
     std::vector<std::int8_t> speckle;  // pairs, edge 2^kSpeckleLog2
     FineStructure fine;
+    TissueLayers layers;
 
     std::vector<TargetBall> targets;
 

@@ -43,6 +43,7 @@ Tables make_tables(const Probe& probe, const ScanGeometry& g) {
     const double wavelength = 1.54 / probe.frequency_mhz;
     const double axial_fwhm = 0.58 * std::pow(3.5 / probe.frequency_mhz, 0.7);  // 0.33 mm at 8 MHz
     t.axial_mm = axial_fwhm;
+    t.wall = make_wall_tables(probe.frequency_mhz, axial_fwhm);
     t.axial_reach = gaussian(axial_fwhm * kSigmaPerFwhm / g.step_mm, kMaxAxial, t.axial);
     const double axial_sum = sum(t.axial);
 

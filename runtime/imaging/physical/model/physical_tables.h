@@ -9,6 +9,7 @@
 #include "formats/exercise/exercise.h"
 #include "runtime/imaging/physical/model/physical_effects.h"
 #include "runtime/imaging/physical/model/physical_model.h"
+#include "runtime/imaging/physical/model/wall_sheets.h"
 #include "runtime/imaging/scan/scan_geometry.h"
 
 namespace sonocase::runtime::physical {
@@ -33,6 +34,7 @@ struct Tables {
     double axial_mm = 0.58;                        // full width at half height
     double scatter_mm = 0.3;                       // spacing of scatterers
     double frequency_mhz = 3.5;
+    WallTables wall;
 };
 
 // Amplitude of the clutter that the probe's own face adds at a depth.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "runtime/imaging/physical/reference/reference_place.h"
+#include "runtime/imaging/physical/reference/reference_wall.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -214,7 +215,9 @@ class Beams {
             if (in_.frame.effects.targets) find_target(in_, beam, p);
             const AcousticProperties& look =
                 in_.scene.looks[static_cast<std::size_t>(p.look_index)];
-            echo_of_tissue(look, p);
+            const WallEcho wall = meet_wall(k, l, o, d, look);
+            echo_of_tissue(look, wall.in_wall, p);
+            p.re += p.row.interface_scale * wall.amplitude;
             meet_surface(in_, beam, p);
             meet_target(in_, p);
             const bool dead = t.log2_light < kDeadLog2;
@@ -231,6 +234,32 @@ class Beams {
     }
 
   private:
+    // The point that beam l shows at depth r, in the middle of the slab.
+    Point3 point_at(int l, PlanePoint o, PlanePoint d, double r_mm) const {
+        const PhysicalFrame& f = in_.frame;
+        const double gap = static_cast<double>(gaps_[static_cast<std::size_t>(l)]);
+        const double along = r_mm + gap * std::exp(-r_mm / kGapReachMm);
+        const Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
+        return breathing_.empty() ? x : x - breathing_.weight(x) * f.motion.breathing_mm;
+    }
+
+    // Sheets of the wall, in soft tissue.
+    WallEcho meet_wall(
+        int k, int l, PlanePoint o, PlanePoint d, const AcousticProperties& look) const {
+        const double step = in_.geometry.step_mm;
+        const int every = std::clamp(static_cast<int>(in_.tables.wall.node_mm / step), 1, 32);
+        const int rows = static_cast<int>(kWallDepthMm / step) / every * every;
+        if (!in_.frame.effects.wall || look.kind != TissueKind::soft || k >= rows ||
+            in_.scene.layers.empty())
+            return {};
+        const double half = 0.5 * every * step;
+        const auto voxel = [&](double r) {
+            return in_.scene.grid.voxel_from_point(point_at(l, o, d, r));
+        };
+        const double r = in_.row(k).r_mm;
+        return wall_echo(in_, voxel(r - half), voxel(r), voxel(r + half), 2 * half);
+    }
+
     // Where sample k of beam l lies, and what is there.
     Sample place_sample(int k, int l, PlanePoint o, PlanePoint d, Vector3 beam) const {
         const PhysicalScene& s = in_.scene;
@@ -238,10 +267,7 @@ class Beams {
         Sample p{in_.row(k)};
         const Vector3 across = f.volume_from_probe.rotation * Vector3{0, 1, 0};
         const Vector3 sideways = f.volume_from_probe.rotation * Vector3{1, 0, 0};
-        const double gap = static_cast<double>(gaps_[static_cast<std::size_t>(l)]);
-        const double along = p.row.r_mm + gap * p.row.contact;
-        Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
-        if (!breathing_.empty()) x = x - breathing_.weight(x) * f.motion.breathing_mm;
+        const Point3 x = point_at(l, o, d, p.row.r_mm);
         p.from_origin = x - s.grid.origin_mm;
 
         const double jitter = in_.draw(in_.noise.white, NoiseUse::elevation, 0, k, l);
@@ -256,12 +282,15 @@ class Beams {
     }
 
     // Echo and attenuation of the tissue itself.
-    void echo_of_tissue(const AcousticProperties& look, Sample& p) const {
+    void echo_of_tissue(const AcousticProperties& look, bool in_wall, Sample& p) const {
         const PhysicalEffects& on = in_.frame.effects;
-        double echo_db = look.echo_db;
+        double echo_db = look.echo_db + (on.wall ? look.wall_db : 0);
         if (p.look_index == p.place.label) {
-            if (on.structure) echo_db += echo_offset_db(in_.scene, p.looked_up);
-            if (on.fine_structure) echo_db += fine_offset_db(in_.scene, p.place.label, p.v);
+            if (on.structure) {
+                const double baked = echo_offset_db(in_.scene, p.looked_up);
+                echo_db += in_wall ? std::min(baked, kWallStructureDb) : baked;
+            }
+            echo_db += fine_offset_db(in_.scene, on, p.place.label, p.v);
         }
         const double amplitude =
             look.kind == TissueKind::outside ? 0 : std::exp2(echo_db / kDbPerLog2);
