@@ -16,6 +16,7 @@
 #include "runtime/imaging/physical/fast/beam_light-inl.h"
 #include "runtime/imaging/physical/fast/beam_place-inl.h"
 #include "runtime/imaging/physical/fast/beam_scatter-inl.h"
+#include "runtime/imaging/physical/fast/beam_streak-inl.h"
 #include "runtime/imaging/physical/fast/beam_surface-inl.h"
 #include "runtime/imaging/physical/fast/beam_target-inl.h"
 #include "runtime/imaging/physical/fast/beam_wall-inl.h"
@@ -68,6 +69,7 @@ void sample_beams_as(PhysicalBlock& b) {
             look_chunk(d, b, c);
             if (b.structure) structure_chunk(d, b, c);
             if (b.wall != nullptr && k < b.wall->rows) wall_chunk(d, b, c);
+            if (b.streak_count > 0) streak_chunk(d, b, c);
             if (b.speckled) speckle_chunk(d, b, c);
             scatter_chunk(d, b, c);
             light_chunk<kHard>(d, b, c, light);

@@ -2,6 +2,7 @@
 
 // Model `physical`, first pass: beams into the anatomy, block by block.
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 
@@ -100,6 +101,25 @@ void PhysicalFast::choose_targets(const PhysicalFrame& f, bool keep_all) {
             std::abs(dot(normal, centre - origin)) < thick + scene_.targets[t].radius_mm)
             near_targets_.push_back(targets_[t]);
     }
+}
+
+// Plates that the block's beams can show.
+int PhysicalFast::choose_streaks(int first, std::span<PhysicalStreak> out) const {
+    int count = 0;
+    for (int n = 0; n < streak_count_ && count < static_cast<int>(out.size()); ++n) {
+        const Streak& s = streaks_[static_cast<std::size_t>(n)];
+        if (s.line_begin >= first + kBeamBlock || s.line_end <= first) continue;
+        out[static_cast<std::size_t>(count++)] = {static_cast<float>(s.centre.x),
+                                                  static_cast<float>(s.centre.z),
+                                                  static_cast<float>(s.normal.x),
+                                                  static_cast<float>(s.normal.z),
+                                                  static_cast<float>(1 / s.width_mm),
+                                                  static_cast<float>(2 / s.length_mm),
+                                                  static_cast<float>(s.amplitude),
+                                                  s.sample_begin,
+                                                  s.sample_end};
+    }
+    return count;
 }
 
 // Looks of the tissues as the frame's effects want them.
@@ -249,6 +269,10 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     const bool breathes = f.effects.breathing && f.motion.breathes() && !breathing.empty();
     const bool needle = f.effects.needle && f.needle != nullptr;
     const NeedleStrip strip = needle ? NeedleStrip(*f.needle) : NeedleStrip();
+    streak_count_ =
+        f.effects.streaks
+            ? find_streaks(scene_, g, tables_, f, breathes ? &breathing : nullptr, gaps_, streaks_)
+            : 0;
     MetByAny met;
     std::atomic<double> needle_ms{0};
     context_.workers.for_each(lines_ / kBeamBlock, [&](int, int block) {
@@ -262,6 +286,10 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         b.echoes = echoes_ + kRowMargin + line;
         b.light = light_ + kRowMargin + line;
         b.tail = tail_ + kRowMargin + line;
+        std::array<PhysicalStreak, kBlockStreaks> streaks;
+        b.plane = plane_beams_.data() + line;
+        b.streaks = streaks.data();
+        b.streak_count = choose_streaks(line, streaks);
         PhysicalWall wall;
         if (f.effects.wall && !scene_.layers.empty()) {
             place_wall(f, breathes ? &breathing : nullptr, keep_all, line, wall);
@@ -288,6 +316,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     met_.hard = met.hard;
     met_.fine = met.fine;
     met_.target = met.target;
+    met_.streaks = streak_count_ > 0;
     met_.wall = met.wall;
     met_.parenchyma = met.parenchyma;
     met_.needle_given = f.needle != nullptr;

@@ -112,6 +112,15 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     beams_.assign(kBeamNumbers * lines + kSlack, 0.0f);
     breathing_.assign((samples / kBreathingNode + 2) * lines + kSlack, 0.0f);
     prepare_wall(tables);
+    streaks_.resize(kMostStreaks);
+    plane_beams_.assign(4 * lines + kSlack, 0.0f);
+    for (std::size_t l = 0; l < lines; ++l) {
+        const auto& [o, d] =
+            geometry.beams[std::min(l, static_cast<std::size_t>(geometry.scanlines) - 1)];
+        int row = 0;
+        for (const double value : {o.x, o.z, d.x, d.z})
+            plane_beams_[static_cast<std::size_t>(row++) * lines + l] = static_cast<float>(value);
+    }
     const std::size_t area = samples * static_cast<std::size_t>(stride_) + kSlack;
     // One allocation; rows begin on cache lines.
     const std::size_t line_of_floats = 16;

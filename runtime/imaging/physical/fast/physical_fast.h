@@ -15,6 +15,7 @@
 #include "runtime/imaging/formation/render_context.h"
 #include "runtime/imaging/physical/fast/physical_kernels.h"
 #include "runtime/imaging/physical/model/physical_frame.h"
+#include "runtime/imaging/physical/model/streak_plates.h"
 
 namespace sonocase::runtime {
 
@@ -55,6 +56,7 @@ class PhysicalFast {
     void set_poses(const PhysicalFrame& frame, PhysicalBlock& block) const;
     void set_tables(const PhysicalFrame& frame, PhysicalBlock& block) const;
     PhysicalBlock block_of_frame(const PhysicalFrame& frame, bool keep_all) const;
+    int choose_streaks(int first, std::span<PhysicalStreak> out) const;  // of a block of beams
     void prepare_wall(const physical::Tables& tables);
     void place_wall(const PhysicalFrame& frame,
                     const BreathingField* breathing,
@@ -88,7 +90,10 @@ class PhysicalFast {
     std::vector<std::uint32_t> elevation_start_, lookup_start_, clutter_start_, haze_start_,
         noise_start_;
 
-    PhysicalWall wall_;  // what all blocks share
+    std::vector<physical::Streak> streaks_;
+    int streak_count_ = 0;
+    std::vector<float> plane_beams_;  // origin x, z, direction x, z; # lines each
+    PhysicalWall wall_;               // what all blocks share
     std::vector<float> wall_nodes_;
     std::vector<std::uint8_t> wall_active_;  // per block and row of nodes
     std::vector<float> raw_gaps_, gaps_, beams_, breathing_;

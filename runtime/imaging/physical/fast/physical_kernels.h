@@ -56,6 +56,15 @@ struct PhysicalWall {
     float per_row = 1, per_mm = 1;  // one over samples, and over mm, between nodes
 };
 
+// Effect streaks: a plate, see model/streak_plates.h.
+struct PhysicalStreak {
+    float x = 0, z = 0, normal_x = 0, normal_z = 1;  // mm, in the plane
+    float per_width = 1, per_length = 1;             // 1 / deviation; 2 / length
+    float amplitude = 0;
+    int sample_begin = 0, sample_end = 0;
+};
+inline constexpr int kBlockStreaks = 64;  // in a block of beams
+
 struct PhysicalTarget {
     float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels
     std::int32_t look = 0;                     // index
@@ -82,6 +91,9 @@ struct PhysicalBlock {
     const std::int8_t* fine = nullptr;   // null: off. Three cubes
     const float* fine_frames = nullptr;  // ten per label: rows of the frame, offset of its cube
     const PhysicalWall* wall = nullptr;  // null: off
+    const PhysicalStreak* streaks = nullptr;
+    int streak_count = 0;
+    const float* plane = nullptr;  // beams in the plane, `lines` apart: origin x, z, direction x, z
     const PhysicalTarget* targets = nullptr;
     int target_count = 0;
     Int3 size;

@@ -18,6 +18,7 @@ struct PhysicalEffects {
     bool fine_structure = true;  // fibres and septa below the voxel
     bool parenchyma = true;      // uneven echo of organs
     bool targets = true;         // balls of the exercise
+    bool streaks = true;         // plates in organs that face the beam
     bool wall = true;            // sheets between skin and organs
     bool speckle = true;
     bool interfaces = true;
@@ -45,6 +46,7 @@ struct PhysicalMet {
     bool fine = false;          // muscle or fat
     bool parenchyma = false;    // liver, spleen, kidney, glands
     bool target = false;        // near the slab
+    bool streaks = false;       // plates that face the beam
     bool wall = false;          // between skin and organs
     bool refraction = false;    // a surface of fluid
     bool hard = false;          // bone or gas
@@ -64,7 +66,7 @@ inline const char* nothing_hard(const PhysicalMet& m) {
 
 }  // namespace physical
 
-inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 27> kPhysicalEffects{{
+inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 28> kPhysicalEffects{{
     {"contact", Pass::contact, 1, 0, 0, &PhysicalEffects::contact,
      [](const PhysicalMet& m) { return m.gap ? "" : "the probe touches everywhere"; }},
     {"slice", Pass::beams, 4, 2, 7},
@@ -84,6 +86,8 @@ inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 27> kPhys
      [](const PhysicalMet& m) { return m.parenchyma ? "" : "no parenchyma crossed"; }},
     {"targets", Pass::beams, 0.5, 1, 4, &PhysicalEffects::targets,
      [](const PhysicalMet& m) { return m.target ? "" : "no target near the slab"; }},
+    {"streaks", Pass::beams, 0.3, 0, 0, &PhysicalEffects::streaks,
+     [](const PhysicalMet& m) { return m.streaks ? "" : "no plate faces the beams"; }},
     {"wall", Pass::beams, 0.3, 2, 0.5, &PhysicalEffects::wall,
      [](const PhysicalMet& m) { return m.wall ? "" : "no body wall near the face"; }},
     {"speckle", Pass::beams, 2, 1, 2, &PhysicalEffects::speckle},

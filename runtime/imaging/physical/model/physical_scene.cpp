@@ -178,6 +178,8 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.textures = options.textures ? options.textures
                                   : std::make_shared<const PhysicalTextures>(physical_textures());
     s.fine = make_fine_structure(bundle, jobs);
+    s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
+                                   [](const FineFrame& f) { return f.cube == kParenchymaCube; });
     s.layers = make_tissue_layers(bundle, jobs);
     return s;
 }

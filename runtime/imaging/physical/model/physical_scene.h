@@ -59,6 +59,7 @@ struct PhysicalScene {
     std::shared_ptr<const PhysicalTextures> textures;
     std::vector<std::int8_t> speckle;  // pairs, edge 2^kSpeckleLog2
     FineStructure fine;
+    bool has_parenchyma = false;  // some label has its cube
     TissueLayers layers;
 
     std::vector<TargetBall> targets;

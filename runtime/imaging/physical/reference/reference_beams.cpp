@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/imaging/physical/model/streak_plates.h"
 #include "runtime/imaging/physical/reference/reference_place.h"
 #include "runtime/imaging/physical/reference/reference_wall.h"
 
@@ -197,6 +198,10 @@ class Beams {
         }
         if (f.effects.breathing && f.motion.breathes())
             breathing_ = BreathingField(*in_.scene.bundle);
+        if (f.effects.streaks)
+            streak_count_ =
+                find_streaks(in_.scene, in_.geometry, in_.tables, f,
+                             breathing_.empty() ? nullptr : &breathing_, gaps_, streaks_);
     }
 
     void trace(int l, BeamSamples& out) const {
@@ -218,6 +223,7 @@ class Beams {
             const WallEcho wall = meet_wall(k, l, o, d, look);
             echo_of_tissue(look, wall.in_wall, p);
             p.re += p.row.interface_scale * wall.amplitude;
+            if (look.kind == TissueKind::soft) meet_streaks(o, d, p);
             meet_surface(in_, beam, p);
             meet_target(in_, p);
             const bool dead = t.log2_light < kDeadLog2;
@@ -241,6 +247,19 @@ class Beams {
         const double along = r_mm + gap * std::exp(-r_mm / kGapReachMm);
         const Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
         return breathing_.empty() ? x : x - breathing_.weight(x) * f.motion.breathing_mm;
+    }
+
+    // Plates that face the beam, in soft tissue.
+    void meet_streaks(PlanePoint o, PlanePoint d, Sample& p) const {
+        for (int n = 0; n < streak_count_; ++n) {
+            const Streak& s = streaks_[static_cast<std::size_t>(n)];
+            const double x = o.x + p.row.r_mm * d.x - s.centre.x,
+                         z = o.z + p.row.r_mm * d.z - s.centre.z;
+            const double off = (x * s.normal.x + z * s.normal.z) / s.width_mm;
+            const double along = 2 * (x * s.normal.z - z * s.normal.x) / s.length_mm;
+            p.re += s.amplitude * std::exp(-0.5 * (off * off + std::pow(along, 4))) *
+                    p.row.interface_scale;
+        }
     }
 
     // Sheets of the wall, in soft tissue.
@@ -304,6 +323,8 @@ class Beams {
     const ReferenceInput& in_;
     std::vector<float> gaps_;  // # scanlines; negative: air
     BreathingField breathing_;
+    std::vector<Streak> streaks_ = std::vector<Streak>(kMostStreaks);
+    int streak_count_ = 0;
     const Matrix3 turn_ = speckle_rotation();
 };
 
