@@ -66,7 +66,6 @@ void sample_beams_as(PhysicalBlock& b) {
             if (b.target_count > 0 && target_chunk(d, b, c)) b.target_met = true;
             look_chunk(d, b, c);
             if (b.structure) structure_chunk(d, b, c);
-            if (b.speckled) speckle_chunk(d, b, c);
             scatter_chunk(d, b, c);
             light_chunk<kHard>(d, b, c, light);
         }
