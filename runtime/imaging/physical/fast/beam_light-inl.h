@@ -117,9 +117,11 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
         const auto alive = hn::Ge(t.light, least);
         t.light = hn::IfThenElseZero(alive, t.light);
         if (!hn::AllTrue(d, alive)) {
-            std::int32_t* echoes = b.echoes + out;
             const auto lit = hn::RebindMask(di, alive);
-            hn::StoreU(hn::IfThenElseZero(lit, hn::LoadU(di, echoes)), di, echoes);
+            for (int look = 0; look < b.looks_at[k]; ++look) {
+                std::int32_t* echoes = b.echoes + look * b.look_stride + out;
+                hn::StoreU(hn::IfThenElseZero(lit, hn::LoadU(di, echoes)), di, echoes);
+            }
         }
         hn::StoreU(t.light, d, b.light + out);
         if constexpr (kTails) {
@@ -165,7 +167,8 @@ HWY_INLINE void dark_rows(D d, const PhysicalBlock& b, int beam, int first, Beam
     const hn::RebindToSigned<D> di;
     for (int k = first; k < b.samples; ++k) {
         const std::ptrdiff_t out = static_cast<std::ptrdiff_t>(k) * b.stride + beam;
-        hn::StoreU(hn::Zero(di), di, b.echoes + out);
+        for (int look = 0; look < b.looks_at[k]; ++look)
+            hn::StoreU(hn::Zero(di), di, b.echoes + look * b.look_stride + out);
         hn::StoreU(hn::Zero(d), d, b.light + out);
         if (t.tail_from > k) continue;
         fade_tails(d, b, t);

@@ -70,7 +70,6 @@ void sample_beams_as(PhysicalBlock& b) {
             if (b.structure) structure_chunk(d, b, c);
             if (b.wall != nullptr && k < b.wall->rows) wall_chunk(d, b, c);
             if (b.streak_count > 0) streak_chunk(d, b, c);
-            if (b.speckled) speckle_chunk(d, b, c);
             scatter_chunk(d, b, c);
             light_chunk<kHard>(d, b, c, light);
         }

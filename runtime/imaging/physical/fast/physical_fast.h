@@ -97,8 +97,12 @@ class PhysicalFast {
     std::vector<float> wall_nodes_;
     std::vector<std::uint8_t> wall_active_;  // per block and row of nodes
     std::vector<float> raw_gaps_, gaps_, beams_, breathing_;
-    std::vector<float> planes_;  // holds the four below, samples x stride each
-    std::int32_t* echoes_ = nullptr;
+    physical::SpeckleSlice slice_;  // of the frame
+    std::vector<float> per_spacing_, per_spacing_thin_, speckle_level_, speckle_level_bare_;
+    std::vector<int> looks_drawn_;
+    std::vector<float> planes_;       // holds the four below, samples x stride each
+    std::int32_t* echoes_ = nullptr;  // one plane per look
+    std::ptrdiff_t look_stride_ = 0;
     float *light_ = nullptr, *tail_ = nullptr, *power_ = nullptr;
     std::vector<std::int32_t> tail_from_;  // per block
     std::vector<float> work_, ring_;       // per thread

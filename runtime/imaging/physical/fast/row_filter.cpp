@@ -17,21 +17,34 @@ HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 using namespace physical;
 
-// Light of the aperture times echoes, then the point spread across beams.
-void filter_across(const PhysicalRowTask& t) {
+// Light of the aperture: boxes of 5 and 3 beams.
+void smooth_light(const PhysicalRowTask& t) {
+    const hn::CappedTag<float, kBeamBlock> d;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    for (int i = 0; i < t.lines; i += lanes) {
+        const auto at = [&](int j) HWY_ATTR { return hn::LoadU(d, t.light + i + j); };
+        auto sum = hn::Mul(hn::Add(at(-3), at(3)), hn::Set(d, 1 / 15.0f));
+        sum = hn::Add(sum, hn::Mul(hn::Add(at(-2), at(2)), hn::Set(d, 2 / 15.0f)));
+        sum = hn::Add(sum, hn::Mul(hn::Add(hn::Add(at(-1), at(1)), at(0)), hn::Set(d, 3 / 15.0f)));
+        hn::StoreU(sum, d, t.work_light + i);
+    }
+}
+
+// Lit echoes of one look, then the point spread across beams.
+void filter_look(const PhysicalRowTask& t,
+                 const std::int32_t* echoes,
+                 float* out_re,
+                 float* out_im) {
     const hn::CappedTag<float, kBeamBlock> d;
     const hn::RebindToSigned<decltype(d)> di;
     const int lanes = static_cast<int>(hn::Lanes(d));
     float* mre = t.work_re;
     float* mim = t.work_im;
     for (int i = 0; i < t.lines; i += lanes) {
-        const auto at = [&](int j) HWY_ATTR { return hn::LoadU(d, t.light + i + j); };
-        auto sum = hn::Mul(hn::Add(at(-3), at(3)), hn::Set(d, 1 / 15.0f));
-        sum = hn::Add(sum, hn::Mul(hn::Add(at(-2), at(2)), hn::Set(d, 2 / 15.0f)));
-        sum = hn::Add(sum, hn::Mul(hn::Add(hn::Add(at(-1), at(1)), at(0)), hn::Set(d, 3 / 15.0f)));
-        const auto echo = hn::LoadU(di, t.echoes + i);
-        hn::StoreU(hn::Mul(echo_real(d, echo), sum), d, mre + i);
-        hn::StoreU(hn::Mul(echo_imaginary(d, echo), sum), d, mim + i);
+        const auto light = hn::LoadU(d, t.work_light + i);
+        const auto echo = hn::LoadU(di, echoes + i);
+        hn::StoreU(hn::Mul(echo_real(d, echo), light), d, mre + i);
+        hn::StoreU(hn::Mul(echo_imaginary(d, echo), light), d, mim + i);
     }
     const int reach = t.point_spread ? t.reach : 0;
     for (int j = 0; j < reach; ++j) {  // mirrored at the sector's edges
@@ -42,10 +55,6 @@ void filter_across(const PhysicalRowTask& t) {
         mim[t.scanlines + j] = mim[right];
     }
     const auto centre = hn::Set(d, t.point_spread ? t.lateral[0] : 1.0f);
-    const auto near = hn::Set(d, t.near_field * t.near_field);
-    const auto half = hn::Set(d, 0.5f);
-    const auto unit = hn::Set(d, t.inverse_gain / 32);
-    const auto noise_level = hn::Set(d, t.noise);
     for (int i = 0; i < t.lines; i += lanes) {
         auto re = hn::Mul(hn::LoadU(d, mre + i), centre),
              im = hn::Mul(hn::LoadU(d, mim + i), centre);
@@ -56,6 +65,21 @@ void filter_across(const PhysicalRowTask& t) {
             im = hn::Add(
                 im, hn::Mul(hn::Add(hn::LoadU(d, mim + i - j), hn::LoadU(d, mim + i + j)), tap));
         }
+        hn::StoreU(re, d, out_re + i);
+        hn::StoreU(im, d, out_im + i);
+    }
+}
+
+// Clutter and electronic noise.
+void add_noise(const PhysicalRowTask& t) {
+    const hn::CappedTag<float, kBeamBlock> d;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const auto near = hn::Set(d, t.near_field * t.near_field);
+    const auto half = hn::Set(d, 0.5f);
+    const auto unit = hn::Set(d, t.inverse_gain / 32);
+    const auto noise_level = hn::Set(d, t.noise);
+    for (int i = 0; i < t.lines; i += lanes) {
+        auto re = hn::LoadU(d, t.out_re + i), im = hn::LoadU(d, t.out_im + i);
         auto power = near;
         if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock])
             power = hn::Add(power, hn::LoadU(d, t.tail + i));
@@ -77,22 +101,34 @@ void filter_across(const PhysicalRowTask& t) {
     }
 }
 
-// Point spread along the beam and gain; the envelope's power.
+void filter_across(const PhysicalRowTask& t) {
+    smooth_light(t);
+    for (int look = 0; look < t.looks; ++look) {
+        filter_look(t, t.echoes + look * t.look_stride, t.out_re + look * t.out_stride,
+                    t.out_im + look * t.out_stride);
+    }
+    add_noise(t);
+}
+
+// Point spread along the beam and gain; the envelope's power, the mean of all looks.
 void make_power(const PhysicalPowerTask& t) {
     const hn::ScalableTag<float> d;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    const auto gain = hn::Set(d, t.gain);
+    const auto gain = hn::Set(d, t.gain * t.gain / static_cast<float>(t.looks));
     for (int i = 0; i < t.lines; i += lanes) {
-        auto re = hn::Zero(d), im = hn::Zero(d);
-        for (int j = 0; j < t.axial_count; ++j) {
-            if (t.re[j] == nullptr) continue;
-            const auto tap = hn::Set(d, t.axial[j]);
-            re = hn::Add(re, hn::Mul(hn::LoadU(d, t.re[j] + i), tap));
-            im = hn::Add(im, hn::Mul(hn::LoadU(d, t.im[j] + i), tap));
+        auto power = hn::Zero(d);
+        for (int look = 0; look < t.looks; ++look) {
+            const std::ptrdiff_t from = look * t.look_stride + i;
+            auto re = hn::Zero(d), im = hn::Zero(d);
+            for (int j = 0; j < t.axial_count; ++j) {
+                if (t.re[j] == nullptr) continue;
+                const auto tap = hn::Set(d, t.axial[j]);
+                re = hn::Add(re, hn::Mul(hn::LoadU(d, t.re[j] + from), tap));
+                im = hn::Add(im, hn::Mul(hn::LoadU(d, t.im[j] + from), tap));
+            }
+            power = hn::Add(power, hn::Add(hn::Mul(re, re), hn::Mul(im, im)));
         }
-        re = hn::Mul(re, gain);
-        im = hn::Mul(im, gain);
-        const auto power = hn::Add(hn::Mul(re, re), hn::Mul(im, im));
+        power = hn::Mul(power, gain);
         if (t.envelope_sum != nullptr) {
             hn::StoreU(hn::Add(hn::LoadU(d, t.envelope_sum + i), hn::Sqrt(power)), d,
                        t.envelope_sum + i);

@@ -139,7 +139,8 @@ LabelMoments moments_of_labels(const CaseBundle& bundle, const Kinds& kinds, Job
 FineFrame frame_of_parenchyma(double voxel_mm) {
     FineFrame frame;
     frame.cube = kParenchymaCube;
-    const Matrix3 turn = speckle_rotation();
+    const Matrix3 turn =
+        rotation_about(normalized(Vector3{0.36, 0.48, 0.8}), 0.7) * rotation_about({0, 0, 1}, 0.55);
     for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 3; ++c)
             frame.cube_from_voxel[static_cast<std::size_t>(3 * r + c)] =

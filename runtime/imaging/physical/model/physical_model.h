@@ -6,8 +6,6 @@
 
 #include <cstdint>
 
-#include "formats/base/geometry.h"
-
 namespace sonocase::runtime::physical {
 
 inline constexpr double kDbPerLog2 = 6.020599913279624;  // amplitude: 20 log10(2)
@@ -20,21 +18,6 @@ inline constexpr double kGapStepMm = 0.5;
 
 // A beam as dark as this (log2 of its amplitude: -96 dB) counts as dead: it lights nothing below.
 inline constexpr double kDeadLog2 = -16;
-
-// Scatterers: a cube of edge 2^kSpeckleLog2 out of the bundle's speckle, repeated in each
-// direction. Every repetition is shuffled by a hash of its place (exclusive or on the cell's
-// coordinates), so that no pattern shows twice.
-inline constexpr int kSpeckleLog2 = 6;
-inline constexpr std::uint32_t kSpeckleHashX = 0x9E3779B1u, kSpeckleHashY = 0x85EBCA77u,
-                               kSpeckleHashZ = 0xC2B2AE3Du;
-// x, y, z: of a cell.
-inline std::uint32_t speckle_hash(std::int32_t x, std::int32_t y, std::int32_t z) {
-    return static_cast<std::uint32_t>(x >> kSpeckleLog2) * kSpeckleHashX ^
-           static_cast<std::uint32_t>(y >> kSpeckleLog2) * kSpeckleHashY ^
-           static_cast<std::uint32_t>(z >> kSpeckleLog2) * kSpeckleHashZ;
-}
-// First bit of the hash for each axis.
-inline constexpr int kShuffleX = 8, kShuffleY = 14, kShuffleZ = 20;
 
 // Surfaces further than this from a voxel's centre have no effect in it.
 inline constexpr double kSurfaceReachVx = 2.0;
@@ -112,11 +95,5 @@ inline constexpr double kParenchymaMm = 1.3;
 // Targets of an exercise are balls in the anatomy; their surface is as rough as that of organs.
 inline constexpr double kTargetReachMm = 2;
 inline constexpr int kMaxTargets = 8;
-
-// Hides the period of the speckle volume: a fixed rotation about no special direction.
-inline Matrix3 speckle_rotation() {
-    return rotation_about(normalized(Vector3{0.36, 0.48, 0.8}), 0.7) *
-           rotation_about({0, 0, 1}, 0.55);
-}
 
 }  // namespace sonocase::runtime::physical

@@ -57,7 +57,6 @@ struct PhysicalScene {
     bool has_hard = true;  // some label is bone or gas; if none, their kernels are left out
 
     std::shared_ptr<const PhysicalTextures> textures;
-    std::vector<std::int8_t> speckle;  // pairs, edge 2^kSpeckleLog2
     FineStructure fine;
     bool has_parenchyma = false;  // some label has its cube
     TissueLayers layers;
@@ -73,7 +72,7 @@ struct PhysicalSceneOptions {
 };
 
 // targets: of the exercise; those that only mark a place do not show in the tissue.
-// The bundle must outlive the scene. Errors: a bundle without labels or speckle; too little memory
+// The bundle must outlive the scene. Errors: a bundle without labels; too little memory
 // for the tables. Cost: some tens of ms for a torso at 1 mm.
 Result<PhysicalScene> make_physical_scene(CaseView view,
                                           const std::vector<Target>& targets = {},

@@ -16,6 +16,8 @@ constexpr std::array<double, 16> kLengthsMm{0.74, 1.25, 1.63, 1.97, 2.3,  2.63, 
 // Eight equally likely amplitudes of mean 0 dB, deviation 2 dB.
 constexpr std::array<double, 8> kLevels{0.70, 0.82, 0.89, 0.96, 1.04, 1.12, 1.22, 1.43};
 
+constexpr std::uint32_t kHashX = 0x9E3779B1u, kHashY = 0x85EBCA77u, kHashZ = 0xC2B2AE3Du;
+
 // (1 - x)^4, close to a Gaussian, 0 from x = 1 on.
 double bump(double x) {
     const double y = std::max(1 - x, 0.0);
@@ -80,9 +82,9 @@ void Search::add_cell(int i, int j, int k) {
     const double turn = kStreakCellMm / (g.fan ? std::max(g.radius_mm + r, kStreakCellMm) : 1e9);
     const double widest = std::min(kStreakFaceSin + turn, 1.0);
     const auto least = static_cast<float>(1 - widest * widest);
-    const std::uint32_t cell = hash32(static_cast<std::uint32_t>(i) * kSpeckleHashX ^
-                                      static_cast<std::uint32_t>(j) * kSpeckleHashY ^
-                                      static_cast<std::uint32_t>(k) * kSpeckleHashZ);
+    const std::uint32_t cell =
+        hash32(static_cast<std::uint32_t>(i) * kHashX ^ static_cast<std::uint32_t>(j) * kHashY ^
+               static_cast<std::uint32_t>(k) * kHashZ);
     for (std::uint32_t t = 0; t < kStreakTries; ++t) {
         const std::uint32_t h = hash32(cell + t);
         const auto nx = static_cast<float>(static_cast<std::int8_t>(h)),
@@ -91,7 +93,7 @@ void Search::add_cell(int i, int j, int k) {
         const float square = nx * nx + ny * ny + nz * nz, cosine = nx * bx + ny * by + nz * bz;
         // Uniform directions: those within the ball.
         if (!(square < 127.0f * 127.0f && cosine * cosine > least * square)) continue;
-        const std::uint32_t place = hash32(h ^ (cell + t) * kSpeckleHashY);
+        const std::uint32_t place = hash32(h ^ (cell + t) * kHashY);
         const auto part = [&](int shift) { return (place >> shift & 0x3FF) / 1024.0; };
         add_plate(corner + kStreakCellMm * Vector3{part(0), part(10), part(20)},
                   {static_cast<double>(nx), static_cast<double>(ny), static_cast<double>(nz)},

@@ -3,10 +3,12 @@
 #include "runtime/imaging/physical/reference/reference_beams.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "runtime/imaging/physical/model/streak_plates.h"
 #include "runtime/imaging/physical/reference/reference_place.h"
+#include "runtime/imaging/physical/reference/reference_speckle.h"
 #include "runtime/imaging/physical/reference/reference_wall.h"
 
 namespace sonocase::runtime {
@@ -40,27 +42,12 @@ struct Sample {
     const TargetBall* ball = nullptr;  // whose surface is near
     double ball_mm = 0, ball_cosine = 0;
     int look_index = 0;
-    double re = 0, im = 0;  // echo
-    double facing = 1;      // how squarely the beam meets the surface, 1 where there is none
-    double loss = 0;        // log2 of amplitude that this sample takes
-    double here = 0;        // amplitude of the light that arrives
+    double re = 0, im = 0;                                 // echo of surfaces
+    std::array<double, kMaxLooks> field_re{}, field_im{};  // of scatterers, one per look
+    double facing = 1;  // how squarely the beam meets the surface, 1 where there is none
+    double loss = 0;    // log2 of amplitude that this sample takes
+    double here = 0;    // amplitude of the light that arrives
 };
-
-// The scatterers of a sample: a pair of amplitudes out of the shuffled speckle cube.
-void scatter(const ReferenceInput& in, const Matrix3& turn, double amplitude, Sample& p) {
-    const Vector3 c = (1 / in.tables.scatter_mm) * (turn * p.from_origin);
-    const std::int32_t i = nearest_integer(c.x), j = nearest_integer(c.y), m = nearest_integer(c.z);
-    const std::uint32_t hash = speckle_hash(i, j, m);
-    const auto wrap = [&](std::int32_t u, int shift) {
-        return (static_cast<std::uint32_t>(u) ^ hash >> shift) & ((1u << kSpeckleLog2) - 1);
-    };
-    const std::size_t cell =
-        wrap(i, kShuffleX) +
-        ((wrap(j, kShuffleY) + (wrap(m, kShuffleZ) << kSpeckleLog2)) << kSpeckleLog2);
-    const double unit = 1 / (32 * std::sqrt(2.0));
-    p.re = amplitude * in.scene.speckle[2 * cell] * unit;
-    p.im = amplitude * in.scene.speckle[2 * cell + 1] * unit;
-}
 
 // log2 of amplitude that a beam loses in one sample where it grazes a wall of fluid.
 double graze_loss(double cosine, double distance_mm, double step_mm) {
@@ -189,7 +176,10 @@ double tail_power(const ReferenceInput& in, const Row& row, BeamLight& t) {
 class Beams {
   public:
     explicit Beams(const ReferenceInput& input)
-        : in_(input), gaps_(static_cast<std::size_t>(input.geometry.scanlines), 0.0f) {
+        : in_(input),
+          gaps_(static_cast<std::size_t>(input.geometry.scanlines), 0.0f),
+          slice_(speckle_slice(input.frame.volume_from_probe.rotation * Vector3{0, 1, 0},
+                               input.tables.cell_mm)) {
         const PhysicalFrame& f = in_.frame;
         if (f.effects.contact) {
             std::vector<float> raw(gaps_.size());
@@ -229,10 +219,13 @@ class Beams {
             const bool dead = t.log2_light < kDeadLog2;
             p.here = dead ? 0 : std::exp2(t.log2_light);
             if (dead) p.re = p.im = 0;
+            if (dead) p.field_re = p.field_im = {};
             light_tails(in_, look.kind, p, t);
             meet_needle(in_, o, d, p, t);
-            out.re[at] = p.re;
-            out.im[at] = p.im;
+            for (std::size_t i = 0; i < out.looks.size(); ++i) {
+                out.looks[i].re[at] = p.re + p.field_re[i];
+                out.looks[i].im[at] = p.im + p.field_im[i];
+            }
             out.light[at] = p.here * std::exp2(t.needle_light);
             out.tail[at] = tail_power(in_, p.row, t);
             t.log2_light -= p.loss;
@@ -313,8 +306,17 @@ class Beams {
         }
         const double amplitude =
             look.kind == TissueKind::outside ? 0 : std::exp2(echo_db / kDbPerLog2);
-        p.re = amplitude;
-        if (on.speckle) scatter(in_, turn_, amplitude, p);
+        p.field_re.fill(amplitude);
+        if (on.speckle) {
+            const SpeckleSample field =
+                speckle_at(slice_, p.from_origin, in_.tables.cell_mm,
+                           slice_spacing(in_.tables, p.row, on), in_.tables.looks);
+            const double level = amplitude * speckle_level(p.row, on);
+            for (std::size_t i = 0; i < kMaxLooks; ++i) {
+                p.field_re[i] = level * field.re[i];
+                p.field_im[i] = level * field.im[i];
+            }
+        }
         p.loss = on.attenuation ? look.attenuation * in_.tables.frequency_mhz *
                                       in_.geometry.step_mm * 0.1 * 2 / kDbPerLog2
                                 : 0;
@@ -325,15 +327,17 @@ class Beams {
     BreathingField breathing_;
     std::vector<Streak> streaks_ = std::vector<Streak>(kMostStreaks);
     int streak_count_ = 0;
-    const Matrix3 turn_ = speckle_rotation();
+    const SpeckleSlice slice_;
 };
 
 }  // namespace
 
 BeamSamples reference_beams(const ReferenceInput& input) {
     const std::size_t count = input.count();
-    BeamSamples out{std::vector<double>(count, 0.0), std::vector<double>(count, 0.0),
-                    std::vector<double>(count, 1.0), std::vector<double>(count, 0.0)};
+    const std::vector<double> dark(count, 0.0);
+    BeamSamples out{
+        std::vector<ComplexPlane>(static_cast<std::size_t>(input.tables.looks), {dark, dark}),
+        std::vector<double>(count, 1.0), dark};
     const Beams beams(input);
     for (int l = 0; l < input.geometry.scanlines; ++l) beams.trace(l, out);
     return out;
