@@ -43,6 +43,7 @@ struct BeamChunk {
     // What the stretch holds.
     bool pooled = false;       // bricks of more than one label
     bool echo_pooled = false;  // bricks of more than one echo offset
+    bool offsets = false;      // structure is filled in
     bool bounded = false;      // bricks with surfaces
     bool surfaces = false;     // echo, edge_loss and facing are filled in
     bool refracts = false;     // some edge_loss is not zero

@@ -5,6 +5,7 @@
 #include "runtime/imaging/simd/simd_math-inl.h"
 //
 #include "runtime/imaging/physical/fast/beam_chunk.h"
+#include "runtime/imaging/physical/model/gas_faces.h"
 
 #if defined(SONOCASE_BEAM_LIGHT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SONOCASE_BEAM_LIGHT_INL_H
@@ -66,8 +67,14 @@ HWY_INLINE hn::Vec<D> tail_power(D d, const PhysicalBlock& b, int k, BeamLight<D
 // A face of bone or gas lights its tails; gas only from its second sample on, since a single one
 // belongs to a neighbour that the random look-up hit. above_mm: depth of the sample above.
 template <class D, class V, class I>
-HWY_INLINE void light_tails(
-    D d, V light_and_gain, V facing, I kind, float above_mm, BeamLight<D>& t) {
+HWY_INLINE void light_tails(D d,
+                            const PhysicalBlock& b,
+                            int beam,
+                            V light_and_gain,
+                            V facing,
+                            I kind,
+                            float above_mm,
+                            BeamLight<D>& t) {
     using namespace physical;
     const hn::RebindToSigned<D> di;
     const auto is = [&](I what, PackedKind which) HWY_ATTR {
@@ -75,9 +82,20 @@ HWY_INLINE void light_tails(
     };
     const auto to_bone =
         hn::RebindMask(d, hn::AndNot(is(t.before, kPackedBone), is(kind, kPackedBone)));
-    const auto to_gas =
+    auto to_gas =
         hn::RebindMask(d, hn::AndNot(is(t.before_that, kPackedGas),
                                      hn::And(is(t.before, kPackedGas), is(kind, kPackedGas))));
+    auto depth = hn::Set(d, above_mm);
+    if (b.face_mm != nullptr) {
+        // The face as it runs over neighbouring beams.
+        const auto face = hn::LoadU(d, b.face_mm + beam);
+        depth = hn::IfThenElse(
+            hn::Lt(hn::Abs(hn::Sub(face, depth)), hn::Set(d, static_cast<float>(kFaceMatchMm))),
+            face, depth);
+    }
+    // Behind the diaphragm it is black.
+    if (b.dome_mm != nullptr)
+        to_gas = hn::And(to_gas, hn::Ge(hn::LoadU(d, b.dome_mm + beam), hn::Set(d, kNoFace)));
     const auto raise = [&](V tail, V to) HWY_ATTR { return hn::Max(tail, to); };
     const auto face = hn::Mul(hn::Mul(light_and_gain, facing),
                               hn::Set(d, static_cast<float>(kBoneTail * kMaxReflection)));
@@ -95,10 +113,18 @@ HWY_INLINE void light_tails(
                            hn::Mul(hn::Mul(light_and_gain, facing),
                                    hn::Set(d, static_cast<float>(kReverb * kReverbLoss))));
     const auto brighter = hn::And(to_gas, hn::Gt(mirror, t.reverb));
-    const auto depth = hn::Set(d, above_mm);
     t.reverb = hn::IfThenElse(brighter, mirror, t.reverb);
     t.period = hn::IfThenElse(brighter, depth, t.period);
     t.next = hn::IfThenElse(brighter, hn::Add(depth, depth), t.next);
+}
+
+// Effect diaphragm: light stays until its line is drawn, and then there is none.
+template <class D, class V>
+HWY_INLINE V behind_dome(D d, const PhysicalBlock& b, int beam, int k, V left) {
+    const auto past = hn::Sub(hn::Set(d, b.r[k]), hn::LoadU(d, b.dome_mm + beam));
+    const auto reach = hn::Set(d, static_cast<float>(physical::kDomeReachMm));
+    const auto near = hn::Gt(past, hn::Set(d, -1.0f));
+    return hn::IfThenElse(near, hn::IfThenElseZero(hn::Lt(past, reach), hn::Set(d, 1.0f)), left);
 }
 
 // kTails: the stretch holds bone or gas, or follows some.
@@ -128,7 +154,7 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
             const auto kind = hn::And(hn::Load(di, c.look.row(row)), kind_bits);
             fade_tails(d, b, t);
             const auto facing = c.surfaces ? hn::Load(d, c.facing.row(row)) : hn::Set(d, 1.0f);
-            light_tails(d, hn::Mul(t.light, hn::Set(d, b.gain[k])), facing, kind,
+            light_tails(d, b, c.beam, hn::Mul(t.light, hn::Set(d, b.gain[k])), facing, kind,
                         b.r[k] - b.step_mm, t);
             t.before_that = t.before;
             t.before = kind;
@@ -140,6 +166,7 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
             const auto loss = hn::Mul(hn::Load(d, c.edge_loss.row(row)), step);
             left = hn::Mul(left, exp2_fading(d, hn::Sub(zero, loss)));
         }
+        if (b.dome_mm != nullptr) left = behind_dome(d, b, c.beam, k, left);
         t.light = hn::Mul(t.light, left);
     }
     if constexpr (!kTails)

@@ -99,7 +99,7 @@ HWY_NOINLINE void scatter_chunk(D d, PhysicalBlock& b, const BeamChunk& c) {
     for (int row = 0; row < c.rows; ++row) {
         const auto look = hn::Load(di, c.look.row(row));
         auto echo = hn::ShiftRight<20>(look);  // 1/16 dB
-        if (b.structure) echo = hn::Add(echo, hn::Load(di, c.structure.row(row)));
+        if (c.offsets) echo = hn::Add(echo, hn::Load(di, c.structure.row(row)));
         if (b.fine != nullptr) echo = hn::Add(echo, fine_offset(d, b, c, row));
         const auto solid = hn::Ne(hn::And(look, hn::Set(di, 7 << 16)), hn::Zero(di));
         const auto amplitude = hn::IfThenElseZero(

@@ -256,7 +256,7 @@ struct MetByAny {
     std::atomic<bool> interface {
         false
     }, refraction{false}, hard{false}, needle{false}, fine{false}, target{false}, wall{false},
-        parenchyma{false};
+        parenchyma{false}, dome{false};
 
     void add(const PhysicalBlock& b) {
         if (b.boundary_met) interface.store(true, std::memory_order_relaxed);
@@ -264,6 +264,7 @@ struct MetByAny {
         if (b.hard_met) hard.store(true, std::memory_order_relaxed);
         if (b.fine_met) fine.store(true, std::memory_order_relaxed);
         if (b.parenchyma_met) parenchyma.store(true, std::memory_order_relaxed);
+        if (b.dome_met) dome.store(true, std::memory_order_relaxed);
         if (b.wall_met) wall.store(true, std::memory_order_relaxed);
         if (b.target_met) target.store(true, std::memory_order_relaxed);
     }
@@ -291,6 +292,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         f.effects.streaks
             ? find_streaks(scene_, g, tables_, f, breathes ? &breathing : nullptr, gaps_, streaks_)
             : 0;
+    find_faces(f, breathes ? &breathing : nullptr);
     MetByAny met;
     std::atomic<double> needle_ms{0};
     context_.workers.for_each(lines_ / kBeamBlock, [&](int, int block) {
@@ -308,6 +310,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         b.plane = plane_beams_.data() + line;
         b.streaks = streaks.data();
         b.streak_count = choose_streaks(line, streaks);
+        show_faces(line, b);
         PhysicalWall wall;
         if (f.effects.wall && !scene_.layers.empty()) {
             place_wall(f, breathes ? &breathing : nullptr, keep_all, line, wall);
@@ -335,6 +338,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     met_.fine = met.fine;
     met_.target = met.target;
     met_.streaks = streak_count_ > 0;
+    met_.dome = met.dome;
     met_.wall = met.wall;
     met_.parenchyma = met.parenchyma;
     met_.needle_given = f.needle != nullptr;

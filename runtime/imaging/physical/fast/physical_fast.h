@@ -14,6 +14,7 @@
 
 #include "runtime/imaging/formation/render_context.h"
 #include "runtime/imaging/physical/fast/physical_kernels.h"
+#include "runtime/imaging/physical/model/gas_faces.h"
 #include "runtime/imaging/physical/model/physical_frame.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
 
@@ -57,6 +58,8 @@ class PhysicalFast {
     void set_tables(const PhysicalFrame& frame, PhysicalBlock& block) const;
     PhysicalBlock block_of_frame(const PhysicalFrame& frame, bool keep_all) const;
     int choose_streaks(int first, std::span<PhysicalStreak> out) const;  // of a block of beams
+    void find_faces(const PhysicalFrame& frame, const BreathingField* breathing);
+    void show_faces(int line, PhysicalBlock& block) const;
     void prepare_wall(const physical::Tables& tables);
     void place_wall(const PhysicalFrame& frame,
                     const BreathingField* breathing,
@@ -92,8 +95,11 @@ class PhysicalFast {
 
     std::vector<physical::Streak> streaks_;
     int streak_count_ = 0;
-    std::vector<float> plane_beams_;  // origin x, z, direction x, z; # lines each
-    PhysicalWall wall_;               // what all blocks share
+    std::vector<float> plane_beams_;              // origin x, z, direction x, z; # lines each
+    std::vector<physical::FaceNode> face_nodes_;  // every kFaceEvery beams
+    physical::GasFaces faces_;
+    bool faces_found_ = false;
+    PhysicalWall wall_;  // what all blocks share
     std::vector<float> wall_nodes_;
     std::vector<std::uint8_t> wall_active_;  // per block and row of nodes
     std::vector<float> raw_gaps_, gaps_, beams_, breathing_;

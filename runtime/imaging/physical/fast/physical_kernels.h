@@ -100,6 +100,8 @@ struct PhysicalBlock {
     const std::int8_t* fine = nullptr;   // null: off. Three cubes
     const float* fine_frames = nullptr;  // ten per label: rows of the frame, offset of its cube
     const PhysicalWall* wall = nullptr;  // null: off
+    const float* face_mm = nullptr;      // per beam, of gas; null: not known
+    const float *dome_mm = nullptr, *dome_peak = nullptr, *cosine = nullptr;  // null: none
     const PhysicalStreak* streaks = nullptr;
     int streak_count = 0;
     const float* plane = nullptr;  // beams in the plane, `lines` apart: origin x, z, direction x, z
@@ -136,7 +138,7 @@ struct PhysicalBlock {
     int stride = 0;
     int tail_from = 0;  // out: first sample with a tail; samples if none
     bool boundary_met = false, refraction_met = false, hard_met = false, fine_met = false,
-         target_met = false, wall_met = false, parenchyma_met = false;  // out
+         target_met = false, dome_met = false, wall_met = false, parenchyma_met = false;  // out
 };
 
 // A row's filter across the beams, and the noise that reaches the receiver with it.

@@ -19,6 +19,7 @@ struct PhysicalEffects {
     bool parenchyma = true;      // uneven echo of organs
     bool targets = true;         // balls of the exercise
     bool streaks = true;         // plates in organs that face the beam
+    bool diaphragm = true;       // between an organ and the lung
     bool wall = true;            // sheets between skin and organs
     bool speckle = true;
     bool interfaces = true;
@@ -47,6 +48,7 @@ struct PhysicalMet {
     bool parenchyma = false;    // liver, spleen, kidney, glands
     bool target = false;        // near the slab
     bool streaks = false;       // plates that face the beam
+    bool dome = false;          // an organ before the lung
     bool wall = false;          // between skin and organs
     bool refraction = false;    // a surface of fluid
     bool hard = false;          // bone or gas
@@ -66,7 +68,7 @@ inline const char* nothing_hard(const PhysicalMet& m) {
 
 }  // namespace physical
 
-inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 28> kPhysicalEffects{{
+inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 29> kPhysicalEffects{{
     {"contact", Pass::contact, 1, 0, 0, &PhysicalEffects::contact,
      [](const PhysicalMet& m) { return m.gap ? "" : "the probe touches everywhere"; }},
     {"slice", Pass::beams, 4, 2, 7},
@@ -88,6 +90,8 @@ inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 28> kPhys
      [](const PhysicalMet& m) { return m.target ? "" : "no target near the slab"; }},
     {"streaks", Pass::beams, 0.3, 0, 0, &PhysicalEffects::streaks,
      [](const PhysicalMet& m) { return m.streaks ? "" : "no plate faces the beams"; }},
+    {"diaphragm", Pass::beams, 0.1, 0, 0, &PhysicalEffects::diaphragm,
+     [](const PhysicalMet& m) { return m.dome ? "" : "no organ before a lung"; }},
     {"wall", Pass::beams, 0.3, 2, 0.5, &PhysicalEffects::wall,
      [](const PhysicalMet& m) { return m.wall ? "" : "no body wall near the face"; }},
     {"speckle", Pass::beams, 2, 1, 2, &PhysicalEffects::speckle},

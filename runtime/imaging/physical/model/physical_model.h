@@ -47,7 +47,7 @@ inline constexpr double kBoneFloor = 0.075, kBoneFloorMm = 90;
 inline constexpr double kGasTail = 1.4, kGasTailMm = 18;
 // A smooth face of gas and the probe's own reflect the pulse back and forth: lines at multiples of
 // the depth (A-lines), each kReverbLoss of the one before; half a line is kReverbWidth pulses wide.
-inline constexpr double kReverb = 9, kReverbLoss = 0.42, kReverbWidth = 1.4;
+inline constexpr double kReverb = 9, kReverbLoss = 0.42, kReverbWidth = 2.6;
 // In fluid the pulse steepens and its harmonics are lost: attenuation in addition to the fluid's
 // own, dB/cm/MHz. Without it, everything behind a full bladder would be white.
 inline constexpr double kFluidSteepening = 0.22;

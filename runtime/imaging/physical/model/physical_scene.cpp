@@ -117,6 +117,10 @@ void add_tissues(const CaseBundle& bundle, const std::vector<Target>& targets, P
     s.has_hard = std::any_of(s.looks.begin(), s.looks.end(), [](const AcousticProperties& l) {
         return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
     });
+    for (std::size_t l = 0; l < count; ++l) {
+        s.is_lung.push_back(tissue(l).name == "lung");
+        s.has_gas = s.has_gas || s.looks[l].kind == TissueKind::gas;
+    }
     add_targets(targets, s);
     for (AcousticProperties& look : s.looks) {
         if (look.kind == TissueKind::fluid) look.attenuation += kFluidSteepening;

@@ -54,6 +54,8 @@ struct PhysicalScene {
     BrickTable words;
     std::vector<AcousticProperties> looks;  // # labels, then one per target
     std::vector<PairEcho> pairs;            // # labels^2, [own * # labels + second]
+    std::vector<bool> is_lung;              // # labels
+    bool has_gas = false;                   // some label is gas or lung
     bool has_hard = true;  // some label is bone or gas; if none, their kernels are left out
 
     std::shared_ptr<const PhysicalTextures> textures;

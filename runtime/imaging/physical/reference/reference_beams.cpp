@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "runtime/imaging/physical/model/gas_faces.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
 #include "runtime/imaging/physical/reference/reference_place.h"
 #include "runtime/imaging/physical/reference/reference_speckle.h"
@@ -110,9 +111,15 @@ void meet_target(const ReferenceInput& in, Sample& p) {
         p.loss += graze_loss(p.ball_cosine, p.ball_mm, in.geometry.step_mm);
 }
 
+// A beam's face of gas, and the diaphragm on it; kNoFace: none.
+struct Face {
+    double depth_mm = static_cast<double>(kNoFace), dome_mm = depth_mm, peak = 0, cosine = 1;
+};
+
 // A face of bone lights its tails; one of gas does so from the second sample on, since a single
 // sample of gas is a neighbour's that the random look-up brought.
-void light_tails(const ReferenceInput& in, TissueKind kind, const Sample& p, BeamLight& t) {
+void light_tails(
+    const ReferenceInput& in, TissueKind kind, const Face& face, const Sample& p, BeamLight& t) {
     const double here = p.here, gain = p.row.gain;
     if (kind == TissueKind::bone && t.before != TissueKind::bone) {
         t.bone = std::max(t.bone, kBoneTail * kMaxReflection * p.facing * here * gain);
@@ -121,12 +128,13 @@ void light_tails(const ReferenceInput& in, TissueKind kind, const Sample& p, Bea
         t.bone_floor = std::max(t.bone_floor, kBoneFloor * std::min(here * gain, 1.0));
     }
     if (kind == TissueKind::gas && t.before == TissueKind::gas &&
-        t.before_that != TissueKind::gas) {
+        t.before_that != TissueKind::gas && face.dome_mm >= static_cast<double>(kNoFace)) {
         t.gas = std::max(t.gas, kGasTail * here * gain);
         const double mirror = p.facing < 1 ? kReverb * kReverbLoss * p.facing * here * gain : 0;
         if (mirror > t.reverb) {
             t.reverb = mirror;
             t.period = p.row.r_mm - in.geometry.step_mm;
+            if (std::abs(face.depth_mm - t.period) < kFaceMatchMm) t.period = face.depth_mm;
             t.next = 2 * t.period;
         }
     }
@@ -188,6 +196,20 @@ class Beams {
         }
         if (f.effects.breathing && f.motion.breathes())
             breathing_ = BreathingField(*in_.scene.bundle);
+        if (in_.scene.has_gas && (f.effects.diaphragm || f.effects.gas_ring_down)) {
+            std::vector<FaceNode> nodes(face_node_count(in_.geometry));
+            for (std::size_t n = 0; n < nodes.size(); ++n) {
+                const int line =
+                    std::min(static_cast<int>(n) * kFaceEvery, in_.geometry.scanlines - 1);
+                nodes[n] = find_face(
+                    in_.scene, in_.geometry, f, breathing_.empty() ? nullptr : &breathing_,
+                    static_cast<double>(gaps_[static_cast<std::size_t>(line)]), line);
+                if (!f.effects.diaphragm) nodes[n].peak = 0;
+            }
+            for (auto* per_beam : {&faces_.depth_mm, &faces_.dome_mm, &faces_.peak, &faces_.cosine})
+                per_beam->resize(gaps_.size());
+            join_faces(in_.geometry, nodes, faces_);
+        }
         if (f.effects.streaks)
             streak_count_ =
                 find_streaks(in_.scene, in_.geometry, in_.tables, f,
@@ -199,6 +221,7 @@ class Beams {
         const PlanePoint o = g.beam_origin(l), d = g.beam_direction(l);
         const Vector3 beam = in_.frame.volume_from_probe.rotation * Vector3{d.x, 0, d.z};
         BeamLight t;
+        const Face face = face_of(l);
         for (int k = 0; k < g.samples; ++k) {
             const std::size_t at = in_.at(k, l);
             t.fade(g.step_mm);
@@ -210,17 +233,25 @@ class Beams {
             if (in_.frame.effects.targets) find_target(in_, beam, p);
             const AcousticProperties& look =
                 in_.scene.looks[static_cast<std::size_t>(p.look_index)];
+            const double past = in_.row(k).r_mm - face.dome_mm;
+            const bool dome = past > -1;
+            const double line = dome_echo(face, past);
             const WallEcho wall = meet_wall(k, l, o, d, look);
-            echo_of_tissue(look, wall.in_wall, p);
+            echo_of_tissue(look, wall.in_wall, line, p);
             p.re += p.row.interface_scale * wall.amplitude;
             if (look.kind == TissueKind::soft) meet_streaks(o, d, p);
             meet_surface(in_, beam, p);
             meet_target(in_, p);
+            if (std::abs(past) < kDomeReachMm) {
+                p.re = line * p.row.interface_scale;
+                p.im = 0;
+            }
             const bool dead = t.log2_light < kDeadLog2;
             p.here = dead ? 0 : std::exp2(t.log2_light);
             if (dead) p.re = p.im = 0;
             if (dead) p.field_re = p.field_im = {};
-            light_tails(in_, look.kind, p, t);
+            if (dome) p.loss = past < kDomeReachMm ? 0 : 1e9;
+            light_tails(in_, look.kind, face, p, t);
             meet_needle(in_, o, d, p, t);
             for (std::size_t i = 0; i < out.looks.size(); ++i) {
                 out.looks[i].re[at] = p.re + p.field_re[i];
@@ -240,6 +271,24 @@ class Beams {
         const double along = r_mm + gap * std::exp(-r_mm / kGapReachMm);
         const Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
         return breathing_.empty() ? x : x - breathing_.weight(x) * f.motion.breathing_mm;
+    }
+
+    Face face_of(int l) const {
+        if (faces_.depth_mm.empty()) return {};
+        const auto at = [&](const std::vector<float>& v) {
+            return static_cast<double>(v[static_cast<std::size_t>(l)]);
+        };
+        return {at(faces_.depth_mm), at(faces_.dome_mm), at(faces_.peak), at(faces_.cosine)};
+    }
+
+    // The diaphragm's line, past mm behind it along the beam: the scatterers' share.
+    static double dome_echo(const Face& face, double past) {
+        if (std::abs(past) >= kDomeReachMm) return 0;
+        const double q = past * face.cosine;
+        const double sigma = q < 0 ? kDomeBeforeMm : kDomeBehindMm;
+        return kDomeShare * face.peak * (0.4 + 0.6 * face.cosine * face.cosine) *
+               (std::exp(-0.5 * q * q / (sigma * sigma)) +
+                kDomeTail * std::exp(-std::abs(q) / kDomeTailMm));
     }
 
     // Plates that face the beam, in soft tissue.
@@ -294,7 +343,11 @@ class Beams {
     }
 
     // Echo and attenuation of the tissue itself.
-    void echo_of_tissue(const AcousticProperties& look, bool in_wall, Sample& p) const {
+    // dome: what the diaphragm adds to the scatterers, amplitude.
+    void echo_of_tissue(const AcousticProperties& look,
+                        bool in_wall,
+                        double dome,
+                        Sample& p) const {
         const PhysicalEffects& on = in_.frame.effects;
         double echo_db = look.echo_db + (on.wall ? look.wall_db : 0);
         if (p.look_index == p.place.label) {
@@ -304,6 +357,9 @@ class Beams {
             }
             echo_db += fine_offset_db(in_.scene, on, p.place.label, p.v);
         }
+        if (dome > 0)
+            echo_db +=
+                kDbPerLog2 * std::log2(1 + dome) + (look.kind == TissueKind::gas ? kDomeGasDb : 0);
         const double amplitude =
             look.kind == TissueKind::outside ? 0 : std::exp2(echo_db / kDbPerLog2);
         p.field_re.fill(amplitude);
@@ -327,6 +383,7 @@ class Beams {
     BreathingField breathing_;
     std::vector<Streak> streaks_ = std::vector<Streak>(kMostStreaks);
     int streak_count_ = 0;
+    GasFaces faces_;
     const SpeckleSlice slice_;
 };
 
