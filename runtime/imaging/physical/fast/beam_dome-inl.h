@@ -37,7 +37,7 @@ HWY_NOINLINE void dome_chunk(D d, PhysicalBlock& b, BeamChunk& c) {
     b.dome_met = true;
     const auto facing =
         hn::Add(hn::Set(d, 0.4f), hn::Mul(hn::Set(d, 0.6f), hn::Mul(cosine, cosine)));
-    const auto peak = hn::Mul(hn::Mul(hn::LoadU(d, b.dome_peak + c.beam), facing),
+    const auto peak = hn::Mul(hn::Mul(hn::LoadU(d, b.face_peak + c.beam), facing),
                               hn::Set(d, static_cast<float>(kDomeShare)));
     const auto square_unit = [](double sigma) { return -0.72134752f / float(sigma * sigma); };
     for (int row = 0; row < c.rows; ++row) {

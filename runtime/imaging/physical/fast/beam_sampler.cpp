@@ -46,6 +46,7 @@ void sample_beams_as(PhysicalBlock& b) {
                            zero,
                            zero,
                            zero,
+                           zero,
                            hn::Zero(di),
                            hn::Zero(di),
                            b.samples};

@@ -28,13 +28,14 @@ void PhysicalFast::find_faces(const PhysicalFrame& f, const BreathingField* brea
 
 // line: of the block's first beam.
 void PhysicalFast::show_faces(int line, PhysicalBlock& b) const {
-    if (faces_found_) b.face_mm = faces_.depth_mm.data() + line;
+    if (!faces_found_) return;
+    b.face_mm = faces_.depth_mm.data() + line;
+    b.face_peak = faces_.peak.data() + line;
+    b.cosine = faces_.cosine.data() + line;
     if (!faces_.any_dome) return;
     const float* dome = faces_.dome_mm.data() + line;
     if (std::all_of(dome, dome + kBeamBlock, [](float mm) { return mm >= kNoFace; })) return;
     b.dome_mm = dome;
-    b.dome_peak = faces_.peak.data() + line;
-    b.cosine = faces_.cosine.data() + line;
 }
 
 }  // namespace sonocase::runtime

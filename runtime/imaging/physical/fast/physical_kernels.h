@@ -101,7 +101,8 @@ struct PhysicalBlock {
     const float* fine_frames = nullptr;  // ten per label: rows of the frame, offset of its cube
     const PhysicalWall* wall = nullptr;  // null: off
     const float* face_mm = nullptr;      // per beam, of gas; null: not known
-    const float *dome_mm = nullptr, *dome_peak = nullptr, *cosine = nullptr;  // null: none
+    const float *face_peak = nullptr, *cosine = nullptr;
+    const float* dome_mm = nullptr;  // null: none
     const PhysicalStreak* streaks = nullptr;
     int streak_count = 0;
     const float* plane = nullptr;  // beams in the plane, `lines` apart: origin x, z, direction x, z

@@ -47,11 +47,11 @@ FaceNode find_face(const PhysicalScene& s,
                                                  static_cast<int>(std::floor(v.z + 0.5))));
     };
     const auto is_gas = [&](std::size_t label) { return s.looks[label].kind == TissueKind::gas; };
-    double parenchyma = -1e9;  // depth of the last sample of an organ
+    bool organ = false;  // met on the way
     for (double r = kFaceStepMm; r < g.depth_mm; r += kFaceStepMm) {
         const std::size_t label = label_of(r);
         if (s.looks[label].kind == TissueKind::bone) return {};
-        if (s.fine.frames[label].cube == kParenchymaCube) parenchyma = r;
+        organ = organ || s.fine.frames[label].cube == kParenchymaCube;
         if (!is_gas(label) || !is_gas(label_of(r + kFaceStepMm))) continue;
         double before = r - kFaceStepMm, behind = r;
         for (int halving = 0; halving < 4; ++halving) {
@@ -59,7 +59,7 @@ FaceNode find_face(const PhysicalScene& s,
             (is_gas(label_of(middle)) ? behind : before) = middle;
         }
         FaceNode face{static_cast<float>(0.5 * (before + behind)), 0};
-        if (s.is_lung[label] && r - parenchyma < 8 && r > kDomeFromMm) {
+        if (s.is_lung[label] && organ && r > kDomeFromMm) {
             const double strength =
                 s.layers.empty() ? 0 : std::clamp(s.layers.at(voxel_at(r)).strength, -2.0, 2.0);
             face.peak = static_cast<float>(kDomeAmplitude *

@@ -24,8 +24,8 @@ inline constexpr float kNoFace = 1e9f;
 inline constexpr int kFaceEvery = 4;       // beams between those that are looked at
 inline constexpr double kFaceStepMm = 2;   // gas thinner than this may be missed
 inline constexpr double kFaceJoinMm = 12;  // neighbours further apart are two faces
-inline constexpr double kFaceMatchMm = 5;  // a beam's own face is this face within so much
-inline constexpr double kDomeFromMm = 25;  // nearer to the face lung lies under the wall
+inline constexpr double kDomeFromMm = 25;     // nearer to the face lung lies under the wall
+inline constexpr double kFaceLightMm = 2;     // the light that a face gets: so far before it
 inline constexpr double kDomeAmplitude = 3.6, kDomeStrengthDb = 2.5, kDomeShare = 0.7;
 inline constexpr double kDomeBeforeMm = 1.35, kDomeBehindMm = 1.7;
 inline constexpr double kDomeTail = 0.12, kDomeTailMm = 3.5;

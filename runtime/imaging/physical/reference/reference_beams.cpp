@@ -22,6 +22,7 @@ struct BeamLight {
     double log2_light = 0;    // left after the tissue, there and back
     double needle_light = 0;  // log2 left after the needle
     double bone = 0, bone_slow = 0, bone_floor = 0, gas = 0, needle_tail = 0;  // tails, amplitudes
+    double lit = 0;  // the last light well before a face of gas
     double reverb = 0, period = 0, next = 0;  // next line: amplitude, mm between lines, its depth
     TissueKind before = TissueKind::soft, before_that = TissueKind::soft;  // of the samples above
 
@@ -127,14 +128,22 @@ void light_tails(
                                kBoneTailSlow * kBoneTail * kMaxReflection * p.facing * here * gain);
         t.bone_floor = std::max(t.bone_floor, kBoneFloor * std::min(here * gain, 1.0));
     }
-    if (kind == TissueKind::gas && t.before == TissueKind::gas &&
-        t.before_that != TissueKind::gas && face.dome_mm >= static_cast<double>(kNoFace)) {
-        t.gas = std::max(t.gas, kGasTail * here * gain);
-        const double mirror = p.facing < 1 ? kReverb * kReverbLoss * p.facing * here * gain : 0;
+    // The frame's face, if it is known: with the light shortly before it.
+    const bool known = in.scene.has_gas && (in.frame.effects.diaphragm || in.frame.effects.gas_ring_down);
+    if (p.row.r_mm < face.depth_mm - kFaceLightMm) t.lit = here * gain;
+    const bool starts = kind == TissueKind::gas && t.before == TissueKind::gas &&
+                        t.before_that != TissueKind::gas;
+    const bool meets = p.row.r_mm >= face.depth_mm &&
+                       p.row.r_mm - in.geometry.step_mm < face.depth_mm && here > 0;
+    if (known ? meets && !(face.peak > 0) : starts) {
+        const double light = known ? t.lit : here * gain;
+        const double facing =
+            known ? 0.25 * face.cosine + 0.75 * std::pow(face.cosine, 6) : p.facing < 1 ? p.facing : 0;
+        t.gas = std::max(t.gas, kGasTail * light);
+        const double mirror = kReverb * kReverbLoss * facing * light;
         if (mirror > t.reverb) {
             t.reverb = mirror;
-            t.period = p.row.r_mm - in.geometry.step_mm;
-            if (std::abs(face.depth_mm - t.period) < kFaceMatchMm) t.period = face.depth_mm;
+            t.period = known ? face.depth_mm : p.row.r_mm - in.geometry.step_mm;
             t.next = 2 * t.period;
         }
     }
