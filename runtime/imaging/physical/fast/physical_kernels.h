@@ -97,7 +97,7 @@ struct PhysicalBlock {
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
     const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr;
-    const std::int8_t* fine = nullptr;   // null: off. Three cubes
+    const std::int8_t* fine = nullptr;   // null: off. Four cubes
     const float* fine_frames = nullptr;  // ten per label: rows of the frame, offset of its cube
     const PhysicalWall* wall = nullptr;  // null: off
     const float* face_mm = nullptr;      // per beam, of gas; null: not known

@@ -90,8 +90,7 @@ Kinds kinds_of_labels(const CaseBundle& bundle) {
         const std::string& tissue = bundle.tissues[static_cast<std::size_t>(tissue_of[l])].name;
         kinds.cube[l] = tissue == "muscle"      ? kFibres
                         : tissue == "fat"       ? kSepta
-                        : is_parenchyma(tissue) ? kParenchymaCube
-                                                : kNeither;
+                        : is_parenchyma(tissue) ? kParenchymaCube : tissue == "nerve" ? kNerveCube : kNeither;
         kinds.spine[l] = bundle.labels[l].name.rfind("vertebra", 0) == 0;
     }
     return kinds;
@@ -119,7 +118,9 @@ LabelMoments moments_of_labels(const CaseBundle& bundle, const Kinds& kinds, Job
                     entry & kUniformBrick
                         ? labels.uniform[entry & ~kUniformBrick]
                         : labels.pool[static_cast<std::size_t>(entry) * kBrickVoxels + 42];
-                if (kinds.cube[label] != kFibres && !kinds.spine[label]) continue;
+                if (kinds.cube[label] != kFibres && kinds.cube[label] != kNerveCube &&
+                    !kinds.spine[label])
+                    continue;
                 const std::size_t i = index % row, j = index % layer / row, k = index / layer;
                 add(moments[label],
                     Vector3{4.0 * static_cast<double>(i), 4.0 * static_cast<double>(j),
@@ -161,8 +162,8 @@ FineFrame frame_along(Vector3 along, int cube, double voxel_mm) {
         along = std::cos(kPennationRad) * straight + std::sin(kPennationRad) * a;
         a = std::cos(kPennationRad) * a - std::sin(kPennationRad) * straight;
     }
-    const double across_mm = cube == kFibres ? kFibreAcrossMm : kSeptaAcrossMm;
-    const double along_mm = cube == kFibres ? kFibreAlongMm : kSeptaAlongMm;
+    const double across_mm = cube == kSepta ? kSeptaAcrossMm : kFibreAcrossMm;
+    const double along_mm = cube == kSepta ? kSeptaAlongMm : kFibreAlongMm;
     const std::array<Vector3, 3> rows{(voxel_mm / along_mm) * along, (voxel_mm / across_mm) * a,
                                       (voxel_mm / across_mm) * b};
     for (int r = 0; r < 3; ++r) {
@@ -190,7 +191,7 @@ FineStructure make_fine_structure(const CaseBundle& bundle, JobRunner& jobs) {
             continue;
         }
         Vector3 along = up;
-        if (kinds.cube[l] == kFibres) {
+        if (kinds.cube[l] == kFibres || kinds.cube[l] == kNerveCube) {
             const Axis own = longest_axis(moments.own[l]);
             if (own.elongation > 1.6) along = own.direction;
         }

@@ -25,13 +25,16 @@ inline constexpr double kSurfaceReachVx = 2.0;
 // Boundary roughness (mm) and the texture that carries it.
 inline constexpr double kRoughnessMm = 0.28;
 inline constexpr int kRoughEdge = 32;  // 128 kB: stays in the second-level cache
-inline constexpr double kRoughVoxelMm = 0.7;
+inline constexpr double kRoughVoxelMm = 1.4;
 
 // Interfaces: amplitude 60 R^0.85, with the reflection coefficient R at most 0.115; specular and
 // diffuse parts by angle.
 inline constexpr double kInterfaceGain = 60;
 inline constexpr double kInterfacePower = 0.85;
 inline constexpr double kMaxReflection = 0.115;
+
+// Walls of portal veins and arteries, and half the distance between the two lines of a capsule.
+inline constexpr double kVesselWall = 5, kVesselWallMm = 0.45, kCapsuleMm = 0.55;
 
 // Refraction at fluid: a beam that grazes the wall, its cosine to the normal below kEdgeCos, loses
 // energy along it.
@@ -85,12 +88,15 @@ inline constexpr double kTipGlintMm = 1.0;
 // Fine structure, below the size of a voxel: fibres of muscle, septa of fat. Periodic cubes of echo
 // offsets in quarter dB; a label's frame gives the cube's coordinates.
 inline constexpr int kFineEdge = 64;
-inline constexpr double kFibreAlongMm = 1.6, kFibreAcrossMm = 0.16;  // a cube's voxel
+inline constexpr double kFibreAlongMm = 2.4, kFibreAcrossMm = 0.16;  // a cube's voxel
 inline constexpr double kPennationRad = 0.2;
 inline constexpr double kSeptaAlongMm = 0.8, kSeptaAcrossMm = 0.4;
 // Parenchyma: a third cube, a voxel of it the same in all directions.
 inline constexpr int kParenchymaCube = 2;
 inline constexpr double kParenchymaMm = 1.3;
+// Nerves: a fourth cube, bundles of kNerveBundle voxels across, straight along the nerve.
+inline constexpr int kNerveCube = 3;
+inline constexpr int kNerveBundle = 8;
 
 // Targets of an exercise are balls in the anatomy; their surface is as rough as that of organs.
 inline constexpr double kTargetReachMm = 2;

@@ -29,6 +29,21 @@ bool is_fat(const Tissue& t) {
     return t.name == "fat";
 }
 
+bool is_parenchyma(const Tissue& t) {
+    return t.name == "liver" || t.name == "spleen" || t.name == "kidney_cortex";
+}
+
+// The wall of a vessel in an organ: portal veins and arteries lie in connective tissue; hepatic
+// veins and the cava have none that shows (recipe 11 of the living sweep).
+void line_vessel(const std::string& vessel, PairEcho& e) {
+    if (contains(vessel, "portal") || is_artery(vessel)) {
+        e.amplitude = kVesselWall;
+        e.sigma_mm = kVesselWallMm;
+    } else if (contains(vessel, "hepatic_vein") || contains(vessel, "cava")) {
+        e.amplitude = 0;
+    }
+}
+
 PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tissue& b) {
     PairEcho e;
     const bool outside = a.kind == TissueKind::outside || b.kind == TissueKind::outside;
@@ -58,6 +73,11 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
         e.amplitude =
             kInterfaceGain * std::pow(std::min(reflection, kMaxReflection), kInterfacePower);
     }
+    if (is_parenchyma(a) && b.name == "blood") line_vessel(lb.name, e);
+    if (is_parenchyma(b) && a.name == "blood") line_vessel(la.name, e);
+    // An organ's capsule, and the peritoneum on it.
+    if (is_parenchyma(a) != is_parenchyma(b) && !e.hard && !fluid(a) && !fluid(b))
+        e.split_mm = kCapsuleMm;
     return e;
 }
 
@@ -112,7 +132,7 @@ void add_tissues(const CaseBundle& bundle, const std::vector<Target>& targets, P
         const Tissue& t = tissue(l);
         s.looks.push_back({t.echo_db, t.attenuation_db_cm_mhz,
                            l == 0 ? TissueKind::outside : t.kind,
-                           t.name == "skin" ? kWallSkinDb : 0});
+                           t.name == "skin" ? kWallSkinDb : t.name == "fat" ? kWallFatDb : 0});
     }
     s.has_hard = std::any_of(s.looks.begin(), s.looks.end(), [](const AcousticProperties& l) {
         return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
