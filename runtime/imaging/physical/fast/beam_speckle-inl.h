@@ -35,11 +35,15 @@ HWY_INLINE hn::Vec<DU> mix_bits(DU du, hn::Vec<DU> h, std::uint32_t factor, hn::
 
 // The draw of each sample's patch of tissue: mix_patch().
 template <class D>
-HWY_INLINE hn::Vec<hn::RebindToUnsigned<D>> patch_draw(D d, const PhysicalBlock& b, int beam, int k) {
+HWY_INLINE hn::Vec<hn::RebindToUnsigned<D>> patch_draw(D d,
+                                                       const PhysicalBlock& b,
+                                                       int beam,
+                                                       int k) {
     using namespace physical;
     const hn::RebindToUnsigned<D> du;
     const hn::RebindToSigned<D> di;
-    const auto p = beam_walk(d, b, beam, kVoxelOrigin, kVoxelPerMm, b.shift_voxel).at(d, b, beam, k);
+    const auto p =
+        beam_walk(d, b, beam, kVoxelOrigin, kVoxelPerMm, b.shift_voxel).at(d, b, beam, k);
     const auto scale = hn::Set(d, b.patch_per_voxel);
     const auto term = [&](auto x, std::uint32_t factor) HWY_ATTR {
         const auto cell = hn::Sub(rounded_bits(d, hn::Mul(x, scale)), hn::Set(di, kRoundingBits));
@@ -54,9 +58,9 @@ template <class D>
 HWY_INLINE SpeckleFoot<D> foot_of_side(D d, const PhysicalBlock& b, int side, int beam, int k) {
     const hn::RebindToUnsigned<D> du;
     const SpeckleCut& cut = b.cuts[side];
-    const auto p = beam_walk(d, b, beam, kSpeckleOrigin + 6 * side, kSpecklePerMm + 6 * side,
-                             cut.shift)
-                       .at(d, b, beam, k);
+    const auto p =
+        beam_walk(d, b, beam, kSpeckleOrigin + 6 * side, kSpecklePerMm + 6 * side, cut.shift)
+            .at(d, b, beam, k);
     return {p.x,
             p.y,
             p.z,
@@ -119,9 +123,8 @@ HWY_INLINE Scatterers<D> scatterers_of_row(D d, const PhysicalBlock& b, int beam
     const auto fu = hn::Sub(u, hn::Sub(u_bits, shift)), fv = hn::Sub(v, hn::Sub(v_bits, shift));
     const auto more = hn::Max(fu, fv), less = hn::Min(fu, fv);
     const hn::Vec<D> blend[3] = {hn::Sub(one, more), hn::Sub(more, less), less};
-    const auto term = [&](auto bits, std::uint32_t factor) HWY_ATTR {
-        return hn::Mul(hn::BitCast(du, bits), hn::Set(du, factor));
-    };
+    const auto term = [&](auto bits, std::uint32_t factor)
+                          HWY_ATTR { return hn::Mul(hn::BitCast(du, bits), hn::Set(du, factor)); };
     constexpr std::uint32_t kBits = static_cast<std::uint32_t>(kRoundingBits);
     const auto sum = hn::Add(
         hn::Add(hn::Add(term(u_bits, kNodeU), term(v_bits, kNodeV)), term(block_bits, kNodeBlock)),
@@ -137,16 +140,17 @@ HWY_INLINE Scatterers<D> scatterers_of_row(D d, const PhysicalBlock& b, int beam
     Scatterers<D> out;
     for (int i = 0; i < 3; ++i) {
         const auto node = mix_bits(du, sums[i], 0x2C1B3C6Du, hn::ShiftRight<16>(sums[i]));
-        const auto begin = hn::Sub(
-            hn::BitCast(d, hn::Or(hn::ShiftRight<9>(node), hn::Set(du, 0x3F800000u))), one);
+        const auto begin =
+            hn::Sub(hn::BitCast(d, hn::Or(hn::ShiftRight<9>(node), hn::Set(du, 0x3F800000u))), one);
         const auto from = hn::Sub(depth, begin);
         const auto step_bits = hn::Add(from, shift);
         const auto off = hn::Sub(from, hn::Sub(step_bits, shift));
-        const auto step = term(step_bits, kNodeStep);
-        const auto h = hn::Add(node, hn::Sub(step, hn::Set(du, kBits * kNodeStep)));
+        static_assert(kBits << kStepShift == 0);
+        const auto h = hn::Add(node, hn::ShiftLeft<kStepShift>(hn::BitCast(du, step_bits)));
         out.bits[i] = mix_bits(du, h, 0x297A2D39u, hn::ShiftRight<15>(h));
-        out.weight[i] =
-            hn::Mul(blend[i], hn::Sub(one, hn::Mul(hn::Mul(off, off), hn::Set(d, 4.0f))));
+        const auto square = hn::Mul(off, off),
+                   most = hn::Sub(one, hn::Mul(square, hn::Set(d, 3.0f)));
+        out.weight[i] = hn::Mul(hn::Mul(blend[i], most), hn::Sub(most, square));
     }
     return out;
 }

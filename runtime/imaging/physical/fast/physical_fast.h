@@ -81,10 +81,10 @@ class PhysicalFast {
         noise_start_;
 
     std::vector<float> raw_gaps_, gaps_, beams_, breathing_;
-    physical::SpeckleSlice slice_;            // of the frame
+    physical::SpeckleSlice slice_;  // of the frame
     std::vector<float> per_spacing_, per_spacing_thin_, speckle_level_, speckle_level_bare_;
     std::vector<int> looks_drawn_;
-    std::vector<float> planes_;  // holds the four below, samples x stride each
+    std::vector<float> planes_;       // holds the four below, samples x stride each
     std::int32_t* echoes_ = nullptr;  // one plane per look
     std::ptrdiff_t look_stride_ = 0;
     float *light_ = nullptr, *tail_ = nullptr, *power_ = nullptr;

@@ -57,8 +57,8 @@ struct PhysicalTarget {
 struct SpeckleCut {
     float u_per_height = 0, v_per_height = 0, per_normal = 1;
     std::uint32_t base = 0;
-    std::int32_t until = 65536;      // of the patch's draw
-    float shift[3] = {0, 0, 0};      // of breathing at weight 1: height, u, v
+    std::int32_t until = 65536;  // of the patch's draw
+    float shift[3] = {0, 0, 0};  // of breathing at weight 1: height, u, v
 };
 
 struct PhysicalBlock {
@@ -87,10 +87,10 @@ struct PhysicalBlock {
     SpeckleCut cuts[physical::kSpeckleSides];
     int cut_count = 1;
     float patch_per_voxel = 1;
-    const float* per_spacing = nullptr;    // per row: one over the distance of a column's scatterers
-    const float* speckle_level = nullptr;  // per row: makes the filtered field's power 1
-    const int* looks_at = nullptr;         // per row: fields that are drawn
-    std::ptrdiff_t look_stride = 0;        // from one look's echoes to the next's
+    const float* per_spacing = nullptr;  // per row: one over the distance of a column's scatterers
+    const float* speckle_level = nullptr;            // per row: makes the filtered field's power 1
+    const int* looks_at = nullptr;                   // per row: fields that are drawn
+    std::ptrdiff_t look_stride = 0;                  // from one look's echoes to the next's
     const float *dim = nullptr, *dim_off = nullptr;  // per look: light that one sample leaves
     float dead_light = 0;
     struct {
@@ -129,8 +129,8 @@ struct PhysicalRowTask {
     std::ptrdiff_t look_stride = 0, out_stride = 0;  // of echoes and of `out`
 
     float inverse_gain = 1, near_field = 0, noise = 0;  // of the first look, for all
-    const float* tail = nullptr;              // null: none
-    const std::int32_t* tail_from = nullptr;  // per block
+    const float* tail = nullptr;                        // null: none
+    const std::int32_t* tail_from = nullptr;            // per block
     int sample = 0;
     const std::int8_t *clutter_re = nullptr, *clutter_im = nullptr;
     int noise_rows = 0;  // 0: none

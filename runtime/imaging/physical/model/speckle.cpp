@@ -11,11 +11,12 @@ namespace {
 // One axis along the body, five around it, turned so that the cardinal planes are no ties.
 std::array<Vector3, kSpeckleAxes> speckle_axes() {
     // cosine and sine of 9 + 72 i degrees
-    constexpr std::array<std::array<double, 2>, 5> kRing{{{0.9876883405951378, 0.1564344650402309},
-                                                          {0.1564344650402309, 0.9876883405951378},
-                                                          {-0.8910065241883679, 0.4539904997395468},
-                                                          {-0.7071067811865476, -0.7071067811865475},
-                                                          {0.4539904997395467, -0.8910065241883679}}};
+    constexpr std::array<std::array<double, 2>, 5> kRing{
+        {{0.9876883405951378, 0.1564344650402309},
+         {0.1564344650402309, 0.9876883405951378},
+         {-0.8910065241883679, 0.4539904997395468},
+         {-0.7071067811865476, -0.7071067811865475},
+         {0.4539904997395467, -0.8910065241883679}}};
     const double low = 1 / std::sqrt(5.0);
     std::array<Vector3, kSpeckleAxes> axes;
     axes[0] = {0, 0, 1};

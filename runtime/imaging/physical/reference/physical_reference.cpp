@@ -30,7 +30,9 @@ void for_samples(const ReferenceInput& in, const Work& work) {
 }
 
 // The light is that of the whole aperture: boxes of 5 and 3 beams.
-ComplexPlane light_echoes(const ReferenceInput& in, const Plane& light, const ComplexPlane& echoes) {
+ComplexPlane light_echoes(const ReferenceInput& in,
+                          const Plane& light,
+                          const ComplexPlane& echoes) {
     constexpr std::array<double, 7> kBoxes{1 / 15.0, 2 / 15.0, 3 / 15.0, 3 / 15.0,
                                            3 / 15.0, 2 / 15.0, 1 / 15.0};
     ComplexPlane out{Plane(in.count()), Plane(in.count())};

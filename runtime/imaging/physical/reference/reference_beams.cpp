@@ -40,11 +40,11 @@ struct Sample {
     const TargetBall* ball = nullptr;  // whose surface is near
     double ball_mm = 0, ball_cosine = 0;
     int look_index = 0;
-    double re = 0, im = 0;  // echo of surfaces
+    double re = 0, im = 0;                                 // echo of surfaces
     std::array<double, kMaxLooks> field_re{}, field_im{};  // of scatterers, one per look
-    double facing = 1;      // how squarely the beam meets the surface, 1 where there is none
-    double loss = 0;        // log2 of amplitude that this sample takes
-    double here = 0;        // amplitude of the light that arrives
+    double facing = 1;  // how squarely the beam meets the surface, 1 where there is none
+    double loss = 0;    // log2 of amplitude that this sample takes
+    double here = 0;    // amplitude of the light that arrives
 };
 
 // log2 of amplitude that a beam loses in one sample where it grazes a wall of fluid.
@@ -64,7 +64,8 @@ void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p) {
     p.facing = pair.hard ? 0.25 * cosine + 0.75 * std::pow(cosine, 6)
                          : 0.08 * cosine + 0.92 * std::pow(cosine, 10);
     if (in.frame.effects.interfaces && pair.amplitude > 0) {
-        const double u = (std::abs(place.distance_mm) - pair.split_mm) / pair.sigma_mm;
+        const double u =
+            (std::abs(place.distance_mm) - pair.split_mm) / blurred_mm(in.tables, pair.sigma_mm);
         const double i = pair.amplitude * p.facing * std::exp2(place.rough.log2_glint) *
                          std::exp(-0.5 * u * u) * p.row.interface_scale;
         p.re += i * place.rough.re;

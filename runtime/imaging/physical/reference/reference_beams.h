@@ -18,8 +18,8 @@ struct ComplexPlane {
 
 struct BeamSamples {
     std::vector<ComplexPlane> looks;  // echoes, as amplitudes under full light
-    std::vector<double> light;   // amplitude that is left, there and back
-    std::vector<double> tail;    // power behind bone, gas and needle
+    std::vector<double> light;        // amplitude that is left, there and back
+    std::vector<double> tail;         // power behind bone, gas and needle
 };
 
 BeamSamples reference_beams(const ReferenceInput& input);
