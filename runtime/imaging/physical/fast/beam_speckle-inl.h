@@ -145,11 +145,12 @@ HWY_INLINE Scatterers<D> scatterers_of_row(D d, const PhysicalBlock& b, int beam
         const auto from = hn::Sub(depth, begin);
         const auto step_bits = hn::Add(from, shift);
         const auto off = hn::Sub(from, hn::Sub(step_bits, shift));
-        const auto step = term(step_bits, kNodeStep);
-        const auto h = hn::Add(node, hn::Sub(step, hn::Set(du, kBits * kNodeStep)));
+        static_assert(kBits << kStepShift == 0);
+        const auto h = hn::Add(node, hn::ShiftLeft<kStepShift>(hn::BitCast(du, step_bits)));
         out.bits[i] = mix_bits(du, h, 0x297A2D39u, hn::ShiftRight<15>(h));
-        out.weight[i] =
-            hn::Mul(blend[i], hn::Sub(one, hn::Mul(hn::Mul(off, off), hn::Set(d, 4.0f))));
+        const auto square = hn::Mul(off, off),
+                   most = hn::Sub(one, hn::Mul(square, hn::Set(d, 3.0f)));
+        out.weight[i] = hn::Mul(hn::Mul(blend[i], most), hn::Sub(most, square));
     }
     return out;
 }

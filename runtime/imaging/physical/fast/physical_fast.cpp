@@ -31,12 +31,12 @@ std::int32_t pack_look(const AcousticProperties& look, double frequency_mhz) {
                                      static_cast<std::uint32_t>(echo) << 20);
 }
 
-std::int32_t pack_pair(const PairEcho& p) {
+std::int32_t pack_pair(const PairEcho& p, double sigma_mm) {
     std::int32_t word = 0;
     if (p.amplitude > 0)
         word = static_cast<std::int32_t>(
             std::lround(std::clamp(std::log2(p.amplitude) * 128 + 2048, 1.0, 4095.0)));
-    word |= static_cast<std::int32_t>(std::lround(std::clamp(32 / p.sigma_mm, 1.0, 255.0))) << 12;
+    word |= static_cast<std::int32_t>(std::lround(std::clamp(32 / sigma_mm, 1.0, 255.0))) << 12;
     word |= static_cast<std::int32_t>(std::lround(std::clamp(128 * p.split_mm, 0.0, 127.0))) << 24;
     if (p.hard) word |= kPairHard;
     if (p.refracts) word |= kPairRefracts;
@@ -93,7 +93,8 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     }
     frame_looks_ = looks_;
     near_targets_.reserve(targets_.size());
-    for (const PairEcho& pair : scene.pairs) pairs_word_.push_back(pack_pair(pair));
+    for (const PairEcho& pair : scene.pairs)
+        pairs_word_.push_back(pack_pair(pair, blurred_mm(tables, pair.sigma_mm)));
     for (const Row& row : tables.rows) {
         r_.push_back(static_cast<float>(row.r_mm));
         contact_.push_back(static_cast<float>(row.contact));

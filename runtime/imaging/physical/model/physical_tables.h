@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "formats/exercise/exercise.h"
@@ -43,6 +44,10 @@ struct Tables {
     int looks = 1;  // the most of any row
 };
 
+// The scatterers' blend is a part of the point spread that an echo drawn as such lacks.
+inline double blurred_mm(const Tables& tables, double sigma_mm) {
+    return std::hypot(sigma_mm, std::sqrt(kSpeckleVariance) * tables.cell_mm);
+}
 // Distance of a column's scatterers along the scan plane's normal: a cell where the slice is thin.
 inline double slice_spacing(const Tables& tables, const Row& row, const PhysicalEffects& on) {
     return on.elevation ? row.spacing_mm : tables.cell_mm;

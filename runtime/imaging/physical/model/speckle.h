@@ -8,7 +8,8 @@
 // deviations of the slice thickness apart and begun at a random height, so that a plane finds
 // exactly one of a column's scatterers within half that distance. A sample blends the three nodes
 // around the foot of its normal by their barycentric weights (continuous along the scan plane) and
-// weighs each by 1 - (2 d)^2, d its distance over the spacing (continuous across it). A field moves
+// weighs each by (1 - x^2)(1 - 3/4 x^2), x its distance over half the spacing (continuous across
+// it). A field moves
 // with the tissue, and changes as slowly as the slice is thick.
 //
 // Feet are taken at the middle height of a block of kHeightBlock cells, near the sample, so that a
@@ -33,19 +34,20 @@ inline constexpr int kSpeckleAxes = 6;
 inline constexpr int kSpeckleSides = 3;        // axes that may share a frame
 inline constexpr int kHeightBlock = 32;        // cells
 inline constexpr double kPatchMm = 5;          // edge of a cube of tissue that changes as one
-inline constexpr double kSliceReach = 4.5;     // distance of a column's scatterers, deviations
+inline constexpr double kSliceReach = 5.1;     // distance of a column's scatterers, deviations
 inline constexpr double kSpeckleShare = 0.06;  // difference of cosines over which axes pass
 inline constexpr int kMaxLooks = 16;
 
 // Mean power of a field per unit of a scatterer's power (2): three barycentric weights squared have
-// the mean 1/2 in sum, the weight across the plane squared has 8/15.
-inline constexpr double kSpecklePower = 2 * 0.5 * 8 / 15.0;
-inline constexpr double kBareSpeckle = 1.3693063937629153;  // one over the root of kSpecklePower
+// the mean 1/2 in sum, the weight across the plane squared has 13/30.
+inline constexpr double kSpecklePower = 2 * 0.5 * 13 / 30.0;
+inline constexpr double kBareSpeckle = 1.5191090506254998;  // one over the root of kSpecklePower
 // Variance of the blend's kernel in either direction, in squared cells.
 inline constexpr double kSpeckleVariance = 1 / 8.0;
 
 inline constexpr std::uint32_t kNodeU = 0x9E3779B1u, kNodeV = 0x85EBCA77u, kNodeBlock = 0xC2B2AE3Du,
-                               kNodeAxis = 0x27D4EB2Fu, kNodeStep = 0x165667B1u;
+                               kNodeAxis = 0x27D4EB2Fu;
+inline constexpr int kStepShift = 16;
 // The bits of a node; those of its scatterer number `step`. Of the latter, look l takes bits 31 -
 // 2l and 30 - 2l as the signs of the real and the imaginary part.
 inline std::uint32_t mix_node(std::uint32_t sum) {
@@ -53,7 +55,7 @@ inline std::uint32_t mix_node(std::uint32_t sum) {
     return sum * 0x2C1B3C6Du;
 }
 inline std::uint32_t mix_scatterer(std::uint32_t node, std::int32_t step) {
-    std::uint32_t h = node + static_cast<std::uint32_t>(step) * kNodeStep;
+    std::uint32_t h = node + (static_cast<std::uint32_t>(step) << kStepShift);
     h ^= h >> 15;
     return h * 0x297A2D39u;
 }

@@ -68,7 +68,8 @@ void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p) {
     p.facing = pair.hard ? 0.25 * cosine + 0.75 * std::pow(cosine, 6)
                          : 0.08 * cosine + 0.92 * std::pow(cosine, 10);
     if (in.frame.effects.interfaces && pair.amplitude > 0) {
-        const double u = (std::abs(place.distance_mm) - pair.split_mm) / pair.sigma_mm;
+        const double u =
+            (std::abs(place.distance_mm) - pair.split_mm) / blurred_mm(in.tables, pair.sigma_mm);
         const double i = pair.amplitude * p.facing * std::exp2(place.rough.log2_glint) *
                          std::exp(-0.5 * u * u) * p.row.interface_scale;
         p.re += i * place.rough.re;

@@ -53,7 +53,7 @@ SpeckleSample speckle_at(
         const double depth = (height - middle) * side.per_normal * cell_mm / spacing_mm;
         const double step = std::nearbyint(depth - begin), off = depth - begin - step;
         const std::uint32_t phases = mix_scatterer(node, static_cast<std::int32_t>(step));
-        const double weight = corner.blend * (1 - 4 * off * off);
+        const double weight = corner.blend * (1 - 4 * off * off) * (1 - 3 * off * off);
         for (int look = 0; look < looks; ++look) {
             const auto l = static_cast<std::size_t>(look);
             out.re[l] += phases >> (31 - 2 * look) & 1 ? -weight : weight;
