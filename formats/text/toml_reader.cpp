@@ -166,6 +166,33 @@ bool TomlTable::whole(std::string_view key, int& to, double low, double high) co
     return true;
 }
 
+bool TomlTable::numbers(std::string_view key,
+                        std::vector<double>& to,
+                        double low,
+                        double high,
+                        std::size_t fewest,
+                        std::size_t most) const {
+    const toml::node* node = part_->find(key);
+    if (!node) return false;
+    const toml::array* list = node->as_array();
+    bool good = list && list->size() >= fewest && list->size() <= most;
+    std::vector<double> read;
+    for (std::size_t i = 0; good && i < list->size(); ++i) {
+        const toml::node& item = *list->get(i);
+        const auto value = item.value<double>();
+        good = item.is_number() && value && *value >= low && *value <= high;
+        if (good) read.push_back(*value);
+    }
+    if (!good) {
+        complain(key, "is not such a list",
+                 "expected " + std::to_string(fewest) + " to " + std::to_string(most) +
+                     " numbers from " + number_text(low, 6) + " to " + number_text(high, 6));
+        return false;
+    }
+    to = std::move(read);
+    return true;
+}
+
 bool TomlTable::flag(std::string_view key, bool& to) const {
     const toml::node* node = part_->find(key);
     if (!node) return false;

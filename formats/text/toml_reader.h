@@ -53,6 +53,13 @@ class TomlTable {
     bool number(
         std::string_view key, double& to, double low, double high, bool above_low = false) const;
     bool whole(std::string_view key, int& to, double low, double high) const;
+    // A list of `fewest` to `most` numbers, each from `low` to `high`.
+    bool numbers(std::string_view key,
+                 std::vector<double>& to,
+                 double low,
+                 double high,
+                 std::size_t fewest,
+                 std::size_t most) const;
     bool flag(std::string_view key, bool& to) const;
     bool point(std::string_view key, Point3& to) const;       // three coordinates, at most 1e5 mm
     bool vector(std::string_view key, Vector3& to) const;     // likewise

@@ -28,24 +28,6 @@ std::string filled(std::string_view block, const HtmlValues& values) {
     return page_template().filled(block, values);
 }
 
-std::string base64(const std::vector<std::uint8_t>& bytes) {
-    static constexpr char kDigits[] =
-        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string out;
-    out.reserve(bytes.size() * 4 / 3 + 4);
-    for (std::size_t i = 0; i < bytes.size(); i += 3) {
-        const std::size_t left = bytes.size() - i;
-        const std::uint32_t v = static_cast<std::uint32_t>(bytes[i] << 16) |
-                                (left > 1 ? static_cast<std::uint32_t>(bytes[i + 1] << 8) : 0) |
-                                (left > 2 ? bytes[i + 2] : 0u);
-        out += kDigits[v >> 18];
-        out += kDigits[(v >> 12) & 63];
-        out += left > 1 ? kDigits[(v >> 6) & 63] : '=';
-        out += left > 2 ? kDigits[v & 63] : '=';
-    }
-    return out;
-}
-
 std::string figure(const std::vector<std::uint8_t>& png, const std::string& caption) {
     return filled("figure", {{"caption", escaped_html(caption)}, {"png", base64(png)}});
 }

@@ -15,11 +15,11 @@ find_package(ZLIB REQUIRED)
 find_package(Threads REQUIRED)
 include(CMakePackageConfigHelpers)
 
-string(CONCAT core_rooms "^(formats/(base|text|volume|container|bundle|bundle/codec|registration|exercise|recording|"
+string(CONCAT core_rooms "^(formats/(base|text|volume|container|bundle|bundle/codec|registration|exercise|machine|recording|"
   "calibration|calibration/solve|scoring)|runtime/(imaging|imaging/.*|engine))$")
 set(formats_rooms "^formats/(threads|files|progress_book)$")
 # Rooms whose headers a program may include, and headers of theirs that are for the room's neighbours alone.
-string(CONCAT public_rooms "^(formats/(base|volume|bundle|registration|exercise|recording|calibration|"
+string(CONCAT public_rooms "^(formats/(base|volume|bundle|registration|exercise|machine|recording|calibration|"
   "calibration/solve|scoring|threads|files|progress_book)|runtime/(imaging|imaging/frame|imaging/host|engine))$")
 set(inner_headers "/(build_facts|event|whole_file|pass_timer|parallel_halves)\\.h$")
 

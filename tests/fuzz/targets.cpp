@@ -16,6 +16,7 @@
 #include "formats/calibration/point.h"
 #include "formats/calibration/quality.h"
 #include "formats/exercise/exercise.h"
+#include "formats/machine/machine_toml.h"
 #include "formats/recording/poses.h"
 #include "formats/recording/sequence.h"
 #include "formats/registration/registration_json.h"
@@ -124,6 +125,14 @@ void stage_files(Bytes given) {
 
 void exercise(Bytes bytes) {
     check_error(parse_exercise(text_of(bytes), "fuzz"));
+}
+
+void machine(Bytes bytes) {
+    const auto read = parse_machine(text_of(bytes), "fuzz");
+    check_error(read);
+    if (!read) return;
+    const auto again = parse_machine(machine_toml(*read), "fuzz");
+    demand(again.has_value() && *again == *read);
 }
 
 void poses(Bytes bytes) {
@@ -266,6 +275,7 @@ const std::vector<Target>& targets() {
         {"bundle", bundle},
         {"stage_files", stage_files},
         {"exercise", exercise},
+        {"machine", machine},
         {"poses", poses},
         {"sequence", sequence},
         {"calibration", calibration},

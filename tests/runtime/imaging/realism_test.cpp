@@ -179,7 +179,7 @@ TEST(Realism, LiverHasTheGrainAndContrastOfRealParenchyma) {
         skew.push_back(g.skew);
         EXPECT_GT(g.axial_mm, 0.6);
         EXPECT_LT(g.axial_mm, 1.4);
-        EXPECT_GT(g.lateral_mm / g.axial_mm, 2.0);
+        EXPECT_GT(g.lateral_mm / g.axial_mm, 1.8);  // lowest of the living liver
         EXPECT_LT(g.lateral_mm / g.axial_mm, 6.0);
     }
     std::nth_element(sd.begin(), sd.begin() + 3, sd.end());

@@ -5,6 +5,7 @@
 #include "runtime/imaging/simd/simd_math-inl.h"
 //
 #include "runtime/imaging/physical/fast/beam_chunk.h"
+#include "runtime/imaging/physical/model/gas_faces.h"
 
 #if defined(SONOCASE_BEAM_LIGHT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SONOCASE_BEAM_LIGHT_INL_H
@@ -23,6 +24,7 @@ struct BeamLight {
     using I = hn::Vec<hn::RebindToSigned<D>>;
     V light;  // one way there and back; 0 once dead
     V bone, bone_slow, bone_floor, gas;
+    V lit;                   // the last light well before a face of gas
     V reverb, period, next;  // amplitude of the next line, mm between lines, depth of the next
     I before, before_that;   // kinds of the two samples above
     int tail_from = 0;
@@ -63,11 +65,48 @@ HWY_INLINE hn::Vec<D> tail_power(D d, const PhysicalBlock& b, int k, BeamLight<D
     return power;
 }
 
+// Gas lights its tail and its lines where `lit`.
+template <class D, class V, class M>
+HWY_INLINE void light_gas(D d, M lit, V light_and_gain, V facing, V depth, BeamLight<D>& t) {
+    using namespace physical;
+    const auto ring = hn::Mul(light_and_gain, hn::Set(d, static_cast<float>(kGasTail)));
+    t.gas = hn::IfThenElse(lit, hn::Max(t.gas, ring), t.gas);
+    const auto mirror = hn::Mul(hn::Mul(light_and_gain, facing),
+                                hn::Set(d, static_cast<float>(kReverb * kReverbLoss)));
+    const auto brighter = hn::And(lit, hn::Gt(mirror, t.reverb));
+    t.reverb = hn::IfThenElse(brighter, mirror, t.reverb);
+    t.period = hn::IfThenElse(brighter, depth, t.period);
+    t.next = hn::IfThenElse(brighter, hn::Add(depth, depth), t.next);
+}
+
+// The same for the frame's faces of gas (model/gas_faces.h): the light shortly before the face,
+// and a direction that neighbouring beams share. Behind the diaphragm it is black.
+template <class D>
+HWY_INLINE void light_face(D d, const PhysicalBlock& b, int beam, int k, BeamLight<D>& t) {
+    using namespace physical;
+    const auto face = hn::LoadU(d, b.face_mm + beam), r = hn::Set(d, b.r[k]);
+    const auto before = hn::Lt(r, hn::Sub(face, hn::Set(d, static_cast<float>(kFaceLightMm))));
+    t.lit = hn::IfThenElse(before, hn::Mul(t.light, hn::Set(d, b.gain[k])), t.lit);
+    const auto meets = hn::And(
+        hn::And(hn::Ge(r, face), hn::Lt(hn::Sub(r, hn::Set(d, b.step_mm)), face)),
+        hn::Gt(t.light, hn::Zero(d)));
+    if (hn::AllFalse(d, meets)) return;
+    const auto dome = hn::Gt(hn::LoadU(d, b.face_peak + beam), hn::Zero(d));
+    const auto c = hn::LoadU(d, b.cosine + beam), c2 = hn::Mul(c, c);
+    const auto facing = hn::Add(hn::Mul(hn::Set(d, 0.25f), c),
+                                hn::Mul(hn::Set(d, 0.75f), hn::Mul(c2, hn::Mul(c2, c2))));
+    light_gas(d, hn::AndNot(dome, meets), t.lit, facing, face, t);
+}
+
 // A face of bone or gas lights its tails; gas only from its second sample on, since a single one
 // belongs to a neighbour that the random look-up hit. above_mm: depth of the sample above.
 template <class D, class V, class I>
-HWY_INLINE void light_tails(
-    D d, V light_and_gain, V facing, I kind, float above_mm, BeamLight<D>& t) {
+HWY_INLINE void light_tails(D d,
+                            const PhysicalBlock& b, V light_and_gain,
+                            V facing,
+                            I kind,
+                            float above_mm,
+                            BeamLight<D>& t) {
     using namespace physical;
     const hn::RebindToSigned<D> di;
     const auto is = [&](I what, PackedKind which) HWY_ATTR {
@@ -84,21 +123,24 @@ HWY_INLINE void light_tails(
     const auto slow = hn::Mul(face, hn::Set(d, static_cast<float>(kBoneTailSlow)));
     const auto floor = hn::Mul(hn::Min(light_and_gain, hn::Set(d, 1.0f)),
                                hn::Set(d, static_cast<float>(kBoneFloor)));
-    const auto ring = hn::Mul(light_and_gain, hn::Set(d, static_cast<float>(kGasTail)));
     t.bone = hn::IfThenElse(to_bone, raise(t.bone, face), t.bone);
     t.bone_slow = hn::IfThenElse(to_bone, raise(t.bone_slow, slow), t.bone_slow);
     t.bone_floor = hn::IfThenElse(to_bone, raise(t.bone_floor, floor), t.bone_floor);
-    t.gas = hn::IfThenElse(to_gas, raise(t.gas, ring), t.gas);
-    // Only a surface whose direction is known is a mirror.
-    const auto mirror =
-        hn::IfThenElseZero(hn::Lt(facing, hn::Set(d, 1.0f)),
-                           hn::Mul(hn::Mul(light_and_gain, facing),
-                                   hn::Set(d, static_cast<float>(kReverb * kReverbLoss))));
-    const auto brighter = hn::And(to_gas, hn::Gt(mirror, t.reverb));
-    const auto depth = hn::Set(d, above_mm);
-    t.reverb = hn::IfThenElse(brighter, mirror, t.reverb);
-    t.period = hn::IfThenElse(brighter, depth, t.period);
-    t.next = hn::IfThenElse(brighter, hn::Add(depth, depth), t.next);
+    if (b.face_mm == nullptr) {
+        // Only a surface whose direction is known is a mirror.
+        light_gas(d, to_gas, light_and_gain,
+                  hn::IfThenElseZero(hn::Lt(facing, hn::Set(d, 1.0f)), facing),
+                  hn::Set(d, above_mm), t);
+    }
+}
+
+// Effect diaphragm: light stays until its line is drawn, and then there is none.
+template <class D, class V>
+HWY_INLINE V behind_dome(D d, const PhysicalBlock& b, int beam, int k, V left) {
+    const auto past = hn::Sub(hn::Set(d, b.r[k]), hn::LoadU(d, b.dome_mm + beam));
+    const auto reach = hn::Set(d, static_cast<float>(physical::kDomeReachMm));
+    const auto near = hn::Gt(past, hn::Set(d, -1.0f));
+    return hn::IfThenElse(near, hn::IfThenElseZero(hn::Lt(past, reach), hn::Set(d, 1.0f)), left);
 }
 
 // kTails: the stretch holds bone or gas, or follows some.
@@ -117,16 +159,19 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
         const auto alive = hn::Ge(t.light, least);
         t.light = hn::IfThenElseZero(alive, t.light);
         if (!hn::AllTrue(d, alive)) {
-            std::int32_t* echoes = b.echoes + out;
             const auto lit = hn::RebindMask(di, alive);
-            hn::StoreU(hn::IfThenElseZero(lit, hn::LoadU(di, echoes)), di, echoes);
+            for (int look = 0; look < b.looks_at[k]; ++look) {
+                std::int32_t* echoes = b.echoes + look * b.look_stride + out;
+                hn::StoreU(hn::IfThenElseZero(lit, hn::LoadU(di, echoes)), di, echoes);
+            }
         }
         hn::StoreU(t.light, d, b.light + out);
+        if (b.face_mm != nullptr) light_face(d, b, c.beam, k, t);
         if constexpr (kTails) {
             const auto kind = hn::And(hn::Load(di, c.look.row(row)), kind_bits);
             fade_tails(d, b, t);
             const auto facing = c.surfaces ? hn::Load(d, c.facing.row(row)) : hn::Set(d, 1.0f);
-            light_tails(d, hn::Mul(t.light, hn::Set(d, b.gain[k])), facing, kind,
+            light_tails(d, b, hn::Mul(t.light, hn::Set(d, b.gain[k])), facing, kind,
                         b.r[k] - b.step_mm, t);
             t.before_that = t.before;
             t.before = kind;
@@ -138,6 +183,7 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
             const auto loss = hn::Mul(hn::Load(d, c.edge_loss.row(row)), step);
             left = hn::Mul(left, exp2_fading(d, hn::Sub(zero, loss)));
         }
+        if (b.dome_mm != nullptr) left = behind_dome(d, b, c.beam, k, left);
         t.light = hn::Mul(t.light, left);
     }
     if constexpr (!kTails)
@@ -151,7 +197,13 @@ HWY_NOINLINE void light_chunk(D d, const PhysicalBlock& b, const BeamChunk& c, B
         light_rows<false>(d, b, c, t);
         return;
     }
-    if (c.hard || b.keep_all) t.tail_from = std::min(t.tail_from, c.first);
+    bool hard = c.hard || b.keep_all;
+    if (b.face_mm != nullptr) {
+        const auto face = hn::LoadU(d, b.face_mm + c.beam);
+        const auto end = hn::Set(d, b.r[c.first + c.rows - 1]);
+        hard = hard || !hn::AllTrue(d, hn::Gt(face, end));
+    }
+    if (hard) t.tail_from = std::min(t.tail_from, c.first);
     if (t.tail_from <= c.first) {
         light_rows<true>(d, b, c, t);
     } else {
@@ -165,7 +217,8 @@ HWY_INLINE void dark_rows(D d, const PhysicalBlock& b, int beam, int first, Beam
     const hn::RebindToSigned<D> di;
     for (int k = first; k < b.samples; ++k) {
         const std::ptrdiff_t out = static_cast<std::ptrdiff_t>(k) * b.stride + beam;
-        hn::StoreU(hn::Zero(di), di, b.echoes + out);
+        for (int look = 0; look < b.looks_at[k]; ++look)
+            hn::StoreU(hn::Zero(di), di, b.echoes + look * b.look_stride + out);
         hn::StoreU(hn::Zero(d), d, b.light + out);
         if (t.tail_from > k) continue;
         fade_tails(d, b, t);

@@ -13,11 +13,14 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 //
+#include "runtime/imaging/physical/fast/beam_dome-inl.h"
 #include "runtime/imaging/physical/fast/beam_light-inl.h"
 #include "runtime/imaging/physical/fast/beam_place-inl.h"
 #include "runtime/imaging/physical/fast/beam_scatter-inl.h"
+#include "runtime/imaging/physical/fast/beam_streak-inl.h"
 #include "runtime/imaging/physical/fast/beam_surface-inl.h"
 #include "runtime/imaging/physical/fast/beam_target-inl.h"
+#include "runtime/imaging/physical/fast/beam_wall-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
@@ -36,6 +39,7 @@ void sample_beams_as(PhysicalBlock& b) {
         c.beam = v;
         const auto air = hn::Lt(hn::LoadU(d, b.beams + kGap * b.lines + v), zero);
         BeamLight<D> light{hn::IfThenZeroElse(air, hn::Set(d, 1.0f)),
+                           zero,
                            zero,
                            zero,
                            zero,
@@ -65,8 +69,11 @@ void sample_beams_as(PhysicalBlock& b) {
             b.refraction_met = b.refraction_met || c.refracts;
             if (b.target_count > 0 && target_chunk(d, b, c)) b.target_met = true;
             look_chunk(d, b, c);
+            c.offsets = b.structure;
             if (b.structure) structure_chunk(d, b, c);
-            if (b.speckled) speckle_chunk(d, b, c);
+            if (b.wall != nullptr && k < b.wall->rows) wall_chunk(d, b, c);
+            if (b.streak_count > 0) streak_chunk(d, b, c);
+            if (b.dome_mm != nullptr) dome_chunk(d, b, c);
             scatter_chunk(d, b, c);
             light_chunk<kHard>(d, b, c, light);
         }

@@ -2,6 +2,7 @@
 
 // Model `physical`, first pass: beams into the anatomy, block by block.
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 
@@ -28,8 +29,7 @@ void PhysicalFast::find_contact(const PhysicalFrame& f) {
 
 void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
     const ScanGeometry& g = geometry_;
-    const Matrix3 turn = speckle_rotation();
-    const double inverse_scatter = 1 / tables_.scatter_mm, inverse_voxel = 1 / scene_.voxel_mm;
+    const double inverse_voxel = 1 / scene_.voxel_mm;
     const auto limited = [](double v) { return static_cast<float>(std::clamp(v, -1e6, 1e6)); };
     for (int l = first; l < first + kBeamBlock; ++l) {
         const int line = std::min(l, g.scanlines - 1);
@@ -37,8 +37,6 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
         const Point3 origin = f.volume_from_probe * Point3{o.x, 0, o.z};
         const Vector3 beam = f.volume_from_probe.rotation * Vector3{d.x, 0, d.z};
         const Vector3 from_origin = origin - scene_.grid.origin_mm;
-        const Vector3 speckle = inverse_scatter * (turn * from_origin),
-                      speckle_step = inverse_scatter * (turn * beam);
         const auto put = [&](int number, double value) {
             beams_[static_cast<std::size_t>(number) * static_cast<std::size_t>(lines_) +
                    static_cast<std::size_t>(l)] = limited(value);
@@ -46,9 +44,15 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
         for (int axis = 0; axis < 3; ++axis) {
             put(kVoxelOrigin + axis, inverse_voxel * from_origin[axis]);
             put(kVoxelPerMm + axis, inverse_voxel * beam[axis]);
-            put(kSpeckleOrigin + axis, speckle[axis]);
-            put(kSpecklePerMm + axis, speckle_step[axis]);
             put(kBeam + axis, beam[axis]);
+        }
+        for (int side = 0; side < slice_.count; ++side) {
+            const SpeckleSide& cut = slice_.sides[static_cast<std::size_t>(side)];
+            const Vector3* of[3] = {&cut.height, &cut.u, &cut.v};
+            for (int i = 0; i < 3; ++i) {
+                put(kSpeckleOrigin + 6 * side + i, dot(*of[i], from_origin));
+                put(kSpecklePerMm + 6 * side + i, dot(*of[i], beam));
+            }
         }
         put(kGap, static_cast<double>(gaps_[static_cast<std::size_t>(line)]));
     }
@@ -102,6 +106,35 @@ void PhysicalFast::choose_targets(const PhysicalFrame& f, bool keep_all) {
     }
 }
 
+// Plates that the block's beams can show.
+int PhysicalFast::choose_streaks(int first, std::span<PhysicalStreak> out) const {
+    int count = 0;
+    for (int n = 0; n < streak_count_ && count < static_cast<int>(out.size()); ++n) {
+        const Streak& s = streaks_[static_cast<std::size_t>(n)];
+        if (s.line_begin >= first + kBeamBlock || s.line_end <= first) continue;
+        out[static_cast<std::size_t>(count++)] = {static_cast<float>(s.centre.x),
+                                                  static_cast<float>(s.centre.z),
+                                                  static_cast<float>(s.normal.x),
+                                                  static_cast<float>(s.normal.z),
+                                                  static_cast<float>(1 / s.width_mm),
+                                                  static_cast<float>(2 / s.length_mm),
+                                                  static_cast<float>(s.amplitude),
+                                                  s.sample_begin,
+                                                  s.sample_end};
+    }
+    return count;
+}
+
+// Looks of the tissues as the frame's effects want them.
+void PhysicalFast::choose_looks(const PhysicalFrame& f) {
+    frame_looks_ = f.effects.wall ? looks_wall_ : looks_;
+    for (std::size_t l = 0; l < scene_.fine.frames.size(); ++l) {
+        const bool parenchyma = scene_.fine.frames[l].cube == kParenchymaCube;
+        if (!(parenchyma ? f.effects.parenchyma : f.effects.fine_structure))
+            frame_looks_[l] &= ~kLookFine;
+    }
+}
+
 // The slab's directions and the anatomy's motion.
 void PhysicalFast::set_poses(const PhysicalFrame& f, PhysicalBlock& b) const {
     const Vector3 across =
@@ -109,14 +142,29 @@ void PhysicalFast::set_poses(const PhysicalFrame& f, PhysicalBlock& b) const {
     const Vector3 sideways =
         (kLookupJitter / 32) * (f.volume_from_probe.rotation * Vector3{1, 0, 0});
     const Vector3 shift = (1 / scene_.voxel_mm) * f.motion.breathing_mm;
-    const Vector3 shift_speckle =
-        (1 / tables_.scatter_mm) * (speckle_rotation() * f.motion.breathing_mm);
     for (int axis = 0; axis < 3; ++axis) {
         b.across[axis] = static_cast<float>(across[axis]);
         b.sideways[axis] = static_cast<float>(sideways[axis]);
         b.shift_voxel[axis] = static_cast<float>(shift[axis]);
-        b.shift_speckle[axis] = static_cast<float>(shift_speckle[axis]);
     }
+    b.cut_count = slice_.count;
+    for (int side = 0; side < slice_.count; ++side) {
+        const SpeckleSide& from = slice_.sides[static_cast<std::size_t>(side)];
+        SpeckleCut& cut = b.cuts[side];
+        cut.u_per_height = static_cast<float>(from.u_per_height);
+        cut.v_per_height = static_cast<float>(from.v_per_height);
+        cut.per_normal = static_cast<float>(from.per_normal);
+        cut.base = from.base;
+        cut.until = static_cast<std::int32_t>(std::lround(from.until * 65536));
+        cut.shift[0] = static_cast<float>(dot(from.height, f.motion.breathing_mm));
+        cut.shift[1] = static_cast<float>(dot(from.u, f.motion.breathing_mm));
+        cut.shift[2] = static_cast<float>(dot(from.v, f.motion.breathing_mm));
+    }
+    b.patch_per_voxel = static_cast<float>(scene_.voxel_mm / kPatchMm);
+    b.per_spacing = (f.effects.elevation ? per_spacing_ : per_spacing_thin_).data();
+    b.speckle_level = (f.effects.point_spread ? speckle_level_ : speckle_level_bare_).data();
+    b.looks_at = looks_drawn_.data();
+    b.look_stride = look_stride_;
     b.pulse_mm = f.effects.pulsation ? static_cast<float>(f.motion.pulse_mm) : 0;
 }
 
@@ -129,11 +177,11 @@ void PhysicalFast::set_tables(const PhysicalFrame& f, PhysicalBlock& b) const {
     b.boundary = f.effects.boundaries && scene_.words.has_boundary()
                      ? reinterpret_cast<const std::int32_t*>(bundle.boundary.pool.data())
                      : nullptr;
-    b.looks = looks_.data();
+    b.looks = frame_looks_.data();
     b.pairs = pairs_word_.data();
     b.rough = reinterpret_cast<const std::int32_t*>(scene_.textures->rough.data());
-    b.speckle = reinterpret_cast<const std::int32_t*>(scene_.speckle.data());
-    b.fine = f.effects.fine_structure ? scene_.textures->fine.data() : nullptr;
+    b.fine =
+        f.effects.fine_structure || f.effects.parenchyma ? scene_.textures->fine.data() : nullptr;
     b.fine_frames = fine_frames_.data();
     b.targets = near_targets_.data();
     b.target_count = static_cast<int>(near_targets_.size());
@@ -207,13 +255,17 @@ namespace {
 struct MetByAny {
     std::atomic<bool> interface {
         false
-    }, refraction{false}, hard{false}, needle{false}, fine{false}, target{false};
+    }, refraction{false}, hard{false}, needle{false}, fine{false}, target{false}, wall{false},
+        parenchyma{false}, dome{false};
 
     void add(const PhysicalBlock& b) {
         if (b.boundary_met) interface.store(true, std::memory_order_relaxed);
         if (b.refraction_met) refraction.store(true, std::memory_order_relaxed);
         if (b.hard_met) hard.store(true, std::memory_order_relaxed);
         if (b.fine_met) fine.store(true, std::memory_order_relaxed);
+        if (b.parenchyma_met) parenchyma.store(true, std::memory_order_relaxed);
+        if (b.dome_met) dome.store(true, std::memory_order_relaxed);
+        if (b.wall_met) wall.store(true, std::memory_order_relaxed);
         if (b.target_met) target.store(true, std::memory_order_relaxed);
     }
 };
@@ -230,10 +282,17 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         lookup_start_[i] = noise_start(f.seed, NoiseUse::lookup, 0, k);
     }
     choose_targets(f, keep_all);
+    choose_looks(f);
+    slice_ = speckle_slice(f.volume_from_probe.rotation * Vector3{0, 1, 0}, tables_.cell_mm);
     const PhysicalBlock base = block_of_frame(f, keep_all);
     const bool breathes = f.effects.breathing && f.motion.breathes() && !breathing.empty();
     const bool needle = f.effects.needle && f.needle != nullptr;
     const NeedleStrip strip = needle ? NeedleStrip(*f.needle) : NeedleStrip();
+    streak_count_ =
+        f.effects.streaks
+            ? find_streaks(scene_, g, tables_, f, breathes ? &breathing : nullptr, gaps_, streaks_)
+            : 0;
+    find_faces(f, breathes ? &breathing : nullptr);
     MetByAny met;
     std::atomic<double> needle_ms{0};
     context_.workers.for_each(lines_ / kBeamBlock, [&](int, int block) {
@@ -247,6 +306,16 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         b.echoes = echoes_ + kRowMargin + line;
         b.light = light_ + kRowMargin + line;
         b.tail = tail_ + kRowMargin + line;
+        std::array<PhysicalStreak, kBlockStreaks> streaks;
+        b.plane = plane_beams_.data() + line;
+        b.streaks = streaks.data();
+        b.streak_count = choose_streaks(line, streaks);
+        show_faces(line, b);
+        PhysicalWall wall;
+        if (f.effects.wall && !scene_.layers.empty()) {
+            place_wall(f, breathes ? &breathing : nullptr, keep_all, line, wall);
+            b.wall = &wall;
+        }
         sample_beam_block(context_.simd, b);
         met.add(b);
         NeedleRow row;
@@ -268,6 +337,10 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     met_.hard = met.hard;
     met_.fine = met.fine;
     met_.target = met.target;
+    met_.streaks = streak_count_ > 0;
+    met_.dome = met.dome;
+    met_.wall = met.wall;
+    met_.parenchyma = met.parenchyma;
     met_.needle_given = f.needle != nullptr;
     met_.needle = met.needle;
     return needle_ms.load() / context_.workers.threads();

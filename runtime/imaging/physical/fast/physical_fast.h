@@ -14,7 +14,9 @@
 
 #include "runtime/imaging/formation/render_context.h"
 #include "runtime/imaging/physical/fast/physical_kernels.h"
+#include "runtime/imaging/physical/model/gas_faces.h"
 #include "runtime/imaging/physical/model/physical_frame.h"
+#include "runtime/imaging/physical/model/streak_plates.h"
 
 namespace sonocase::runtime {
 
@@ -50,10 +52,20 @@ class PhysicalFast {
     // first: of a block of beams.
     void place_beams(const PhysicalFrame& frame, int first);
     void weigh_breathing(const PhysicalFrame& frame, const BreathingField& breathing, int first);
+    void choose_looks(const PhysicalFrame& frame);
     void choose_targets(const PhysicalFrame& frame, bool keep_all);
     void set_poses(const PhysicalFrame& frame, PhysicalBlock& block) const;
     void set_tables(const PhysicalFrame& frame, PhysicalBlock& block) const;
     PhysicalBlock block_of_frame(const PhysicalFrame& frame, bool keep_all) const;
+    int choose_streaks(int first, std::span<PhysicalStreak> out) const;  // of a block of beams
+    void find_faces(const PhysicalFrame& frame, const BreathingField* breathing);
+    void show_faces(int line, PhysicalBlock& block) const;
+    void prepare_wall(const physical::Tables& tables);
+    void place_wall(const PhysicalFrame& frame,
+                    const BreathingField* breathing,
+                    bool keep_all,
+                    int first,
+                    PhysicalWall& wall);
     // Returns the time of the needle, ms.
     double sample_beams(const PhysicalFrame& frame, const BreathingField& breathing, bool keep_all);
     void mirror_light(int block);
@@ -72,7 +84,8 @@ class PhysicalFast {
     ScanConversionTable conversion_;
     int lines_ = 0, stride_ = 0, pair_stride_ = 0, cells_k_ = 0, cells_l_ = 0;
 
-    std::vector<std::int32_t> looks_, pairs_word_;  // packed: see physical_kernels.h
+    std::vector<std::int32_t> looks_, looks_wall_, frame_looks_,
+        pairs_word_;  // packed: see physical_kernels.h
     std::vector<float> r_, contact_, elevation_, interface_scale_, gain_;
     std::vector<float> elevation_off_, fine_frames_;
     std::vector<float> dim_, dim_off_;  // per look: light that one sample leaves
@@ -80,9 +93,22 @@ class PhysicalFast {
     std::vector<std::uint32_t> elevation_start_, lookup_start_, clutter_start_, haze_start_,
         noise_start_;
 
+    std::vector<physical::Streak> streaks_;
+    int streak_count_ = 0;
+    std::vector<float> plane_beams_;              // origin x, z, direction x, z; # lines each
+    std::vector<physical::FaceNode> face_nodes_;  // every kFaceEvery beams
+    physical::GasFaces faces_;
+    bool faces_found_ = false;
+    PhysicalWall wall_;  // what all blocks share
+    std::vector<float> wall_nodes_;
+    std::vector<std::uint8_t> wall_active_;  // per block and row of nodes
     std::vector<float> raw_gaps_, gaps_, beams_, breathing_;
-    std::vector<float> planes_;  // holds the four below, samples x stride each
-    std::int32_t* echoes_ = nullptr;
+    physical::SpeckleSlice slice_;  // of the frame
+    std::vector<float> per_spacing_, per_spacing_thin_, speckle_level_, speckle_level_bare_;
+    std::vector<int> looks_drawn_;
+    std::vector<float> planes_;       // holds the four below, samples x stride each
+    std::int32_t* echoes_ = nullptr;  // one plane per look
+    std::ptrdiff_t look_stride_ = 0;
     float *light_ = nullptr, *tail_ = nullptr, *power_ = nullptr;
     std::vector<std::int32_t> tail_from_;  // per block
     std::vector<float> work_, ring_;       // per thread

@@ -8,6 +8,7 @@
 #include "formats/base/geometry.h"
 #include "runtime/imaging/needle/needle_strip.h"
 #include "runtime/imaging/physical/model/physical_model.h"
+#include "runtime/imaging/physical/model/speckle.h"
 
 namespace sonocase::runtime {
 
@@ -33,23 +34,51 @@ inline constexpr int kPairHard = 1 << 20, kPairRefracts = 1 << 21, kPairOwnPulse
 enum BeamNumber {
     kVoxelOrigin = 0,
     kVoxelPerMm = 3,
-    kSpeckleOrigin = 6,
-    kSpecklePerMm = 9,
-    kBeam = 12,
-    kGap = 15,
-    kBeamNumbers = 16
+    kBeam = 6,
+    kGap = 9,
+    kSpeckleOrigin = 10,  // height, u, v; then the same per mm; kSpeckleSides times
+    kSpecklePerMm = 13,
+    kBeamNumbers = kSpeckleOrigin + 6 * physical::kSpeckleSides
 };
 
 inline constexpr int kRowSlack = 64;   // behind rows and buffers: lanes of the widest vector
 inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 3
 
 inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
+inline constexpr int kWallMostRows = 32;   // samples between nodes of the wall, at most
+
+// Effect wall: distances at nodes, `lines` of the block apart, and the tables of sheets.
+struct PhysicalWall {
+    const float *depth = nullptr, *above = nullptr, *strength = nullptr;
+    const std::uint8_t* active = nullptr;  // per row of nodes: something shows below it
+    const float *outer = nullptr, *inner = nullptr;
+    int outer_size = 0, inner_size = 0;
+    int every = 1, rows = 0;        // samples between nodes; samples that can show a sheet
+    float per_row = 1, per_mm = 1;  // one over samples, and over mm, between nodes
+};
+
+// Effect streaks: a plate, see model/streak_plates.h.
+struct PhysicalStreak {
+    float x = 0, z = 0, normal_x = 0, normal_z = 1;  // mm, in the plane
+    float per_width = 1, per_length = 1;             // 1 / deviation; 2 / length
+    float amplitude = 0;
+    int sample_begin = 0, sample_end = 0;
+};
+inline constexpr int kBlockStreaks = 64;  // in a block of beams
 
 struct PhysicalTarget {
     float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels
     std::int32_t look = 0;                     // index
     float wall = 0;
     bool fluid = false;
+};
+
+// physical::SpeckleSide without what is worked out per beam.
+struct SpeckleCut {
+    float u_per_height = 0, v_per_height = 0, per_normal = 1;
+    std::uint32_t base = 0;
+    std::int32_t until = 65536;  // of the patch's draw
+    float shift[3] = {0, 0, 0};  // of breathing at weight 1: height, u, v
 };
 
 struct PhysicalBlock {
@@ -63,18 +92,32 @@ struct PhysicalBlock {
     const std::uint32_t *elevation_start = nullptr, *lookup_start = nullptr;
 
     const float* breathing = nullptr;  // weight at nodes, `lines` apart; null: nothing moves
-    float shift_voxel[3] = {0, 0, 0}, shift_speckle[3] = {0, 0, 0};
+    float shift_voxel[3] = {0, 0, 0};
     float pulse_mm = 0;
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
-    const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr, *speckle = nullptr;
-    const std::int8_t* fine = nullptr;   // null: off. Two cubes
+    const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr;
+    const std::int8_t* fine = nullptr;   // null: off. Four cubes
     const float* fine_frames = nullptr;  // ten per label: rows of the frame, offset of its cube
+    const PhysicalWall* wall = nullptr;  // null: off
+    const float* face_mm = nullptr;      // per beam, of gas; null: not known
+    const float *face_peak = nullptr, *cosine = nullptr;
+    const float* dome_mm = nullptr;  // null: none
+    const PhysicalStreak* streaks = nullptr;
+    int streak_count = 0;
+    const float* plane = nullptr;  // beams in the plane, `lines` apart: origin x, z, direction x, z
     const PhysicalTarget* targets = nullptr;
     int target_count = 0;
     Int3 size;
     int blocks_x = 0, blocks_xy = 0, block_log2 = 3;  // of the table: BrickTable
     int label_count = 0;
+    SpeckleCut cuts[physical::kSpeckleSides];
+    int cut_count = 1;
+    float patch_per_voxel = 1;
+    const float* per_spacing = nullptr;  // per row: one over the distance of a column's scatterers
+    const float* speckle_level = nullptr;            // per row: makes the filtered field's power 1
+    const int* looks_at = nullptr;                   // per row: fields that are drawn
+    std::ptrdiff_t look_stride = 0;                  // from one look's echoes to the next's
     const float *dim = nullptr, *dim_off = nullptr;  // per look: light that one sample leaves
     float dead_light = 0;
     struct {
@@ -96,7 +139,7 @@ struct PhysicalBlock {
     int stride = 0;
     int tail_from = 0;  // out: first sample with a tail; samples if none
     bool boundary_met = false, refraction_met = false, hard_met = false, fine_met = false,
-         target_met = false;  // out
+         target_met = false, dome_met = false, wall_met = false, parenchyma_met = false;  // out
 };
 
 // A row's filter across the beams, and the noise that reaches the receiver with it.
@@ -107,12 +150,14 @@ struct PhysicalRowTask {
     const float* lateral = nullptr;  // centre tap
     int reach = 0;
     bool point_spread = true;
-    float *work_re = nullptr, *work_im = nullptr;  // with margins
-    float *out_re = nullptr, *out_im = nullptr;
+    float *work_re = nullptr, *work_im = nullptr, *work_light = nullptr;  // with margins
+    float *out_re = nullptr, *out_im = nullptr;                           // of the first look
+    int looks = 1;
+    std::ptrdiff_t look_stride = 0, out_stride = 0;  // of echoes and of `out`
 
-    float inverse_gain = 1, near_field = 0, noise = 0;
-    const float* tail = nullptr;              // null: none
-    const std::int32_t* tail_from = nullptr;  // per block
+    float inverse_gain = 1, near_field = 0, noise = 0;  // of the first look, for all
+    const float* tail = nullptr;                        // null: none
+    const std::int32_t* tail_from = nullptr;            // per block
     int sample = 0;
     const std::int8_t *clutter_re = nullptr, *clutter_im = nullptr;
     int noise_rows = 0;  // 0: none
@@ -124,8 +169,10 @@ struct PhysicalRowTask {
 // A row's filter along the beams; the envelope's power.
 struct PhysicalPowerTask {
     int lines = 0;
-    const float* const* re = nullptr;  // rows of the filter; null rows count as zero
+    const float* const* re = nullptr;  // rows of the filter, first look; null rows count as zero
     const float* const* im = nullptr;
+    int looks = 1;
+    std::ptrdiff_t look_stride = 0;
     const float* axial = nullptr;  // first tap
     int axial_count = 1;
     float gain = 1;

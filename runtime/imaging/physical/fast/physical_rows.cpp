@@ -28,13 +28,15 @@ void PhysicalFast::fill_row_task(const PhysicalFrame& f, int k, PhysicalRowTask&
     const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
     t.echoes = echoes_ + at;
     t.light = light_ + at;
-    t.inverse_gain = static_cast<float>(1 / row.gain);
+    t.looks = row.looks_drawn;
+    const double all = std::sqrt(static_cast<double>(row.looks)) / row.gain;
+    t.inverse_gain = static_cast<float>(all);
     t.near_field = static_cast<float>(face_clutter(row, f.effects));
     t.tail = tails ? tail_ + at : nullptr;
     t.sample = k;
     t.clutter_re = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
     t.clutter_im = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
-    t.noise = static_cast<float>(row.noise / row.gain * std::sqrt(0.5) / 32);
+    t.noise = static_cast<float>(row.noise * all * std::sqrt(0.5) / 32);
     t.noise_rows = f.effects.noise ? persisted : 0;
     for (int j = 0; j < t.noise_rows; ++j) {
         const std::uint32_t frame = f.frame - static_cast<std::uint32_t>(j);
@@ -59,8 +61,9 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
                                                                                 int item) {
         const int begin = item * kCellsAtOnce * kHazeCell;
         const int end = std::min(begin + kCellsAtOnce * kHazeCell, g.samples);
-        float* work = work_.data() + static_cast<std::ptrdiff_t>(part) * 2 * stride_;
-        float* ring = ring_.data() + static_cast<std::ptrdiff_t>(part) * 2 * ring_rows * stride_;
+        float* work = work_.data() + static_cast<std::ptrdiff_t>(part) * 3 * stride_;
+        const std::ptrdiff_t ring_size = static_cast<std::ptrdiff_t>(2) * ring_rows * stride_;
+        float* ring = ring_.data() + part * tables_.looks * ring_size;
         float* envelope = envelope_.data() + static_cast<std::ptrdiff_t>(part) * stride_;
         const auto ring_re = [&](int k) {
             return ring + static_cast<std::ptrdiff_t>(2 * (k % ring_rows)) * stride_;
@@ -73,6 +76,9 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
         row_task.point_spread = f.effects.point_spread;
         row_task.work_re = work + kRowMargin;
         row_task.work_im = work + stride_ + kRowMargin;
+        row_task.work_light = work + 2 * static_cast<std::ptrdiff_t>(stride_) + kRowMargin;
+        row_task.look_stride = look_stride_;
+        row_task.out_stride = ring_size;
         const auto fill = [&](int k) {
             fill_row_task(f, k, row_task);
             row_task.out_re = ring_re(k);
@@ -91,6 +97,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
         t.lines = lines_;
         t.re = rows_re;
         t.im = rows_im;
+        t.look_stride = ring_size;
         t.axial =
             f.effects.point_spread ? tables_.axial.data() + kMaxAxial - reach : kOneTap.data();
         t.axial_count = 2 * reach + 1;
@@ -106,6 +113,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             const Row& row = tables_.rows[static_cast<std::size_t>(k)];
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
             t.gain = static_cast<float>(row.gain);
+            t.looks = row.looks;
             t.power = power_ + at;
             make_power_row(context_.simd, t);
             if (f.effects.haze && (k % kHazeCell == kHazeCell - 1 || k == g.samples - 1))
@@ -180,7 +188,8 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
     start_rows();
     context_.workers.for_each((g.samples + kGreyRows - 1) / kGreyRows, [&](int part, int item) {
         const int begin = item * kGreyRows, end = std::min(begin + kGreyRows, g.samples);
-        float* ring = ring_.data() + static_cast<std::ptrdiff_t>(part) * 2 * ring_rows * stride_;
+        float* ring = ring_.data() +
+                      static_cast<std::ptrdiff_t>(part) * tables_.looks * 2 * ring_rows * stride_;
         const auto ring_at = [&](int k) {
             return ring + static_cast<std::ptrdiff_t>(k % 3) * stride_;
         };
@@ -193,7 +202,7 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
         t.lines = lines_;
         t.scanlines = g.scanlines;
         t.post_filter = f.effects.post_filter;
-        t.work = work_.data() + static_cast<std::ptrdiff_t>(part) * 2 * stride_ + kRowMargin;
+        t.work = work_.data() + static_cast<std::ptrdiff_t>(part) * 3 * stride_ + kRowMargin;
         const auto fill = [&](int k) {
             fill_grey_task(f, k, t);
             t.out = ring_at(k);

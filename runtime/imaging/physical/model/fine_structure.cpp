@@ -71,6 +71,11 @@ Axis longest_axis(const Moments& m) {
 
 constexpr int kFibres = 0, kSepta = 1, kNeither = -1;
 
+bool is_parenchyma(const std::string& tissue) {
+    return tissue == "liver" || tissue == "spleen" || tissue == "kidney_cortex" ||
+           tissue == "pancreas" || tissue == "gland" || tissue == "heart_muscle";
+}
+
 struct Kinds {
     std::vector<int> cube;    // # labels: kFibres, kSepta or kNeither
     std::vector<bool> spine;  // # labels: a vertebra
@@ -83,7 +88,9 @@ Kinds kinds_of_labels(const CaseBundle& bundle) {
     for (std::size_t l = 1; l < bundle.labels.size(); ++l) {
         if (tissue_of[l] < 0) continue;
         const std::string& tissue = bundle.tissues[static_cast<std::size_t>(tissue_of[l])].name;
-        kinds.cube[l] = tissue == "muscle" ? kFibres : tissue == "fat" ? kSepta : kNeither;
+        kinds.cube[l] = tissue == "muscle"      ? kFibres
+                        : tissue == "fat"       ? kSepta
+                        : is_parenchyma(tissue) ? kParenchymaCube : tissue == "nerve" ? kNerveCube : kNeither;
         kinds.spine[l] = bundle.labels[l].name.rfind("vertebra", 0) == 0;
     }
     return kinds;
@@ -111,7 +118,9 @@ LabelMoments moments_of_labels(const CaseBundle& bundle, const Kinds& kinds, Job
                     entry & kUniformBrick
                         ? labels.uniform[entry & ~kUniformBrick]
                         : labels.pool[static_cast<std::size_t>(entry) * kBrickVoxels + 42];
-                if (kinds.cube[label] != kFibres && !kinds.spine[label]) continue;
+                if (kinds.cube[label] != kFibres && kinds.cube[label] != kNerveCube &&
+                    !kinds.spine[label])
+                    continue;
                 const std::size_t i = index % row, j = index % layer / row, k = index / layer;
                 add(moments[label],
                     Vector3{4.0 * static_cast<double>(i), 4.0 * static_cast<double>(j),
@@ -127,6 +136,20 @@ LabelMoments moments_of_labels(const CaseBundle& bundle, const Kinds& kinds, Job
     return sums;
 }
 
+// The same grain in all directions, about axes that no organ or probe is likely to follow.
+FineFrame frame_of_parenchyma(double voxel_mm) {
+    FineFrame frame;
+    frame.cube = kParenchymaCube;
+    const Matrix3 turn =
+        rotation_about(normalized(Vector3{0.36, 0.48, 0.8}), 0.7) * rotation_about({0, 0, 1}, 0.55);
+    for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c)
+            frame.cube_from_voxel[static_cast<std::size_t>(3 * r + c)] =
+                static_cast<float>(voxel_mm / kParenchymaMm * turn(r, c));
+    }
+    return frame;
+}
+
 // along: unit vector along fibres or lobules.
 FineFrame frame_along(Vector3 along, int cube, double voxel_mm) {
     FineFrame frame;
@@ -139,8 +162,8 @@ FineFrame frame_along(Vector3 along, int cube, double voxel_mm) {
         along = std::cos(kPennationRad) * straight + std::sin(kPennationRad) * a;
         a = std::cos(kPennationRad) * a - std::sin(kPennationRad) * straight;
     }
-    const double across_mm = cube == kFibres ? kFibreAcrossMm : kSeptaAcrossMm;
-    const double along_mm = cube == kFibres ? kFibreAlongMm : kSeptaAlongMm;
+    const double across_mm = cube == kSepta ? kSeptaAcrossMm : kFibreAcrossMm;
+    const double along_mm = cube == kSepta ? kSeptaAlongMm : kFibreAlongMm;
     const std::array<Vector3, 3> rows{(voxel_mm / along_mm) * along, (voxel_mm / across_mm) * a,
                                       (voxel_mm / across_mm) * b};
     for (int r = 0; r < 3; ++r) {
@@ -163,8 +186,12 @@ FineStructure make_fine_structure(const CaseBundle& bundle, JobRunner& jobs) {
     const Vector3 up = longest_axis(moments.spine).direction;
     for (std::size_t l = 1; l < kinds.cube.size(); ++l) {
         if (kinds.cube[l] == kNeither) continue;
+        if (kinds.cube[l] == kParenchymaCube) {
+            f.frames[l] = frame_of_parenchyma(bundle.grid.spacing_mm.x);
+            continue;
+        }
         Vector3 along = up;
-        if (kinds.cube[l] == kFibres) {
+        if (kinds.cube[l] == kFibres || kinds.cube[l] == kNerveCube) {
             const Axis own = longest_axis(moments.own[l]);
             if (own.elongation > 1.6) along = own.direction;
         }

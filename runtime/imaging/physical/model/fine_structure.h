@@ -17,7 +17,7 @@
 namespace sonocase::runtime {
 
 struct FineFrame {
-    int cube = -1;  // 0 fibres, 1 septa; negative: none
+    int cube = -1;  // 0 fibres, 1 septa, 2 parenchyma, 3 nerve; negative: none
     // Rows of the matrix that takes voxel coordinates to the cube's, without an offset.
     std::array<float, 9> cube_from_voxel{};
 };

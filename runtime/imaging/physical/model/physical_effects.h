@@ -16,7 +16,11 @@ struct PhysicalEffects {
     bool boundaries = true;      // sub-voxel planes between labels
     bool structure = true;       // echo offsets inside organs
     bool fine_structure = true;  // fibres and septa below the voxel
+    bool parenchyma = true;      // uneven echo of organs
     bool targets = true;         // balls of the exercise
+    bool streaks = true;         // plates in organs that face the beam
+    bool diaphragm = true;       // between an organ and the lung
+    bool wall = true;            // sheets between skin and organs
     bool speckle = true;
     bool interfaces = true;
     bool edge_shadow = true;
@@ -41,7 +45,11 @@ struct PhysicalMet {
     bool interface = false;     // a surface between two labels
     bool has_echo = false;      // the bundle holds echo offsets
     bool fine = false;          // muscle or fat
+    bool parenchyma = false;    // liver, spleen, kidney, glands
     bool target = false;        // near the slab
+    bool streaks = false;       // plates that face the beam
+    bool dome = false;          // an organ before the lung
+    bool wall = false;          // between skin and organs
     bool refraction = false;    // a surface of fluid
     bool hard = false;          // bone or gas
     bool needle_given = false;  // there is a needle to draw
@@ -60,7 +68,7 @@ inline const char* nothing_hard(const PhysicalMet& m) {
 
 }  // namespace physical
 
-inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 25> kPhysicalEffects{{
+inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 29> kPhysicalEffects{{
     {"contact", Pass::contact, 1, 0, 0, &PhysicalEffects::contact,
      [](const PhysicalMet& m) { return m.gap ? "" : "the probe touches everywhere"; }},
     {"slice", Pass::beams, 4, 2, 7},
@@ -76,8 +84,16 @@ inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 25> kPhys
      [](const PhysicalMet& m) { return m.has_echo ? "" : "the bundle holds no structure"; }},
     {"fine_structure", Pass::beams, 1, 1, 1, &PhysicalEffects::fine_structure,
      [](const PhysicalMet& m) { return m.fine ? "" : "no muscle or fat crossed"; }},
+    {"parenchyma", Pass::beams, 1, 1, 1, &PhysicalEffects::parenchyma,
+     [](const PhysicalMet& m) { return m.parenchyma ? "" : "no parenchyma crossed"; }},
     {"targets", Pass::beams, 0.5, 1, 4, &PhysicalEffects::targets,
      [](const PhysicalMet& m) { return m.target ? "" : "no target near the slab"; }},
+    {"streaks", Pass::beams, 0.3, 0, 0, &PhysicalEffects::streaks,
+     [](const PhysicalMet& m) { return m.streaks ? "" : "no plate faces the beams"; }},
+    {"diaphragm", Pass::beams, 0.1, 0, 0, &PhysicalEffects::diaphragm,
+     [](const PhysicalMet& m) { return m.dome ? "" : "no organ before a lung"; }},
+    {"wall", Pass::beams, 0.3, 2, 0.5, &PhysicalEffects::wall,
+     [](const PhysicalMet& m) { return m.wall ? "" : "no body wall near the face"; }},
     {"speckle", Pass::beams, 2, 1, 2, &PhysicalEffects::speckle},
     {"interfaces", Pass::beams, 1, 1, 4, &PhysicalEffects::interfaces, physical::no_interface},
     {"edge_shadow", Pass::beams, 0.3, 0, 0, &PhysicalEffects::edge_shadow,

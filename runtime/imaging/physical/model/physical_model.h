@@ -6,8 +6,6 @@
 
 #include <cstdint>
 
-#include "formats/base/geometry.h"
-
 namespace sonocase::runtime::physical {
 
 inline constexpr double kDbPerLog2 = 6.020599913279624;  // amplitude: 20 log10(2)
@@ -21,34 +19,22 @@ inline constexpr double kGapStepMm = 0.5;
 // A beam as dark as this (log2 of its amplitude: -96 dB) counts as dead: it lights nothing below.
 inline constexpr double kDeadLog2 = -16;
 
-// Scatterers: a cube of edge 2^kSpeckleLog2 out of the bundle's speckle, repeated in each
-// direction. Every repetition is shuffled by a hash of its place (exclusive or on the cell's
-// coordinates), so that no pattern shows twice.
-inline constexpr int kSpeckleLog2 = 6;
-inline constexpr std::uint32_t kSpeckleHashX = 0x9E3779B1u, kSpeckleHashY = 0x85EBCA77u,
-                               kSpeckleHashZ = 0xC2B2AE3Du;
-// x, y, z: of a cell.
-inline std::uint32_t speckle_hash(std::int32_t x, std::int32_t y, std::int32_t z) {
-    return static_cast<std::uint32_t>(x >> kSpeckleLog2) * kSpeckleHashX ^
-           static_cast<std::uint32_t>(y >> kSpeckleLog2) * kSpeckleHashY ^
-           static_cast<std::uint32_t>(z >> kSpeckleLog2) * kSpeckleHashZ;
-}
-// First bit of the hash for each axis.
-inline constexpr int kShuffleX = 8, kShuffleY = 14, kShuffleZ = 20;
-
 // Surfaces further than this from a voxel's centre have no effect in it.
 inline constexpr double kSurfaceReachVx = 2.0;
 
 // Boundary roughness (mm) and the texture that carries it.
 inline constexpr double kRoughnessMm = 0.28;
 inline constexpr int kRoughEdge = 32;  // 128 kB: stays in the second-level cache
-inline constexpr double kRoughVoxelMm = 0.7;
+inline constexpr double kRoughVoxelMm = 1.4;
 
 // Interfaces: amplitude 60 R^0.85, with the reflection coefficient R at most 0.115; specular and
 // diffuse parts by angle.
 inline constexpr double kInterfaceGain = 60;
 inline constexpr double kInterfacePower = 0.85;
 inline constexpr double kMaxReflection = 0.115;
+
+// Walls of portal veins and arteries, and half the distance between the two lines of a capsule.
+inline constexpr double kVesselWall = 5, kVesselWallMm = 0.45, kCapsuleMm = 0.55;
 
 // Refraction at fluid: a beam that grazes the wall, its cosine to the normal below kEdgeCos, loses
 // energy along it.
@@ -64,7 +50,7 @@ inline constexpr double kBoneFloor = 0.075, kBoneFloorMm = 90;
 inline constexpr double kGasTail = 1.4, kGasTailMm = 18;
 // A smooth face of gas and the probe's own reflect the pulse back and forth: lines at multiples of
 // the depth (A-lines), each kReverbLoss of the one before; half a line is kReverbWidth pulses wide.
-inline constexpr double kReverb = 9, kReverbLoss = 0.42, kReverbWidth = 1.4;
+inline constexpr double kReverb = 9, kReverbLoss = 0.42, kReverbWidth = 2.6;
 // In fluid the pulse steepens and its harmonics are lost: attenuation in addition to the fluid's
 // own, dB/cm/MHz. Without it, everything behind a full bladder would be white.
 inline constexpr double kFluidSteepening = 0.22;
@@ -102,18 +88,18 @@ inline constexpr double kTipGlintMm = 1.0;
 // Fine structure, below the size of a voxel: fibres of muscle, septa of fat. Periodic cubes of echo
 // offsets in quarter dB; a label's frame gives the cube's coordinates.
 inline constexpr int kFineEdge = 64;
-inline constexpr double kFibreAlongMm = 1.6, kFibreAcrossMm = 0.16;  // a cube's voxel
+inline constexpr double kFibreAlongMm = 2.4, kFibreAcrossMm = 0.16;  // a cube's voxel
 inline constexpr double kPennationRad = 0.2;
 inline constexpr double kSeptaAlongMm = 0.8, kSeptaAcrossMm = 0.4;
+// Parenchyma: a third cube, a voxel of it the same in all directions.
+inline constexpr int kParenchymaCube = 2;
+inline constexpr double kParenchymaMm = 1.3;
+// Nerves: a fourth cube, bundles of kNerveBundle voxels across, straight along the nerve.
+inline constexpr int kNerveCube = 3;
+inline constexpr int kNerveBundle = 8;
 
 // Targets of an exercise are balls in the anatomy; their surface is as rough as that of organs.
 inline constexpr double kTargetReachMm = 2;
 inline constexpr int kMaxTargets = 8;
-
-// Hides the period of the speckle volume: a fixed rotation about no special direction.
-inline Matrix3 speckle_rotation() {
-    return rotation_about(normalized(Vector3{0.36, 0.48, 0.8}), 0.7) *
-           rotation_about({0, 0, 1}, 0.55);
-}
 
 }  // namespace sonocase::runtime::physical

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "runtime/imaging/physical/model/physical_model.h"
+#include "runtime/imaging/physical/model/wall_sheets.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -26,6 +27,21 @@ bool is_muscle(const Tissue& t) {
 }
 bool is_fat(const Tissue& t) {
     return t.name == "fat";
+}
+
+bool is_parenchyma(const Tissue& t) {
+    return t.name == "liver" || t.name == "spleen" || t.name == "kidney_cortex";
+}
+
+// The wall of a vessel in an organ: portal veins and arteries lie in connective tissue; hepatic
+// veins and the cava have none that shows (recipe 11 of the living sweep).
+void line_vessel(const std::string& vessel, PairEcho& e) {
+    if (contains(vessel, "portal") || is_artery(vessel)) {
+        e.amplitude = kVesselWall;
+        e.sigma_mm = kVesselWallMm;
+    } else if (contains(vessel, "hepatic_vein") || contains(vessel, "cava")) {
+        e.amplitude = 0;
+    }
 }
 
 PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tissue& b) {
@@ -57,25 +73,12 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
         e.amplitude =
             kInterfaceGain * std::pow(std::min(reflection, kMaxReflection), kInterfacePower);
     }
+    if (is_parenchyma(a) && b.name == "blood") line_vessel(lb.name, e);
+    if (is_parenchyma(b) && a.name == "blood") line_vessel(la.name, e);
+    // An organ's capsule, and the peritoneum on it.
+    if (is_parenchyma(a) != is_parenchyma(b) && !e.hard && !fluid(a) && !fluid(b))
+        e.split_mm = kCapsuleMm;
     return e;
-}
-
-// A cube of edge 2^kSpeckleLog2 out of the bundle's speckle, which is repeated or cut.
-std::vector<std::int8_t> speckle_cube(const std::vector<std::int8_t>& voxels, int edge) {
-    const auto cube = static_cast<std::size_t>(1 << kSpeckleLog2),
-               given = static_cast<std::size_t>(edge);
-    std::vector<std::int8_t> out(2 * cube * cube * cube);
-    for (std::size_t z = 0; z < cube; ++z) {
-        for (std::size_t y = 0; y < cube; ++y) {
-            for (std::size_t x = 0; x < cube; ++x) {
-                const std::size_t from = x % given + given * (y % given + given * (z % given));
-                const std::size_t to = x + cube * (y + cube * z);
-                out[2 * to] = voxels[2 * from];
-                out[2 * to + 1] = voxels[2 * from + 1];
-            }
-        }
-    }
-    return out;
 }
 
 // What a target that shows is made of.
@@ -127,12 +130,17 @@ void add_tissues(const CaseBundle& bundle, const std::vector<Target>& targets, P
     const std::size_t count = bundle.labels.size();
     for (std::size_t l = 0; l < count; ++l) {
         const Tissue& t = tissue(l);
-        s.looks.push_back(
-            {t.echo_db, t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind});
+        s.looks.push_back({t.echo_db, t.attenuation_db_cm_mhz,
+                           l == 0 ? TissueKind::outside : t.kind,
+                           t.name == "skin" ? kWallSkinDb : t.name == "fat" ? kWallFatDb : 0});
     }
     s.has_hard = std::any_of(s.looks.begin(), s.looks.end(), [](const AcousticProperties& l) {
         return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
     });
+    for (std::size_t l = 0; l < count; ++l) {
+        s.is_lung.push_back(tissue(l).name == "lung");
+        s.has_gas = s.has_gas || s.looks[l].kind == TissueKind::gas;
+    }
     add_targets(targets, s);
     for (AcousticProperties& look : s.looks) {
         if (look.kind == TissueKind::fluid) look.attenuation += kFluidSteepening;
@@ -161,13 +169,6 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     if (bundle.labels.empty() || bundle.label_bricks.table.empty()) {
         return Error{"the bundle holds no label volume", "", "build the case again"};
     }
-    const int edge = bundle.speckle.edge;
-    if (edge < 8 ||
-        bundle.speckle.voxels.size() != 2 * static_cast<std::size_t>(edge) * edge * edge) {
-        return Error{"the bundle holds no speckle volume", "",
-                     "build the case again, or use --model paper"};
-    }
-    s.speckle = speckle_cube(bundle.speckle.voxels, edge);
     add_tissues(bundle, targets, s);
     Result<BrickTable> words = BrickTable::create(bundle);
     if (!words) return words.error();
@@ -176,6 +177,9 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.textures = options.textures ? options.textures
                                   : std::make_shared<const PhysicalTextures>(physical_textures());
     s.fine = make_fine_structure(bundle, jobs);
+    s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
+                                   [](const FineFrame& f) { return f.cube == kParenchymaCube; });
+    s.layers = make_tissue_layers(bundle, jobs);
     return s;
 }
 

@@ -15,6 +15,7 @@
 #include "runtime/imaging/physical/model/brick_table.h"
 #include "runtime/imaging/physical/model/fine_structure.h"
 #include "runtime/imaging/physical/model/physical_textures.h"
+#include "runtime/imaging/physical/model/tissue_layers.h"
 
 namespace sonocase::runtime {
 
@@ -32,6 +33,7 @@ struct AcousticProperties {
     double echo_db = 0;
     double attenuation = 0;  // dB/cm/MHz
     TissueKind kind = TissueKind::outside;
+    double wall_db = 0;  // added to echo_db by effect wall, whose sheets draw the skin
 };
 
 // A target of the exercise: a ball in the anatomy.
@@ -52,11 +54,14 @@ struct PhysicalScene {
     BrickTable words;
     std::vector<AcousticProperties> looks;  // # labels, then one per target
     std::vector<PairEcho> pairs;            // # labels^2, [own * # labels + second]
+    std::vector<bool> is_lung;              // # labels
+    bool has_gas = false;                   // some label is gas or lung
     bool has_hard = true;  // some label is bone or gas; if none, their kernels are left out
 
     std::shared_ptr<const PhysicalTextures> textures;
-    std::vector<std::int8_t> speckle;  // pairs, edge 2^kSpeckleLog2
     FineStructure fine;
+    bool has_parenchyma = false;  // some label has its cube
+    TissueLayers layers;
 
     std::vector<TargetBall> targets;
 
@@ -69,7 +74,7 @@ struct PhysicalSceneOptions {
 };
 
 // targets: of the exercise; those that only mark a place do not show in the tissue.
-// The bundle must outlive the scene. Errors: a bundle without labels or speckle; too little memory
+// The bundle must outlive the scene. Errors: a bundle without labels; too little memory
 // for the tables. Cost: some tens of ms for a torso at 1 mm.
 Result<PhysicalScene> make_physical_scene(CaseView view,
                                           const std::vector<Target>& targets = {},

@@ -8,6 +8,18 @@
 namespace sonocase::runtime::physical {
 namespace {
 
+constexpr double kSigmaPerFwhm = 1 / 2.3548200450309493;
+constexpr double kLayerMm = 0.18;      // deviation of a reflecting layer, about
+constexpr double kPhaseLoss = 0.75;    // measured on the rough face of bone
+constexpr double kCellMm = 0.6;        // edge of the scatterers' lattice at 3.5 MHz,
+constexpr double kCellPerStep = 1.25;  // and at least of a sample
+
+// Deviation that is left to the taps: the blend of the scatterers is a part of the point spread.
+double rest_of(double fwhm_mm, double cell_mm) {
+    const double sigma = fwhm_mm * kSigmaPerFwhm;
+    return std::sqrt(std::max(sigma * sigma - kSpeckleVariance * cell_mm * cell_mm, 0.0));
+}
+
 // Gaussian taps of unit power; returns the reach.
 template <std::size_t kSize>
 int gaussian(double sigma, int most, std::array<float, kSize>& taps) {
@@ -31,20 +43,52 @@ double sum(const auto& taps) {
     return s;
 }
 
+// Peak that taps make of a Gaussian layer of height 1. step: between taps, deviations of the layer.
+double peak_of_layer(const auto& taps, double step) {
+    double peak = 0;
+    const double centre = 0.5 * (static_cast<double>(taps.size()) - 1);
+    for (std::size_t i = 0; i < taps.size(); ++i) {
+        const double off = step * (static_cast<double>(i) - centre);
+        peak += static_cast<double>(taps[i]) * std::exp(-0.5 * off * off);
+    }
+    return peak;
+}
+
+// Power that taps make of the scatterers' field, per its own. step: between taps, cells.
+double power_of_taps(const auto& taps, double step) {
+    double power = 0;
+    for (std::size_t i = 0; i < taps.size(); ++i) {
+        for (std::size_t j = 0; j < taps.size(); ++j) {
+            const double apart = step * (static_cast<double>(i) - static_cast<double>(j));
+            // The correlation of a Gaussian blend with itself.
+            power += static_cast<double>(taps[i]) * static_cast<double>(taps[j]) *
+                     std::exp(-0.25 / kSpeckleVariance * apart * apart);
+        }
+    }
+    return power;
+}
+
 }  // namespace
 
 Tables make_tables(const Probe& probe, const ScanGeometry& g) {
-    constexpr double kSigmaPerFwhm = 1 / 2.3548200450309493;
     Tables t;
     t.frequency_mhz = probe.frequency_mhz;
-    // Scatterers no finer than a tenth of a millimetre, or the volume's period would show; at least
-    // one per sample, or the speckle's power would drift with the depth setting.
-    t.scatter_mm = std::max(0.1, std::min(0.30 * 3.5 / probe.frequency_mhz, g.step_mm));
     const double wavelength = 1.54 / probe.frequency_mhz;
     const double axial_fwhm = 0.58 * std::pow(3.5 / probe.frequency_mhz, 0.7);  // 0.33 mm at 8 MHz
     t.axial_mm = axial_fwhm;
-    t.axial_reach = gaussian(axial_fwhm * kSigmaPerFwhm / g.step_mm, kMaxAxial, t.axial);
-    const double axial_sum = sum(t.axial);
+    t.wall = make_wall_tables(probe.frequency_mhz, axial_fwhm);
+    // As coarse as the point spread allows, so that samples a beam apart share scatterers.
+    t.cell_mm = std::max(std::min(kCellMm * std::pow(3.5 / probe.frequency_mhz, 0.7), axial_fwhm),
+                         kCellPerStep * g.step_mm);
+    t.axial_reach = gaussian(rest_of(axial_fwhm, t.cell_mm) / g.step_mm, kMaxAxial, t.axial);
+    const double axial_power = power_of_taps(t.axial, g.step_mm / t.cell_mm);
+    // Peaks of interfaces as if all of the point spread were in the taps, which would also average
+    // their phases.
+    std::array<float, 2 * kMaxAxial + 1> whole{};
+    gaussian(axial_fwhm * kSigmaPerFwhm / g.step_mm, kMaxAxial, whole);
+    const double peak = kPhaseLoss * peak_of_layer(whole, g.step_mm / kLayerMm) /
+                        (0.5 * sum(whole) + 0.5 * static_cast<double>(whole[kMaxAxial])) /
+                        peak_of_layer(t.axial, g.step_mm / blurred_mm(t, kLayerMm));
 
     t.rows.resize(static_cast<std::size_t>(g.samples));
     for (int k = 0; k < g.samples; ++k) {
@@ -60,16 +104,17 @@ Tables make_tables(const Probe& probe, const ScanGeometry& g) {
                                           : 1.25 * wavelength * std::max(2.0, r / 14) *
                                                 std::sqrt(1 + off * off / (25.0 * 25));
         const double pitch = g.fan ? (g.radius_mm + r) * g.line_step : g.line_step;
-        row.reach = gaussian(lateral_fwhm * kSigmaPerFwhm / pitch, kMaxLateral, row.lateral);
-        row.interface_scale =
-            1 /
-            (sum(row.lateral) * (0.5 * axial_sum + 0.5 * static_cast<double>(t.axial[kMaxAxial])));
+        row.reach = gaussian(rest_of(lateral_fwhm, t.cell_mm) / pitch, kMaxLateral, row.lateral);
+        row.speckle = 1 / std::sqrt(kSpecklePower * axial_power *
+                                    power_of_taps(row.lateral, pitch / t.cell_mm));
+        row.interface_scale = peak / sum(row.lateral);
         row.near_field = 1.6 * std::exp(-r / 2.2) + 0.3 * std::exp(-r / 9);
         const double gain_db = 20 * std::log10(row.gain);
         row.noise = std::pow(10.0, (kNoiseDb + std::min(gain_db, kMaxNoiseGainDb)) / 20);
         const double spread = g.fan ? 60.0 : 25.0;
         row.elevation_mm =
             probe.elevation_mm * kSigmaPerFwhm * std::sqrt(1 + off * off / (spread * spread));
+        row.spacing_mm = std::max(kSliceReach * row.elevation_mm, t.cell_mm);
     }
     return t;
 }

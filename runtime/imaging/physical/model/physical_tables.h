@@ -4,11 +4,14 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "formats/exercise/exercise.h"
 #include "runtime/imaging/physical/model/physical_effects.h"
 #include "runtime/imaging/physical/model/physical_model.h"
+#include "runtime/imaging/physical/model/speckle.h"
+#include "runtime/imaging/physical/model/wall_sheets.h"
 #include "runtime/imaging/scan/scan_geometry.h"
 
 namespace sonocase::runtime::physical {
@@ -22,6 +25,10 @@ struct Row {
     double near_field = 0;       // amplitude
     double noise = 0;            // amplitude of the electronic noise
     double elevation_mm = 0;     // standard deviation of the beam across the plane
+    double spacing_mm = 1;       // of a column's scatterers, along the scan plane's normal
+    double speckle = 1;          // makes the power of the filtered field 1
+    int looks = 1;               // fields that are detected and averaged here
+    int looks_drawn = 1;         // fields that the filter along the beam reaches
     int reach = 0;               // lateral taps to each side
     std::array<float, 2 * kMaxLateral + 1> lateral{};  // centre at kMaxLateral; unit power
 };
@@ -31,9 +38,24 @@ struct Tables {
     int axial_reach = 0;
     std::array<float, 2 * kMaxAxial + 1> axial{};  // centre at kMaxAxial; unit power
     double axial_mm = 0.58;                        // full width at half height
-    double scatter_mm = 0.3;                       // spacing of scatterers
+    double cell_mm = 0.6;                          // of the scatterers' lattice
     double frequency_mhz = 3.5;
+    WallTables wall;
+    int looks = 1;  // the most of any row
 };
+
+// The scatterers' blend is a part of the point spread that an echo drawn as such lacks.
+inline double blurred_mm(const Tables& tables, double sigma_mm) {
+    return std::hypot(sigma_mm, std::sqrt(kSpeckleVariance) * tables.cell_mm);
+}
+// Distance of a column's scatterers along the scan plane's normal: a cell where the slice is thin.
+inline double slice_spacing(const Tables& tables, const Row& row, const PhysicalEffects& on) {
+    return on.elevation ? row.spacing_mm : tables.cell_mm;
+}
+// What the scatterers' field is multiplied by.
+inline double speckle_level(const Row& row, const PhysicalEffects& on) {
+    return on.point_spread ? row.speckle : kBareSpeckle;
+}
 
 // Amplitude of the clutter that the probe's own face adds at a depth.
 inline double face_clutter(const Row& row, const PhysicalEffects& on) {

@@ -24,12 +24,12 @@ std::uint32_t signed_byte(double v) {
 std::vector<std::uint32_t> make_rough_surfaces() {
     const RawVector<float> rough = smooth_periodic_noise(kRoughEdge, 2, 11),
                            glint = smooth_periodic_noise(kRoughEdge, 2, 12),
-                           phase = smooth_periodic_noise(kRoughEdge, 2, 13);
+                           phase = smooth_periodic_noise(kRoughEdge, 3, 13);
     std::vector<std::uint32_t> out(rough.size());
     for (std::size_t i = 0; i < rough.size(); ++i) {
         const double p = 0.9 * static_cast<double>(phase[i]);
         out[i] = signed_byte(32 * static_cast<double>(rough[i])) |
-                 signed_byte(32 * 0.75 * 1.4426950408889634 * static_cast<double>(glint[i])) << 8 |
+                 signed_byte(32 * 0.5 * 1.4426950408889634 * static_cast<double>(glint[i])) << 8 |
                  signed_byte(127 * std::cos(p)) << 16 | signed_byte(127 * std::sin(p)) << 24;
     }
     return out;
@@ -53,9 +53,55 @@ void store(const RawVector<float>& db, std::int8_t* out) {
     }
 }
 
+// Echo of parenchyma at middle scale: 1.5 dB over 6 mm, 1.2 dB over 1.3 mm whose depth itself
+// varies over 6 mm, and shading of 2.4 dB over 26 mm (recipe 7 of the living sweep).
+void make_parenchyma(std::int8_t* out) {
+    const RawVector<float> fine = smooth_periodic_noise(kFineEdge, 0, 31),
+                           depth = smooth_periodic_noise(kFineEdge, 2, 32),
+                           middle = smooth_periodic_noise(kFineEdge, 2, 33),
+                           shading = smooth_periodic_noise(kFineEdge, 10, 34);
+    RawVector<float> db(fine.size());
+    for (std::size_t i = 0; i < db.size(); ++i)
+        db[i] = 1.5f * middle[i] +
+                1.2f * static_cast<float>(std::exp(0.3 * static_cast<double>(depth[i]))) * fine[i] +
+                2.4f * shading[i];
+    store(db, out);
+}
+
+// Honeycomb: dark bundles in bright sheaths. A bundle's middle lies at a random place in its cell
+// of the cross-section; between the two nearest middles there is a sheath.
+void make_nerve(std::int8_t* out) {
+    constexpr int kCells = kFineEdge / kNerveBundle;
+    const auto wrapped = [](int d) { return (d + 3 * kFineEdge / 2) % kFineEdge - kFineEdge / 2; };
+    std::vector<std::pair<int, int>> middles;
+    for (std::uint32_t c = 0; c < kCells * kCells; ++c) {
+        const std::uint32_t h = hash32(c + 51);
+        middles.emplace_back(static_cast<int>(c % kCells) * kNerveBundle + static_cast<int>(h & 7),
+                             static_cast<int>(c / kCells) * kNerveBundle +
+                                 static_cast<int>(h >> 8 & 7));
+    }
+    RawVector<float> db(static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge);
+    for (int v = 0; v < kFineEdge; ++v) {
+        for (int u = 0; u < kFineEdge; ++u) {
+            double nearest = 1e9, next = 1e9;
+            for (const auto& [x, y] : middles) {
+                const int dx = wrapped(u - x), dy = wrapped(v - y);
+                const double away = std::sqrt(static_cast<double>(dx * dx + dy * dy));
+                next = std::min(next, std::max(away, nearest));
+                nearest = std::min(nearest, away);
+            }
+            const auto sheath = static_cast<float>(std::clamp(1.6 - (next - nearest), 0.0, 1.0));
+            for (int along = 0; along < kFineEdge; ++along)
+                db[static_cast<std::size_t>(along + kFineEdge * (u + kFineEdge * v))] =
+                    -6 + 15 * sheath;
+        }
+    }
+    store(db, out);
+}
+
 std::vector<std::int8_t> make_cubes() {
     const std::size_t cube = static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge;
-    std::vector<std::int8_t> cubes(2 * cube + kGatherSlack);
+    std::vector<std::int8_t> cubes(4 * cube + kGatherSlack);
     const RawVector<float> a = smooth_periodic_noise(kFineEdge, 2, 21),
                            b = smooth_periodic_noise(kFineEdge, 5, 22),
                            c = smooth_periodic_noise(kFineEdge, 5, 23);
@@ -64,16 +110,19 @@ std::vector<std::int8_t> make_cubes() {
     for (std::size_t i = 0; i < cube; ++i)
         db[i] = -5 + 13 * std::clamp(a[i] + 0.3f * c[i] - 0.35f, 0.0f, 1.9f);
     store(db, cubes.data());
-    // Septa: thin sheets where a smooth field crosses zero, torn here and there.
+    // Septa: thin sheets where a smooth field crosses zero, torn here and there. Those that show
+    // as lines are sheets of the wall (wall_sheets.h); these are faint.
     for (std::size_t i = 0; i < cube; ++i) {
         constexpr float kNothing = 20;  // exp(-20) shows nowhere
         const float off = b[i] / 0.11f, square = off * off;
         db[i] = -4;
         if (square < kNothing)
-            db[i] += 18 * static_cast<float>(std::exp(-static_cast<double>(square))) *
+            db[i] += 7 * static_cast<float>(std::exp(-static_cast<double>(square))) *
                      std::clamp(0.45f + 0.7f * c[i], 0.0f, 1.3f);
     }
     store(db, cubes.data() + cube);
+    make_parenchyma(cubes.data() + 2 * cube);
+    make_nerve(cubes.data() + kNerveCube * cube);
     return cubes;
 }
 

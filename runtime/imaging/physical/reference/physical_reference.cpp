@@ -14,13 +14,6 @@ namespace {
 
 using namespace physical;
 
-// One value per sample: # samples x scanlines, row by row.
-using Plane = std::vector<double>;
-
-struct ComplexPlane {
-    Plane re, im;
-};
-
 // Beyond the outermost beams their neighbours repeat, mirrored.
 int reflect(int l, int n) {
     if (l < 0) l = -1 - l;
@@ -37,7 +30,9 @@ void for_samples(const ReferenceInput& in, const Work& work) {
 }
 
 // The light is that of the whole aperture: boxes of 5 and 3 beams.
-ComplexPlane light_echoes(const ReferenceInput& in, const BeamSamples& beams) {
+ComplexPlane light_echoes(const ReferenceInput& in,
+                          const Plane& light,
+                          const ComplexPlane& echoes) {
     constexpr std::array<double, 7> kBoxes{1 / 15.0, 2 / 15.0, 3 / 15.0, 3 / 15.0,
                                            3 / 15.0, 2 / 15.0, 1 / 15.0};
     ComplexPlane out{Plane(in.count()), Plane(in.count())};
@@ -45,9 +40,9 @@ ComplexPlane light_echoes(const ReferenceInput& in, const BeamSamples& beams) {
         double smooth = 0;
         for (int j = -3; j <= 3; ++j)
             smooth += kBoxes[static_cast<std::size_t>(j + 3)] *
-                      beams.light[in.at(k, reflect(l + j, in.geometry.scanlines))];
-        out.re[in.at(k, l)] = beams.re[in.at(k, l)] * smooth;
-        out.im[in.at(k, l)] = beams.im[in.at(k, l)] * smooth;
+                      light[in.at(k, reflect(l + j, in.geometry.scanlines))];
+        out.re[in.at(k, l)] = echoes.re[in.at(k, l)] * smooth;
+        out.im[in.at(k, l)] = echoes.im[in.at(k, l)] * smooth;
     });
     return out;
 }
@@ -70,14 +65,16 @@ void spread_across(const ReferenceInput& in, ComplexPlane& echoes) {
     });
 }
 
-// Clutter and electronic noise as they reach the receiver: before the gain and its filter.
+// Clutter and electronic noise as they reach the receiver: before the gain and its filter. One look
+// carries them for all.
 void add_noise(const ReferenceInput& in, const Plane& tail, ComplexPlane& echoes) {
     const PhysicalEffects& on = in.frame.effects;
     for_samples(in, [&](int k, int l) {
         const Row& row = in.row(k);
         double &re = echoes.re[in.at(k, l)], &im = echoes.im[in.at(k, l)];
         const double face = face_clutter(row, on);
-        const double clutter = std::sqrt(0.5 * (tail[in.at(k, l)] + face * face)) / row.gain;
+        const double all = std::sqrt(static_cast<double>(row.looks));
+        const double clutter = all * std::sqrt(0.5 * (tail[in.at(k, l)] + face * face)) / row.gain;
         re += clutter * in.draw(in.noise.streak, NoiseUse::clutter_re, 0, k, l);
         im += clutter * in.draw(in.noise.streak, NoiseUse::clutter_im, 0, k, l);
         if (!on.noise) return;
@@ -88,8 +85,8 @@ void add_noise(const ReferenceInput& in, const Plane& tail, ComplexPlane& echoes
             n_re += w * in.draw(in.noise.fine, NoiseUse::electronic_re, number, k, l);
             n_im += w * in.draw(in.noise.fine, NoiseUse::electronic_im, number, k, l);
         }
-        re += row.noise / row.gain * std::sqrt(0.5) * n_re;
-        im += row.noise / row.gain * std::sqrt(0.5) * n_im;
+        re += all * row.noise / row.gain * std::sqrt(0.5) * n_re;
+        im += all * row.noise / row.gain * std::sqrt(0.5) * n_im;
     });
 }
 
@@ -112,6 +109,14 @@ Plane envelope_power(const ReferenceInput& in, const ComplexPlane& echoes) {
         power[in.at(k, l)] = (re * re + im * im) * row.gain * row.gain;
     });
     return power;
+}
+
+// Looks are detected and averaged.
+void add_look(const ReferenceInput& in, int look, const Plane& of_look, Plane& power) {
+    for_samples(in, [&](int k, int l) {
+        const int looks = in.row(k).looks;
+        if (look < looks) power[in.at(k, l)] += of_look[in.at(k, l)] / looks;
+    });
 }
 
 // Side lobes and reverberation: the mean envelope nearby, kHazeDb below.
@@ -239,10 +244,14 @@ void render_physical_reference(const PhysicalScene& scene,
                                std::span<std::uint8_t> pixels) {
     const ReferenceInput in{scene, geometry, tables, noise, frame};
     const BeamSamples beams = reference_beams(in);
-    ComplexPlane echoes = light_echoes(in, beams);
-    if (frame.effects.point_spread) spread_across(in, echoes);
-    add_noise(in, beams.tail, echoes);
-    Plane power = envelope_power(in, echoes);
+    Plane power(in.count(), 0.0);
+    for (int look = 0; look < tables.looks; ++look) {
+        ComplexPlane echoes =
+            light_echoes(in, beams.light, beams.looks[static_cast<std::size_t>(look)]);
+        if (frame.effects.point_spread) spread_across(in, echoes);
+        if (look == 0) add_noise(in, beams.tail, echoes);
+        add_look(in, look, envelope_power(in, echoes), power);
+    }
     if (frame.effects.haze) add_haze(in, power);
     convert(in, grey_of(in, power), pixels);
 }

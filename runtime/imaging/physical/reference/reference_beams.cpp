@@ -3,9 +3,14 @@
 #include "runtime/imaging/physical/reference/reference_beams.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "runtime/imaging/physical/model/gas_faces.h"
+#include "runtime/imaging/physical/model/streak_plates.h"
 #include "runtime/imaging/physical/reference/reference_place.h"
+#include "runtime/imaging/physical/reference/reference_speckle.h"
+#include "runtime/imaging/physical/reference/reference_wall.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -17,6 +22,7 @@ struct BeamLight {
     double log2_light = 0;    // left after the tissue, there and back
     double needle_light = 0;  // log2 left after the needle
     double bone = 0, bone_slow = 0, bone_floor = 0, gas = 0, needle_tail = 0;  // tails, amplitudes
+    double lit = 0;  // the last light well before a face of gas
     double reverb = 0, period = 0, next = 0;  // next line: amplitude, mm between lines, its depth
     TissueKind before = TissueKind::soft, before_that = TissueKind::soft;  // of the samples above
 
@@ -38,27 +44,12 @@ struct Sample {
     const TargetBall* ball = nullptr;  // whose surface is near
     double ball_mm = 0, ball_cosine = 0;
     int look_index = 0;
-    double re = 0, im = 0;  // echo
-    double facing = 1;      // how squarely the beam meets the surface, 1 where there is none
-    double loss = 0;        // log2 of amplitude that this sample takes
-    double here = 0;        // amplitude of the light that arrives
+    double re = 0, im = 0;                                 // echo of surfaces
+    std::array<double, kMaxLooks> field_re{}, field_im{};  // of scatterers, one per look
+    double facing = 1;  // how squarely the beam meets the surface, 1 where there is none
+    double loss = 0;    // log2 of amplitude that this sample takes
+    double here = 0;    // amplitude of the light that arrives
 };
-
-// The scatterers of a sample: a pair of amplitudes out of the shuffled speckle cube.
-void scatter(const ReferenceInput& in, const Matrix3& turn, double amplitude, Sample& p) {
-    const Vector3 c = (1 / in.tables.scatter_mm) * (turn * p.from_origin);
-    const std::int32_t i = nearest_integer(c.x), j = nearest_integer(c.y), m = nearest_integer(c.z);
-    const std::uint32_t hash = speckle_hash(i, j, m);
-    const auto wrap = [&](std::int32_t u, int shift) {
-        return (static_cast<std::uint32_t>(u) ^ hash >> shift) & ((1u << kSpeckleLog2) - 1);
-    };
-    const std::size_t cell =
-        wrap(i, kShuffleX) +
-        ((wrap(j, kShuffleY) + (wrap(m, kShuffleZ) << kSpeckleLog2)) << kSpeckleLog2);
-    const double unit = 1 / (32 * std::sqrt(2.0));
-    p.re = amplitude * in.scene.speckle[2 * cell] * unit;
-    p.im = amplitude * in.scene.speckle[2 * cell + 1] * unit;
-}
 
 // log2 of amplitude that a beam loses in one sample where it grazes a wall of fluid.
 double graze_loss(double cosine, double distance_mm, double step_mm) {
@@ -77,7 +68,8 @@ void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p) {
     p.facing = pair.hard ? 0.25 * cosine + 0.75 * std::pow(cosine, 6)
                          : 0.08 * cosine + 0.92 * std::pow(cosine, 10);
     if (in.frame.effects.interfaces && pair.amplitude > 0) {
-        const double u = (std::abs(place.distance_mm) - pair.split_mm) / pair.sigma_mm;
+        const double u =
+            (std::abs(place.distance_mm) - pair.split_mm) / blurred_mm(in.tables, pair.sigma_mm);
         const double i = pair.amplitude * p.facing * std::exp2(place.rough.log2_glint) *
                          std::exp(-0.5 * u * u) * p.row.interface_scale;
         p.re += i * place.rough.re;
@@ -121,9 +113,15 @@ void meet_target(const ReferenceInput& in, Sample& p) {
         p.loss += graze_loss(p.ball_cosine, p.ball_mm, in.geometry.step_mm);
 }
 
+// A beam's face of gas, and the diaphragm on it; kNoFace: none.
+struct Face {
+    double depth_mm = static_cast<double>(kNoFace), dome_mm = depth_mm, peak = 0, cosine = 1;
+};
+
 // A face of bone lights its tails; one of gas does so from the second sample on, since a single
 // sample of gas is a neighbour's that the random look-up brought.
-void light_tails(const ReferenceInput& in, TissueKind kind, const Sample& p, BeamLight& t) {
+void light_tails(
+    const ReferenceInput& in, TissueKind kind, const Face& face, const Sample& p, BeamLight& t) {
     const double here = p.here, gain = p.row.gain;
     if (kind == TissueKind::bone && t.before != TissueKind::bone) {
         t.bone = std::max(t.bone, kBoneTail * kMaxReflection * p.facing * here * gain);
@@ -131,13 +129,22 @@ void light_tails(const ReferenceInput& in, TissueKind kind, const Sample& p, Bea
                                kBoneTailSlow * kBoneTail * kMaxReflection * p.facing * here * gain);
         t.bone_floor = std::max(t.bone_floor, kBoneFloor * std::min(here * gain, 1.0));
     }
-    if (kind == TissueKind::gas && t.before == TissueKind::gas &&
-        t.before_that != TissueKind::gas) {
-        t.gas = std::max(t.gas, kGasTail * here * gain);
-        const double mirror = p.facing < 1 ? kReverb * kReverbLoss * p.facing * here * gain : 0;
+    // The frame's face, if it is known: with the light shortly before it.
+    const bool known = in.scene.has_gas && (in.frame.effects.diaphragm || in.frame.effects.gas_ring_down);
+    if (p.row.r_mm < face.depth_mm - kFaceLightMm) t.lit = here * gain;
+    const bool starts = kind == TissueKind::gas && t.before == TissueKind::gas &&
+                        t.before_that != TissueKind::gas;
+    const bool meets = p.row.r_mm >= face.depth_mm &&
+                       p.row.r_mm - in.geometry.step_mm < face.depth_mm && here > 0;
+    if (known ? meets && !(face.peak > 0) : starts) {
+        const double light = known ? t.lit : here * gain;
+        const double facing =
+            known ? 0.25 * face.cosine + 0.75 * std::pow(face.cosine, 6) : p.facing < 1 ? p.facing : 0;
+        t.gas = std::max(t.gas, kGasTail * light);
+        const double mirror = kReverb * kReverbLoss * facing * light;
         if (mirror > t.reverb) {
             t.reverb = mirror;
-            t.period = p.row.r_mm - in.geometry.step_mm;
+            t.period = known ? face.depth_mm : p.row.r_mm - in.geometry.step_mm;
             t.next = 2 * t.period;
         }
     }
@@ -187,7 +194,10 @@ double tail_power(const ReferenceInput& in, const Row& row, BeamLight& t) {
 class Beams {
   public:
     explicit Beams(const ReferenceInput& input)
-        : in_(input), gaps_(static_cast<std::size_t>(input.geometry.scanlines), 0.0f) {
+        : in_(input),
+          gaps_(static_cast<std::size_t>(input.geometry.scanlines), 0.0f),
+          slice_(speckle_slice(input.frame.volume_from_probe.rotation * Vector3{0, 1, 0},
+                               input.tables.cell_mm)) {
         const PhysicalFrame& f = in_.frame;
         if (f.effects.contact) {
             std::vector<float> raw(gaps_.size());
@@ -196,6 +206,24 @@ class Beams {
         }
         if (f.effects.breathing && f.motion.breathes())
             breathing_ = BreathingField(*in_.scene.bundle);
+        if (in_.scene.has_gas && (f.effects.diaphragm || f.effects.gas_ring_down)) {
+            std::vector<FaceNode> nodes(face_node_count(in_.geometry));
+            for (std::size_t n = 0; n < nodes.size(); ++n) {
+                const int line =
+                    std::min(static_cast<int>(n) * kFaceEvery, in_.geometry.scanlines - 1);
+                nodes[n] = find_face(
+                    in_.scene, in_.geometry, f, breathing_.empty() ? nullptr : &breathing_,
+                    static_cast<double>(gaps_[static_cast<std::size_t>(line)]), line);
+                if (!f.effects.diaphragm) nodes[n].peak = 0;
+            }
+            for (auto* per_beam : {&faces_.depth_mm, &faces_.dome_mm, &faces_.peak, &faces_.cosine})
+                per_beam->resize(gaps_.size());
+            join_faces(in_.geometry, nodes, faces_);
+        }
+        if (f.effects.streaks)
+            streak_count_ =
+                find_streaks(in_.scene, in_.geometry, in_.tables, f,
+                             breathing_.empty() ? nullptr : &breathing_, gaps_, streaks_);
     }
 
     void trace(int l, BeamSamples& out) const {
@@ -203,6 +231,7 @@ class Beams {
         const PlanePoint o = g.beam_origin(l), d = g.beam_direction(l);
         const Vector3 beam = in_.frame.volume_from_probe.rotation * Vector3{d.x, 0, d.z};
         BeamLight t;
+        const Face face = face_of(l);
         for (int k = 0; k < g.samples; ++k) {
             const std::size_t at = in_.at(k, l);
             t.fade(g.step_mm);
@@ -214,16 +243,30 @@ class Beams {
             if (in_.frame.effects.targets) find_target(in_, beam, p);
             const AcousticProperties& look =
                 in_.scene.looks[static_cast<std::size_t>(p.look_index)];
-            echo_of_tissue(look, p);
+            const double past = in_.row(k).r_mm - face.dome_mm;
+            const bool dome = past > -1;
+            const double line = dome_echo(face, past);
+            const WallEcho wall = meet_wall(k, l, o, d, look);
+            echo_of_tissue(look, wall.in_wall, line, p);
+            p.re += p.row.interface_scale * wall.amplitude;
+            if (look.kind == TissueKind::soft) meet_streaks(o, d, p);
             meet_surface(in_, beam, p);
             meet_target(in_, p);
+            if (std::abs(past) < kDomeReachMm) {
+                p.re = line * p.row.interface_scale;
+                p.im = 0;
+            }
             const bool dead = t.log2_light < kDeadLog2;
             p.here = dead ? 0 : std::exp2(t.log2_light);
             if (dead) p.re = p.im = 0;
-            light_tails(in_, look.kind, p, t);
+            if (dead) p.field_re = p.field_im = {};
+            if (dome) p.loss = past < kDomeReachMm ? 0 : 1e9;
+            light_tails(in_, look.kind, face, p, t);
             meet_needle(in_, o, d, p, t);
-            out.re[at] = p.re;
-            out.im[at] = p.im;
+            for (std::size_t i = 0; i < out.looks.size(); ++i) {
+                out.looks[i].re[at] = p.re + p.field_re[i];
+                out.looks[i].im[at] = p.im + p.field_im[i];
+            }
             out.light[at] = p.here * std::exp2(t.needle_light);
             out.tail[at] = tail_power(in_, p.row, t);
             t.log2_light -= p.loss;
@@ -231,6 +274,63 @@ class Beams {
     }
 
   private:
+    // The point that beam l shows at depth r, in the middle of the slab.
+    Point3 point_at(int l, PlanePoint o, PlanePoint d, double r_mm) const {
+        const PhysicalFrame& f = in_.frame;
+        const double gap = static_cast<double>(gaps_[static_cast<std::size_t>(l)]);
+        const double along = r_mm + gap * std::exp(-r_mm / kGapReachMm);
+        const Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
+        return breathing_.empty() ? x : x - breathing_.weight(x) * f.motion.breathing_mm;
+    }
+
+    Face face_of(int l) const {
+        if (faces_.depth_mm.empty()) return {};
+        const auto at = [&](const std::vector<float>& v) {
+            return static_cast<double>(v[static_cast<std::size_t>(l)]);
+        };
+        return {at(faces_.depth_mm), at(faces_.dome_mm), at(faces_.peak), at(faces_.cosine)};
+    }
+
+    // The diaphragm's line, past mm behind it along the beam: the scatterers' share.
+    static double dome_echo(const Face& face, double past) {
+        if (std::abs(past) >= kDomeReachMm) return 0;
+        const double q = past * face.cosine;
+        const double sigma = q < 0 ? kDomeBeforeMm : kDomeBehindMm;
+        return kDomeShare * face.peak * (0.4 + 0.6 * face.cosine * face.cosine) *
+               (std::exp(-0.5 * q * q / (sigma * sigma)) +
+                kDomeTail * std::exp(-std::abs(q) / kDomeTailMm));
+    }
+
+    // Plates that face the beam, in soft tissue.
+    void meet_streaks(PlanePoint o, PlanePoint d, Sample& p) const {
+        for (int n = 0; n < streak_count_; ++n) {
+            const Streak& s = streaks_[static_cast<std::size_t>(n)];
+            const double x = o.x + p.row.r_mm * d.x - s.centre.x,
+                         z = o.z + p.row.r_mm * d.z - s.centre.z;
+            const double off = (x * s.normal.x + z * s.normal.z) / s.width_mm;
+            const double along = 2 * (x * s.normal.z - z * s.normal.x) / s.length_mm;
+            p.re += s.amplitude * std::exp(-0.5 * (off * off + std::pow(along, 4))) *
+                    p.row.interface_scale;
+        }
+    }
+
+    // Sheets of the wall, in soft tissue.
+    WallEcho meet_wall(
+        int k, int l, PlanePoint o, PlanePoint d, const AcousticProperties& look) const {
+        const double step = in_.geometry.step_mm;
+        const int every = std::clamp(static_cast<int>(in_.tables.wall.node_mm / step), 1, 32);
+        const int rows = static_cast<int>(kWallDepthMm / step) / every * every;
+        if (!in_.frame.effects.wall || look.kind != TissueKind::soft || k >= rows ||
+            in_.scene.layers.empty())
+            return {};
+        const double half = 0.5 * every * step;
+        const auto voxel = [&](double r) {
+            return in_.scene.grid.voxel_from_point(point_at(l, o, d, r));
+        };
+        const double r = in_.row(k).r_mm;
+        return wall_echo(in_, voxel(r - half), voxel(r), voxel(r + half), 2 * half);
+    }
+
     // Where sample k of beam l lies, and what is there.
     Sample place_sample(int k, int l, PlanePoint o, PlanePoint d, Vector3 beam) const {
         const PhysicalScene& s = in_.scene;
@@ -238,10 +338,7 @@ class Beams {
         Sample p{in_.row(k)};
         const Vector3 across = f.volume_from_probe.rotation * Vector3{0, 1, 0};
         const Vector3 sideways = f.volume_from_probe.rotation * Vector3{1, 0, 0};
-        const double gap = static_cast<double>(gaps_[static_cast<std::size_t>(l)]);
-        const double along = p.row.r_mm + gap * p.row.contact;
-        Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
-        if (!breathing_.empty()) x = x - breathing_.weight(x) * f.motion.breathing_mm;
+        const Point3 x = point_at(l, o, d, p.row.r_mm);
         p.from_origin = x - s.grid.origin_mm;
 
         const double jitter = in_.draw(in_.noise.white, NoiseUse::elevation, 0, k, l);
@@ -256,17 +353,36 @@ class Beams {
     }
 
     // Echo and attenuation of the tissue itself.
-    void echo_of_tissue(const AcousticProperties& look, Sample& p) const {
+    // dome: what the diaphragm adds to the scatterers, amplitude.
+    void echo_of_tissue(const AcousticProperties& look,
+                        bool in_wall,
+                        double dome,
+                        Sample& p) const {
         const PhysicalEffects& on = in_.frame.effects;
-        double echo_db = look.echo_db;
+        double echo_db = look.echo_db + (on.wall ? look.wall_db : 0);
         if (p.look_index == p.place.label) {
-            if (on.structure) echo_db += echo_offset_db(in_.scene, p.looked_up);
-            if (on.fine_structure) echo_db += fine_offset_db(in_.scene, p.place.label, p.v);
+            if (on.structure) {
+                const double baked = echo_offset_db(in_.scene, p.looked_up);
+                echo_db += in_wall ? std::min(baked, kWallStructureDb) : baked;
+            }
+            echo_db += fine_offset_db(in_.scene, on, p.place.label, p.v);
         }
+        if (dome > 0)
+            echo_db +=
+                kDbPerLog2 * std::log2(1 + dome) + (look.kind == TissueKind::gas ? kDomeGasDb : 0);
         const double amplitude =
             look.kind == TissueKind::outside ? 0 : std::exp2(echo_db / kDbPerLog2);
-        p.re = amplitude;
-        if (on.speckle) scatter(in_, turn_, amplitude, p);
+        p.field_re.fill(amplitude);
+        if (on.speckle) {
+            const SpeckleSample field =
+                speckle_at(slice_, p.from_origin, in_.tables.cell_mm,
+                           slice_spacing(in_.tables, p.row, on), in_.tables.looks);
+            const double level = amplitude * speckle_level(p.row, on);
+            for (std::size_t i = 0; i < kMaxLooks; ++i) {
+                p.field_re[i] = level * field.re[i];
+                p.field_im[i] = level * field.im[i];
+            }
+        }
         p.loss = on.attenuation ? look.attenuation * in_.tables.frequency_mhz *
                                       in_.geometry.step_mm * 0.1 * 2 / kDbPerLog2
                                 : 0;
@@ -275,15 +391,20 @@ class Beams {
     const ReferenceInput& in_;
     std::vector<float> gaps_;  // # scanlines; negative: air
     BreathingField breathing_;
-    const Matrix3 turn_ = speckle_rotation();
+    std::vector<Streak> streaks_ = std::vector<Streak>(kMostStreaks);
+    int streak_count_ = 0;
+    GasFaces faces_;
+    const SpeckleSlice slice_;
 };
 
 }  // namespace
 
 BeamSamples reference_beams(const ReferenceInput& input) {
     const std::size_t count = input.count();
-    BeamSamples out{std::vector<double>(count, 0.0), std::vector<double>(count, 0.0),
-                    std::vector<double>(count, 1.0), std::vector<double>(count, 0.0)};
+    const std::vector<double> dark(count, 0.0);
+    BeamSamples out{
+        std::vector<ComplexPlane>(static_cast<std::size_t>(input.tables.looks), {dark, dark}),
+        std::vector<double>(count, 1.0), dark};
     const Beams beams(input);
     for (int l = 0; l < input.geometry.scanlines; ++l) beams.trace(l, out);
     return out;

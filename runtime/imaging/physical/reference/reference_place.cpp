@@ -21,10 +21,10 @@ double echo_offset_db(const PhysicalScene& s, Point3 v) {
     return s.bundle->echo_offset.at(i, j, k) / 4.0;
 }
 
-double fine_offset_db(const PhysicalScene& s, int label, Point3 v) {
+double fine_offset_db(const PhysicalScene& s, const PhysicalEffects& on, int label, Point3 v) {
     if (label >= static_cast<int>(s.fine.frames.size())) return 0;
     const FineFrame& f = s.fine.frames[static_cast<std::size_t>(label)];
-    if (f.cube < 0) return 0;
+    if (f.cube < 0 || !(f.cube == kParenchymaCube ? on.parenchyma : on.fine_structure)) return 0;
     std::size_t cell = 0;
     for (int r = 2; r >= 0; --r) {
         const auto m = [&](int c) {

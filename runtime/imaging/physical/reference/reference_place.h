@@ -32,6 +32,6 @@ Place place_at(const PhysicalScene& scene, const PhysicalFrame& frame, Point3 v,
 
 // Echo offsets, dB: the baked one of the nearest voxel; that of the label's fibres or septa.
 double echo_offset_db(const PhysicalScene& scene, Point3 v);
-double fine_offset_db(const PhysicalScene& scene, int label, Point3 v);
+double fine_offset_db(const PhysicalScene& scene, const PhysicalEffects& on, int label, Point3 v);
 
 }  // namespace sonocase::runtime

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// How an ultrasound machine draws: its beam, speckle, grey map, gain and artefacts, as data. Read
+// from the table [machine] of a TOML file (machine_toml.h); `sonocase look` measures one.
+//
+// The defaults are those of the built-in machine `modern`, fitted to a living liver (fan). The
+// limits in brackets are those of the reader. Amplitudes are relative to e = 1: the mean amplitude
+// of healthy liver after time gain compensation. Depths are along the beam, from the probe's face.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace sonocase {
+
+// Widths are full widths at half height of the point spread's amplitude (two-way). A width given
+// here holds at reference_mhz and is scaled by reference_mhz / frequency.
+struct MachineBeam {
+    double frequency_mhz = 0;      // 0: the exercise's; else [0.5, 50]
+    double reference_mhz = 3.5;    // [0.5, 50]
+    double axial_mm = 0.74;        // along the beam; 0: from the frequency alone; [0, 10]
+    double lateral_mm = 1.25;      // along the face, at the focus; 0: from the frequency; [0, 20]
+    double lateral_focus_mm = 60;  // 0: the exercise's; [0, 500]
+    double lateral_range_mm = 60;  // width = lateral_mm sqrt(1 + ((r - focus) / range)^2); [1, 1e4]
+    double elevation_mm = 0;       // slice thickness at the focus; 0: the exercise's; [0, 50]
+    bool operator==(const MachineBeam&) const = default;
+};
+
+// Independent speckle fields that are detected and averaged: spatial and frequency compounding.
+struct MachineLooks {
+    int count = 3;        // [1, 16]
+    int near_count = 6;   // above near_mm, [1, 16]
+    double near_mm = 30;  // [0, 500]
+    bool operator==(const MachineLooks&) const = default;
+};
+
+// power: grey = floor + level e^exponent, and knee_slope of that slope above the grey `knee`.
+// log:   grey = level + 255 / dynamic_range_db * 20 log10(e), not below floor.
+enum class GreyMap { power, log };
+struct MachineGrey {
+    GreyMap map = GreyMap::power;
+    double floor = 9;              // the machine's own black, [0, 255]
+    double level = 39;             // of e = 1; power: above the floor; [1, 255]
+    double exponent = 0.75;        // power only, [0.05, 4]
+    double knee = 160;             // power only; 255: none; [1, 255]
+    double knee_slope = 0.5;       // [0, 1]
+    double dynamic_range_db = 60;  // log; for both maps, where the console's knob starts; [20, 120]
+    bool operator==(const MachineGrey&) const = default;
+};
+
+struct MachineNoise {
+    double level_db = -70;  // of the receiver, amplitude relative to e = 1, [-200, 20]
+    bool reject = true;     // nothing is drawn below the grey floor, noise neither
+    bool operator==(const MachineNoise&) const = default;
+};
+
+struct MachineGain {
+    double tgc_db_per_cm_mhz = 0;  // one way; 0: by the probe's shape; [0, 3]
+    double far_from_mm = 95;       // beyond it the gain falls again, [0, 500]
+    double far_db_per_cm = 2;      // by so much, [0, 30]
+    double far_limit_db = 14;      // and no further, [0, 120]
+    bool operator==(const MachineGain&) const = default;
+};
+
+// Ringing of the probe's face: amplitude ring_level exp(-r / ring_decay_mm), with a second, slower
+// decay, and lines fixed to the probe at first_mm + k spacing_mm, line_db - k line_step_db over it.
+// Everything else is multiplied by min(1, start + r / start_mm) below the face.
+struct MachineNearField {
+    double ring_level = 2;       // [0, 100]
+    double ring_decay_mm = 2.5;  // [0.1, 100]
+    double tail_level = 0;       // [0, 100]
+    double tail_decay_mm = 9;    // [0.1, 100]
+    int lines = 6;               // [0, 32]
+    double first_mm = 0.5;       // [0, 50]
+    double spacing_mm = 1.9;     // [0.1, 50]
+    double line_db = 7;          // [-60, 60]
+    double line_step_db = 2.2;   // [0, 60]
+    double line_mm = 0.8;        // full width at half height, [0.05, 20]
+    double start = 0.25;         // [0, 1]; 1: not darker at the face
+    double start_mm = 3;         // [0.1, 50]
+    bool operator==(const MachineNearField&) const = default;
+};
+
+// Haze under bright lines: along each beam, power fraction (1 - q) sum q^k s^2 with
+// q = exp(-dr / decay_mm), smoothed over across_mm along the face.
+struct MachineHaze {
+    double fraction = 0.3;  // 0: none; [0, 10]
+    double decay_mm = 4.5;  // [0.1, 100]
+    double across_mm = 2;   // full width at half height, [0, 50]
+    bool operator==(const MachineHaze&) const = default;
+};
+
+// Poor contact of the outer beams: edge_db at the outermost, over edge_fraction of the face.
+struct MachineContact {
+    double edge_db = 10;         // [0, 120]
+    double edge_fraction = 0.1;  // of the face, at each end, [0, 0.5]
+    bool operator==(const MachineContact&) const = default;
+};
+
+struct Machine {
+    std::string name = "modern";
+    std::string title = "Modern scanner, abdominal fan";  // shown to people
+    MachineBeam beam;
+    MachineLooks looks;
+    MachineGrey grey;
+    MachineNoise noise;
+    MachineGain gain;
+    MachineNearField near_field;
+    MachineHaze haze;
+    MachineContact contact;
+    // Weights of the frames that persistence blends, newest first; scaled to sum to 1. One: none.
+    std::vector<double> persistence{0.4, 0.3, 0.2, 0.1};  // 1 to 8 weights, [0, 1], the first > 0
+    double edge_enhancement = 0;  // amount of the unsharp mask; 0: none; [0, 4]
+    bool post_filter = false;     // speckle reduction: a binomial filter of three samples
+    // Level of tissues that somebody measured, dB over e = 1, by label. Optional.
+    std::map<std::string, double> tissue_db;  // [-60, 60]
+    bool operator==(const Machine&) const = default;
+};
+
+}  // namespace sonocase

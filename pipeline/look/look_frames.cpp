@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/look/look_frames.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "pipeline/base/delimited_text.h"
+#include "pipeline/texture/example/read_example.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr const char* kExpected = "expected PNG frames of one clip, or a folder of them";
+
+// 1 within `reach` pixels of a 1, in x and y.
+std::vector<std::uint8_t> widened(const std::vector<std::uint8_t>& mask,
+                                  const FramePile& pile,
+                                  int reach) {
+    std::vector<std::uint8_t> out(mask.size());
+    for (int y = 0; y < pile.height_px; ++y) {
+        for (int x = 0; x < pile.width_px; ++x) {
+            if (!mask[pile.index(x, y)]) continue;
+            for (int v = std::max(y - reach, 0); v <= std::min(y + reach, pile.height_px - 1);
+                 ++v) {
+                for (int u = std::max(x - reach, 0); u <= std::min(x + reach, pile.width_px - 1);
+                     ++u)
+                    out[pile.index(u, v)] = 1;
+            }
+        }
+    }
+    return out;
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> list_frames(const std::vector<std::string>& inputs) {
+    namespace fs = std::filesystem;
+    std::vector<std::string> paths;
+    for (const std::string& input : inputs) {
+        std::error_code failed;
+        if (!fs::is_directory(input, failed)) {
+            if (!fs::exists(input, failed))
+                return Error{"no such file or folder", input, kExpected};
+            paths.push_back(input);
+            continue;
+        }
+        std::vector<std::string> found;
+        for (const auto& entry : fs::directory_iterator(input, failed)) {
+            const std::string ending = lower_case(entry.path().extension().string());
+            if (ending == ".png" || ending == ".tif" || ending == ".tiff")
+                found.push_back(entry.path().string());
+        }
+        if (failed) return Error{"the folder cannot be read", input, kExpected};
+        if (found.empty()) return Error{"no .png or .tif file in the folder", input, kExpected};
+        std::sort(found.begin(), found.end());
+        paths.insert(paths.end(), found.begin(), found.end());
+    }
+    if (paths.empty()) return Error{"no frames", "", kExpected};
+    return paths;
+}
+
+Result<LookFrame> read_look_frame(const std::string& path) {
+    const auto image = read_example(path);
+    if (!image) return image.error();
+    LookFrame frame{image->width, image->height, {}, {}};
+    frame.grey.resize(image->count());
+    frame.colour.resize(image->count());
+    for (std::size_t i = 0; i < image->count(); ++i) {
+        const float grey = image->grey[i];
+        frame.colour[i] = !image->used(i);
+        frame.grey[i] = std::isfinite(grey)
+                            ? static_cast<std::uint8_t>(std::lround(std::clamp(grey, 0.0f, 255.0f)))
+                            : 0;
+    }
+    return frame;
+}
+
+std::vector<std::size_t> spread_indices(std::size_t total, std::size_t count) {
+    std::vector<std::size_t> indices;
+    count = std::min(total, count);
+    for (std::size_t i = 0; i < count; ++i) indices.push_back(i * total / count);
+    return indices;
+}
+
+Status FramePile::add(const LookFrame& frame, const std::string& path) {
+    if (frames == 0) {
+        width_px = frame.width_px;
+        height_px = frame.height_px;
+        lowest = highest = frame.grey;
+        colour = frame.colour;
+        mean.assign(frame.grey.size(), 0.0f);
+    } else if (frame.width_px != width_px || frame.height_px != height_px) {
+        return Error{"frame of " + std::to_string(frame.width_px) + " x " +
+                         std::to_string(frame.height_px) + " pixels after frames of " +
+                         std::to_string(width_px) + " x " + std::to_string(height_px),
+                     path, "expected frames of one clip, all of one size"};
+    }
+    for (std::size_t i = 0; i < frame.grey.size(); ++i) {
+        lowest[i] = std::min(lowest[i], frame.grey[i]);
+        highest[i] = std::max(highest[i], frame.grey[i]);
+        colour[i] |= frame.colour[i];
+        mean[i] += (static_cast<float>(frame.grey[i]) - mean[i]) / static_cast<float>(frames + 1);
+    }
+    ++frames;
+    return Done{};
+}
+
+std::vector<std::uint8_t> burnt_in(const FramePile& pile) {
+    constexpr int kBright = 60, kStill = 2, kRim = 2;
+    std::vector<std::uint8_t> mask = pile.colour;
+    std::vector<std::uint8_t> still(mask.size());
+    std::size_t stills = 0, bright = 0;
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+        if (pile.highest[i] < kBright) continue;
+        ++bright;
+        still[i] = pile.highest[i] - pile.lowest[i] <= kStill;
+        stills += still[i];
+    }
+    // A clip whose picture does not move says nothing about what is burnt in.
+    if (pile.frames >= 3 && stills * 2 < bright) {
+        for (std::size_t i = 0; i < mask.size(); ++i) mask[i] |= still[i];
+    }
+    return widened(mask, pile, kRim);
+}
+
+}  // namespace sonocase::pipeline

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What can be measured of a machine's look in its frames, before anything is fitted.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/image_scores/patch_scores.h"
+#include "formats/image_scores/structure_scores.h"
+
+namespace sonocase::pipeline {
+
+// A place of known tissue, in pixels of the picture.
+struct LookRectangle {
+    int x = 0, y = 0, width = 0, height = 0;
+    std::string tissue;  // empty: the parenchyma that texture is measured in
+};
+
+// Medians of the even patches of a stretch of depth.
+struct LookBand {
+    double depth_mm = 0;
+    int patches = 0;
+    double mean = 0;  // grey
+    double grain_along_mm = 0, grain_across_mm = 0;
+};
+
+struct LookMeasures {
+    int frames = 0;
+    int patches = 0;          // even ones: without vessels, walls or shadows
+    double black = 0;         // the machine's own black, grey
+    bool black_seen = false;  // false: nothing black was seen; the darkest hundredth stands in
+    PatchScores texture;      // medians over the even patches
+    double lowest_mm = 0, highest_mm = 0;  // depths that they span
+    std::vector<LookBand> bands;           // shallow to deep
+    double streaks_per_cm2 = 0;
+    WallScores wall;           // fans only
+    double first_4_mm = 0;     // mean grey
+    std::vector<double> near;  // grey per sample from the face: mean over lines, median of frames
+    double near_still = 0;     // correlation of the first 5 mm between frames far apart
+    bool moves = false;        // frames differ enough for near_still to mean anything
+    std::vector<double> by_line;  // grey per line in the middle depths, median of frames
+    std::optional<DiaphragmScore> diaphragm;
+    std::map<std::string, double> tissue_grey;  // of named rectangles, mean
+    std::vector<std::string> warnings;
+};
+
+// Takes frames one by one, in order; memory does not grow with their pixels.
+class LookGauge {
+  public:
+    // `use`: 1 where a sample may be used; # of the grid. `rectangle`: # of the grid, 1 inside the
+    // rectangles of parenchyma; empty: even patches are looked for everywhere.
+    LookGauge(BeamImage grid,
+              std::vector<std::uint8_t> use,
+              std::vector<std::uint8_t> parenchyma,
+              std::map<std::string, std::vector<std::uint8_t>> tissues);
+
+    // What one frame gives; frames may be measured at the same time.
+    struct Part {
+        std::vector<PatchScores> patches;  // of all patches that are not black
+        std::vector<double> dark;          // means of smooth squares, grey
+        double lowest = 255;               // hundredth of the grey
+        StreakScore streaks;
+        WallScores wall;
+        double first_4_mm = 0;
+        std::vector<float> near, by_line, near_lines;
+        std::optional<DiaphragmScore> diaphragm;
+        std::map<std::string, double> tissue_sum;
+    };
+    Part measure(const BeamImage& image) const;
+    void add(Part part);
+
+    LookMeasures result() const;
+
+  private:
+    double black(bool& seen) const;
+    BeamImage grid_;
+    std::vector<std::uint8_t> use_, parenchyma_;
+    std::map<std::string, std::vector<std::uint8_t>> tissues_;
+    std::vector<Part> parts_;
+};
+
+// Patches of parenchyma: bright enough over `black`, without shading, walls or vessels.
+bool is_even(const PatchScores& patch, double black);
+
+}  // namespace sonocase::pipeline

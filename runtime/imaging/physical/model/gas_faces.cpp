@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/physical/model/gas_faces.h"
+
+namespace sonocase::runtime::physical {
+namespace {
+
+bool joined(const FaceNode& a, const FaceNode& b) {
+    return a.depth_mm < kNoFace && b.depth_mm < kNoFace && (a.peak > 0) == (b.peak > 0) &&
+           std::abs(a.depth_mm - b.depth_mm) < static_cast<float>(kFaceJoinMm);
+}
+
+// Neighbours of one face, 1 2 1.
+void smooth(std::span<FaceNode> nodes) {
+    FaceNode before = nodes.front();
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+        const FaceNode here = nodes[n];
+        const FaceNode& left = n > 0 && joined(before, here) ? before : here;
+        const FaceNode& right =
+            n + 1 < nodes.size() && joined(here, nodes[n + 1]) ? nodes[n + 1] : here;
+        nodes[n].depth_mm = 0.25f * (left.depth_mm + 2 * here.depth_mm + right.depth_mm);
+        nodes[n].peak = 0.25f * (left.peak + 2 * here.peak + right.peak);
+        before = here;
+    }
+}
+
+}  // namespace
+
+FaceNode find_face(const PhysicalScene& s,
+                   const ScanGeometry& g,
+                   const PhysicalFrame& f,
+                   const BreathingField* breathing,
+                   double gap_mm,
+                   int line) {
+    if (gap_mm < 0) return {};
+    const auto& [o, d] = g.beams[static_cast<std::size_t>(std::min(line, g.scanlines - 1))];
+    const auto voxel_at = [&](double r) {
+        const double along = r + gap_mm * std::exp(-r / kGapReachMm);
+        Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
+        if (breathing != nullptr) x = x - breathing->weight(x) * f.motion.breathing_mm;
+        return s.grid.voxel_from_point(x);
+    };
+    const auto label_of = [&](double r) {
+        const Point3 v = voxel_at(r);
+        return static_cast<std::size_t>(label_at(s, static_cast<int>(std::floor(v.x + 0.5)),
+                                                 static_cast<int>(std::floor(v.y + 0.5)),
+                                                 static_cast<int>(std::floor(v.z + 0.5))));
+    };
+    const auto is_gas = [&](std::size_t label) { return s.looks[label].kind == TissueKind::gas; };
+    bool organ = false;  // met on the way
+    for (double r = kFaceStepMm; r < g.depth_mm; r += kFaceStepMm) {
+        const std::size_t label = label_of(r);
+        if (s.looks[label].kind == TissueKind::bone) return {};
+        organ = organ || s.fine.frames[label].cube == kParenchymaCube;
+        if (!is_gas(label) || !is_gas(label_of(r + kFaceStepMm))) continue;
+        double before = r - kFaceStepMm, behind = r;
+        for (int halving = 0; halving < 4; ++halving) {
+            const double middle = 0.5 * (before + behind);
+            (is_gas(label_of(middle)) ? behind : before) = middle;
+        }
+        FaceNode face{static_cast<float>(0.5 * (before + behind)), 0};
+        if (s.is_lung[label] && organ && r > kDomeFromMm) {
+            const double strength =
+                s.layers.empty() ? 0 : std::clamp(s.layers.at(voxel_at(r)).strength, -2.0, 2.0);
+            face.peak = static_cast<float>(kDomeAmplitude *
+                                           std::exp2(kDomeStrengthDb / kDbPerLog2 * strength));
+        }
+        return face;
+    }
+    return {};
+}
+
+void join_faces(const ScanGeometry& g, std::span<FaceNode> nodes, GasFaces& faces) {
+    for (int pass = 0; pass < 3; ++pass) smooth(nodes);
+    faces.any_dome = false;
+    for (std::size_t l = 0; l < faces.depth_mm.size(); ++l) {
+        const std::size_t n = std::min(l / kFaceEvery, nodes.size() - 1),
+                          next = std::min(n + 1, nodes.size() - 1);
+        const float part = static_cast<float>(l % kFaceEvery) / kFaceEvery;
+        const FaceNode &a = nodes[n], &b = nodes[next];
+        const bool between = joined(a, b);
+        const FaceNode& nearest = part < 0.5f ? a : b;
+        const float depth =
+                        between ? a.depth_mm + (b.depth_mm - a.depth_mm) * part : nearest.depth_mm,
+                    peak = between ? a.peak + (b.peak - a.peak) * part : nearest.peak;
+        faces.depth_mm[l] = depth;
+        faces.peak[l] = depth < kNoFace ? peak : 0;
+        faces.dome_mm[l] = faces.peak[l] > 0 ? depth : kNoFace;
+        faces.any_dome = faces.any_dome || faces.peak[l] > 0;
+        const double pitch =
+            kFaceEvery *
+            (g.fan ? (g.radius_mm + static_cast<double>(std::min(depth, 1e3f))) * g.line_step
+                   : g.line_step);
+        const double slope =
+            between ? static_cast<double>(b.depth_mm - a.depth_mm) / std::max(pitch, 1e-3) : 0;
+        faces.cosine[l] = static_cast<float>(1 / std::sqrt(1 + slope * slope));
+    }
+}
+
+}  // namespace sonocase::runtime::physical

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/physical/model/tissue_layers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "formats/base/raw_vector.h"
+#include "runtime/imaging/host/parallel_halves.h"
+#include "runtime/imaging/noise/periodic_noise.h"
+
+namespace sonocase::runtime {
+namespace {
+
+constexpr double kCellMm = 6;
+constexpr int kNoiseEdge = 64;
+constexpr double kDistanceUnit = 256, kNoiseUnit = 4096;
+
+using Field = std::vector<float>;
+
+struct Cells {
+    Int3 size{0, 0, 0};
+    int edge = 1;  // voxels
+    double mm = kCellMm;
+
+    std::size_t count() const {
+        return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
+               static_cast<std::size_t>(size.z);
+    }
+    std::ptrdiff_t stride(int axis) const {
+        return axis == 0 ? 1 : axis == 1 ? size.x : static_cast<std::ptrdiff_t>(size.x) * size.y;
+    }
+};
+
+// Tissue of the wall, and what runs through it: everything else is an organ.
+bool is_organ(const Label& label, const Tissue& tissue) {
+    constexpr std::array<std::string_view, 9> kWall{
+        "skin", "fat", "muscle", "tendon", "fascia", "nerve", "soft_tissue", "cartilage", "blood"};
+    if (label.name.find("visceral") != std::string::npos) return true;
+    if (tissue.kind == TissueKind::outside || tissue.kind == TissueKind::bone) return false;
+    return std::find(kWall.begin(), kWall.end(), tissue.name) == kWall.end();
+}
+
+// Bit 0: body, bit 1: organ, bit 2: wall. Vessels are neither: they run through both.
+std::vector<std::uint8_t> kinds_of_labels(const CaseBundle& bundle) {
+    const std::vector<int> tissue_of = tissue_of_label(bundle);
+    std::vector<std::uint8_t> kinds(256, 0);
+    for (std::size_t l = 1; l < bundle.labels.size() && l < kinds.size(); ++l) {
+        kinds[l] = 5;
+        if (tissue_of[l] < 0) continue;
+        const Tissue& tissue = bundle.tissues[static_cast<std::size_t>(tissue_of[l])];
+        if (is_organ(bundle.labels[l], tissue)) kinds[l] = 3;
+        if (tissue.name == "blood") kinds[l] = 1;
+    }
+    return kinds;
+}
+
+// Shares of body, organ and wall in each cell, from eight of its voxels.
+void find_shares(const CaseBundle& bundle,
+                 const Cells& c,
+                 JobRunner& jobs,
+                 Field& body,
+                 Field& organ,
+                 Field& wall) {
+    const std::vector<std::uint8_t> kinds = kinds_of_labels(bundle);
+    const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
+    const int near = c.edge / 4, far = c.edge - 1 - c.edge / 4;
+    parallel_halves(jobs, static_cast<std::size_t>(c.size.z),
+                    [&](std::size_t, std::size_t begin, std::size_t end) {
+                        std::size_t at = begin * static_cast<std::size_t>(c.stride(2));
+                        for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
+                            for (int j = 0; j < c.size.y; ++j) {
+                                for (int i = 0; i < c.size.x; ++i, ++at) {
+                                    int inside = 0, organs = 0, walls = 0;
+                                    for (int corner = 0; corner < 8; ++corner) {
+                                        const int x = i * c.edge + (corner & 1 ? far : near),
+                                                  y = j * c.edge + (corner & 2 ? far : near),
+                                                  z = k * c.edge + (corner & 4 ? far : near);
+                                        const std::uint8_t kind =
+                                            kinds[labels.at(std::min(x, labels.size.x - 1),
+                                                            std::min(y, labels.size.y - 1),
+                                                            std::min(z, labels.size.z - 1))];
+                                        inside += kind & 1;
+                                        organs += kind >> 1 & 1;
+                                        walls += kind >> 2;
+                                    }
+                                    body[at] = static_cast<float>(inside) / 8;
+                                    organ[at] = static_cast<float>(organs) / 8;
+                                    wall[at] = static_cast<float>(walls) / 8;
+                                }
+                            }
+                        }
+                    });
+}
+
+// The mean of three neighbours along each axis; the border repeats.
+void smooth(const Cells& c, Field& f) {
+    Field line(static_cast<std::size_t>(std::max({c.size.x, c.size.y, c.size.z})));
+    for (int axis = 0; axis < 3; ++axis) {
+        const int n = c.size[axis];
+        const std::ptrdiff_t step = c.stride(axis);
+        const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
+        for (int b = 0; b < c.size[v]; ++b) {
+            for (int a = 0; a < c.size[u]; ++a) {
+                float* first = f.data() + a * c.stride(u) + b * c.stride(v);
+                for (int i = 0; i < n; ++i) line[static_cast<std::size_t>(i)] = first[i * step];
+                for (int i = 0; i < n; ++i) {
+                    const auto at = [&](int j) {
+                        return line[static_cast<std::size_t>(std::clamp(j, 0, n - 1))];
+                    };
+                    first[i * step] = (at(i - 1) + at(i) + at(i + 1)) * (1 / 3.0f);
+                }
+            }
+        }
+    }
+}
+
+// Solves |grad u| = 1 (Godunov's upwind scheme) for one cell from its smallest neighbours.
+float upwind(float a, float b, float c, float h) {
+    if (a > b) std::swap(a, b);
+    if (b > c) std::swap(b, c);
+    if (a > b) std::swap(a, b);
+    float u = a + h;
+    if (u <= b) return u;
+    u = 0.5f * (a + b + std::sqrt(std::max(2 * h * h - (a - b) * (a - b), 0.0f)));
+    if (u <= c) return u;
+    const float s = a + b + c;
+    return (s + std::sqrt(std::max(s * s - 3 * (a * a + b * b + c * c - h * h), 0.0f))) / 3;
+}
+
+// Fast sweeping (Zhao 2005): eight orders of the cells, each of which follows the characteristics
+// of one octant. Cells that are not open keep their value.
+void march(const Cells& c, const std::vector<std::uint8_t>& open, Field& u) {
+    const auto h = static_cast<float>(c.mm);
+    constexpr auto kFar = static_cast<float>(kLayerFarMm);
+    const std::ptrdiff_t sy = c.stride(1), sz = c.stride(2);
+    for (int order = 0; order < 8; ++order) {
+        const auto index = [&](int i, int axis) {
+            return order >> axis & 1 ? c.size[axis] - 1 - i : i;
+        };
+        for (int k0 = 0; k0 < c.size.z; ++k0) {
+            const int k = index(k0, 2);
+            for (int j0 = 0; j0 < c.size.y; ++j0) {
+                const int j = index(j0, 1);
+                for (int i0 = 0; i0 < c.size.x; ++i0) {
+                    const int i = index(i0, 0);
+                    const std::ptrdiff_t at = i + j * sy + k * sz;
+                    if (!open[static_cast<std::size_t>(at)]) continue;
+                    float* p = u.data() + at;
+                    const auto least = [&](int n, int size, std::ptrdiff_t step) {
+                        return std::min(n > 0 ? p[-step] : kFar, n < size - 1 ? p[step] : kFar);
+                    };
+                    const float a = least(i, c.size.x, 1), b = least(j, c.size.y, sy),
+                                d = least(k, c.size.z, sz);
+                    if (std::min({a, b, d}) >= kFar) continue;
+                    *p = std::min({*p, upwind(a, b, d, h), kFar});
+                }
+            }
+        }
+    }
+}
+
+// Distance into the side where `share` is large, mm; on the other side the negative distance down
+// to -kLayerBandMm. share: smoothed. wanted: share of the body, outside which distances do not
+// matter.
+Field distance_into(const Cells& c, const Field& share, const Field* wanted) {
+    Field u(share.size());
+    std::vector<std::uint8_t> open(share.size(), 0);
+    constexpr auto kFar = static_cast<float>(kLayerFarMm), kBand = static_cast<float>(kLayerBandMm);
+    const auto mm = static_cast<float>(c.mm);
+    std::size_t at = 0;
+    for (int k = 0; k < c.size.z; ++k) {
+        for (int j = 0; j < c.size.y; ++j) {
+            for (int i = 0; i < c.size.x; ++i, ++at) {
+                const float s = share[at];
+                u[at] = s >= 0.5f ? kFar : -kBand;
+                const auto slope = [&](int n, int axis) {
+                    const int last = c.size[axis] - 1;
+                    const float* p = share.data() + at;
+                    const std::ptrdiff_t step = c.stride(axis);
+                    return (p[n < last ? step : 0] - p[n > 0 ? -step : 0]) /
+                           (mm * static_cast<float>((n < last) + (n > 0) > 0 ? (n < last) + (n > 0)
+                                                                             : 1));
+                };
+                const float gx = slope(i, 0), gy = slope(j, 1), gz = slope(k, 2);
+                const float steep = std::sqrt(gx * gx + gy * gy + gz * gz);
+                const float level = (s - 0.5f) / std::max(steep, 1e-6f);
+                if (std::abs(level) < mm) {
+                    u[at] = level;  // near the surface the share itself is the distance
+                } else if (s >= 0.5f) {
+                    open[at] = wanted == nullptr || (*wanted)[at] > 0.05f;
+                } else {
+                    u[at] = std::max(level, -kBand);
+                }
+            }
+        }
+    }
+    march(c, open, u);
+    smooth(c, u);
+    return u;
+}
+
+// Fat and vessels between organs are no wall: cells above the organs that are not connected with
+// the outside count as organ.
+void keep_what_reaches_out(const Cells& c, const Field& body, Field& above) {
+    std::vector<std::uint8_t> met(above.size(), 0);
+    std::vector<std::size_t> front;
+    const auto visit = [&](std::size_t at) {
+        if (met[at] || above[at] < 0.5f) return;
+        met[at] = 1;
+        front.push_back(at);
+    };
+    for (std::size_t at = 0; at < body.size(); ++at) {
+        if (body[at] < 0.5f) visit(at);
+    }
+    while (!front.empty()) {
+        const std::size_t at = front.back();
+        front.pop_back();
+        std::size_t rest = at;
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto n = static_cast<std::size_t>(c.size[axis]);
+            const auto step = static_cast<std::size_t>(c.stride(axis));
+            const std::size_t i = rest % n;
+            rest /= n;
+            if (i > 0) visit(at - step);
+            if (i + 1 < n) visit(at + step);
+        }
+    }
+    for (std::size_t at = 0; at < above.size(); ++at) {
+        if (!met[at]) above[at] = std::min(above[at], 0.3f);
+    }
+}
+
+std::int16_t packed(double value, double unit) {
+    return static_cast<std::int16_t>(std::lround(std::clamp(value * unit, -32767.0, 32767.0)));
+}
+
+}  // namespace
+
+LayerPoint TissueLayers::at(Point3 voxel) const noexcept {
+    const auto place = [&](double v, int size, int& first) {
+        const double cell = std::clamp((v + 0.5) * cells_per_voxel_ - 0.5, 0.0, size - 1.0);
+        first = std::min(static_cast<int>(cell), std::max(size - 2, 0));
+        return static_cast<float>(cell - first);
+    };
+    int i = 0, j = 0, k = 0;
+    const float x = place(voxel.x, size_.x, i), y = place(voxel.y, size_.y, j),
+                z = place(voxel.z, size_.z, k);
+    const std::ptrdiff_t sx = size_.x > 1 ? 1 : 0, sy = size_.y > 1 ? size_.x : 0,
+                         sz = size_.z > 1 ? static_cast<std::ptrdiff_t>(size_.x) * size_.y : 0;
+    const auto* p = cells_.data() + (static_cast<std::ptrdiff_t>(k) * size_.y + j) * size_.x + i;
+    // Distances are linear between cells; noises have no kinks there.
+    const auto even = [](float t) { return t * t * (3 - 2 * t); };
+    const float u = even(x), v = even(y), w = even(z);
+    std::array<float, 4> sum{};
+    for (int corner = 0; corner < 8; ++corner) {
+        const float linear =
+            (corner & 1 ? x : 1 - x) * (corner & 2 ? y : 1 - y) * (corner & 4 ? z : 1 - z);
+        const float smooth =
+            (corner & 1 ? u : 1 - u) * (corner & 2 ? v : 1 - v) * (corner & 4 ? w : 1 - w);
+        const auto& cell = p[(corner & 1 ? sx : 0) + (corner & 2 ? sy : 0) + (corner & 4 ? sz : 0)];
+        for (std::size_t n = 0; n < 2; ++n) sum[n] += linear * static_cast<float>(cell[n]);
+        for (std::size_t n = 2; n < 4; ++n) sum[n] += smooth * static_cast<float>(cell[n]);
+    }
+    return {static_cast<double>(sum[0]) / kDistanceUnit,
+            static_cast<double>(sum[1]) / kDistanceUnit, static_cast<double>(sum[2]) / kNoiseUnit,
+            static_cast<double>(sum[3]) / kNoiseUnit};
+}
+
+TissueLayers make_tissue_layers(const CaseBundle& bundle, JobRunner& jobs) {
+    Cells c;
+    const double voxel_mm = bundle.grid.spacing_mm.x;
+    c.edge = std::max(1, static_cast<int>(std::lround(kCellMm / voxel_mm)));
+    c.mm = c.edge * voxel_mm;
+    const auto cells = [&](int voxels) { return (voxels + c.edge - 1) / c.edge; };
+    const Int3 voxels = bundle.label_bricks.size;
+    c.size = {cells(voxels.x), cells(voxels.y), cells(voxels.z)};
+    Field body(c.count()), organ(c.count()), wall(c.count());
+    find_shares(bundle, c, jobs, body, organ, wall);
+    for (Field* share : {&body, &organ, &wall}) smooth(c, *share);
+    // Above the organs: the share of what is not organ; outside of the body too.
+    for (std::size_t at = 0; at < organ.size(); ++at) {
+        const float known = organ[at] + wall[at] + (1 - body[at]);
+        organ[at] = known > 0.05f ? 1 - organ[at] / known : 0;
+    }
+    keep_what_reaches_out(c, body, organ);
+    Field depth, above;
+    RawVector<float> wave, strength;
+    jobs.run(2, [&](std::size_t job) {
+        if (job == 0) {
+            depth = distance_into(c, body, nullptr);
+            wave = smooth_periodic_noise(kNoiseEdge, 1, 41);
+        } else {
+            above = distance_into(c, organ, &body);
+            strength = smooth_periodic_noise(kNoiseEdge, 1, 42);
+        }
+    });
+    TissueLayers layers;
+    layers.size_ = c.size;
+    layers.cells_per_voxel_ = 1.0 / c.edge;
+    layers.cells_.resize(c.count());
+    std::size_t at = 0;
+    for (int k = 0; k < c.size.z; ++k) {
+        for (int j = 0; j < c.size.y; ++j) {
+            for (int i = 0; i < c.size.x; ++i, ++at) {
+                const std::size_t n = static_cast<std::size_t>(
+                    i % kNoiseEdge + kNoiseEdge * (j % kNoiseEdge + kNoiseEdge * (k % kNoiseEdge)));
+                layers.cells_[at] = {packed(static_cast<double>(depth[at]), kDistanceUnit),
+                                     packed(static_cast<double>(above[at]), kDistanceUnit),
+                                     packed(static_cast<double>(wave[n]), kNoiseUnit),
+                                     packed(static_cast<double>(strength[n]), kNoiseUnit)};
+            }
+        }
+    }
+    return layers;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Effect wall: the sheets of the body wall, between the skin and the organs' hull. They are smooth
+// and long, unlike the surfaces of labels, and belong to the tissue (TissueLayers).
+//
+// Echo of a sample, amplitude, added to its surfaces':
+//     (outer(depth) w + inner(above) (1 - w)) 10^(strength / 20) interface_scale
+// outer, inner: tables of sheets by depth below the skin and by height above the organs, each times
+// |cosine|^8 of the beam to the sheet; w = 1/2 + (above - depth) / 3, within 0 to 1.
+// Depths include the wave. Source: recipe 5 of the living sweep; places (a).
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "runtime/imaging/physical/model/tissue_layers.h"
+
+namespace sonocase::runtime::physical {
+
+inline constexpr double kWallWaveMm = 0.4;     // deviation of a sheet from its even course
+inline constexpr double kWallMostDb = 4;       // its echo along it varies up to so much more
+inline constexpr double kWallStructureDb = 2;  // coarse structure of the wall is no brighter
+inline constexpr double kWallBlendMm = 3;      // between sheets of the skin and of the organs
+inline constexpr double kWallDepthMm = 60;     // nothing is drawn deeper along a beam
+inline constexpr double kWallFatDb = -3;        // fat between sheets is dark
+inline constexpr double kWallSkinDb = -8;      // the skin's own scatterers, where sheets draw it
+
+// Amplitude by distance, in steps of 1/kWallSteps mm from -kWallBeforeMm on; 0 at both ends.
+inline constexpr int kWallSteps = 32;
+inline constexpr double kWallBeforeMm = 4;
+
+struct WallTables {
+    std::vector<float> outer, inner;
+    double wave_mm = kWallWaveMm;
+    double strength_db = 3.5;  // deviation of a sheet's echo along it
+    double node_mm = 2.5;      // between nodes along a beam, at most
+};
+
+// frequency_mhz: sheets are as thick as the pulse lets them be. axial_mm: its width at half height.
+WallTables make_wall_tables(double frequency_mhz, double axial_mm);
+
+// Index of a distance in a table of `size` steps: the nearest, an end beyond it.
+inline int wall_step(double mm, std::size_t size) {
+    const double step = (mm + kWallBeforeMm) * kWallSteps + 0.5;
+    return static_cast<int>(std::clamp(step, 0.0, static_cast<double>(size - 1)));
+}
+
+// The two distances with the wave that all sheets share.
+struct WallPlace {
+    double depth = 0, above = 0, strength_db = 0;
+};
+inline WallPlace wall_place(const TissueLayers& layers, const WallTables& wall, Point3 voxel) {
+    const LayerPoint p = layers.at(voxel);
+    return {p.depth + wall.wave_mm * p.wave, p.above_organs + wall.wave_mm * p.wave,
+            std::min(wall.strength_db * p.strength, kWallMostDb)};
+}
+
+}  // namespace sonocase::runtime::physical
