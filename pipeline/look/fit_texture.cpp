@@ -31,19 +31,39 @@ Window window_of(const LookMeasures& m, const ScanPlace& place) {
 }
 
 // Draws beam-space grey on the picture's pixels and samples it again, as real frames were: what the
-// pixels blur is blurred in the stand-in as well.
+// pixels blur is blurred in the stand-in as well. Where each pixel lies is worked out once.
 class PixelPassage {
   public:
-    PixelPassage(const ScanPlace& place, int width_px, int height_px)
-        : place_(place), width_px_(width_px), height_px_(height_px) {}
+    PixelPassage(const ScanPlace& place, const Window& window, int width_px, int height_px)
+        : place_(place), width_px_(width_px), height_px_(height_px) {
+        for (int y = 0; y < height_px; ++y) {
+            for (int x = 0; x < width_px; ++x) {
+                const BeamPoint p =
+                    beam_of(place, window.grid, {static_cast<double>(x), static_cast<double>(y)});
+                if (!in_grid(window.grid, p) || p.sample < window.first - 2 ||
+                    p.sample > window.end + 2)
+                    continue;
+                pixels_.push_back(static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) +
+                                  static_cast<std::size_t>(x));
+                points_.push_back(p);
+            }
+        }
+    }
     BeamImage operator()(const BeamImage& image) const {
-        return beam_from_picture(picture_from_beam(image, place_, width_px_, height_px_), width_px_,
-                                 height_px_, place_, image.lines, image.sample_mm);
+        std::vector<std::uint8_t> picture(static_cast<std::size_t>(width_px_) *
+                                          static_cast<std::size_t>(height_px_));
+        for (std::size_t i = 0; i < pixels_.size(); ++i)
+            picture[pixels_[i]] = static_cast<std::uint8_t>(
+                std::lround(std::clamp(grey_at(image, points_[i]), 0.0, 255.0)));
+        return beam_from_picture(picture, width_px_, height_px_, place_, image.lines,
+                                 image.sample_mm);
     }
 
   private:
     ScanPlace place_;
     int width_px_, height_px_;
+    std::vector<std::size_t> pixels_;
+    std::vector<BeamPoint> points_;
 };
 
 struct Simulation {
@@ -236,8 +256,9 @@ void fit_texture(const LookMeasures& measures,
                  const FitOptions& options,
                  FittedMachine& fit) {
     Machine& machine = fit.machine;
-    const Simulation sim{measures, place, options, window_of(measures, place),
-                         PixelPassage(place, width_px, height_px)};
+    const Window window = window_of(measures, place);
+    const Simulation sim{measures, place, options, window,
+                         PixelPassage(place, window, width_px, height_px)};
     if (machine.beam.axial_mm == 0) machine.beam.axial_mm = 0.6;
     if (machine.beam.lateral_mm == 0) machine.beam.lateral_mm = 1.5;
     constexpr int kRounds = 2;  // widths and grey map change each other's scores a little
