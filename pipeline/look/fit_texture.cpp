@@ -13,6 +13,7 @@ namespace sonocase::pipeline {
 namespace {
 
 constexpr std::array<int, 7> kLooks{1, 2, 3, 4, 5, 6, 8};
+constexpr std::array<int, 3> kFirstLooks{1, 3, 8};  // of the first round, which is corrected
 
 // Rows of a grid that the real patches span, as a grid of their own.
 struct Window {
@@ -247,6 +248,22 @@ void fit_widths(const Simulation& sim, Machine& machine) {
     }
 }
 
+// Among those that fit nearly as well as the best, the one nearest to the usual number of looks.
+std::vector<LooksChoice>::const_iterator chosen(const std::vector<LooksChoice>& choices,
+                                                int usual_looks) {
+    double least = choices.front().misfit;
+    for (const LooksChoice& choice : choices) least = std::min(least, choice.misfit);
+    constexpr double kAsGood = 0.75;
+    auto best = choices.end();
+    for (auto choice = choices.begin(); choice != choices.end(); ++choice) {
+        if (choice->misfit > least + kAsGood) continue;
+        if (best == choices.end() ||
+            std::abs(choice->looks - usual_looks) < std::abs(best->looks - usual_looks))
+            best = choice;
+    }
+    return best;
+}
+
 }  // namespace
 
 void fit_texture(const LookMeasures& measures,
@@ -264,22 +281,17 @@ void fit_texture(const LookMeasures& measures,
     constexpr int kRounds = 2;  // widths and grey map change each other's scores a little
     for (int round = 0; round < kRounds; ++round) {
         fit_widths(sim, machine);
-        const auto amplitudes = sim.amplitudes(machine, kLooks);
-        fit.choices.assign(kLooks.size(), {});
-        parallel_for(kLooks.size(), 1, [&](std::size_t begin, std::size_t end) {
+        const std::span<const int> looks =
+            round + 1 < kRounds ? std::span<const int>(kFirstLooks) : std::span<const int>(kLooks);
+        const auto amplitudes = sim.amplitudes(machine, looks);
+        fit.choices.assign(looks.size(), {});
+        parallel_for(looks.size(), 1, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
-                fit.choices[i] = best_map(sim, amplitudes[i], kLooks[i], machine.grey);
+                fit.choices[i] = best_map(sim, amplitudes[i], looks[i], machine.grey);
         });
-        const double least = std::min_element(fit.choices.begin(), fit.choices.end(),
-                                              [](const LooksChoice& a, const LooksChoice& b) {
-                                                  return a.misfit < b.misfit;
-                                              })
-                                 ->misfit;
-        // The fewest looks that fit nearly as well: each costs the renderer time.
-        constexpr double kAsGood = 0.75;
-        const auto best = std::find_if(
-            fit.choices.begin(), fit.choices.end(),
-            [&](const LooksChoice& choice) { return choice.misfit <= least + kAsGood; });
+        // Machines that show the logarithm of a single look are common, of several are not.
+        const bool log = fit.choices.front().map == GreyMap::log;
+        const auto best = chosen(fit.choices, log ? 1 : options.base.looks.count);
         machine.looks.count = best->looks;
         machine.grey.map = best->map;
         machine.grey.exponent = best->exponent;
