@@ -48,6 +48,25 @@ PixelPoint pixel_of(const ScanPlace& place, const BeamImage& grid, double sample
     return {place.apex_x_px + std::sin(angle) * r, place.apex_y_px + std::cos(angle) * r};
 }
 
+BeamPoint beam_of(const ScanPlace& place, const BeamImage& grid, PixelPoint pixel) {
+    const double dx = (pixel.x_px - place.apex_x_px) * place.mm_per_px,
+                 dy = (pixel.y_px - place.apex_y_px) * place.mm_per_px;
+    const double across = grid.fan ? std::atan2(dx, dy) : dx;
+    const double depth = grid.fan ? std::hypot(dx, dy) - grid.radius_mm : dy;
+    const double middle = 0.5 * grid.lines * grid.line_step;
+    return {depth / grid.sample_mm - 0.5, (across + middle) / grid.line_step - 0.5};
+}
+
+bool in_grid(const BeamImage& grid, BeamPoint p) {
+    return p.line >= -0.5 && p.line <= grid.lines - 0.5 && p.sample >= -0.5 &&
+           p.sample <= grid.samples - 0.5;
+}
+
+double grey_at(const BeamImage& image, BeamPoint p) {
+    return bilinear(p.line, p.sample, image.lines, image.samples,
+                    [&](int l, int k) { return static_cast<double>(image.at(k, l)); });
+}
+
 BeamImage beam_from_picture(std::span<const std::uint8_t> pixels,
                             int width_px,
                             int height_px,
@@ -82,20 +101,12 @@ std::vector<std::uint8_t> picture_from_beam(const BeamImage& image,
                                             std::uint8_t outside) {
     std::vector<std::uint8_t> pixels(
         static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px), outside);
-    const auto at = [&](int l, int k) { return static_cast<double>(image.at(k, l)); };
-    const double middle = 0.5 * image.lines * image.line_step;
     for (int y = 0; y < height_px; ++y) {
         for (int x = 0; x < width_px; ++x) {
-            const double dx = (x - place.apex_x_px) * place.mm_per_px,
-                         dy = (y - place.apex_y_px) * place.mm_per_px;
-            const double across = image.fan ? std::atan2(dx, dy) : dx;
-            const double depth = image.fan ? std::hypot(dx, dy) - image.radius_mm : dy;
-            const double line = (across + middle) / image.line_step - 0.5,
-                         sample = depth / image.sample_mm - 0.5;
-            if (line < -0.5 || line > image.lines - 0.5 || sample < -0.5 ||
-                sample > image.samples - 0.5)
-                continue;
-            const double grey = bilinear(line, sample, image.lines, image.samples, at);
+            const BeamPoint point =
+                beam_of(place, image, {static_cast<double>(x), static_cast<double>(y)});
+            if (!in_grid(image, point)) continue;
+            const double grey = grey_at(image, point);
             pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) +
                    static_cast<std::size_t>(x)] =
                 static_cast<std::uint8_t>(std::lround(std::clamp(grey, 0.0, 255.0)));

@@ -57,6 +57,14 @@ struct PixelPoint {
 };
 PixelPoint pixel_of(const ScanPlace& place, const BeamImage& grid, double sample, double line);
 
+struct BeamPoint {
+    double sample = 0, line = 0;  // whole numbers at the grid's own samples
+};
+BeamPoint beam_of(const ScanPlace& place, const BeamImage& grid, PixelPoint pixel);
+// Within half a sample and half a line of the grid.
+bool in_grid(const BeamImage& grid, BeamPoint point);
+double grey_at(const BeamImage& image, BeamPoint point);  // bilinear
+
 // Bilinear, the nearest pixel beyond the edge. `pixels`: # width * height, rows from the top down.
 // Cost: 1 ms per 130,000 samples.
 BeamImage beam_from_picture(std::span<const std::uint8_t> pixels,

@@ -62,7 +62,7 @@ Lines middle_lines(const BeamImage& image) {
 // Greys of one profile: peaks that rise by `rise` over the lowest grey on both sides.
 struct Peak {
     int at;
-    double grey, base;
+    double grey, base;  // base: the lowest grey between it and the one before
 };
 std::vector<Peak> peaks_of(const std::vector<double>& profile, double rise) {
     std::vector<Peak> peaks;
@@ -83,7 +83,7 @@ std::vector<Peak> peaks_of(const std::vector<double>& profile, double rise) {
             if (v > profile[static_cast<std::size_t>(top)]) top = i;
             const double height = profile[static_cast<std::size_t>(top)];
             if (v < height - rise) {
-                peaks.push_back({top, height, std::max(base, v)});
+                peaks.push_back({top, height, base});
                 rising = false;
                 low = v;
             }

@@ -136,6 +136,11 @@ Error no_sides() {
             "give its place with --geometry FILE.json"};
 }
 
+// A side is a line over a quarter of the picture's height; round outlines have shorter ones.
+bool is_long(const EdgeLine& line, const FramePile& pile) {
+    return line.support * std::sqrt(1 + line.slope * line.slope) > 0.25 * pile.height_px;
+}
+
 Result<FoundScan> linear_scan(const std::vector<std::uint8_t>& mask,
                               const FramePile& pile,
                               double left,
@@ -221,7 +226,8 @@ Result<FoundScan> find_scan(const FramePile& pile, const std::vector<std::uint8_
         return scan;
     }
     const EdgeLine left = supporting_line(sides.left, -1), right = supporting_line(sides.right, 1);
-    if ((!open_left && left.support < 12) || (!open_right && right.support < 12)) return no_sides();
+    if ((!open_left && !is_long(left, pile)) || (!open_right && !is_long(right, pile)))
+        return no_sides();
     const double upright = 0.03;  // 2 degrees
     const bool left_upright = open_left || std::abs(left.slope) < upright,
                right_upright = open_right || std::abs(right.slope) < upright;

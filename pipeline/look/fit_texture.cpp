@@ -13,6 +13,7 @@ namespace sonocase::pipeline {
 namespace {
 
 constexpr std::array<int, 7> kLooks{1, 2, 3, 4, 5, 6, 8};
+constexpr std::array<int, 3> kFirstLooks{1, 3, 8};  // of the first round, which is corrected
 
 // Rows of a grid that the real patches span, as a grid of their own.
 struct Window {
@@ -31,19 +32,39 @@ Window window_of(const LookMeasures& m, const ScanPlace& place) {
 }
 
 // Draws beam-space grey on the picture's pixels and samples it again, as real frames were: what the
-// pixels blur is blurred in the stand-in as well.
+// pixels blur is blurred in the stand-in as well. Where each pixel lies is worked out once.
 class PixelPassage {
   public:
-    PixelPassage(const ScanPlace& place, int width_px, int height_px)
-        : place_(place), width_px_(width_px), height_px_(height_px) {}
+    PixelPassage(const ScanPlace& place, const Window& window, int width_px, int height_px)
+        : place_(place), width_px_(width_px), height_px_(height_px) {
+        for (int y = 0; y < height_px; ++y) {
+            for (int x = 0; x < width_px; ++x) {
+                const BeamPoint p =
+                    beam_of(place, window.grid, {static_cast<double>(x), static_cast<double>(y)});
+                if (!in_grid(window.grid, p) || p.sample < window.first - 2 ||
+                    p.sample > window.end + 2)
+                    continue;
+                pixels_.push_back(static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) +
+                                  static_cast<std::size_t>(x));
+                points_.push_back(p);
+            }
+        }
+    }
     BeamImage operator()(const BeamImage& image) const {
-        return beam_from_picture(picture_from_beam(image, place_, width_px_, height_px_), width_px_,
-                                 height_px_, place_, image.lines, image.sample_mm);
+        std::vector<std::uint8_t> picture(static_cast<std::size_t>(width_px_) *
+                                          static_cast<std::size_t>(height_px_));
+        for (std::size_t i = 0; i < pixels_.size(); ++i)
+            picture[pixels_[i]] = static_cast<std::uint8_t>(
+                std::lround(std::clamp(grey_at(image, points_[i]), 0.0, 255.0)));
+        return beam_from_picture(picture, width_px_, height_px_, place_, image.lines,
+                                 image.sample_mm);
     }
 
   private:
     ScanPlace place_;
     int width_px_, height_px_;
+    std::vector<std::size_t> pixels_;
+    std::vector<BeamPoint> points_;
 };
 
 struct Simulation {
@@ -227,6 +248,22 @@ void fit_widths(const Simulation& sim, Machine& machine) {
     }
 }
 
+// Among those that fit nearly as well as the best, the one nearest to the usual number of looks.
+std::vector<LooksChoice>::const_iterator chosen(const std::vector<LooksChoice>& choices,
+                                                int usual_looks) {
+    double least = choices.front().misfit;
+    for (const LooksChoice& choice : choices) least = std::min(least, choice.misfit);
+    constexpr double kAsGood = 0.75;
+    auto best = choices.end();
+    for (auto choice = choices.begin(); choice != choices.end(); ++choice) {
+        if (choice->misfit > least + kAsGood) continue;
+        if (best == choices.end() ||
+            std::abs(choice->looks - usual_looks) < std::abs(best->looks - usual_looks))
+            best = choice;
+    }
+    return best;
+}
+
 }  // namespace
 
 void fit_texture(const LookMeasures& measures,
@@ -236,29 +273,25 @@ void fit_texture(const LookMeasures& measures,
                  const FitOptions& options,
                  FittedMachine& fit) {
     Machine& machine = fit.machine;
-    const Simulation sim{measures, place, options, window_of(measures, place),
-                         PixelPassage(place, width_px, height_px)};
+    const Window window = window_of(measures, place);
+    const Simulation sim{measures, place, options, window,
+                         PixelPassage(place, window, width_px, height_px)};
     if (machine.beam.axial_mm == 0) machine.beam.axial_mm = 0.6;
     if (machine.beam.lateral_mm == 0) machine.beam.lateral_mm = 1.5;
     constexpr int kRounds = 2;  // widths and grey map change each other's scores a little
     for (int round = 0; round < kRounds; ++round) {
         fit_widths(sim, machine);
-        const auto amplitudes = sim.amplitudes(machine, kLooks);
-        fit.choices.assign(kLooks.size(), {});
-        parallel_for(kLooks.size(), 1, [&](std::size_t begin, std::size_t end) {
+        const std::span<const int> looks =
+            round + 1 < kRounds ? std::span<const int>(kFirstLooks) : std::span<const int>(kLooks);
+        const auto amplitudes = sim.amplitudes(machine, looks);
+        fit.choices.assign(looks.size(), {});
+        parallel_for(looks.size(), 1, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
-                fit.choices[i] = best_map(sim, amplitudes[i], kLooks[i], machine.grey);
+                fit.choices[i] = best_map(sim, amplitudes[i], looks[i], machine.grey);
         });
-        const double least = std::min_element(fit.choices.begin(), fit.choices.end(),
-                                              [](const LooksChoice& a, const LooksChoice& b) {
-                                                  return a.misfit < b.misfit;
-                                              })
-                                 ->misfit;
-        // The fewest looks that fit nearly as well: each costs the renderer time.
-        constexpr double kAsGood = 0.75;
-        const auto best = std::find_if(
-            fit.choices.begin(), fit.choices.end(),
-            [&](const LooksChoice& choice) { return choice.misfit <= least + kAsGood; });
+        // Machines that show the logarithm of a single look are common, of several are not.
+        const bool log = fit.choices.front().map == GreyMap::log;
+        const auto best = chosen(fit.choices, log ? 1 : options.base.looks.count);
         machine.looks.count = best->looks;
         machine.grey.map = best->map;
         machine.grey.exponent = best->exponent;
