@@ -22,9 +22,9 @@ struct OpenSide {
     double size = 0;
     Vector3 direction;  // unit, mannequin frame: towards the hole; zero if size is 0
     // Extent across the body over extent towards the hole. A sweep of one flank is nearly as deep
-    // as it is wide, and its open side is not the back.
+    // as it is wide, and its open side is not the back; what remains of those, choose_pose finds.
     double flatness = 0;
-    bool open() const { return size > 0.15 && flatness > 1.35; }
+    bool open() const { return size > 0.15 && flatness > 1.4; }
     // Of |back - direction|^2 in the cost of a pose, mm^2: from 0 for a small opening to 300.
     double weight_mm2() const;
 };

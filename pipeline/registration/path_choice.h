@@ -20,9 +20,9 @@
 namespace sonocase::pipeline {
 
 // What the residual warp has to reach to be kept.
-inline constexpr double kSufficientP95_mm = 3, kVolumeTolerance = 0.1, kLeastOrgan_ml = 20;
+inline constexpr double kSufficientP95_mm = 3, kSufficientVolume = 0.08, kLeastOrgan_ml = 20;
 // What a structure may change by before a warning says so.
-inline constexpr double kShapeTolerance = 0.2;
+inline constexpr double kVolumeTolerance = 0.1, kShapeTolerance = 0.2;
 
 // Completes w: with the residual warp already in it where that was fitted. Sets its path, reason,
 // one-to-one bounds, organs and warnings, and replaces its map where the elastic warp is taken.

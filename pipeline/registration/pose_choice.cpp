@@ -15,7 +15,7 @@ constexpr double kDegree = 3.14159265358979323846 / 180;
 // Candidates are compared after a quadratic of this stiffness, by gaps with this Cauchy scale; a
 // point without a counterpart costs as much as this gap.
 constexpr double kJudgeConstraint_mm = 10, kJudgeScale_mm = 5, kNoCounterpart_mm = 12;
-constexpr double kCloseScore = 1.10;
+constexpr double kCloseScore = 1.10, kQuarterTurn = 1.25;
 
 double penalty(double gap) {
     return kJudgeScale_mm * kJudgeScale_mm *
@@ -68,7 +68,8 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
     const Matches& matches = fit.matches;
     const double gaps = 0.5 * mean(matches.from_target, matches.target_queries) +
                         0.5 * mean(matches.from_skin, matches.skin_queries);
-    double hints = s.hints.back_cost_mm2(rigid.target_from_skin);
+    judged.back_cost_mm2 = s.hints.back_cost_mm2(rigid.target_from_skin);
+    double hints = judged.back_cost_mm2;
     for (const Correspondence& c : s.landmarks) {
         const Vector3 r = map_point(judged.quadratic, c.skin) - c.place;
         hints += s.hints.landmark_weight * std::min(dot(r, r), 60.0 * 60.0);
@@ -81,6 +82,34 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
     judged.coverage = static_cast<double>(matches.from_target.size()) /
                       static_cast<double>(std::max<std::size_t>(1, matches.target_queries));
     return judged;
+}
+
+// A sweep of one flank is open towards the other. Taken for the back, that would roll the patient
+// by a quarter turn, which, unlike a half turn, fits clearly worse: then the open side says
+// nothing.
+bool drop_open_side(const FitContext& s,
+                    const RegisterOptions& options,
+                    std::vector<JudgedPose>& judged) {
+    if (!s.hints.back || options.open_side != "auto") return false;
+    const auto bare = [](const JudgedPose& p) {
+        return std::sqrt(std::max(0.0, p.score_mm * p.score_mm - p.back_cost_mm2));
+    };
+    const JudgedPose *with = &judged[0], *without = &judged[0];
+    for (const JudgedPose& p : judged) {
+        if (p.score_mm < with->score_mm) with = &p;
+        if (bare(p) < bare(*without)) without = &p;
+    }
+    const auto front = [](const JudgedPose& p) {
+        return p.rigid.target_from_skin.rotation.column(1);
+    };
+    const bool followed = std::abs(dot(front(*with), *s.hints.back)) > 0.7;
+    const bool turned = std::abs(dot(front(*with), front(*without))) < 0.7;
+    if (followed && (!turned || bare(*with) < kQuarterTurn * bare(*without))) return false;
+    for (JudgedPose& p : judged) {
+        p.score_mm = bare(p);
+        p.back_cost_mm2 = 0;
+    }
+    return true;
 }
 
 // How another pose differs from the chosen one, in terms that a case author understands.
@@ -173,10 +202,11 @@ PoseChoice choose_pose(const FitContext& s,
     parallel_for(candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n) judged[n] = judge(s, s.target, candidates[n]);
     });
+    PoseChoice choice;
+    choice.open_side_dropped = drop_open_side(s, options, judged);
     std::stable_sort(judged.begin(), judged.end(), [](const JudgedPose& a, const JudgedPose& b) {
         return a.score_mm < b.score_mm;
     });
-    PoseChoice choice;
     choice.best = judged[0];
     for (std::size_t n = 1; n < judged.size(); ++n) {
         choice.runners_up.push_back(described(judged[0], judged[n]));

@@ -17,11 +17,13 @@ struct JudgedPose {
     double score_mm =
         0;  // root of the total cost: gaps, missing counterparts, deformation and hints
     double coverage = 0;
+    double back_cost_mm2 = 0;  // the part of score_mm^2 for the open side of the sweep
 };
 
 struct PoseChoice {
     JudgedPose best;
     std::vector<RunnerUp> runners_up;  // best first
+    bool open_side_dropped = false;    // the sweep is of a flank: the open side was not considered
     double mirror_score_mm = 0;        // of the mirrored surface
     std::vector<std::string> warnings;
 };

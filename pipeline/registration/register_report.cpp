@@ -101,7 +101,13 @@ StageReport align_report(const FitContext& s,
     report.measures.push_back({"pose_score_mm", choice.best.score_mm});
     report.measures.push_back({"mirror_score_mm", choice.mirror_score_mm});
     report.measures.push_back({"open_side_size", s.open_side.size});
-    report.notes = {{"open_side", s.open_side_is}, {"open_side_reason", s.open_side_why}};
+    if (choice.open_side_dropped) {
+        report.notes = {
+            {"open_side", "none"},
+            {"open_side_reason", "the sweep is of a flank, which says nothing of the back"}};
+    } else {
+        report.notes = {{"open_side", s.open_side_is}, {"open_side_reason", s.open_side_why}};
+    }
     if (!choice.runners_up.empty()) {
         const RunnerUp& r = choice.runners_up.front();
         report.measures.push_back({"runner_up_score_mm", r.score_mm});

@@ -71,6 +71,8 @@ MappedPoints map_points(const SkinModel& skin, const TargetSurface& target, cons
 struct Pair {
     std::uint32_t skin = 0, reading = 0;
     double gap_mm = 0;
+    Vector3 normal;
+    double weight = 1;
     bool found = false;
 };
 
@@ -87,7 +89,8 @@ ElasticRows::ElasticRows(const SkinModel& skin,
       readings_(std::move(readings)),
       landmarks_(landmarks.begin(), landmarks.end()),
       landmark_weight_(landmark_weight),
-      near_edge_(points_near_edge(skin)) {
+      near_edge_(points_near_edge(skin)),
+      rim_(target, readings_) {
     grid_.size = grid.size;
     grid_.origin_mm = grid.origin_mm;
     grid_.spacing_mm = grid.spacing_mm;
@@ -121,7 +124,7 @@ void ElasticRows::match(const Registration& map, const GapOptions& options) {
             const double gap = dot(mapped.normals[i], mapped.points[i] - target_.points[j]);
             const double aside = std::sqrt(std::max(0.0, d2 - gap * gap));
             if (aside > std::max(8.0, 0.7 * std::abs(gap) + 4)) continue;
-            pairs[n] = {i, j, gap, true};
+            pairs[n] = {i, j, gap, mapped.normals[i], 1, true};
         }
     });
     rows_.clear();
@@ -132,7 +135,7 @@ void ElasticRows::match(const Registration& map, const GapOptions& options) {
     };
     double weight = 1 / count();
     for (const Pair& p : pairs) {
-        if (p.found) add_row(p.skin, mapped.normals[p.skin], p.gap_mm, weight);
+        if (p.found) add_row(p.skin, p.normal, p.gap_mm, weight);
     }
     from_readings_ = rows_.size();
     pairs.assign((skin_.points.size() + options.skin_stride - 1) / options.skin_stride, {});
@@ -146,13 +149,19 @@ void ElasticRows::match(const Registration& map, const GapOptions& options) {
             if (dot(mapped.normals[i], target_.normals[j]) < kLeastCosine) continue;
             const double gap = dot(target_.normals[j], mapped.points[i] - target_.points[j]);
             const double aside = std::sqrt(std::max(0.0, d2 - gap * gap));
-            if (aside > (target_.on_rim[j] ? 0.35 : 1.0) * 1.2 * target_.spacing_mm) continue;
-            pairs[n] = {i, j, gap, true};
+            if (aside <= (target_.on_rim[j] ? 0.35 : 1.0) * 1.2 * target_.spacing_mm) {
+                pairs[n] = {i, j, gap, target_.normals[j], 1, true};
+                continue;
+            }
+            const RimPatches::Foot foot = rim_.foot(j, mapped.points[i]);
+            if (!foot.found) continue;
+            const double faded = 1 - aside / RimPatches::kReach_mm;
+            pairs[n] = {i, j, foot.gap_mm, foot.normal, options.rim_weight * faded, true};
         }
     });
     weight = options.skin_weight / count();
     for (const Pair& p : pairs) {
-        if (p.found) add_row(p.skin, target_.normals[p.reading], p.gap_mm, weight);
+        if (p.found) add_row(p.skin, p.normal, p.gap_mm, weight * p.weight);
     }
     marks_.clear();
     for (const Correspondence& c : landmarks_) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/registration/registration.h"
+#include "pipeline/registration/elastic/rim_patch.h"
 #include "pipeline/registration/elastic/spline_lattice.h"
 #include "pipeline/registration/matching/matching.h"
 #include "pipeline/registration/warp/quadratic_warp.h"
@@ -14,9 +15,10 @@
 namespace sonocase::pipeline {
 
 struct GapOptions {
-    double farthest_mm = 30;      // points farther apart are not matched
-    double loss_mm = 2.5;         // Cauchy scale
-    double skin_weight = 0.1;     // of skin to reading; reading to skin has 1
+    double farthest_mm = 30;   // points farther apart are not matched
+    double loss_mm = 2.5;      // Cauchy scale
+    double rim_weight = 0.3;   // of skin beyond the last readings to the surface extrapolated there
+    double skin_weight = 0.1;  // of skin to reading; reading to skin has 1
     std::size_t skin_stride = 1;  // every n-th skin point is matched
 };
 
@@ -34,7 +36,7 @@ class ElasticRows {
                 const DisplacementGrid& grid);
 
     // Matches anew. Reading to skin: the nearest mapped skin point, along its mapped normal; skin
-    // to reading: the nearest reading, along its normal.
+    // to reading: the nearest reading, along its normal, or its patch beyond the rim (rim_patch.h).
     void match(const Registration& map, const GapOptions& options);
 
     struct Value {
@@ -73,6 +75,7 @@ class ElasticRows {
     DisplacementGrid grid_;  // without control points
     std::array<std::size_t, 64> offset_;
     std::vector<std::uint8_t> near_edge_;  // # skin points
+    RimPatches rim_;
     std::vector<Row> rows_;
     std::vector<Mark> marks_;
     std::size_t from_readings_ = 0;

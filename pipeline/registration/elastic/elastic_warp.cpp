@@ -9,34 +9,38 @@ namespace sonocase::pipeline {
 namespace {
 
 constexpr Lanes kZero = {0, 0, 0, 0};
-// From stiff to soft: in each round stiffness, Cauchy scale and gate change by these factors, from
-// 30 times the stiffness, 20 mm and 70 mm to 1, 2.5 mm and 30 mm. They are the roots of order 8.4
-// of 1 / 30, 2.5 / 20 and 30 / 70: the last rounds are all at the final values.
-constexpr double kStiffer = 30, kFirstLoss_mm = 20, kLastLoss_mm = 2.5;
-constexpr double kFirstGate_mm = 70, kLastGate_mm = 30;
-constexpr double kStiffnessFactor = 0.66704, kLossFactor = 0.78071, kGateFactor = 0.90405;
-constexpr double kAnnealing = 8.4;
+// From stiff to soft: in each round stiffness, Cauchy scale and gate change by a factor, from 30
+// times the stiffness and the first values to 1 and the last ones. The factors are the roots of the
+// ratios of order `rounds`, written out because libm's pow differs between platforms. After
+// `rounds` all stay at the final values.
+struct Annealing {
+    double first_loss_mm, first_gate_mm;
+    double stiffness_factor, loss_factor, gate_factor;
+    double rounds;
+};
+constexpr Annealing kNear{20, 70, 0.66704, 0.78071, 0.90405, 8.4};
+constexpr Annealing kFar{40, 130, 0.81673, 0.84785, 0.91642, 16.8};
+constexpr double kStiffer = 30, kLastLoss_mm = 2.5, kLastGate_mm = 30;
 constexpr double kLeastSampledDet = 0.02;
 
 struct Stage {
-    double stiffness = kStiffer, share = 0;
+    double stiffness = kStiffer;
     GapOptions gaps;
 };
 
-Stage stage_of(int round) {
+Stage stage_of(const Annealing& annealing, int round) {
     Stage s;
-    s.gaps.loss_mm = kFirstLoss_mm;
-    s.gaps.farthest_mm = kFirstGate_mm;
+    s.gaps.loss_mm = annealing.first_loss_mm;
+    s.gaps.farthest_mm = annealing.first_gate_mm;
     for (int n = 0; n < round; ++n) {
-        s.stiffness *= kStiffnessFactor;
-        s.gaps.loss_mm *= kLossFactor;
-        s.gaps.farthest_mm *= kGateFactor;
+        s.stiffness *= annealing.stiffness_factor;
+        s.gaps.loss_mm *= annealing.loss_factor;
+        s.gaps.farthest_mm *= annealing.gate_factor;
     }
     s.stiffness = std::max(1.0, s.stiffness);
     s.gaps.loss_mm = std::max(kLastLoss_mm, s.gaps.loss_mm);
     s.gaps.farthest_mm = std::max(kLastGate_mm, s.gaps.farthest_mm);
-    s.share = std::min(1.0, round / kAnnealing);
-    s.gaps.skin_weight = 0.5 * (1 - s.share) + 0.1;
+    s.gaps.skin_weight = 0.5 * (1 - std::min(1.0, round / annealing.rounds)) + 0.1;
     return s;
 }
 
@@ -75,7 +79,9 @@ class Descent {
 
     // Matches and goes one Gauss-Newton step. False: no step lowers the sum.
     bool step(const Stage& stage, ElasticFit* fit) {
-        rows_.match(registration_, stage.gaps);
+        GapOptions gaps = stage.gaps;
+        gaps.rim_weight = options_.rim;
+        rows_.match(registration_, gaps);
         fit->counterparts = rows_.from_readings();
         if (rows_.from_readings() + rows_.from_skin() < 30) return false;
         StrainOptions strain;
@@ -202,11 +208,13 @@ ElasticFit fit_elastic(const ElasticInput& input,
     if (!warm) registration->residual = std::move(grid);
     Descent descent(input, options, registration);
     ElasticFit fit;
+    const Annealing& annealing = options.far ? kFar : kNear;
+    const int rounds = options.far ? 2 * options.rounds : options.rounds;
     // A warm start is past the annealing.
-    const int first = warm ? static_cast<int>(kAnnealing) : 0;
-    for (int round = first; round < options.rounds; ++round) {
-        report_progress(progress, 0.7 + 0.2 * round / options.rounds, "elastic warp");
-        if (descent.step(stage_of(round), &fit)) ++fit.rounds;
+    const int first = warm ? static_cast<int>(annealing.rounds) : 0;
+    for (int round = first; round < rounds; ++round) {
+        report_progress(progress, 0.7 + 0.2 * round / rounds, "elastic warp");
+        if (descent.step(stage_of(annealing, round), &fit)) ++fit.rounds;
     }
     return fit;
 }

@@ -28,7 +28,9 @@ struct ElasticOptions {
     double barrier = 30;     // against det J < barrier_det, mm^2
     double barrier_det = 0.6;
     double bending = 0.0005;
-    int rounds = 12;      // of matching
+    double rim = 6;       // weight of the surface extrapolated beyond the last readings; 0: none
+    int rounds = 12;      // of matching; twice as many where `far`
+    bool far = false;     // start from farther: bodies that differ by more than 50 mm
     int iterations = 30;  // of conjugate gradients in each
     int readings = 4000;  // at most so many of them are used
     int skin_queries = 2500;

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Which side of a sweep is open, and what follows for the pose.
+#include "pipeline/registration/open_side.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pipeline/anatomy/analytic_torso.h"
+#include "pipeline/registration/register_surfaces.h"
+#include "support/torso_builds.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using namespace sonocase::testing;
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+TEST(OpenSide, OfHalfAndWholeCylinders) {
+    Random random(1);
+    for (const double from : {0.0, -3.14159265358979}) {
+        Surface tube;
+        for (int n = 0; n < 1500; ++n) {
+            const double angle = random.uniform(from, 3.14159265358979);
+            tube.points.push_back(
+                {150 * std::cos(angle), 110 * std::sin(angle), random.uniform(-180, 180)});
+        }
+        const auto target = prepare_target(tube);
+        ASSERT_TRUE(target);
+        for (const auto& head :
+             {std::optional<Vector3>{Vector3{0, 0, 1}}, std::optional<Vector3>{}}) {
+            const OpenSide side = find_open_side(*target, head);
+            if (from == 0) {
+                EXPECT_GT(side.size, 0.3);
+                EXPECT_TRUE(side.open());
+                EXPECT_GT(dot(side.direction, {0, -1, 0}), std::cos(15 * kDegree));
+            } else {
+                EXPECT_LT(side.size, 0.1);
+                EXPECT_EQ(side.weight_mm2(), 0);
+            }
+        }
+    }
+}
+
+// A sweep of one flank is open as well, but not towards the back: no quarter turn follows.
+TEST(OpenSide, AFlankIsNoFront) {
+    const BuiltMannequin whole = built_mannequin(Build::belly, 2, {});
+    const Vector3 left = cross(whole.head, whole.back);
+    Point3 centre;
+    for (Point3 p : whole.sweep.points)
+        centre = centre + (p - Point3{}) / static_cast<double>(whole.sweep.points.size());
+    Surface flank;
+    for (Point3 p : whole.sweep.points) {
+        if (dot(p - centre, left) > 0) flank.points.push_back(p);
+    }
+    const auto target = prepare_target(flank);
+    ASSERT_TRUE(target);
+    EXPECT_GT(find_open_side(*target, whole.head).size, 0.3);
+    RegisterOptions options;
+    options.up = whole.head;
+    const auto aligned =
+        align_surfaces({torso_patient().skin, flank, &torso_patient().labels}, options);
+    ASSERT_TRUE(aligned);
+    EXPECT_GT(std::abs(dot(aligned->registration.mannequin_from_ct.rotation.column(1), whole.back)),
+              0.7);
+    for (const Note& note : aligned->report.notes) {
+        if (note.name == "open_side") {
+            EXPECT_EQ(note.text, "none");
+        }
+    }
+}
+
+TEST(OpenSide, TwentyOpenSweepsAreReadWithinFifteenDegreesAndClosedOnesNotAtAll) {
+    int right = 0, decided_on_closed = 0;
+    for (const Build build : kBuilds) {
+        for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+            BuildSweep plan;
+            plan.least_front = -0.3;
+            const BuiltMannequin open = built_mannequin(build, seed, plan);
+            const auto target = prepare_target(open.sweep);
+            ASSERT_TRUE(target);
+            const OpenSide side = find_open_side(*target, open.head);
+            right += side.open() && dot(side.direction, open.back) > std::cos(15 * kDegree);
+            plan.least_front = -2;
+            const auto closed = prepare_target(built_mannequin(build, seed, plan).sweep);
+            ASSERT_TRUE(closed);
+            decided_on_closed += find_open_side(*closed, open.head).open();
+        }
+    }
+    EXPECT_EQ(right, 20);
+    EXPECT_EQ(decided_on_closed, 0);
+}
+
+TEST(OpenSide, FrontSweepsWithTheHeadDirectionAloneLieTheRightWayRound) {
+    int right = 0;
+    for (const Build build : kBuilds) {
+        for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+            BuildSweep plan;
+            plan.least_front = -0.3;
+            const BuiltMannequin open = built_mannequin(build, seed, plan);
+            RegisterOptions options;
+            options.up = open.head;
+            const auto aligned = align_surfaces(
+                {torso_patient().skin, open.sweep, &torso_patient().labels}, options);
+            ASSERT_TRUE(aligned) << aligned.error().message();
+            const Matrix3& turn = aligned->registration.mannequin_from_ct.rotation;
+            right += dot(turn.column(1), open.back) < -0.7 && dot(turn.column(2), open.head) > 0.8;
+        }
+    }
+    EXPECT_EQ(right, 15);
+}
+
+TEST(OpenSide, TheOptionAndLandmarksOverruleIt) {
+    BuildSweep plan;
+    plan.least_front = -0.3;
+    const BuiltMannequin open = built_mannequin(Build::belly, 1, plan);
+    const RegisterInput input{torso_patient().skin, open.sweep, &torso_patient().labels};
+    RegisterOptions options;
+    options.up = open.head;
+    options.open_side = "front";  // a prone patient, read from behind
+    const auto prone = align_surfaces(input, options);
+    ASSERT_TRUE(prone);
+    EXPECT_GT(dot(prone->registration.mannequin_from_ct.rotation.column(1), open.back), 0.7);
+    // Landmarks that were touched as if the patient lay prone say the same.
+    options.open_side = "auto";
+    for (const auto& mark : open.landmarks) {
+        Landmark turned = mark;
+        turned.ct.y = -turned.ct.y;
+        turned.ct.x = -turned.ct.x;
+        options.landmarks.push_back(turned);
+    }
+    const auto told = align_surfaces(input, options);
+    ASSERT_TRUE(told);
+    EXPECT_GT(dot(told->registration.mannequin_from_ct.rotation.column(1), open.back), 0.5);
+    for (const Note& note : told->report.notes) {
+        if (note.name == "open_side") {
+            EXPECT_EQ(note.text, "front");
+        }
+    }
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
