@@ -36,10 +36,9 @@ struct BeamChunk {
     ChunkRows<std::int32_t> record;     // of the voxel's surface; kNoBoundary: none
     ChunkRows<std::int32_t> structure;  // baked echo offset, 1/16 dB
     ChunkRows<std::int32_t> look;
-    ChunkRows<std::int32_t> scatterers;  // pair of signed bytes in the upper half
-    ChunkRows<float> echo_re, echo_im;   // of surfaces
-    ChunkRows<float> edge_loss;          // log2 of amplitude per mm
-    ChunkRows<float> facing;             // of the surface that was met, 1 where there is none
+    ChunkRows<float> echo_re, echo_im;  // of surfaces
+    ChunkRows<float> edge_loss;         // log2 of amplitude per mm
+    ChunkRows<float> facing;            // of the surface that was met, 1 where there is none
 
     // What the stretch holds.
     bool pooled = false;       // bricks of more than one label

@@ -25,6 +25,7 @@ struct BeamLight {
     V bone, bone_slow, bone_floor, gas;
     V reverb, period, next;  // amplitude of the next line, mm between lines, depth of the next
     I before, before_that;   // kinds of the two samples above
+    V clutter;               // power
     int tail_from = 0;
 };
 
@@ -101,6 +102,20 @@ HWY_INLINE void light_tails(
     t.next = hn::IfThenElse(brighter, hn::Add(depth, depth), t.next);
 }
 
+// Reverberation between the layers below what is bright: each sample leaves a part of its power.
+template <class D>
+HWY_INLINE void add_clutter(
+    D d, const PhysicalBlock& b, std::ptrdiff_t at, int k, BeamLight<D>& t) {
+    const hn::RebindToSigned<D> di;
+    const auto echo = hn::LoadU(di, b.echoes + at);
+    const auto re = echo_real(d, echo), im = echo_imaginary(d, echo);
+    const auto lit = hn::Mul(t.light, hn::Set(d, b.gain[k]));
+    const auto power = hn::Mul(hn::Add(hn::Mul(re, re), hn::Mul(im, im)), hn::Mul(lit, lit));
+    t.clutter = hn::Add(hn::Mul(t.clutter, hn::Set(d, b.clutter_keep)),
+                        hn::Mul(power, hn::Set(d, b.clutter_gain)));
+    hn::StoreU(t.clutter, d, b.clutter + at);
+}
+
 // kTails: the stretch holds bone or gas, or follows some.
 template <bool kTails, class D>
 HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, BeamLight<D>& t) {
@@ -117,11 +132,14 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
         const auto alive = hn::Ge(t.light, least);
         t.light = hn::IfThenElseZero(alive, t.light);
         if (!hn::AllTrue(d, alive)) {
-            std::int32_t* echoes = b.echoes + out;
             const auto lit = hn::RebindMask(di, alive);
-            hn::StoreU(hn::IfThenElseZero(lit, hn::LoadU(di, echoes)), di, echoes);
+            for (int look = 0; look < b.looks_at[k]; ++look) {
+                std::int32_t* echoes = b.echoes + look * b.look_stride + out;
+                hn::StoreU(hn::IfThenElseZero(lit, hn::LoadU(di, echoes)), di, echoes);
+            }
         }
         hn::StoreU(t.light, d, b.light + out);
+        if (b.clutter != nullptr) add_clutter(d, b, out, k, t);
         if constexpr (kTails) {
             const auto kind = hn::And(hn::Load(di, c.look.row(row)), kind_bits);
             fade_tails(d, b, t);
@@ -165,8 +183,13 @@ HWY_INLINE void dark_rows(D d, const PhysicalBlock& b, int beam, int first, Beam
     const hn::RebindToSigned<D> di;
     for (int k = first; k < b.samples; ++k) {
         const std::ptrdiff_t out = static_cast<std::ptrdiff_t>(k) * b.stride + beam;
-        hn::StoreU(hn::Zero(di), di, b.echoes + out);
+        for (int look = 0; look < b.looks_at[k]; ++look)
+            hn::StoreU(hn::Zero(di), di, b.echoes + look * b.look_stride + out);
         hn::StoreU(hn::Zero(d), d, b.light + out);
+        if (b.clutter != nullptr) {
+            t.clutter = hn::Mul(t.clutter, hn::Set(d, b.clutter_keep));
+            hn::StoreU(t.clutter, d, b.clutter + out);
+        }
         if (t.tail_from > k) continue;
         fade_tails(d, b, t);
         hn::StoreU(tail_power(d, b, k, t), d, b.tail + out);

@@ -54,12 +54,15 @@ void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int ro
                 const auto bright =
                     hn::Add(hn::Add(rough, hn::Mul(hn::Sub(one, rough), mirror)), glint);
                 const auto strength = hn::Mul(seen, hn::Set(d, static_cast<float>(kNeedleGain)));
-                const auto echo = hn::LoadU(di, b.echoes + at);
                 const auto mirrored =
                     hn::Mul(hn::Mul(strength, bright), hn::Set(d, b.interface_scale[k]));
-                hn::StoreU(
-                    pack_echo(d, hn::Add(echo_real(d, echo), mirrored), echo_imaginary(d, echo)),
-                    di, b.echoes + at);
+                for (int look = 0; look < b.looks_at[k]; ++look) {
+                    std::int32_t* echoes = b.echoes + look * b.look_stride + at;
+                    const auto echo = hn::LoadU(di, echoes);
+                    hn::StoreU(pack_echo(d, hn::Add(echo_real(d, echo), mirrored),
+                                         echo_imaginary(d, echo)),
+                               di, echoes);
+                }
                 tail = hn::Max(tail,
                                hn::Mul(hn::Mul(strength, hn::Add(rough, mirror)),
                                        hn::Mul(light, hn::Set(d, static_cast<float>(kNeedleTail) *

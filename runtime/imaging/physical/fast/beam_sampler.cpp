@@ -35,7 +35,8 @@ void sample_beams_as(PhysicalBlock& b) {
     for (int v = 0; v < kBeamBlock; v += lanes) {
         c.beam = v;
         const auto air = hn::Lt(hn::LoadU(d, b.beams + kGap * b.lines + v), zero);
-        BeamLight<D> light{hn::IfThenZeroElse(air, hn::Set(d, 1.0f)),
+        const auto edge = hn::LoadU(d, b.beams + kEdge * b.lines + v);
+        BeamLight<D> light{hn::IfThenZeroElse(air, edge),
                            zero,
                            zero,
                            zero,
@@ -45,6 +46,7 @@ void sample_beams_as(PhysicalBlock& b) {
                            zero,
                            hn::Zero(di),
                            hn::Zero(di),
+                           zero,
                            b.samples};
         for (int k = 0; k < b.samples; k += kChunkRows) {
             if (!b.keep_all && hn::AllTrue(d, hn::Lt(light.light, hn::Set(d, b.dead_light)))) {
@@ -66,7 +68,6 @@ void sample_beams_as(PhysicalBlock& b) {
             if (b.target_count > 0 && target_chunk(d, b, c)) b.target_met = true;
             look_chunk(d, b, c);
             if (b.structure) structure_chunk(d, b, c);
-            if (b.speckled) speckle_chunk(d, b, c);
             scatter_chunk(d, b, c);
             light_chunk<kHard>(d, b, c, light);
         }

@@ -2,7 +2,7 @@
 
 // Effects structure, fine_structure and speckle: the scatterers of a stretch, with the echoes of
 // its surfaces.
-#include "runtime/imaging/physical/fast/beam_walk-inl.h"
+#include "runtime/imaging/physical/fast/beam_speckle-inl.h"
 //
 #include "runtime/imaging/physical/fast/beam_chunk.h"
 
@@ -89,43 +89,10 @@ HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) 
     return sum;
 }
 
-// The scatterers' pairs, in the order of speckle_hash().
-template <class D>
-HWY_NOINLINE void speckle_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
-    using namespace physical;
-    const hn::RebindToSigned<D> di;
-    const int v = c.beam;
-    const auto walk = beam_walk(d, b, v, kSpeckleOrigin, kSpecklePerMm, b.shift_speckle);
-    const auto mask = hn::Set(di, (1 << kSpeckleLog2) - 1);
-    for (int row = 0; row < c.rows; ++row) {
-        const int k = c.first + row;
-        const auto [x, y, z] = walk.at(d, b, v, k);
-        // Cells that carry kRoundingBits.
-        const auto i = rounded_bits(d, x), j = rounded_bits(d, y), l = rounded_bits(d, z);
-        const auto period = [&](auto cell, std::uint32_t factor) HWY_ATTR {
-            const auto number = hn::Sub(hn::ShiftRight<kSpeckleLog2>(cell),
-                                        hn::Set(di, kRoundingBits >> kSpeckleLog2));
-            return hn::Mul(number, hn::Set(di, static_cast<std::int32_t>(factor)));
-        };
-        const auto hash = hn::Xor(period(i, kSpeckleHashX),
-                                  hn::Xor(period(j, kSpeckleHashY), period(l, kSpeckleHashZ)));
-        const auto wi = hn::And(hn::Xor(i, hn::ShiftRight<kShuffleX>(hash)), mask);
-        const auto wj = hn::And(hn::Xor(j, hn::ShiftRight<kShuffleY>(hash)), mask);
-        const auto wl = hn::And(hn::Xor(l, hn::ShiftRight<kShuffleZ>(hash)), mask);
-        const auto at = hn::Or(
-            wi, hn::Or(hn::ShiftLeft<kSpeckleLog2>(wj), hn::ShiftLeft<2 * kSpeckleLog2>(wl)));
-        // Two pairs per word: the half that is wanted is moved to the top.
-        const auto word = hn::GatherIndex(di, b.speckle, hn::ShiftRight<1>(at));
-        const auto odd = hn::TestBit(at, hn::Set(di, 1));
-        hn::Store(hn::IfThenElse(odd, word, hn::ShiftLeft<16>(word)), di, c.scatterers.row(row));
-    }
-}
-
 template <class D>
 HWY_NOINLINE void scatter_chunk(D d, PhysicalBlock& b, const BeamChunk& c) {
     const hn::RebindToSigned<D> di;
     const auto per_log2 = hn::Set(d, static_cast<float>(1 / (16 * physical::kDbPerLog2)));
-    const auto unit = hn::Set(d, 0.70710678f / 32);
     for (int row = 0; row < c.rows; ++row) {
         const auto look = hn::Load(di, c.look.row(row));
         auto echo = hn::ShiftRight<20>(look);  // 1/16 dB
@@ -134,19 +101,26 @@ HWY_NOINLINE void scatter_chunk(D d, PhysicalBlock& b, const BeamChunk& c) {
         const auto solid = hn::Ne(hn::And(look, hn::Set(di, 7 << 16)), hn::Zero(di));
         const auto amplitude = hn::IfThenElseZero(
             hn::RebindMask(d, solid), exp2_near(d, hn::Mul(hn::ConvertTo(d, echo), per_log2)));
-        auto re = amplitude, im = hn::Zero(d);
-        if (b.speckled) {
-            const auto pair = hn::Load(di, c.scatterers.row(row));
-            const auto scaled = hn::Mul(amplitude, unit);
-            re = hn::Mul(scaled, signed_byte<2>(d, pair));
-            im = hn::Mul(scaled, signed_byte<3>(d, pair));
-        }
-        if (c.surfaces) {
-            re = hn::Add(re, hn::Load(d, c.echo_re.row(row)));
-            im = hn::Add(im, hn::Load(d, c.echo_im.row(row)));
-        }
         const std::ptrdiff_t out = static_cast<std::ptrdiff_t>(c.first + row) * b.stride + c.beam;
-        hn::StoreU(pack_echo(d, re, im), di, b.echoes + out);
+        const auto write = [&](auto re, auto im, int field) HWY_ATTR {
+            if (c.surfaces) {
+                re = hn::Add(re, hn::Load(d, c.echo_re.row(row)));
+                im = hn::Add(im, hn::Load(d, c.echo_im.row(row)));
+            }
+            hn::StoreU(pack_echo(d, re, im), di, b.echoes + field * b.look_stride + out);
+        };
+        const int looks = b.looks_at[c.first + row];
+        if (!b.speckled) {
+            for (int field = 0; field < looks; ++field) write(amplitude, hn::Zero(d), field);
+            continue;
+        }
+        auto scatterers = scatterers_of_row(d, b, c.beam, c.first + row);
+        const auto level = hn::Mul(amplitude, hn::Set(d, b.speckle_level[c.first + row]));
+        for (int field = 0; field < looks; ++field) {
+            hn::Vec<D> re, im;
+            field_of_look(d, scatterers, re, im);
+            write(hn::Mul(re, level), hn::Mul(im, level), field);
+        }
     }
 }
 

@@ -28,8 +28,7 @@ void PhysicalFast::find_contact(const PhysicalFrame& f) {
 
 void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
     const ScanGeometry& g = geometry_;
-    const Matrix3 turn = speckle_rotation();
-    const double inverse_scatter = 1 / tables_.scatter_mm, inverse_voxel = 1 / scene_.voxel_mm;
+    const double inverse_voxel = 1 / scene_.voxel_mm;
     const auto limited = [](double v) { return static_cast<float>(std::clamp(v, -1e6, 1e6)); };
     for (int l = first; l < first + kBeamBlock; ++l) {
         const int line = std::min(l, g.scanlines - 1);
@@ -37,8 +36,6 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
         const Point3 origin = f.volume_from_probe * Point3{o.x, 0, o.z};
         const Vector3 beam = f.volume_from_probe.rotation * Vector3{d.x, 0, d.z};
         const Vector3 from_origin = origin - scene_.grid.origin_mm;
-        const Vector3 speckle = inverse_scatter * (turn * from_origin),
-                      speckle_step = inverse_scatter * (turn * beam);
         const auto put = [&](int number, double value) {
             beams_[static_cast<std::size_t>(number) * static_cast<std::size_t>(lines_) +
                    static_cast<std::size_t>(l)] = limited(value);
@@ -46,9 +43,16 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
         for (int axis = 0; axis < 3; ++axis) {
             put(kVoxelOrigin + axis, inverse_voxel * from_origin[axis]);
             put(kVoxelPerMm + axis, inverse_voxel * beam[axis]);
-            put(kSpeckleOrigin + axis, speckle[axis]);
-            put(kSpecklePerMm + axis, speckle_step[axis]);
             put(kBeam + axis, beam[axis]);
+        }
+        put(kEdge, f.effects.contact ? tables_.edge[static_cast<std::size_t>(line)] : 1);
+        for (int side = 0; side < slice_.count; ++side) {
+            const SpeckleSide& cut = slice_.sides[static_cast<std::size_t>(side)];
+            const Vector3* of[3] = {&cut.height, &cut.u, &cut.v};
+            for (int i = 0; i < 3; ++i) {
+                put(kSpeckleOrigin + 6 * side + i, dot(*of[i], from_origin));
+                put(kSpecklePerMm + 6 * side + i, dot(*of[i], beam));
+            }
         }
         put(kGap, static_cast<double>(gaps_[static_cast<std::size_t>(line)]));
     }
@@ -109,14 +113,29 @@ void PhysicalFast::set_poses(const PhysicalFrame& f, PhysicalBlock& b) const {
     const Vector3 sideways =
         (kLookupJitter / 32) * (f.volume_from_probe.rotation * Vector3{1, 0, 0});
     const Vector3 shift = (1 / scene_.voxel_mm) * f.motion.breathing_mm;
-    const Vector3 shift_speckle =
-        (1 / tables_.scatter_mm) * (speckle_rotation() * f.motion.breathing_mm);
     for (int axis = 0; axis < 3; ++axis) {
         b.across[axis] = static_cast<float>(across[axis]);
         b.sideways[axis] = static_cast<float>(sideways[axis]);
         b.shift_voxel[axis] = static_cast<float>(shift[axis]);
-        b.shift_speckle[axis] = static_cast<float>(shift_speckle[axis]);
     }
+    b.cut_count = slice_.count;
+    for (int side = 0; side < slice_.count; ++side) {
+        const SpeckleSide& from = slice_.sides[static_cast<std::size_t>(side)];
+        SpeckleCut& cut = b.cuts[side];
+        cut.u_per_height = static_cast<float>(from.u_per_height);
+        cut.v_per_height = static_cast<float>(from.v_per_height);
+        cut.per_normal = static_cast<float>(from.per_normal);
+        cut.base = from.base;
+        cut.until = static_cast<std::int32_t>(std::lround(from.until * 65536));
+        cut.shift[0] = static_cast<float>(dot(from.height, f.motion.breathing_mm));
+        cut.shift[1] = static_cast<float>(dot(from.u, f.motion.breathing_mm));
+        cut.shift[2] = static_cast<float>(dot(from.v, f.motion.breathing_mm));
+    }
+    b.patch_per_voxel = static_cast<float>(scene_.voxel_mm / kPatchMm);
+    b.per_spacing = (f.effects.elevation ? per_spacing_ : per_spacing_thin_).data();
+    b.speckle_level = (f.effects.point_spread ? speckle_level_ : speckle_level_bare_).data();
+    b.looks_at = looks_drawn_.data();
+    b.look_stride = look_stride_;
     b.pulse_mm = f.effects.pulsation ? static_cast<float>(f.motion.pulse_mm) : 0;
 }
 
@@ -132,7 +151,6 @@ void PhysicalFast::set_tables(const PhysicalFrame& f, PhysicalBlock& b) const {
     b.looks = looks_.data();
     b.pairs = pairs_word_.data();
     b.rough = reinterpret_cast<const std::int32_t*>(scene_.textures->rough.data());
-    b.speckle = reinterpret_cast<const std::int32_t*>(scene_.speckle.data());
     b.fine = f.effects.fine_structure ? scene_.textures->fine.data() : nullptr;
     b.fine_frames = fine_frames_.data();
     b.targets = near_targets_.data();
@@ -179,25 +197,20 @@ PhysicalBlock PhysicalFast::block_of_frame(const PhysicalFrame& f, bool keep_all
     b.keep_all = keep_all;
     b.hard_scene = scene_.has_hard;
     b.stride = stride_;
+    b.clutter_keep = static_cast<float>(tables_.haze_keep);
+    b.clutter_gain = static_cast<float>(tables_.haze_gain);
     return b;
 }
 
-// Beyond the outermost beams the light is mirrored, for the boxes of the aperture.
-void PhysicalFast::mirror_light(int block) {
+// Beyond the outermost beams a plane is mirrored, `reach` beams far.
+void PhysicalFast::mirror_rows(float* plane, int reach) const {
     const int lines = geometry_.scanlines;
-    const auto each_row = [&](const auto& work) {
-        for (int k = 0; k < geometry_.samples; ++k)
-            work(light_ + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_);
-    };
-    if (block == 0) {
-        each_row([&](float* light) {
-            for (int j = 0; j < 3; ++j) light[-1 - j] = light[std::min(j, lines - 1)];
-        });
-    }
-    if (block == lines_ / kBeamBlock - 1) {
-        each_row([&](float* light) {
-            for (int j = 0; j < 3; ++j) light[lines + j] = light[std::max(lines - 1 - j, 0)];
-        });
+    for (int k = 0; k < geometry_.samples; ++k) {
+        float* row = plane + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_;
+        for (int j = 0; j < reach; ++j) {
+            row[-1 - j] = row[std::min(j, lines - 1)];
+            row[lines + j] = row[std::max(lines - 1 - j, 0)];
+        }
     }
 }
 
@@ -220,6 +233,20 @@ struct MetByAny {
 
 }  // namespace
 
+// What the machine has, for the table of effects.
+void PhysicalFast::meet_machine(const PhysicalFrame& f) {
+    const Machine& m = tables_.machine;
+    met_.edge_contact = m.contact.edge_db > 0 && m.contact.edge_fraction > 0;
+    met_.compounding = tables_.looks > 1;
+    met_.receiver_noise = has_noise(tables_);
+    met_.blending = has_noise(tables_) && f.effects.noise && tables_.persisted > 1;
+    met_.reverberation = has_clutter(tables_);
+    met_.side_lobes = has_side_lobes(tables_);
+    met_.binomial = m.post_filter;
+    met_.sharpening = m.edge_enhancement > 0;
+    met_.logarithm = has_logarithm(tables_);
+}
+
 double PhysicalFast::sample_beams(const PhysicalFrame& f,
                                   const BreathingField& breathing,
                                   bool keep_all) {
@@ -230,10 +257,12 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         lookup_start_[i] = noise_start(f.seed, NoiseUse::lookup, 0, k);
     }
     choose_targets(f, keep_all);
+    slice_ = speckle_slice(f.volume_from_probe.rotation * Vector3{0, 1, 0}, tables_.cell_mm);
     const PhysicalBlock base = block_of_frame(f, keep_all);
     const bool breathes = f.effects.breathing && f.motion.breathes() && !breathing.empty();
     const bool needle = f.effects.needle && f.needle != nullptr;
     const NeedleStrip strip = needle ? NeedleStrip(*f.needle) : NeedleStrip();
+    const bool clutter = f.effects.clutter && has_clutter(tables_);
     MetByAny met;
     std::atomic<double> needle_ms{0};
     context_.workers.for_each(lines_ / kBeamBlock, [&](int, int block) {
@@ -247,6 +276,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         b.echoes = echoes_ + kRowMargin + line;
         b.light = light_ + kRowMargin + line;
         b.tail = tail_ + kRowMargin + line;
+        b.clutter = clutter ? clutter_ + kRowMargin + line : nullptr;
         sample_beam_block(context_.simd, b);
         met.add(b);
         NeedleRow row;
@@ -258,8 +288,9 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
             met.needle.store(true, std::memory_order_relaxed);
         }
         tail_from_[static_cast<std::size_t>(block)] = b.tail_from;
-        mirror_light(block);
     });
+    mirror_rows(light_, 3);  // for the boxes of the aperture
+    if (clutter) mirror_rows(clutter_, kMaxHazeReach);
     met_.breathes = f.motion.breathes();
     met_.pulses = f.motion.pulse_mm != 0;
     met_.has_echo = scene_.words.has_echo();
@@ -270,6 +301,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     met_.target = met.target;
     met_.needle_given = f.needle != nullptr;
     met_.needle = met.needle;
+    meet_machine(f);
     return needle_ms.load() / context_.workers.threads();
 }
 

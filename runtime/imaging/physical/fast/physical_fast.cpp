@@ -31,12 +31,12 @@ std::int32_t pack_look(const AcousticProperties& look, double frequency_mhz) {
                                      static_cast<std::uint32_t>(echo) << 20);
 }
 
-std::int32_t pack_pair(const PairEcho& p) {
+std::int32_t pack_pair(const PairEcho& p, double sigma_mm) {
     std::int32_t word = 0;
     if (p.amplitude > 0)
         word = static_cast<std::int32_t>(
             std::lround(std::clamp(std::log2(p.amplitude) * 128 + 2048, 1.0, 4095.0)));
-    word |= static_cast<std::int32_t>(std::lround(std::clamp(32 / p.sigma_mm, 1.0, 255.0))) << 12;
+    word |= static_cast<std::int32_t>(std::lround(std::clamp(32 / sigma_mm, 1.0, 255.0))) << 12;
     word |= static_cast<std::int32_t>(std::lround(std::clamp(128 * p.split_mm, 0.0, 127.0))) << 24;
     if (p.hard) word |= kPairHard;
     if (p.refracts) word |= kPairRefracts;
@@ -85,18 +85,24 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
                             t.look, static_cast<float>(t.wall), t.fluid});
     }
     near_targets_.reserve(targets_.size());
-    for (const PairEcho& pair : scene.pairs) pairs_word_.push_back(pack_pair(pair));
+    for (const PairEcho& pair : scene.pairs)
+        pairs_word_.push_back(pack_pair(pair, blurred_mm(tables, pair.sigma_mm)));
     for (const Row& row : tables.rows) {
         r_.push_back(static_cast<float>(row.r_mm));
         contact_.push_back(static_cast<float>(row.contact));
         elevation_.push_back(static_cast<float>(row.elevation_mm / 32));
         interface_scale_.push_back(static_cast<float>(row.interface_scale));
         gain_.push_back(static_cast<float>(row.gain));
+        per_spacing_.push_back(static_cast<float>(tables.cell_mm / row.spacing_mm));
+        speckle_level_.push_back(static_cast<float>(row.speckle));
+        looks_drawn_.push_back(row.looks_drawn);
     }
     elevation_off_.assign(samples, 0.0f);
+    per_spacing_thin_.assign(samples, 1.0f);
+    speckle_level_bare_.assign(samples, static_cast<float>(kBareSpeckle));
     for (auto* starts : {&elevation_start_, &lookup_start_, &clutter_start_, &haze_start_})
         starts->resize(2 * samples);
-    noise_start_.resize(2 * kPersistedFrames * samples);
+    noise_start_.resize(2 * kMaxPersisted * samples);
 
     const auto lines = static_cast<std::size_t>(lines_);
     raw_gaps_.assign(lines + kSlack, 0.0f);
@@ -106,20 +112,26 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     const std::size_t area = samples * static_cast<std::size_t>(stride_) + kSlack;
     // One allocation; rows begin on cache lines.
     const std::size_t line_of_floats = 16;
-    planes_.assign(4 * area + line_of_floats, 0.0f);
+    const std::size_t echoes_at = has_clutter(tables) ? 4 : 3;
+    const std::size_t planes = static_cast<std::size_t>(tables.looks) + echoes_at;
+    planes_.assign(planes * area + line_of_floats, 0.0f);
     void* start = planes_.data();
     std::size_t space = planes_.size() * sizeof(float);
     auto* plane = static_cast<float*>(
-        std::align(line_of_floats * sizeof(float), 4 * area * sizeof(float), start, space));
-    echoes_ = reinterpret_cast<std::int32_t*>(plane);
-    light_ = plane + area;
-    tail_ = plane + 2 * area;
-    power_ = plane + 3 * area;
+        std::align(line_of_floats * sizeof(float), planes * area * sizeof(float), start, space));
+    light_ = plane;
+    tail_ = plane + area;
+    power_ = plane + 2 * area;
+    echoes_ = reinterpret_cast<std::int32_t*>(plane + echoes_at * area);
+    if (has_clutter(tables)) clutter_ = plane + 3 * area;
+    look_stride_ = static_cast<std::ptrdiff_t>(area);
     tail_from_.assign(lines / kBeamBlock, 0);
     const auto threads = static_cast<std::size_t>(context.workers.threads());
-    work_.assign(threads * 2 * static_cast<std::size_t>(stride_), 0.0f);
+    work_.assign(threads * 3 * static_cast<std::size_t>(stride_), 0.0f);
     const auto ring_rows = static_cast<std::size_t>(std::max(2 * tables.axial_reach + 1, 3));
-    ring_.assign(threads * 2 * ring_rows * static_cast<std::size_t>(stride_), 0.0f);
+    ring_.assign(threads * 2 * ring_rows * static_cast<std::size_t>(tables.looks) *
+                     static_cast<std::size_t>(stride_),
+                 0.0f);
     next_row_.assign(threads, -1);
     envelope_.assign(threads * static_cast<std::size_t>(stride_), 0.0f);
     haze_.assign(static_cast<std::size_t>(cells_k_) * static_cast<std::size_t>(stride_), 0.0f);

@@ -8,6 +8,7 @@
 #include "formats/base/geometry.h"
 #include "runtime/imaging/needle/needle_strip.h"
 #include "runtime/imaging/physical/model/physical_model.h"
+#include "runtime/imaging/physical/model/speckle.h"
 
 namespace sonocase::runtime {
 
@@ -33,11 +34,12 @@ inline constexpr int kPairHard = 1 << 20, kPairRefracts = 1 << 21, kPairOwnPulse
 enum BeamNumber {
     kVoxelOrigin = 0,
     kVoxelPerMm = 3,
-    kSpeckleOrigin = 6,
-    kSpecklePerMm = 9,
-    kBeam = 12,
-    kGap = 15,
-    kBeamNumbers = 16
+    kBeam = 6,
+    kGap = 9,
+    kEdge = 10,           // amplitude that the beam's contact leaves
+    kSpeckleOrigin = 11,  // height, u, v; then the same per mm; kSpeckleSides times
+    kSpecklePerMm = kSpeckleOrigin + 3,
+    kBeamNumbers = kSpeckleOrigin + 6 * physical::kSpeckleSides
 };
 
 inline constexpr int kRowSlack = 64;   // behind rows and buffers: lanes of the widest vector
@@ -52,6 +54,14 @@ struct PhysicalTarget {
     bool fluid = false;
 };
 
+// physical::SpeckleSide without what is worked out per beam.
+struct SpeckleCut {
+    float u_per_height = 0, v_per_height = 0, per_normal = 1;
+    std::uint32_t base = 0;
+    std::int32_t until = 65536;  // of the patch's draw
+    float shift[3] = {0, 0, 0};  // of breathing at weight 1: height, u, v
+};
+
 struct PhysicalBlock {
     const float* beams = nullptr;
     int lines = 0, samples = 0;
@@ -63,11 +73,11 @@ struct PhysicalBlock {
     const std::uint32_t *elevation_start = nullptr, *lookup_start = nullptr;
 
     const float* breathing = nullptr;  // weight at nodes, `lines` apart; null: nothing moves
-    float shift_voxel[3] = {0, 0, 0}, shift_speckle[3] = {0, 0, 0};
+    float shift_voxel[3] = {0, 0, 0};
     float pulse_mm = 0;
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
-    const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr, *speckle = nullptr;
+    const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr;
     const std::int8_t* fine = nullptr;   // null: off. Two cubes
     const float* fine_frames = nullptr;  // ten per label: rows of the frame, offset of its cube
     const PhysicalTarget* targets = nullptr;
@@ -75,6 +85,13 @@ struct PhysicalBlock {
     Int3 size;
     int blocks_x = 0, blocks_xy = 0, block_log2 = 3;  // of the table: BrickTable
     int label_count = 0;
+    SpeckleCut cuts[physical::kSpeckleSides];
+    int cut_count = 1;
+    float patch_per_voxel = 1;
+    const float* per_spacing = nullptr;  // per row: one over the distance of a column's scatterers
+    const float* speckle_level = nullptr;            // per row: makes the filtered field's power 1
+    const int* looks_at = nullptr;                   // per row: fields that are drawn
+    std::ptrdiff_t look_stride = 0;                  // from one look's echoes to the next's
     const float *dim = nullptr, *dim_off = nullptr;  // per look: light that one sample leaves
     float dead_light = 0;
     struct {
@@ -93,6 +110,8 @@ struct PhysicalBlock {
     // second-level cache.
     std::int32_t* echoes = nullptr;
     float *light = nullptr, *tail = nullptr;
+    float* clutter = nullptr;  // power of the reverberation below what is bright; null: none
+    float clutter_keep = 0, clutter_gain = 0;
     int stride = 0;
     int tail_from = 0;  // out: first sample with a tail; samples if none
     bool boundary_met = false, refraction_met = false, hard_met = false, fine_met = false,
@@ -107,28 +126,39 @@ struct PhysicalRowTask {
     const float* lateral = nullptr;  // centre tap
     int reach = 0;
     bool point_spread = true;
-    float *work_re = nullptr, *work_im = nullptr;  // with margins
-    float *out_re = nullptr, *out_im = nullptr;
+    float *work_re = nullptr, *work_im = nullptr, *work_light = nullptr;  // with margins
+    float *out_re = nullptr, *out_im = nullptr;                           // of the first look
+    int looks = 1;
+    std::ptrdiff_t look_stride = 0, out_stride = 0;  // of echoes and of `out`
 
-    float inverse_gain = 1, near_field = 0, noise = 0;
-    const float* tail = nullptr;              // null: none
-    const std::int32_t* tail_from = nullptr;  // per block
+    float inverse_gain = 1, near_field = 0, noise = 0;  // of the first look, for all
+    const float* tail = nullptr;                        // null: none
+    const std::int32_t* tail_from = nullptr;            // per block
     int sample = 0;
+    const float* clutter = nullptr;  // power, with margins; null: none
+    int clutter_reach = 0;           // beams to each side of its mean
+    float clutter_drawn = 1;         // share of it that varies
     const std::int8_t *clutter_re = nullptr, *clutter_im = nullptr;
     int noise_rows = 0;  // 0: none
-    const std::int8_t* noise_re[4] = {nullptr, nullptr, nullptr, nullptr};
-    const std::int8_t* noise_im[4] = {nullptr, nullptr, nullptr, nullptr};
-    float noise_weight[4] = {0, 0, 0, 0};
+    const std::int8_t* noise_re[physical::kMaxPersisted] = {};
+    const std::int8_t* noise_im[physical::kMaxPersisted] = {};
+    float noise_weight[physical::kMaxPersisted] = {};
 };
 
 // A row's filter along the beams; the envelope's power.
 struct PhysicalPowerTask {
     int lines = 0;
-    const float* const* re = nullptr;  // rows of the filter; null rows count as zero
+    const float* const* re = nullptr;  // rows of the filter, first look; null rows count as zero
     const float* const* im = nullptr;
+    int looks = 1;
+    std::ptrdiff_t look_stride = 0;
     const float* axial = nullptr;  // first tap
     int axial_count = 1;
     float gain = 1;
+    float steady = 0;                // power that the looks leave of the near field's ringing
+    const float* clutter = nullptr;  // null: none
+    int clutter_reach = 0;
+    float clutter_steady = 0;       // its share
     float* envelope_sum = nullptr;  // the envelope is added to it; null: not needed
     float* power = nullptr;
 };
@@ -142,9 +172,14 @@ struct PhysicalGreyTask {
     const std::int8_t* haze_re[2] = {nullptr, nullptr};  // rows to blend
     const std::int8_t* haze_im[2] = {nullptr, nullptr};
     float haze_first = 1, haze_second = 0;
-    float offset = 0, per_log2 = 0;
-    bool post_filter = true;
-    float* work = nullptr;  // with margins
+    // Logarithm: grey = offset + per_log2 log2(power). Otherwise floor plus 2 to that power, and
+    // above the knee less steep.
+    float offset = 0, per_log2 = 0, low = 0;
+    bool logarithm = true;
+    float floor = 0, knee = 255, knee_slope = 1;
+    bool filtered = true;
+    float* work = nullptr;   // with margins
+    float* plain = nullptr;  // null: not needed; grey before the filter
     float* out = nullptr;
 };
 
@@ -152,7 +187,9 @@ struct PhysicalGreyTask {
 struct PhysicalShadeTask {
     int lines = 0;
     const float *above = nullptr, *here = nullptr, *below = nullptr;  // grey rows
-    bool post_filter = true, grey_map = true;
+    bool filtered = true, grey_map = true;
+    const float* plain = nullptr;  // grey before the filter, where its weight is not 1
+    float filter_weight = 1;
     std::uint8_t* out = nullptr;
 };
 

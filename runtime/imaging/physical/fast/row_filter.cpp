@@ -17,21 +17,74 @@ HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 using namespace physical;
 
-// Light of the aperture times echoes, then the point spread across beams.
-void filter_across(const PhysicalRowTask& t) {
+// Light of the aperture: boxes of 5 and 3 beams.
+template <class D>
+HWY_INLINE hn::Vec<D> smooth_light(D d, const float* light) {
+    const auto at = [&](int j) HWY_ATTR { return hn::LoadU(d, light + j); };
+    auto sum = hn::Mul(hn::Add(at(-3), at(3)), hn::Set(d, 1 / 15.0f));
+    sum = hn::Add(sum, hn::Mul(hn::Add(at(-2), at(2)), hn::Set(d, 2 / 15.0f)));
+    return hn::Add(sum, hn::Mul(hn::Add(hn::Add(at(-1), at(1)), at(0)), hn::Set(d, 3 / 15.0f)));
+}
+
+// Mean of the clutter over neighbouring beams.
+template <class D>
+HWY_INLINE hn::Vec<D> mean_clutter(D d, const float* row, int reach) {
+    auto sum = hn::LoadU(d, row);
+    for (int j = 1; j <= reach; ++j)
+        sum = hn::Add(sum, hn::Add(hn::LoadU(d, row - j), hn::LoadU(d, row + j)));
+    return hn::Mul(sum, hn::Set(d, 1 / (2 * static_cast<float>(reach) + 1)));
+}
+
+// Adds clutter and electronic noise.
+template <class D, class V>
+HWY_INLINE void add_noise(D d, const PhysicalRowTask& t, int i, V& re, V& im) {
+    const auto half = hn::Set(d, 0.5f);
+    const auto unit = hn::Set(d, t.inverse_gain / 32);
+    auto power = hn::Set(d, t.near_field * t.near_field);
+    if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock])
+        power = hn::Add(power, hn::LoadU(d, t.tail + i));
+    if (t.clutter != nullptr) {
+        power = hn::Add(power, hn::Mul(mean_clutter(d, t.clutter + i, t.clutter_reach),
+                                       hn::Set(d, t.clutter_drawn)));
+    }
+    const auto level = hn::Mul(hn::Sqrt(hn::Mul(half, power)), unit);
+    re = hn::Add(re, hn::Mul(level, noise_of(d, t.clutter_re + i)));
+    im = hn::Add(im, hn::Mul(level, noise_of(d, t.clutter_im + i)));
+    if (t.noise_rows == 0) return;
+    const auto noise_level = hn::Set(d, t.noise);
+    auto n_re = hn::Zero(d), n_im = hn::Zero(d);
+    for (int j = 0; j < t.noise_rows; ++j) {
+        const auto w = hn::Set(d, t.noise_weight[j]);
+        n_re = hn::Add(n_re, hn::Mul(w, noise_of(d, t.noise_re[j] + i)));
+        n_im = hn::Add(n_im, hn::Mul(w, noise_of(d, t.noise_im[j] + i)));
+    }
+    re = hn::Add(re, hn::Mul(noise_level, n_re));
+    im = hn::Add(im, hn::Mul(noise_level, n_im));
+}
+
+// Light of the aperture times echoes, then the point spread across beams. kFirst: of the looks; it
+// leaves the light to the others, and carries the noise.
+template <bool kFirst>
+HWY_INLINE void filter_look(const PhysicalRowTask& t, int look) {
     const hn::CappedTag<float, kBeamBlock> d;
     const hn::RebindToSigned<decltype(d)> di;
     const int lanes = static_cast<int>(hn::Lanes(d));
+    const std::int32_t* echoes = t.echoes + look * t.look_stride;
+    float* out_re = t.out_re + look * t.out_stride;
+    float* out_im = t.out_im + look * t.out_stride;
     float* mre = t.work_re;
     float* mim = t.work_im;
     for (int i = 0; i < t.lines; i += lanes) {
-        const auto at = [&](int j) HWY_ATTR { return hn::LoadU(d, t.light + i + j); };
-        auto sum = hn::Mul(hn::Add(at(-3), at(3)), hn::Set(d, 1 / 15.0f));
-        sum = hn::Add(sum, hn::Mul(hn::Add(at(-2), at(2)), hn::Set(d, 2 / 15.0f)));
-        sum = hn::Add(sum, hn::Mul(hn::Add(hn::Add(at(-1), at(1)), at(0)), hn::Set(d, 3 / 15.0f)));
-        const auto echo = hn::LoadU(di, t.echoes + i);
-        hn::StoreU(hn::Mul(echo_real(d, echo), sum), d, mre + i);
-        hn::StoreU(hn::Mul(echo_imaginary(d, echo), sum), d, mim + i);
+        auto light = hn::Zero(d);
+        if constexpr (kFirst) {
+            light = smooth_light(d, t.light + i);
+            if (t.looks > 1) hn::StoreU(light, d, t.work_light + i);
+        } else {
+            light = hn::LoadU(d, t.work_light + i);
+        }
+        const auto echo = hn::LoadU(di, echoes + i);
+        hn::StoreU(hn::Mul(echo_real(d, echo), light), d, mre + i);
+        hn::StoreU(hn::Mul(echo_imaginary(d, echo), light), d, mim + i);
     }
     const int reach = t.point_spread ? t.reach : 0;
     for (int j = 0; j < reach; ++j) {  // mirrored at the sector's edges
@@ -42,10 +95,6 @@ void filter_across(const PhysicalRowTask& t) {
         mim[t.scanlines + j] = mim[right];
     }
     const auto centre = hn::Set(d, t.point_spread ? t.lateral[0] : 1.0f);
-    const auto near = hn::Set(d, t.near_field * t.near_field);
-    const auto half = hn::Set(d, 0.5f);
-    const auto unit = hn::Set(d, t.inverse_gain / 32);
-    const auto noise_level = hn::Set(d, t.noise);
     for (int i = 0; i < t.lines; i += lanes) {
         auto re = hn::Mul(hn::LoadU(d, mre + i), centre),
              im = hn::Mul(hn::LoadU(d, mim + i), centre);
@@ -56,43 +105,40 @@ void filter_across(const PhysicalRowTask& t) {
             im = hn::Add(
                 im, hn::Mul(hn::Add(hn::LoadU(d, mim + i - j), hn::LoadU(d, mim + i + j)), tap));
         }
-        auto power = near;
-        if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock])
-            power = hn::Add(power, hn::LoadU(d, t.tail + i));
-        const auto level = hn::Mul(hn::Sqrt(hn::Mul(half, power)), unit);
-        re = hn::Add(re, hn::Mul(level, noise_of(d, t.clutter_re + i)));
-        im = hn::Add(im, hn::Mul(level, noise_of(d, t.clutter_im + i)));
-        if (t.noise_rows > 0) {
-            auto n_re = hn::Zero(d), n_im = hn::Zero(d);
-            for (int j = 0; j < t.noise_rows; ++j) {
-                const auto w = hn::Set(d, t.noise_weight[j]);
-                n_re = hn::Add(n_re, hn::Mul(w, noise_of(d, t.noise_re[j] + i)));
-                n_im = hn::Add(n_im, hn::Mul(w, noise_of(d, t.noise_im[j] + i)));
-            }
-            re = hn::Add(re, hn::Mul(noise_level, n_re));
-            im = hn::Add(im, hn::Mul(noise_level, n_im));
-        }
-        hn::StoreU(re, d, t.out_re + i);
-        hn::StoreU(im, d, t.out_im + i);
+        if constexpr (kFirst) add_noise(d, t, i, re, im);
+        hn::StoreU(re, d, out_re + i);
+        hn::StoreU(im, d, out_im + i);
     }
 }
 
-// Point spread along the beam and gain; the envelope's power.
+void filter_across(const PhysicalRowTask& t) {
+    filter_look<true>(t, 0);
+    for (int look = 1; look < t.looks; ++look) filter_look<false>(t, look);
+}
+
+// Point spread along the beam and gain; the envelope's power, the mean of all looks.
 void make_power(const PhysicalPowerTask& t) {
-    const hn::ScalableTag<float> d;
+    const hn::CappedTag<float, kBeamBlock> d;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    const auto gain = hn::Set(d, t.gain);
+    const auto gain = hn::Set(d, t.gain * t.gain / static_cast<float>(t.looks));
     for (int i = 0; i < t.lines; i += lanes) {
-        auto re = hn::Zero(d), im = hn::Zero(d);
-        for (int j = 0; j < t.axial_count; ++j) {
-            if (t.re[j] == nullptr) continue;
-            const auto tap = hn::Set(d, t.axial[j]);
-            re = hn::Add(re, hn::Mul(hn::LoadU(d, t.re[j] + i), tap));
-            im = hn::Add(im, hn::Mul(hn::LoadU(d, t.im[j] + i), tap));
+        auto power = hn::Zero(d);
+        for (int look = 0; look < t.looks; ++look) {
+            const std::ptrdiff_t from = look * t.look_stride + i;
+            auto re = hn::Zero(d), im = hn::Zero(d);
+            for (int j = 0; j < t.axial_count; ++j) {
+                if (t.re[j] == nullptr) continue;
+                const auto tap = hn::Set(d, t.axial[j]);
+                re = hn::Add(re, hn::Mul(hn::LoadU(d, t.re[j] + from), tap));
+                im = hn::Add(im, hn::Mul(hn::LoadU(d, t.im[j] + from), tap));
+            }
+            power = hn::Add(power, hn::Add(hn::Mul(re, re), hn::Mul(im, im)));
         }
-        re = hn::Mul(re, gain);
-        im = hn::Mul(im, gain);
-        const auto power = hn::Add(hn::Mul(re, re), hn::Mul(im, im));
+        power = hn::Add(hn::Mul(power, gain), hn::Set(d, t.steady));
+        if (t.clutter != nullptr) {
+            power = hn::Add(power, hn::Mul(mean_clutter(d, t.clutter + i, t.clutter_reach),
+                                           hn::Set(d, t.clutter_steady)));
+        }
         if (t.envelope_sum != nullptr) {
             hn::StoreU(hn::Add(hn::LoadU(d, t.envelope_sum + i), hn::Sqrt(power)), d,
                        t.envelope_sum + i);

@@ -6,8 +6,6 @@
 
 #include <cstdint>
 
-#include "formats/base/geometry.h"
-
 namespace sonocase::runtime::physical {
 
 inline constexpr double kDbPerLog2 = 6.020599913279624;  // amplitude: 20 log10(2)
@@ -20,21 +18,6 @@ inline constexpr double kGapStepMm = 0.5;
 
 // A beam as dark as this (log2 of its amplitude: -96 dB) counts as dead: it lights nothing below.
 inline constexpr double kDeadLog2 = -16;
-
-// Scatterers: a cube of edge 2^kSpeckleLog2 out of the bundle's speckle, repeated in each
-// direction. Every repetition is shuffled by a hash of its place (exclusive or on the cell's
-// coordinates), so that no pattern shows twice.
-inline constexpr int kSpeckleLog2 = 6;
-inline constexpr std::uint32_t kSpeckleHashX = 0x9E3779B1u, kSpeckleHashY = 0x85EBCA77u,
-                               kSpeckleHashZ = 0xC2B2AE3Du;
-// x, y, z: of a cell.
-inline std::uint32_t speckle_hash(std::int32_t x, std::int32_t y, std::int32_t z) {
-    return static_cast<std::uint32_t>(x >> kSpeckleLog2) * kSpeckleHashX ^
-           static_cast<std::uint32_t>(y >> kSpeckleLog2) * kSpeckleHashY ^
-           static_cast<std::uint32_t>(z >> kSpeckleLog2) * kSpeckleHashZ;
-}
-// First bit of the hash for each axis.
-inline constexpr int kShuffleX = 8, kShuffleY = 14, kShuffleZ = 20;
 
 // Surfaces further than this from a voxel's centre have no effect in it.
 inline constexpr double kSurfaceReachVx = 2.0;
@@ -69,18 +52,15 @@ inline constexpr double kReverb = 9, kReverbLoss = 0.42, kReverbWidth = 1.4;
 // own, dB/cm/MHz. Without it, everything behind a full bladder would be white.
 inline constexpr double kFluidSteepening = 0.22;
 
-// Haze: side lobes and reverberation, relative to the mean envelope nearby.
-inline constexpr double kHazeDb = -24;
+// Haze: side lobes, relative to the mean envelope nearby.
 inline constexpr int kHazeCell = 8;   // samples and beams of a cell of the mean
 inline constexpr int kHazeReach = 3;  // cells to each side
 
 inline constexpr int kHazeGrain = 3;  // samples along the beam
 
 // TGC, dB/cm/MHz: abdominal organs for a fan, muscle and fat for a linear probe.
-inline constexpr double kGainSlopeFan = 0.56, kGainSlopeLinear = 0.72;
+inline constexpr double kGainSlopeFan = 0.50, kGainSlopeLinear = 0.72;
 inline constexpr double kMaxNoiseGainDb = 48;
-inline constexpr double kNoiseDb = -70;
-inline constexpr double kGreyOfUnit = 136;
 inline constexpr double kGreyFloor = -25, kGreyCeiling = 290;  // before the post-filter
 // t - kGreyMap t (1 - t)(1 - 2t): close to t - 0.03 sin(2 pi t), without the sine.
 inline constexpr double kGreyMap = 0.31;
@@ -88,6 +68,9 @@ inline constexpr double kGreyMap = 0.31;
 // Echo offsets are baked one per voxel: a random step of this many voxels (one standard deviation)
 // blends them.
 inline constexpr double kLookupJitter = 0.4;
+
+inline constexpr int kMaxPersisted = 8;  // frames
+inline constexpr int kMaxHazeReach = 8;  // beams to each side
 
 inline constexpr int kMaxLateral = 12;  // taps to each side
 inline constexpr int kMaxAxial = 10;
@@ -109,11 +92,5 @@ inline constexpr double kSeptaAlongMm = 0.8, kSeptaAcrossMm = 0.4;
 // Targets of an exercise are balls in the anatomy; their surface is as rough as that of organs.
 inline constexpr double kTargetReachMm = 2;
 inline constexpr int kMaxTargets = 8;
-
-// Hides the period of the speckle volume: a fixed rotation about no special direction.
-inline Matrix3 speckle_rotation() {
-    return rotation_about(normalized(Vector3{0.36, 0.48, 0.8}), 0.7) *
-           rotation_about({0, 0, 1}, 0.55);
-}
 
 }  // namespace sonocase::runtime::physical

@@ -60,24 +60,6 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
     return e;
 }
 
-// A cube of edge 2^kSpeckleLog2 out of the bundle's speckle, which is repeated or cut.
-std::vector<std::int8_t> speckle_cube(const std::vector<std::int8_t>& voxels, int edge) {
-    const auto cube = static_cast<std::size_t>(1 << kSpeckleLog2),
-               given = static_cast<std::size_t>(edge);
-    std::vector<std::int8_t> out(2 * cube * cube * cube);
-    for (std::size_t z = 0; z < cube; ++z) {
-        for (std::size_t y = 0; y < cube; ++y) {
-            for (std::size_t x = 0; x < cube; ++x) {
-                const std::size_t from = x % given + given * (y % given + given * (z % given));
-                const std::size_t to = x + cube * (y + cube * z);
-                out[2 * to] = voxels[2 * from];
-                out[2 * to + 1] = voxels[2 * from + 1];
-            }
-        }
-    }
-    return out;
-}
-
 // What a target that shows is made of.
 struct TargetTissue {
     AcousticProperties look{-8, 0.6, TissueKind::soft};
@@ -118,7 +100,10 @@ void add_targets(const std::vector<Target>& targets, PhysicalScene& s) {
 }
 
 // Acoustic properties of labels and targets, and the echoes between labels.
-void add_tissues(const CaseBundle& bundle, const std::vector<Target>& targets, PhysicalScene& s) {
+void add_tissues(const CaseBundle& bundle,
+                 const std::vector<Target>& targets,
+                 const std::map<std::string, double>& measured_db,
+                 PhysicalScene& s) {
     const std::vector<int> tissue_of = tissue_of_label(bundle);
     const Tissue nothing{};
     const auto tissue = [&](std::size_t l) -> const Tissue& {
@@ -127,8 +112,9 @@ void add_tissues(const CaseBundle& bundle, const std::vector<Target>& targets, P
     const std::size_t count = bundle.labels.size();
     for (std::size_t l = 0; l < count; ++l) {
         const Tissue& t = tissue(l);
-        s.looks.push_back(
-            {t.echo_db, t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind});
+        const auto measured = measured_db.find(bundle.labels[l].name);
+        s.looks.push_back({measured != measured_db.end() ? measured->second : t.echo_db,
+                           t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind});
     }
     s.has_hard = std::any_of(s.looks.begin(), s.looks.end(), [](const AcousticProperties& l) {
         return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
@@ -161,14 +147,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     if (bundle.labels.empty() || bundle.label_bricks.table.empty()) {
         return Error{"the bundle holds no label volume", "", "build the case again"};
     }
-    const int edge = bundle.speckle.edge;
-    if (edge < 8 ||
-        bundle.speckle.voxels.size() != 2 * static_cast<std::size_t>(edge) * edge * edge) {
-        return Error{"the bundle holds no speckle volume", "",
-                     "build the case again, or use --model paper"};
-    }
-    s.speckle = speckle_cube(bundle.speckle.voxels, edge);
-    add_tissues(bundle, targets, s);
+    add_tissues(bundle, targets, options.tissue_db, s);
     Result<BrickTable> words = BrickTable::create(bundle);
     if (!words) return words.error();
     s.words = std::move(*words);

@@ -5,7 +5,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "formats/base/jobs.h"
@@ -55,7 +57,6 @@ struct PhysicalScene {
     bool has_hard = true;  // some label is bone or gas; if none, their kernels are left out
 
     std::shared_ptr<const PhysicalTextures> textures;
-    std::vector<std::int8_t> speckle;  // pairs, edge 2^kSpeckleLog2
     FineStructure fine;
 
     std::vector<TargetBall> targets;
@@ -66,10 +67,11 @@ struct PhysicalScene {
 struct PhysicalSceneOptions {
     JobRunner* jobs = nullptr;                         // null: one job after the other
     std::shared_ptr<const PhysicalTextures> textures;  // null: made here
+    std::map<std::string, double> tissue_db;           // of labels, instead of the bundle's own
 };
 
 // targets: of the exercise; those that only mark a place do not show in the tissue.
-// The bundle must outlive the scene. Errors: a bundle without labels or speckle; too little memory
+// The bundle must outlive the scene. Errors: a bundle without labels; too little memory
 // for the tables. Cost: some tens of ms for a torso at 1 mm.
 Result<PhysicalScene> make_physical_scene(CaseView view,
                                           const std::vector<Target>& targets = {},

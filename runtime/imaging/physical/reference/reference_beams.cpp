@@ -3,9 +3,11 @@
 #include "runtime/imaging/physical/reference/reference_beams.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "runtime/imaging/physical/reference/reference_place.h"
+#include "runtime/imaging/physical/reference/reference_speckle.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -18,6 +20,7 @@ struct BeamLight {
     double needle_light = 0;  // log2 left after the needle
     double bone = 0, bone_slow = 0, bone_floor = 0, gas = 0, needle_tail = 0;  // tails, amplitudes
     double reverb = 0, period = 0, next = 0;  // next line: amplitude, mm between lines, its depth
+    double clutter = 0;                       // power
     TissueKind before = TissueKind::soft, before_that = TissueKind::soft;  // of the samples above
 
     void fade(double step_mm) {
@@ -38,27 +41,12 @@ struct Sample {
     const TargetBall* ball = nullptr;  // whose surface is near
     double ball_mm = 0, ball_cosine = 0;
     int look_index = 0;
-    double re = 0, im = 0;  // echo
-    double facing = 1;      // how squarely the beam meets the surface, 1 where there is none
-    double loss = 0;        // log2 of amplitude that this sample takes
-    double here = 0;        // amplitude of the light that arrives
+    double re = 0, im = 0;                                 // echo of surfaces
+    std::array<double, kMaxLooks> field_re{}, field_im{};  // of scatterers, one per look
+    double facing = 1;  // how squarely the beam meets the surface, 1 where there is none
+    double loss = 0;    // log2 of amplitude that this sample takes
+    double here = 0;    // amplitude of the light that arrives
 };
-
-// The scatterers of a sample: a pair of amplitudes out of the shuffled speckle cube.
-void scatter(const ReferenceInput& in, const Matrix3& turn, double amplitude, Sample& p) {
-    const Vector3 c = (1 / in.tables.scatter_mm) * (turn * p.from_origin);
-    const std::int32_t i = nearest_integer(c.x), j = nearest_integer(c.y), m = nearest_integer(c.z);
-    const std::uint32_t hash = speckle_hash(i, j, m);
-    const auto wrap = [&](std::int32_t u, int shift) {
-        return (static_cast<std::uint32_t>(u) ^ hash >> shift) & ((1u << kSpeckleLog2) - 1);
-    };
-    const std::size_t cell =
-        wrap(i, kShuffleX) +
-        ((wrap(j, kShuffleY) + (wrap(m, kShuffleZ) << kSpeckleLog2)) << kSpeckleLog2);
-    const double unit = 1 / (32 * std::sqrt(2.0));
-    p.re = amplitude * in.scene.speckle[2 * cell] * unit;
-    p.im = amplitude * in.scene.speckle[2 * cell + 1] * unit;
-}
 
 // log2 of amplitude that a beam loses in one sample where it grazes a wall of fluid.
 double graze_loss(double cosine, double distance_mm, double step_mm) {
@@ -77,7 +65,8 @@ void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p) {
     p.facing = pair.hard ? 0.25 * cosine + 0.75 * std::pow(cosine, 6)
                          : 0.08 * cosine + 0.92 * std::pow(cosine, 10);
     if (in.frame.effects.interfaces && pair.amplitude > 0) {
-        const double u = (std::abs(place.distance_mm) - pair.split_mm) / pair.sigma_mm;
+        const double u =
+            (std::abs(place.distance_mm) - pair.split_mm) / blurred_mm(in.tables, pair.sigma_mm);
         const double i = pair.amplitude * p.facing * std::exp2(place.rough.log2_glint) *
                          std::exp(-0.5 * u * u) * p.row.interface_scale;
         p.re += i * place.rough.re;
@@ -145,6 +134,13 @@ void light_tails(const ReferenceInput& in, TissueKind kind, const Sample& p, Bea
     t.before = kind;
 }
 
+// Reverberation below what is bright: each sample leaves a part of its power.
+void add_clutter(const ReferenceInput& in, const Sample& p, BeamLight& t) {
+    const double lit = p.here * p.row.gain, re = p.re + p.field_re[0], im = p.im + p.field_im[0];
+    t.clutter =
+        in.tables.haze_keep * t.clutter + in.tables.haze_gain * (re * re + im * im) * lit * lit;
+}
+
 // Mirror, shadow and tail of the needle.
 void meet_needle(const ReferenceInput& in, PlanePoint o, PlanePoint d, Sample& p, BeamLight& t) {
     if (!in.frame.effects.needle || in.frame.needle == nullptr) return;
@@ -187,7 +183,10 @@ double tail_power(const ReferenceInput& in, const Row& row, BeamLight& t) {
 class Beams {
   public:
     explicit Beams(const ReferenceInput& input)
-        : in_(input), gaps_(static_cast<std::size_t>(input.geometry.scanlines), 0.0f) {
+        : in_(input),
+          gaps_(static_cast<std::size_t>(input.geometry.scanlines), 0.0f),
+          slice_(speckle_slice(input.frame.volume_from_probe.rotation * Vector3{0, 1, 0},
+                               input.tables.cell_mm)) {
         const PhysicalFrame& f = in_.frame;
         if (f.effects.contact) {
             std::vector<float> raw(gaps_.size());
@@ -203,6 +202,8 @@ class Beams {
         const PlanePoint o = g.beam_origin(l), d = g.beam_direction(l);
         const Vector3 beam = in_.frame.volume_from_probe.rotation * Vector3{d.x, 0, d.z};
         BeamLight t;
+        if (in_.frame.effects.contact)
+            t.log2_light = std::log2(in_.tables.edge[static_cast<std::size_t>(l)]);
         for (int k = 0; k < g.samples; ++k) {
             const std::size_t at = in_.at(k, l);
             t.fade(g.step_mm);
@@ -220,10 +221,15 @@ class Beams {
             const bool dead = t.log2_light < kDeadLog2;
             p.here = dead ? 0 : std::exp2(t.log2_light);
             if (dead) p.re = p.im = 0;
+            if (dead) p.field_re = p.field_im = {};
+            add_clutter(in_, p, t);
+            out.clutter[at] = t.clutter;
             light_tails(in_, look.kind, p, t);
             meet_needle(in_, o, d, p, t);
-            out.re[at] = p.re;
-            out.im[at] = p.im;
+            for (std::size_t i = 0; i < out.looks.size(); ++i) {
+                out.looks[i].re[at] = p.re + p.field_re[i];
+                out.looks[i].im[at] = p.im + p.field_im[i];
+            }
             out.light[at] = p.here * std::exp2(t.needle_light);
             out.tail[at] = tail_power(in_, p.row, t);
             t.log2_light -= p.loss;
@@ -265,8 +271,17 @@ class Beams {
         }
         const double amplitude =
             look.kind == TissueKind::outside ? 0 : std::exp2(echo_db / kDbPerLog2);
-        p.re = amplitude;
-        if (on.speckle) scatter(in_, turn_, amplitude, p);
+        p.field_re.fill(amplitude);
+        if (on.speckle) {
+            const SpeckleSample field =
+                speckle_at(slice_, p.from_origin, in_.tables.cell_mm,
+                           slice_spacing(in_.tables, p.row, on), in_.tables.looks);
+            const double level = amplitude * speckle_level(p.row, on);
+            for (std::size_t i = 0; i < kMaxLooks; ++i) {
+                p.field_re[i] = level * field.re[i];
+                p.field_im[i] = level * field.im[i];
+            }
+        }
         p.loss = on.attenuation ? look.attenuation * in_.tables.frequency_mhz *
                                       in_.geometry.step_mm * 0.1 * 2 / kDbPerLog2
                                 : 0;
@@ -275,15 +290,17 @@ class Beams {
     const ReferenceInput& in_;
     std::vector<float> gaps_;  // # scanlines; negative: air
     BreathingField breathing_;
-    const Matrix3 turn_ = speckle_rotation();
+    const SpeckleSlice slice_;
 };
 
 }  // namespace
 
 BeamSamples reference_beams(const ReferenceInput& input) {
     const std::size_t count = input.count();
-    BeamSamples out{std::vector<double>(count, 0.0), std::vector<double>(count, 0.0),
-                    std::vector<double>(count, 1.0), std::vector<double>(count, 0.0)};
+    const std::vector<double> dark(count, 0.0);
+    BeamSamples out{
+        std::vector<ComplexPlane>(static_cast<std::size_t>(input.tables.looks), {dark, dark}),
+        std::vector<double>(count, 1.0), dark, dark};
     const Beams beams(input);
     for (int l = 0; l < input.geometry.scanlines; ++l) beams.trace(l, out);
     return out;

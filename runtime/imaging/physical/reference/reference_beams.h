@@ -10,10 +10,17 @@
 namespace sonocase::runtime {
 
 // One value per sample: # samples x scanlines, row by row.
+using Plane = std::vector<double>;
+
+struct ComplexPlane {
+    Plane re, im;
+};
+
 struct BeamSamples {
-    std::vector<double> re, im;  // echoes, as amplitudes under full light
-    std::vector<double> light;   // amplitude that is left, there and back
-    std::vector<double> tail;    // power behind bone, gas and needle
+    std::vector<ComplexPlane> looks;  // echoes, as amplitudes under full light
+    std::vector<double> light;        // amplitude that is left, there and back
+    std::vector<double> tail;         // power behind bone, gas and needle
+    std::vector<double> clutter;      // power of the reverberation
 };
 
 BeamSamples reference_beams(const ReferenceInput& input);

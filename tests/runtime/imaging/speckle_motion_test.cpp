@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Speckle that moves with the tissue. Limits are those of a living liver's sweep (docs/realism.md):
+// correlation of 48 x 48 pixels of detail against movement of the scan plane.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "imaging_support.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using namespace sonocase::testing;
+
+constexpr int kWidth = 764, kHeight = 617, kPatch = 48;
+
+// A liver that fills the fan, as far as the probe moves.
+const CaseBundle& liver() {
+    static const CaseBundle bundle = [] {
+        PhantomOptions o;
+        o.ribs = o.gas = o.vessels = o.kidney = o.layers = false;
+        o.lower = {-80, -20, -25};
+        o.upper = {80, 20, 130};
+        o.voxel_mm = 2;
+        return Phantom(o).bundle();
+    }();
+    return bundle;
+}
+
+// The fan of the sweep.
+Exercise sweep_exercise() {
+    Exercise e = phantom_exercise();
+    e.probe.radius_mm = 50.6;
+    e.probe.field_of_view_rad = 60.2 * 3.14159265358979 / 180;
+    e.probe.depth_mm = 180;
+    e.probe.frequency_mhz = 3.5;
+    e.probe.focus_mm = 90;
+    e.probe.elevation_mm = 3;
+    return e;
+}
+
+using Plane = std::vector<double>;
+
+// Rows and columns less their Gaussian mean of 12 pixels.
+Plane detail_of(const std::vector<std::uint8_t>& pixels) {
+    constexpr double kSigma = 12;
+    constexpr int kReach = 36;
+    std::vector<double> taps;
+    double sum = 0;
+    for (int i = -kReach; i <= kReach; ++i)
+        sum += taps.emplace_back(std::exp(-0.5 * i * i / (kSigma * kSigma)));
+    const auto blur = [&](const Plane& in, int step, int length, int other, int other_step) {
+        Plane out(in.size());
+        for (int o = 0; o < other; ++o) {
+            for (int i = 0; i < length; ++i) {
+                double v = 0;
+                for (int j = -kReach; j <= kReach; ++j) {
+                    const int at = std::clamp(i + j, 0, length - 1);
+                    v += taps[static_cast<std::size_t>(j + kReach)] *
+                         in[static_cast<std::size_t>(at * step + o * other_step)];
+                }
+                out[static_cast<std::size_t>(i * step + o * other_step)] = v / sum;
+            }
+        }
+        return out;
+    };
+    Plane grey(pixels.begin(), pixels.end());
+    const Plane mean = blur(blur(grey, 1, kWidth, kHeight, kWidth), kWidth, kHeight, kWidth, 1);
+    for (std::size_t i = 0; i < grey.size(); ++i) grey[i] -= mean[i];
+    return grey;
+}
+
+class Sweep {
+  public:
+    explicit Sweep(RenderOptions options = {}, Exercise exercise = sweep_exercise()) {
+        options.width_px = kWidth;
+        options.height_px = kHeight;
+        renderer_.emplace(std::move(*Renderer::create(liver(), exercise, options)));
+        pixels_.resize(kWidth * kHeight);
+    }
+    Plane detail(const Rigid& pose, double time_s = 0, std::uint32_t frame = 0) {
+        FrameInput input;
+        input.mannequin_from_probe = pose;
+        input.time_s = time_s;
+        input.frame = frame;
+        renderer_->render(input, pixels_);
+        return detail_of(pixels_);
+    }
+    const std::vector<std::uint8_t>& pixels() const { return pixels_; }
+    // Mean of the best correlation of each patch whose middle lies so deep, the shift in the plane
+    // searched.
+    double correlation(const Plane& a, const Plane& b, double from_mm, double to_mm) const {
+        const auto layout = renderer_->layout();
+        double sum = 0;
+        int n = 0;
+        for (int y = 0; y + kPatch < kHeight; y += kPatch / 2) {
+            const double z = (y + kPatch / 2 - layout.origin_y_px) * layout.mm_per_px;
+            for (int x = kPatch; x + 2 * kPatch < kWidth; x += kPatch) {
+                const double across = (x + kPatch / 2 - layout.origin_x_px) * layout.mm_per_px;
+                const double r = std::hypot(across, z + 50.6) - 50.6;
+                if (r < from_mm || r > to_mm || std::abs(across) > 0.35 * (z + 50.6)) continue;
+                sum += best_of(a, b, x, y);
+                ++n;
+            }
+        }
+        return sum / n;
+    }
+
+  private:
+    static double best_of(const Plane& a, const Plane& b, int x, int y) {
+        double best = -1;
+        for (int dy = -4; dy <= 4; ++dy) {
+            for (int dx = -4; dx <= 4; ++dx) {
+                double sa = 0, sb = 0, aa = 0, bb = 0, ab = 0;
+                for (int j = 0; j < kPatch; ++j) {
+                    for (int i = 0; i < kPatch; ++i) {
+                        const double
+                            p = a[static_cast<std::size_t>((y + j) * kWidth + x + i)],
+                            q = b[static_cast<std::size_t>((y + dy + j) * kWidth + x + dx + i)];
+                        sa += p;
+                        sb += q;
+                        aa += p * p;
+                        bb += q * q;
+                        ab += p * q;
+                    }
+                }
+                constexpr double n = kPatch * kPatch;
+                best = std::max(
+                    best, (ab - sa * sb / n) / std::sqrt((aa - sa * sa / n) * (bb - sb * sb / n)));
+            }
+        }
+        return best;
+    }
+
+    std::optional<Renderer> renderer_;
+    std::vector<std::uint8_t> pixels_;
+};
+
+// Movement along the probe's own axes.
+Rigid moved(const Rigid& pose, Vector3 by_mm) {
+    return {pose.rotation, pose.translation + pose.rotation * by_mm};
+}
+
+Rigid turned(Vector3 axis, double degrees) {
+    return {rotation_about(normalized(axis), degrees * 3.14159265358979 / 180), {0, 0, 0}};
+}
+
+TEST(SpeckleMotion, AcrossTheSliceItFadesAsALivingLiverDoes) {
+    Sweep sweep;
+    // Level, and where two axes of the scatterers' lattice share the tissue.
+    for (const Rigid& pose : {Rigid{}, turned({0, 0, 1}, 20), turned({0.3, 0.2, 1}, 27)}) {
+        const Plane still = sweep.detail(pose);
+        const struct {
+            double mm, least;
+        } limits[] = {{0.2, 0.85}, {0.4, 0.75}, {0.6, 0.65}, {0.9, 0.50}, {1.5, 0.25}};
+        double half_mm = 0;
+        for (const auto& limit : limits) {
+            for (const double depth : {35, 52, 70}) {
+                const double c = sweep.correlation(
+                    still, sweep.detail(moved(pose, {0, limit.mm, 0})), depth, depth + 18);
+                std::printf("%.1f mm across the slice, %2.0f mm deep: %.2f\n", limit.mm, depth, c);
+                EXPECT_GE(c, limit.least);
+                if (c > 0.5) half_mm = std::max(half_mm, limit.mm);
+            }
+        }
+        EXPECT_GE(half_mm, 0.8);
+        EXPECT_LT(sweep.correlation(still, sweep.detail(moved(pose, {0, 2.2, 0})), 35, 88), 0.5);
+        EXPECT_LT(sweep.correlation(still, sweep.detail(moved(pose, {0, 6, 0})), 35, 88), 0.3);
+    }
+}
+
+TEST(SpeckleMotion, AlongTheFaceAndInDepthAFractionOfABeamKeepsIt) {
+    Sweep sweep;
+    for (const Rigid& pose : {Rigid{}, turned({0, 1, 0}, 30), turned({0.3, 0.2, 1}, 27),
+                              turned({0, 0, 1}, 90), turned({1, 1, 0}, 25)}) {
+        const Plane still = sweep.detail(pose);
+        const struct {
+            Vector3 by_mm;
+            double least;
+        } limits[] = {
+            {{0.2, 0, 0}, 0.85}, {{0.4, 0, 0}, 0.80}, {{0, 0, 0.1}, 0.85}, {{0, 0, 0.175}, 0.75}};
+        for (const auto& limit : limits) {
+            const double c =
+                sweep.correlation(still, sweep.detail(moved(pose, limit.by_mm)), 35, 88);
+            std::printf("%.2f mm along the face, %.2f in depth: %.2f\n", limit.by_mm.x,
+                        limit.by_mm.z, c);
+            EXPECT_GE(c, limit.least);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
