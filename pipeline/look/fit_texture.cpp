@@ -76,13 +76,14 @@ struct Simulation {
 
     // Amplitude fields, mean 1, for each of kLooks.
     std::vector<std::vector<float>> amplitudes(const Machine& machine,
-                                               std::span<const int> looks) const {
+                                               std::span<const int> looks,
+                                               std::uint64_t draw = 0) const {
         std::vector<std::vector<float>> fields(looks.size());
         parallel_for(looks.size(), 1, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
-                std::vector<float> power =
-                    speckle_power(machine, window.grid, options.tissue, 0, looks[i], options.seed);
-                add_streaks(window.grid, machine, options.tissue, options.seed, power);
+                std::vector<float> power = speckle_power(machine, window.grid, options.tissue, 0,
+                                                         looks[i], options.seed + draw);
+                add_streaks(window.grid, machine, options.tissue, options.seed + draw, power);
                 double mean = 0;
                 for (float& p : power) {
                     p = std::sqrt(p);
@@ -222,10 +223,15 @@ void fit_widths(const Simulation& sim, Machine& machine) {
     constexpr int kRounds = 3;
     for (int round = 0; round < kRounds; ++round) {
         const int looks[] = {machine.looks.count};
-        const auto amplitude = sim.amplitudes(machine, looks);
-        MachineGrey map = machine.grey;
-        set_level(amplitude[0], sim.measures.texture.mean, map);
-        const auto patches = sim.scores(amplitude[0], map);
+        // Two draws: the chance of one would be taken for a difference of width.
+        std::vector<PatchScores> patches;
+        for (const std::uint64_t draw : {0, 1}) {
+            const auto amplitude = sim.amplitudes(machine, looks, draw);
+            MachineGrey map = machine.grey;
+            set_level(amplitude[0], sim.measures.texture.mean, map);
+            const auto own = sim.scores(amplitude[0], map);
+            patches.insert(patches.end(), own.begin(), own.end());
+        }
         const PatchScores all = median_scores(patches);
         machine.beam.axial_mm =
             std::clamp(corrected(machine.beam.axial_mm, sim.measures.texture.grain_along_mm,

@@ -24,6 +24,8 @@ Suite smooth_suite();
 Suite texture_suite();
 // Probe point from synthetic recordings with a known tip.
 Suite calibrate_suite();
+// Point spread and grey of a known machine from frames of its own.
+Suite look_suite();
 // Frames of the player beside this program, against its finest sampling.
 Suite render_suite();
 // The whole chain on the demo torso, or another body of the same family.

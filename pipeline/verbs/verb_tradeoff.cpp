@@ -67,6 +67,7 @@ std::vector<NamedSuite> suites() {
         {"smooth", smooth_suite},
         {"texture", texture_suite},
         {"calibrate", calibrate_suite},
+        {"look", look_suite},
         {"render", render_suite},
         {"case", [] { return case_suite({}, kTimedBody); }},
         {"case", [] { return case_suite(*analytic_body("slender"), "slender"); }},

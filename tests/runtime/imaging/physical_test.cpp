@@ -71,7 +71,7 @@ TEST(PhysicalModel, AgreesWithTheSlowRendererWhileBreathing) {
     EXPECT_GT(compare(draw(exercise, physical_options(), input),
                       draw(exercise, physical_options(), still))
                   .mean,
-              3.0);
+              1.0);  // of a liver at 48 grey
 }
 
 TEST(PhysicalModel, AgreementHoldsOverRandomPosesProbesAndBundles) {
@@ -154,8 +154,8 @@ TEST(PhysicalModel, TargetsShowWhereTheyAreAndNowhereElse) {
             }
         }
     }
-    EXPECT_LT(inside / n, 35);
-    EXPECT_GT(before / n, 60);
+    EXPECT_LT(inside / n, 18);
+    EXPECT_GT(before / n, 28);
     // Far from the slab it is pruned, and the picture is the plain one.
     exercise.targets[0].centre.y = 25;
     EXPECT_TRUE(draw(exercise, physical_options(), input) == without);
