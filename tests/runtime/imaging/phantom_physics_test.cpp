@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Scores of realism, with limits from real images (docs/realism.md says which and how they were
-// measured). Homogeneous or simple phantoms, so that each score tests one thing; docs/realism.md
-// has those of organs.
+// What physics and phantoms say of the picture, whatever the machine: statistics of one look,
+// growth of the beam, bone, fascia, fluid, gas. Homogeneous or simple phantoms with exact surfaces,
+// so that each test is of one thing. What a living body's pictures look like: realism_test.cpp.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -94,7 +94,7 @@ Moments moments(const Bench& b, double from_mm, double to_mm) {
     return {sum / std::sqrt(square - sum * sum), square * square / (fourth - square * square)};
 }
 
-TEST(Realism, SpeckleOfHomogeneousTissueIsRayleigh) {
+TEST(PhantomPhysics, SpeckleOfHomogeneousTissueIsRayleigh) {
     for (const bool linear : {false, true}) {
         Bench b(homogeneous(), linear ? phantom_linear_exercise() : phantom_exercise());
         b.run();
@@ -165,38 +165,28 @@ Grain grain(const Bench& b, double from_mm, double to_mm) {
     return out;
 }
 
-TEST(Realism, LiverHasTheGrainAndContrastOfRealParenchyma) {
+TEST(PhantomPhysics, GrainIsFineAlongTheBeamAndWidensWithDepth) {
     PhantomOptions o;
     o.ribs = o.gas = o.vessels = o.kidney = o.layers = false;
     o.lower = {-110, -12, -25};
     o.upper = {110, 12, 160};
     Bench b(Phantom(o).bundle(), phantom_exercise());
     b.run();
-    std::vector<double> sd, skew;
     for (double z = 30; z < 120; z += 15) {
         const Grain g = grain(b, z, z + 15);
-        std::printf("liver %3.0f mm: grey %.0f sd %.1f skew %+.2f axial %.2f mm lateral %.2f mm\n",
-                    z, g.mean, g.sd, g.skew, g.axial_mm, g.lateral_mm);
-        sd.push_back(g.sd);
-        skew.push_back(g.skew);
+        std::printf("liver %3.0f mm: axial %.2f mm lateral %.2f mm\n", z, g.axial_mm, g.lateral_mm);
         EXPECT_GT(g.axial_mm, 0.6);
         EXPECT_LT(g.axial_mm, 1.4);
         EXPECT_GT(g.lateral_mm / g.axial_mm, 1.8);  // lowest of the living liver
         EXPECT_LT(g.lateral_mm / g.axial_mm, 6.0);
     }
-    std::nth_element(sd.begin(), sd.begin() + 3, sd.end());
-    std::nth_element(skew.begin(), skew.begin() + 3, skew.end());
-    EXPECT_GT(sd[3], 12);
-    EXPECT_LT(sd[3], 20);
-    EXPECT_GT(skew[3], -0.5);
-    EXPECT_LT(skew[3], 0.5);
     const double growth = grain(b, 110, 130).lateral_mm / grain(b, 50, 70).lateral_mm;
     std::printf("lateral growth from 60 to 120 mm: %.2f\n", growth);
     EXPECT_GT(growth, 1.2);
     EXPECT_LT(growth, 2.0);
 }
 
-TEST(Realism, BoneIsABrightLineWithADarkButNotBlackShadow) {
+TEST(PhantomPhysics, BoneIsABrightLineWithADarkButNotBlackShadow) {
     PhantomOptions o;
     o.gas = o.vessels = o.kidney = false;
     o.lower = {-60, -12, -15};
@@ -248,7 +238,7 @@ TEST(Realism, BoneIsABrightLineWithADarkButNotBlackShadow) {
     EXPECT_GT(shadow / m, 5);
 }
 
-TEST(Realism, FasciaStandsOutAndAVesselIsDark) {
+TEST(PhantomPhysics, FasciaStandsOutAndAVesselIsDark) {
     PhantomOptions o;
     o.ribs = o.gas = false;
     o.lower = {-30, -12, -10};
@@ -284,8 +274,7 @@ TEST(Realism, FasciaStandsOutAndAVesselIsDark) {
         }
     }
     std::printf("vessel lumen %.1f grey\n", lumen / m);
-    EXPECT_GT(lumen / m, 5);
-    EXPECT_LT(lumen / m, 35);
+    EXPECT_LT(lumen / m, 35);  // of living vessels 2 to 46
 }
 
 // Mean grey of some beams over a stretch of depth.
@@ -298,7 +287,7 @@ double grey_of(const Bench& b, double from_mm, double to_mm, int first_line, int
     return sum / n;
 }
 
-TEST(Realism, BehindFluidTissueIsBrighterButNotWhite) {
+TEST(PhantomPhysics, BehindFluidTissueIsBrighterButNotWhite) {
     PhantomOptions o;
     o.ribs = o.gas = o.kidney = false;
     Bench b(Phantom(o).bundle(), phantom_exercise());
@@ -317,7 +306,7 @@ TEST(Realism, BehindFluidTissueIsBrighterButNotWhite) {
     EXPECT_LT(behind - beside, 35);
 }
 
-TEST(Realism, GasThrowsLinesAtMultiplesOfItsDepth) {
+TEST(PhantomPhysics, GasThrowsLinesAtMultiplesOfItsDepth) {
     Bench b(phantom(), phantom_exercise());
     b.frame.volume_from_probe.translation = {48, 0, 0};  // its face 36 mm under the middle
     // Few beams meet the face squarely, and a draw of clutter is wider than they: mean of draws.
@@ -350,7 +339,7 @@ TEST(Realism, GasThrowsLinesAtMultiplesOfItsDepth) {
     EXPECT_GT(mean(40, 46), mean(86, 96) + 30);
 }
 
-TEST(Realism, SpeckleFollowsTheTissue) {
+TEST(PhantomPhysics, SpeckleFollowsTheTissue) {
     Bench b(homogeneous(), phantom_linear_exercise());
     const double pitch = b.geometry.line_step;
     const int beams = static_cast<int>(std::lround(1.75 / pitch));
@@ -388,7 +377,7 @@ TEST(Realism, SpeckleFollowsTheTissue) {
     EXPECT_LT(correlation(0), 0.2);
 }
 
-TEST(Realism, MuscleUnderALinearProbeIsStrandsOnDarkGround) {
+TEST(PhantomPhysics, MuscleUnderALinearProbeIsStrandsOnDarkGround) {
     PhantomOptions o;
     o.ribs = o.gas = o.vessels = o.kidney = false;
     o.lower = {-35, -12, -10};
