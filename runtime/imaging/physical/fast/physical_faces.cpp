@@ -18,7 +18,7 @@ void PhysicalFast::find_faces(const PhysicalFrame& f, const BreathingField* brea
         for (int n = part * kFaceEvery; n < std::min((part + 1) * kFaceEvery, nodes); ++n) {
             const int line = std::min(n * kFaceEvery, geometry_.scanlines - 1);
             face_nodes_[static_cast<std::size_t>(n)] =
-                find_face(scene_, geometry_, f, breathing,
+                find_face(scene_, geometry_, tables_, f, breathing,
                           static_cast<double>(gaps_[static_cast<std::size_t>(line)]), line);
             if (!f.effects.diaphragm) face_nodes_[static_cast<std::size_t>(n)].peak = 0;
         }

@@ -64,7 +64,7 @@ struct PhysicalStreak {
     float amplitude = 0;
     int sample_begin = 0, sample_end = 0;
 };
-inline constexpr int kBlockStreaks = 64;  // in a block of beams
+inline constexpr int kBlockStreaks = 192;  // in a block of beams
 
 struct PhysicalTarget {
     float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels

@@ -53,6 +53,7 @@ struct GasFaces {
 // gap_mm: of the beam; negative: air. Cost: 1 us.
 FaceNode find_face(const PhysicalScene& scene,
                    const ScanGeometry& geometry,
+                   const Tables& tables,
                    const PhysicalFrame& frame,
                    const BreathingField* breathing,
                    double gap_mm,

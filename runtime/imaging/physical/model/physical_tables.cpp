@@ -76,7 +76,6 @@ Tables make_tables(const Probe& probe, const ScanGeometry& g) {
     const double wavelength = 1.54 / probe.frequency_mhz;
     const double axial_fwhm = 0.58 * std::pow(3.5 / probe.frequency_mhz, 0.7);  // 0.33 mm at 8 MHz
     t.axial_mm = axial_fwhm;
-    t.wall = make_wall_tables(probe.frequency_mhz, axial_fwhm);
     // As coarse as the point spread allows, so that samples a beam apart share scatterers.
     t.cell_mm = std::max(std::min(kCellMm * std::pow(3.5 / probe.frequency_mhz, 0.7), axial_fwhm),
                          kCellPerStep * g.step_mm);
@@ -89,6 +88,16 @@ Tables make_tables(const Probe& probe, const ScanGeometry& g) {
     const double peak = kPhaseLoss * peak_of_layer(whole, g.step_mm / kLayerMm) /
                         (0.5 * sum(whole) + 0.5 * static_cast<double>(whole[kMaxAxial])) /
                         peak_of_layer(t.axial, g.step_mm / blurred_mm(t, kLayerMm));
+
+    // What brings the peak of a smooth layer of that deviation, times interface_scale, to 1.
+    const auto layer_scale = [&](double sigma_mm) {
+        return 1 / (peak * peak_of_layer(t.axial, g.step_mm / sigma_mm));
+    };
+    t.wall = make_wall_tables(probe.frequency_mhz,
+                              rest_of(axial_fwhm, t.cell_mm) / kSigmaPerFwhm, layer_scale);
+    t.streak_mm = std::max(kStreakMm, 0.6 * g.step_mm);
+    t.streak_scale = layer_scale(t.streak_mm);
+    t.dome_scale = layer_scale(kDomeMm);
 
     t.rows.resize(static_cast<std::size_t>(g.samples));
     for (int k = 0; k < g.samples; ++k) {

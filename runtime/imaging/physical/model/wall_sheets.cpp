@@ -22,7 +22,7 @@ constexpr Sheet kOuter[] = {
 };
 // Above the organs: the peritoneum, then the sheets of three muscles.
 constexpr Sheet kInner[] = {
-    {1.4, 16, 1.5}, {4.6, 12, 1.2, 1.3}, {8.6, 12, 1.3}, {12.6, 11, 1.3, 1.5}, {17, 8, 1.2},
+    {1.4, 18, 1.5}, {4.6, 12, 1.2, 1.3}, {8.6, 12, 1.3}, {12.6, 11, 1.3, 1.5}, {17, 8, 1.2},
 };
 // What a pulse of a third of the length shows: septa of fat and fasciae, thin and many.
 constexpr Sheet kOuterFine[] = {
@@ -35,7 +35,10 @@ constexpr Sheet kInnerFine[] = {
 };
 constexpr double kFineMhz = 6;
 
-std::vector<float> table_of(std::span<const Sheet> sheets, double scale, double axial_mm) {
+std::vector<float> table_of(std::span<const Sheet> sheets,
+                            double scale,
+                            double axial_mm,
+                            const std::function<double(double)>& layer_scale) {
     const double last = sheets.back().at_mm + 5;
     std::vector<float> table(static_cast<std::size_t>((last + kWallBeforeMm) * kWallSteps), 0.0f);
     const auto add = [&](double at_mm, double db, double width_mm) {
@@ -44,7 +47,7 @@ std::vector<float> table_of(std::span<const Sheet> sheets, double scale, double 
         const double seen = width_mm * scale;
         const double own = std::max(seen * seen - axial_mm * axial_mm, 0.09 * seen * seen);
         const double sigma = std::sqrt(own) / kFwhmPerSigma;
-        const double amplitude = std::pow(10.0, db / 20);
+        const double amplitude = std::pow(10.0, db / 20) * layer_scale(sigma);
         for (std::size_t i = 0; i < table.size(); ++i) {
             const double u = (static_cast<double>(i) / kWallSteps - kWallBeforeMm - at_mm) / sigma;
             if (std::abs(u) < 4) table[i] += static_cast<float>(amplitude * std::exp(-0.5 * u * u));
@@ -60,12 +63,16 @@ std::vector<float> table_of(std::span<const Sheet> sheets, double scale, double 
 
 }  // namespace
 
-WallTables make_wall_tables(double frequency_mhz, double axial_mm) {
+WallTables make_wall_tables(double frequency_mhz,
+                            double axial_mm,
+                            const std::function<double(double)>& layer_scale) {
     const bool fine = frequency_mhz > kFineMhz;
     const double scale = std::pow(3.5 / frequency_mhz, 0.7);
     WallTables t;
-    t.outer = table_of(fine ? std::span<const Sheet>(kOuterFine) : kOuter, scale, axial_mm);
-    t.inner = table_of(fine ? std::span<const Sheet>(kInnerFine) : kInner, scale, axial_mm);
+    t.outer = table_of(fine ? std::span<const Sheet>(kOuterFine) : kOuter, scale, axial_mm,
+                       layer_scale);
+    t.inner = table_of(fine ? std::span<const Sheet>(kInnerFine) : kInner, scale, axial_mm,
+                       layer_scale);
     if (fine) {
         t.wave_mm = 0.25;
         t.strength_db = 9;

@@ -211,8 +211,7 @@ class Beams {
             for (std::size_t n = 0; n < nodes.size(); ++n) {
                 const int line =
                     std::min(static_cast<int>(n) * kFaceEvery, in_.geometry.scanlines - 1);
-                nodes[n] = find_face(
-                    in_.scene, in_.geometry, f, breathing_.empty() ? nullptr : &breathing_,
+                nodes[n] = find_face(in_.scene, in_.geometry, in_.tables, f, breathing_.empty() ? nullptr : &breathing_,
                     static_cast<double>(gaps_[static_cast<std::size_t>(line)]), line);
                 if (!f.effects.diaphragm) nodes[n].peak = 0;
             }
