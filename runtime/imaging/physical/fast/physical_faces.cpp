@@ -18,7 +18,7 @@ void PhysicalFast::find_faces(const PhysicalFrame& f, const BreathingField* brea
         for (int n = part * kFaceEvery; n < std::min((part + 1) * kFaceEvery, nodes); ++n) {
             const int line = std::min(n * kFaceEvery, geometry_.scanlines - 1);
             face_nodes_[static_cast<std::size_t>(n)] =
-                find_face(scene_, geometry_, tables_, f, breathing,
+                find_face(scene_, geometry_, f, breathing,
                           static_cast<double>(gaps_[static_cast<std::size_t>(line)]), line);
             if (!f.effects.diaphragm) face_nodes_[static_cast<std::size_t>(n)].peak = 0;
         }
@@ -36,6 +36,7 @@ void PhysicalFast::show_faces(int line, PhysicalBlock& b) const {
     const float* dome = faces_.dome_mm.data() + line;
     if (std::all_of(dome, dome + kBeamBlock, [](float mm) { return mm >= kNoFace; })) return;
     b.dome_mm = dome;
+    b.dome_scale = static_cast<float>(tables_.dome_scale);
 }
 
 }  // namespace sonocase::runtime

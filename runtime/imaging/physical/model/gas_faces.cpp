@@ -28,7 +28,6 @@ void smooth(std::span<FaceNode> nodes) {
 
 FaceNode find_face(const PhysicalScene& s,
                    const ScanGeometry& g,
-                   const Tables& tables,
                    const PhysicalFrame& f,
                    const BreathingField* breathing,
                    double gap_mm,
@@ -63,7 +62,7 @@ FaceNode find_face(const PhysicalScene& s,
         if (s.is_lung[label] && organ && r > kDomeFromMm) {
             const double strength =
                 s.layers.empty() ? 0 : std::clamp(s.layers.at(voxel_at(r)).strength, -2.0, 2.0);
-            face.peak = static_cast<float>(kDomeAmplitude * tables.dome_scale *
+            face.peak = static_cast<float>(kDomeAmplitude *
                                            std::exp2(kDomeStrengthDb / kDbPerLog2 * strength));
         }
         return face;

@@ -214,6 +214,7 @@ void keep_what_reaches_out(const Cells& c, const Field& body, Field& above) {
     for (std::size_t at = 0; at < body.size(); ++at) {
         if (body[at] < 0.5f) visit(at);
     }
+    if (front.empty()) return;  // a block without surroundings
     while (!front.empty()) {
         const std::size_t at = front.back();
         front.pop_back();
