@@ -14,11 +14,11 @@ Machine classic() {
     m.beam.axial_mm = m.beam.lateral_mm = 0;
     m.beam.lateral_focus_mm = 0;
     m.looks = {1, 1, 0};
-    m.grey = {GreyMap::log, 0, 136, 1, 255, 1, 60};
-    m.noise = {-70, false};
+    m.grey = {GreyMap::log, 0, 131.5, 1, 255, 1, 60};
+    m.noise = {-67, false};
     m.gain = {0, 500, 0, 0};
     m.near_field = {1.6, 2.2, 0.3, 9, 0, 0.5, 1.9, 0, 0, 0.8, 1, 3};
-    m.haze.fraction = 0;
+    m.haze = {0, 4.5, 2, -24};
     m.contact = {0, 0};
     m.post_filter = true;
     return m;
@@ -38,7 +38,7 @@ Machine modern_linear() {
     m.looks.near_mm = 8;
     m.gain = {0, 14, 3, 10};
     m.near_field = {1, 0.9, 0, 9, 3, 0.3, 0.8, 4, 2.2, 0.35, 0.5, 1.5};
-    m.haze = {0.2, 1.6, 0.8};
+    m.haze = {0.2, 1.6, 0.8, -120};
     m.contact = {6, 0.05};
     return m;
 }

@@ -87,7 +87,9 @@ struct MachineNearField {
 struct MachineHaze {
     double fraction = 0.3;  // 0: none; [0, 10]
     double decay_mm = 4.5;  // [0.1, 100]
-    double across_mm = 2;   // full width at half height, [0, 50]
+    double across_mm = 2;   // full width of the mean, [0, 50]
+    // Side lobes: a part of the mean envelope of the neighbourhood, dB; -120: none; [-120, 0]
+    double side_lobe_db = -120;
     bool operator==(const MachineHaze&) const = default;
 };
 

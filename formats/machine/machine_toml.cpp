@@ -64,6 +64,7 @@ void visit_machine(M& m, V& v) {
     v.number("fraction", m.haze.fraction, 0, 10);
     v.number("decay_mm", m.haze.decay_mm, 0.1, 100);
     v.number("across_mm", m.haze.across_mm, 0, 50);
+    v.number("side_lobe_db", m.haze.side_lobe_db, -120, 0);
     v.table("contact");
     v.number("edge_db", m.contact.edge_db, 0, 120);
     v.number("edge_fraction", m.contact.edge_fraction, 0, 0.5);

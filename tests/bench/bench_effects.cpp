@@ -128,7 +128,7 @@ struct PhysicalRig {
     const runtime::ScanGeometry geometry =
         runtime::make_scan_geometry(exercise.probe, kPhysicalLines, kSamples, kPixels, kPixels);
     const runtime::physical::Tables tables =
-        runtime::physical::make_tables(exercise.probe, geometry);
+        runtime::physical::make_tables(exercise.probe, {}, geometry);
     const runtime::PhysicalNoise noise = runtime::make_physical_noise(
         runtime::physical_textures().normal_levels, 1, kPhysicalLines + 128);
     const runtime::NeedleShape shaft = needle_of(exercise);

@@ -5,9 +5,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "formats/machine/machine.h"
 #include "runtime/imaging/host/host.h"
 
 namespace sonocase::runtime {
@@ -20,9 +22,11 @@ struct PhysicalTextures;  // see make_physical_textures() in renderer.h
 struct RenderOptions {
     ImageModel model = ImageModel::physical;
     RendererKind kind = RendererKind::fast;
-    int width_px = 512;                        // [1, 8192]
-    int height_px = 512;                       // [1, 8192]
-    int threads = 1;                           // [1, 256], the caller's included; see Host
+    int width_px = 512;   // [1, 8192]
+    int height_px = 512;  // [1, 8192]
+    int threads = 1;      // [1, 256], the caller's included; see Host
+    // How the machine draws, model physical; none: `modern`, or `modern-linear` for a linear probe.
+    std::optional<Machine> machine;
     std::vector<std::string> effects{"auto"};  // "auto", "all", "none", NAME or -NAME
     std::uint32_t seed = 1;
     // Beams [0, 4096] and samples per beam [0, 8192]; 0 takes the model's own number (paper

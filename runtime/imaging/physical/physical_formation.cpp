@@ -16,6 +16,11 @@
 namespace sonocase::runtime {
 namespace {
 
+Machine machine_of(const FormationInput& input) {
+    return input.options.machine ? *input.options.machine
+                                 : physical::default_machine(input.exercise.probe);
+}
+
 class PhysicalFormation final : public ImageFormation {
   public:
     PhysicalFormation(PhysicalScene scene, PhysicalNoise noise, const FormationInput& input)
@@ -27,7 +32,8 @@ class PhysicalFormation final : public ImageFormation {
           reference_(input.options.kind == RendererKind::reference),
           keep_all_(input.effects.keep_all),
           switches_(switches_of<PhysicalEffects>(kPhysicalEffects, input.effects.on)),
-          context_(input.context) {
+          context_(input.context),
+          machine_(machine_of(input)) {
         if (exercise_.breathing.amplitude_mm != 0) breathing_ = BreathingField(*input.bundle);
         const auto make_background = input.options.host.make_background;
         if (input.options.read_ahead && blocks_ != nullptr && !reference_ &&
@@ -38,7 +44,7 @@ class PhysicalFormation final : public ImageFormation {
     void add_level(const ScanGeometry& geometry) override {
         Level& level = *levels_.emplace_back(std::make_unique<Level>());
         level.geometry = geometry;
-        level.tables = physical::make_tables(exercise_.probe, geometry);
+        level.tables = physical::make_tables(exercise_.probe, machine_, geometry);
         if (reference_) return;
         level.fast =
             std::make_unique<PhysicalFast>(scene_, geometry, level.tables, noise_, context_);
@@ -112,6 +118,7 @@ class PhysicalFormation final : public ImageFormation {
     const bool reference_, keep_all_;
     const PhysicalEffects switches_;
     const RenderContext context_;
+    const Machine machine_;
     std::vector<std::unique_ptr<Level>> levels_;
     std::optional<ReadAhead> ahead_;  // ends before the levels that it looks at
 };
@@ -128,7 +135,8 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,
                                         input.scanlines + kNoiseSlack);
         } else {
-            scene = make_physical_scene(input.bundle, input.exercise.targets, {&jobs, textures});
+            scene = make_physical_scene(input.bundle, input.exercise.targets,
+                                        {&jobs, textures, machine_of(input).tissue_db});
         }
     });
     if (!*scene) return scene->error();

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/machine/machine_toml.h"
 #include "imaging_support.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
 
@@ -53,7 +54,7 @@ struct BlockBench {
     BlockBench(const CaseBundle& b, const Exercise& e) : bundle(b), exercise(e) {
         geometry = make_scan_geometry(exercise.probe, 192, 512, 128, 128);
         scene = *make_physical_scene(bundle);
-        tables = physical::make_tables(exercise.probe, geometry);
+        tables = physical::make_tables(exercise.probe, *built_in_machine("classic"), geometry);
         noise = make_physical_noise(scene.textures->normal_levels, 1, 192 + 128);
         gain.assign(512, 0.0f);
         renderer = std::make_unique<PhysicalFast>(
@@ -66,9 +67,10 @@ struct BlockBench {
         frame.effects.point_spread = true;
     }
     void run() { renderer->render(frame, {}, false, false, pixels); }
-    // Amplitude; row: a sample.
+    // Amplitude before TGC; row: a sample.
     double envelope(int row, int line) const {
-        return std::sqrt(static_cast<double>(renderer->power_row(row)[line]));
+        return std::sqrt(static_cast<double>(renderer->power_row(row)[line])) /
+               tables.rows[static_cast<std::size_t>(row)].gain;
     }
     double mean_envelope(int row) const {
         double sum = 0;

@@ -92,10 +92,11 @@ TEST(BodyWall, ASheetsEchoIsItsOwnTimesTheEighthPowerOfTheCosine) {
         return sum;
     };
     const double straight = peak(0);
-    EXPECT_NEAR(20 * std::log10(straight), 18, 1.5);
-    for (const double angle : {0.15, 0.3}) {
+    // The slope of the distances is good to 5 %, its eighth power to 3.5 dB.
+    EXPECT_NEAR(20 * std::log10(straight), 18, 3.5);
+    for (const double angle : {0.45, 0.6}) {
         const double expected = 8 * 20 * std::log10(std::cos(angle));
-        EXPECT_NEAR(20 * std::log10(peak(angle) / straight), expected, 1.2) << angle;
+        EXPECT_NEAR(20 * std::log10(peak(angle) / straight), expected, 4) << angle;
     }
 }
 

@@ -71,7 +71,7 @@ TEST(PhysicalModel, AgreesWithTheSlowRendererWhileBreathing) {
     EXPECT_GT(compare(draw(exercise, physical_options(), input),
                       draw(exercise, physical_options(), still))
                   .mean,
-              3.0);
+              1.0);  // of a liver at 48 grey
 }
 
 TEST(PhysicalModel, AgreementHoldsOverRandomPosesProbesAndBundles) {
@@ -160,8 +160,8 @@ TEST(PhysicalModel, TargetsShowWhereTheyAreAndNowhereElse) {
             }
         }
     }
-    EXPECT_LT(inside / n, 35);
-    EXPECT_GT(before / n, 60);
+    EXPECT_LT(inside / n, 18);
+    EXPECT_GT(before / n, 20);
     // Far from the slab it is pruned, and the picture is the plain one.
     exercise.targets[0].centre.y = 25;
     EXPECT_TRUE(draw(exercise, physical_options(), input) == without);
@@ -176,7 +176,7 @@ TEST(PhysicalModel, PicturesForTheEye) {
     FrameInput input;
     write_pgm(::testing::TempDir() + "physical_linear.pgm", draw(linear, o, input), 512, 512);
     const auto pixels = draw(curved, o, input);
-    EXPECT_GT(*std::max_element(pixels.begin(), pixels.end()), 200);
+    EXPECT_GT(*std::max_element(pixels.begin(), pixels.end()), 150);
 }
 
 }  // namespace

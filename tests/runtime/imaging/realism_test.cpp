@@ -10,6 +10,7 @@
 #include <complex>
 #include <numeric>
 
+#include "formats/machine/machine_toml.h"
 #include "imaging_support.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
 
@@ -32,10 +33,11 @@ struct Bench {
     PhysicalFrame frame;
     std::vector<std::uint8_t> pixels;
 
-    Bench(CaseBundle b, const Exercise& e) : bundle(std::move(b)), exercise(e) {
+    Bench(CaseBundle b, const Exercise& e, const std::string& machine = "classic")
+        : bundle(std::move(b)), exercise(e) {
         geometry = make_scan_geometry(exercise.probe, 192, 512, 512, 512);
         scene = *make_physical_scene(bundle);
-        tables = physical::make_tables(exercise.probe, geometry);
+        tables = physical::make_tables(exercise.probe, *built_in_machine(machine), geometry);
         noise = make_physical_noise(scene.textures->normal_levels, 1, 192 + 128);
         gain.assign(512, 0.0f);
         renderer = std::make_unique<PhysicalFast>(

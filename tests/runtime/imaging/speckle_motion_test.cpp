@@ -174,7 +174,8 @@ TEST(SpeckleMotion, AcrossTheSliceItFadesAsALivingLiverDoes) {
 
 TEST(SpeckleMotion, AlongTheFaceAndInDepthAFractionOfABeamKeepsIt) {
     Sweep sweep;
-    for (const Rigid& pose : {Rigid{}, turned({0.3, 0.2, 1}, 27)}) {
+    for (const Rigid& pose : {Rigid{}, turned({0, 1, 0}, 30), turned({0.3, 0.2, 1}, 27),
+                              turned({0, 0, 1}, 90), turned({1, 1, 0}, 25)}) {
         const Plane still = sweep.detail(pose);
         const struct {
             Vector3 by_mm;

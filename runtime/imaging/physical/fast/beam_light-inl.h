@@ -27,6 +27,7 @@ struct BeamLight {
     V lit;                   // the last light well before a face of gas
     V reverb, period, next;  // amplitude of the next line, mm between lines, depth of the next
     I before, before_that;   // kinds of the two samples above
+    V clutter;               // power
     int tail_from = 0;
 };
 
@@ -87,9 +88,9 @@ HWY_INLINE void light_face(D d, const PhysicalBlock& b, int beam, int k, BeamLig
     const auto face = hn::LoadU(d, b.face_mm + beam), r = hn::Set(d, b.r[k]);
     const auto before = hn::Lt(r, hn::Sub(face, hn::Set(d, static_cast<float>(kFaceLightMm))));
     t.lit = hn::IfThenElse(before, hn::Mul(t.light, hn::Set(d, b.gain[k])), t.lit);
-    const auto meets = hn::And(
-        hn::And(hn::Ge(r, face), hn::Lt(hn::Sub(r, hn::Set(d, b.step_mm)), face)),
-        hn::Gt(t.light, hn::Zero(d)));
+    const auto meets =
+        hn::And(hn::And(hn::Ge(r, face), hn::Lt(hn::Sub(r, hn::Set(d, b.step_mm)), face)),
+                hn::Gt(t.light, hn::Zero(d)));
     if (hn::AllFalse(d, meets)) return;
     const auto dome = hn::Gt(hn::LoadU(d, b.face_peak + beam), hn::Zero(d));
     const auto c = hn::LoadU(d, b.cosine + beam), c2 = hn::Mul(c, c);
@@ -102,7 +103,8 @@ HWY_INLINE void light_face(D d, const PhysicalBlock& b, int beam, int k, BeamLig
 // belongs to a neighbour that the random look-up hit. above_mm: depth of the sample above.
 template <class D, class V, class I>
 HWY_INLINE void light_tails(D d,
-                            const PhysicalBlock& b, V light_and_gain,
+                            const PhysicalBlock& b,
+                            V light_and_gain,
                             V facing,
                             I kind,
                             float above_mm,
@@ -143,6 +145,20 @@ HWY_INLINE V behind_dome(D d, const PhysicalBlock& b, int beam, int k, V left) {
     return hn::IfThenElse(near, hn::IfThenElseZero(hn::Lt(past, reach), hn::Set(d, 1.0f)), left);
 }
 
+// Reverberation between the layers below what is bright: each sample leaves a part of its power.
+template <class D>
+HWY_INLINE void add_clutter(
+    D d, const PhysicalBlock& b, std::ptrdiff_t at, int k, BeamLight<D>& t) {
+    const hn::RebindToSigned<D> di;
+    const auto echo = hn::LoadU(di, b.echoes + at);
+    const auto re = echo_real(d, echo), im = echo_imaginary(d, echo);
+    const auto lit = hn::Mul(t.light, hn::Set(d, b.gain[k]));
+    const auto power = hn::Mul(hn::Add(hn::Mul(re, re), hn::Mul(im, im)), hn::Mul(lit, lit));
+    t.clutter = hn::Add(hn::Mul(t.clutter, hn::Set(d, b.clutter_keep)),
+                        hn::Mul(power, hn::Set(d, b.clutter_gain)));
+    hn::StoreU(t.clutter, d, b.clutter + at);
+}
+
 // kTails: the stretch holds bone or gas, or follows some.
 template <bool kTails, class D>
 HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, BeamLight<D>& t) {
@@ -167,6 +183,7 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
         }
         hn::StoreU(t.light, d, b.light + out);
         if (b.face_mm != nullptr) light_face(d, b, c.beam, k, t);
+        if (b.clutter != nullptr) add_clutter(d, b, out, k, t);
         if constexpr (kTails) {
             const auto kind = hn::And(hn::Load(di, c.look.row(row)), kind_bits);
             fade_tails(d, b, t);
@@ -220,6 +237,10 @@ HWY_INLINE void dark_rows(D d, const PhysicalBlock& b, int beam, int first, Beam
         for (int look = 0; look < b.looks_at[k]; ++look)
             hn::StoreU(hn::Zero(di), di, b.echoes + look * b.look_stride + out);
         hn::StoreU(hn::Zero(d), d, b.light + out);
+        if (b.clutter != nullptr) {
+            t.clutter = hn::Mul(t.clutter, hn::Set(d, b.clutter_keep));
+            hn::StoreU(t.clutter, d, b.clutter + out);
+        }
         if (t.tail_from > k) continue;
         fade_tails(d, b, t);
         hn::StoreU(tail_power(d, b, k, t), d, b.tail + out);

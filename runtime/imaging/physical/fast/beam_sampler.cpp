@@ -38,7 +38,8 @@ void sample_beams_as(PhysicalBlock& b) {
     for (int v = 0; v < kBeamBlock; v += lanes) {
         c.beam = v;
         const auto air = hn::Lt(hn::LoadU(d, b.beams + kGap * b.lines + v), zero);
-        BeamLight<D> light{hn::IfThenZeroElse(air, hn::Set(d, 1.0f)),
+        const auto edge = hn::LoadU(d, b.beams + kEdge * b.lines + v);
+        BeamLight<D> light{hn::IfThenZeroElse(air, edge),
                            zero,
                            zero,
                            zero,
@@ -49,6 +50,7 @@ void sample_beams_as(PhysicalBlock& b) {
                            zero,
                            hn::Zero(di),
                            hn::Zero(di),
+                           zero,
                            b.samples};
         for (int k = 0; k < b.samples; k += kChunkRows) {
             if (!b.keep_all && hn::AllTrue(d, hn::Lt(light.light, hn::Set(d, b.dead_light)))) {

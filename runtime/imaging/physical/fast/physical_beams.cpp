@@ -46,6 +46,7 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
             put(kVoxelPerMm + axis, inverse_voxel * beam[axis]);
             put(kBeam + axis, beam[axis]);
         }
+        put(kEdge, f.effects.contact ? tables_.edge[static_cast<std::size_t>(line)] : 1);
         for (int side = 0; side < slice_.count; ++side) {
             const SpeckleSide& cut = slice_.sides[static_cast<std::size_t>(side)];
             const Vector3* of[3] = {&cut.height, &cut.u, &cut.v};
@@ -227,25 +228,20 @@ PhysicalBlock PhysicalFast::block_of_frame(const PhysicalFrame& f, bool keep_all
     b.keep_all = keep_all;
     b.hard_scene = scene_.has_hard;
     b.stride = stride_;
+    b.clutter_keep = static_cast<float>(tables_.haze_keep);
+    b.clutter_gain = static_cast<float>(tables_.haze_gain);
     return b;
 }
 
-// Beyond the outermost beams the light is mirrored, for the boxes of the aperture.
-void PhysicalFast::mirror_light(int block) {
+// Beyond the outermost beams a plane is mirrored, `reach` beams far.
+void PhysicalFast::mirror_rows(float* plane, int reach) const {
     const int lines = geometry_.scanlines;
-    const auto each_row = [&](const auto& work) {
-        for (int k = 0; k < geometry_.samples; ++k)
-            work(light_ + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_);
-    };
-    if (block == 0) {
-        each_row([&](float* light) {
-            for (int j = 0; j < 3; ++j) light[-1 - j] = light[std::min(j, lines - 1)];
-        });
-    }
-    if (block == lines_ / kBeamBlock - 1) {
-        each_row([&](float* light) {
-            for (int j = 0; j < 3; ++j) light[lines + j] = light[std::max(lines - 1 - j, 0)];
-        });
+    for (int k = 0; k < geometry_.samples; ++k) {
+        float* row = plane + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_;
+        for (int j = 0; j < reach; ++j) {
+            row[-1 - j] = row[std::min(j, lines - 1)];
+            row[lines + j] = row[std::max(lines - 1 - j, 0)];
+        }
     }
 }
 
@@ -272,6 +268,20 @@ struct MetByAny {
 
 }  // namespace
 
+// What the machine has, for the table of effects.
+void PhysicalFast::meet_machine(const PhysicalFrame& f) {
+    const Machine& m = tables_.machine;
+    met_.edge_contact = m.contact.edge_db > 0 && m.contact.edge_fraction > 0;
+    met_.compounding = tables_.looks > 1;
+    met_.receiver_noise = has_noise(tables_);
+    met_.blending = has_noise(tables_) && f.effects.noise && tables_.persisted > 1;
+    met_.reverberation = has_clutter(tables_);
+    met_.side_lobes = has_side_lobes(tables_);
+    met_.binomial = m.post_filter;
+    met_.sharpening = m.edge_enhancement > 0;
+    met_.logarithm = has_logarithm(tables_);
+}
+
 double PhysicalFast::sample_beams(const PhysicalFrame& f,
                                   const BreathingField& breathing,
                                   bool keep_all) {
@@ -293,6 +303,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
             ? find_streaks(scene_, g, tables_, f, breathes ? &breathing : nullptr, gaps_, streaks_)
             : 0;
     find_faces(f, breathes ? &breathing : nullptr);
+    const bool clutter = f.effects.clutter && has_clutter(tables_);
     MetByAny met;
     std::atomic<double> needle_ms{0};
     context_.workers.for_each(lines_ / kBeamBlock, [&](int, int block) {
@@ -316,6 +327,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
             place_wall(f, breathes ? &breathing : nullptr, keep_all, line, wall);
             b.wall = &wall;
         }
+        b.clutter = clutter ? clutter_ + kRowMargin + line : nullptr;
         sample_beam_block(context_.simd, b);
         met.add(b);
         NeedleRow row;
@@ -327,8 +339,9 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
             met.needle.store(true, std::memory_order_relaxed);
         }
         tail_from_[static_cast<std::size_t>(block)] = b.tail_from;
-        mirror_light(block);
     });
+    mirror_rows(light_, 3);  // for the boxes of the aperture
+    if (clutter) mirror_rows(clutter_, kMaxHazeReach);
     met_.breathes = f.motion.breathes();
     met_.pulses = f.motion.pulse_mm != 0;
     met_.has_echo = scene_.words.has_echo();
@@ -343,6 +356,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     met_.parenchyma = met.parenchyma;
     met_.needle_given = f.needle != nullptr;
     met_.needle = met.needle;
+    meet_machine(f);
     return needle_ms.load() / context_.workers.threads();
 }
 

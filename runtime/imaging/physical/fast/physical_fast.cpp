@@ -110,7 +110,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     speckle_level_bare_.assign(samples, static_cast<float>(kBareSpeckle));
     for (auto* starts : {&elevation_start_, &lookup_start_, &clutter_start_, &haze_start_})
         starts->resize(2 * samples);
-    noise_start_.resize(2 * kPersistedFrames * samples);
+    noise_start_.resize(2 * kMaxPersisted * samples);
 
     const auto lines = static_cast<std::size_t>(lines_);
     raw_gaps_.assign(lines + kSlack, 0.0f);
@@ -133,7 +133,8 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     const std::size_t area = samples * static_cast<std::size_t>(stride_) + kSlack;
     // One allocation; rows begin on cache lines.
     const std::size_t line_of_floats = 16;
-    const auto planes = static_cast<std::size_t>(tables.looks) + 3;
+    const std::size_t echoes_at = has_clutter(tables) ? 4 : 3;
+    const std::size_t planes = static_cast<std::size_t>(tables.looks) + echoes_at;
     planes_.assign(planes * area + line_of_floats, 0.0f);
     void* start = planes_.data();
     std::size_t space = planes_.size() * sizeof(float);
@@ -142,7 +143,8 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     light_ = plane;
     tail_ = plane + area;
     power_ = plane + 2 * area;
-    echoes_ = reinterpret_cast<std::int32_t*>(plane + 3 * area);
+    echoes_ = reinterpret_cast<std::int32_t*>(plane + echoes_at * area);
+    if (has_clutter(tables)) clutter_ = plane + 3 * area;
     look_stride_ = static_cast<std::ptrdiff_t>(area);
     tail_from_.assign(lines / kBeamBlock, 0);
     const auto threads = static_cast<std::size_t>(context.workers.threads());

@@ -68,7 +68,8 @@ class PhysicalFast {
                     PhysicalWall& wall);
     // Returns the time of the needle, ms.
     double sample_beams(const PhysicalFrame& frame, const BreathingField& breathing, bool keep_all);
-    void mirror_light(int block);
+    void mirror_rows(float* plane, int reach) const;
+    void meet_machine(const PhysicalFrame& frame);
     void filter_rows(const PhysicalFrame& frame);
     void fill_row_task(const PhysicalFrame& frame, int sample, PhysicalRowTask& task) const;
     void spread_haze(int cell_row, float level, const float* envelope);
@@ -110,6 +111,7 @@ class PhysicalFast {
     std::int32_t* echoes_ = nullptr;  // one plane per look
     std::ptrdiff_t look_stride_ = 0;
     float *light_ = nullptr, *tail_ = nullptr, *power_ = nullptr;
+    float* clutter_ = nullptr;             // null: the machine has none
     std::vector<std::int32_t> tail_from_;  // per block
     std::vector<float> work_, ring_;       // per thread
     std::vector<int> next_row_;            // per thread: the row that its ring is ready for

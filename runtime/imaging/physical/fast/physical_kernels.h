@@ -36,8 +36,9 @@ enum BeamNumber {
     kVoxelPerMm = 3,
     kBeam = 6,
     kGap = 9,
-    kSpeckleOrigin = 10,  // height, u, v; then the same per mm; kSpeckleSides times
-    kSpecklePerMm = 13,
+    kEdge = 10,           // amplitude that the beam's contact leaves
+    kSpeckleOrigin = 11,  // height, u, v; then the same per mm; kSpeckleSides times
+    kSpecklePerMm = kSpeckleOrigin + 3,
     kBeamNumbers = kSpeckleOrigin + 6 * physical::kSpeckleSides
 };
 
@@ -137,6 +138,8 @@ struct PhysicalBlock {
     // second-level cache.
     std::int32_t* echoes = nullptr;
     float *light = nullptr, *tail = nullptr;
+    float* clutter = nullptr;  // power of the reverberation below what is bright; null: none
+    float clutter_keep = 0, clutter_gain = 0;
     int stride = 0;
     int tail_from = 0;  // out: first sample with a tail; samples if none
     bool boundary_met = false, refraction_met = false, hard_met = false, fine_met = false,
@@ -160,11 +163,14 @@ struct PhysicalRowTask {
     const float* tail = nullptr;                        // null: none
     const std::int32_t* tail_from = nullptr;            // per block
     int sample = 0;
+    const float* clutter = nullptr;  // power, with margins; null: none
+    int clutter_reach = 0;           // beams to each side of its mean
+    float clutter_drawn = 1;         // share of it that varies
     const std::int8_t *clutter_re = nullptr, *clutter_im = nullptr;
     int noise_rows = 0;  // 0: none
-    const std::int8_t* noise_re[4] = {nullptr, nullptr, nullptr, nullptr};
-    const std::int8_t* noise_im[4] = {nullptr, nullptr, nullptr, nullptr};
-    float noise_weight[4] = {0, 0, 0, 0};
+    const std::int8_t* noise_re[physical::kMaxPersisted] = {};
+    const std::int8_t* noise_im[physical::kMaxPersisted] = {};
+    float noise_weight[physical::kMaxPersisted] = {};
 };
 
 // A row's filter along the beams; the envelope's power.
@@ -177,6 +183,10 @@ struct PhysicalPowerTask {
     const float* axial = nullptr;  // first tap
     int axial_count = 1;
     float gain = 1;
+    float steady = 0;                // power that the looks leave of the near field's ringing
+    const float* clutter = nullptr;  // null: none
+    int clutter_reach = 0;
+    float clutter_steady = 0;       // its share
     float* envelope_sum = nullptr;  // the envelope is added to it; null: not needed
     float* power = nullptr;
 };
@@ -190,9 +200,14 @@ struct PhysicalGreyTask {
     const std::int8_t* haze_re[2] = {nullptr, nullptr};  // rows to blend
     const std::int8_t* haze_im[2] = {nullptr, nullptr};
     float haze_first = 1, haze_second = 0;
-    float offset = 0, per_log2 = 0;
-    bool post_filter = true;
-    float* work = nullptr;  // with margins
+    // Logarithm: grey = offset + per_log2 log2(power). Otherwise floor plus 2 to that power, and
+    // above the knee less steep.
+    float offset = 0, per_log2 = 0, low = 0;
+    bool logarithm = true;
+    float floor = 0, knee = 255, knee_slope = 1;
+    bool filtered = true;
+    float* work = nullptr;   // with margins
+    float* plain = nullptr;  // null: not needed; grey before the filter
     float* out = nullptr;
 };
 
@@ -200,7 +215,9 @@ struct PhysicalGreyTask {
 struct PhysicalShadeTask {
     int lines = 0;
     const float *above = nullptr, *here = nullptr, *below = nullptr;  // grey rows
-    bool post_filter = true, grey_map = true;
+    bool filtered = true, grey_map = true;
+    const float* plain = nullptr;  // grey before the filter, where its weight is not 1
+    float filter_weight = 1;
     std::uint8_t* out = nullptr;
 };
 

@@ -23,7 +23,7 @@ constexpr int kGreyRows = 16;
 // The inputs of a row's filter across the beams.
 void PhysicalFast::fill_row_task(const PhysicalFrame& f, int k, PhysicalRowTask& t) const {
     const bool tails = f.effects.bone_tail || f.effects.gas_ring_down || f.effects.needle;
-    const int persisted = f.effects.persistence ? kPersistedFrames : 1;
+    const int persisted = f.effects.persistence ? tables_.persisted : 1;
     const Row& row = tables_.rows[static_cast<std::size_t>(k)];
     const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
     t.echoes = echoes_ + at;
@@ -31,20 +31,24 @@ void PhysicalFast::fill_row_task(const PhysicalFrame& f, int k, PhysicalRowTask&
     t.looks = row.looks_drawn;
     const double all = std::sqrt(static_cast<double>(row.looks)) / row.gain;
     t.inverse_gain = static_cast<float>(all);
-    t.near_field = static_cast<float>(face_clutter(row, f.effects));
+    t.near_field = static_cast<float>(face_clutter(row, f.effects) * std::sqrt(row.drawn));
+    t.clutter = f.effects.clutter && clutter_ != nullptr ? clutter_ + at : nullptr;
+    t.clutter_reach = row.haze_reach;
+    t.clutter_drawn = static_cast<float>(row.drawn);
     t.tail = tails ? tail_ + at : nullptr;
     t.sample = k;
     t.clutter_re = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
     t.clutter_im = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
     t.noise = static_cast<float>(row.noise * all * std::sqrt(0.5) / 32);
-    t.noise_rows = f.effects.noise ? persisted : 0;
+    t.noise_rows = f.effects.noise && has_noise(tables_) ? persisted : 0;
     for (int j = 0; j < t.noise_rows; ++j) {
         const std::uint32_t frame = f.frame - static_cast<std::uint32_t>(j);
         t.noise_re[j] = noise_.fine.data() + noise_start(f.seed, NoiseUse::electronic_re, frame, k);
         t.noise_im[j] = noise_.fine.data() + noise_start(f.seed, NoiseUse::electronic_im, frame, k);
-        t.noise_weight[j] = f.effects.persistence
-                                ? static_cast<float>(kPersistence[static_cast<std::size_t>(j)])
-                                : 1;
+        t.noise_weight[j] =
+            f.effects.persistence
+                ? static_cast<float>(tables_.persistence[static_cast<std::size_t>(j)])
+                : 1;
     }
     t.lateral = row.lateral.data() + kMaxLateral;
     t.reach = row.reach;
@@ -55,7 +59,9 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
     const int reach = f.effects.point_spread ? tables_.axial_reach : 0;
     const int ring_rows = std::max(2 * tables_.axial_reach + 1, 3);
     static constexpr std::array<float, 1> kOneTap{1.0f};
-    const auto haze_level = static_cast<float>(std::pow(10.0, kHazeDb / 20));
+    const bool haze = f.effects.haze && has_side_lobes(tables_);
+    const auto haze_level =
+        static_cast<float>(std::pow(10.0, tables_.machine.haze.side_lobe_db / 20));
     start_rows();
     context_.workers.for_each((cells_k_ + kCellsAtOnce - 1) / kCellsAtOnce, [&](int part,
                                                                                 int item) {
@@ -101,7 +107,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
         t.axial =
             f.effects.point_spread ? tables_.axial.data() + kMaxAxial - reach : kOneTap.data();
         t.axial_count = 2 * reach + 1;
-        t.envelope_sum = f.effects.haze ? envelope : nullptr;
+        t.envelope_sum = haze ? envelope : nullptr;
         for (int k = begin; k < end; ++k) {
             if (k % kHazeCell == 0) std::fill_n(envelope, lines_, 0.0f);
             if (k + reach < g.samples) fill(k + reach);
@@ -114,9 +120,14 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
             t.gain = static_cast<float>(row.gain);
             t.looks = row.looks;
+            const double face = face_clutter(row, f.effects);
+            t.steady = static_cast<float>(face * face * (1 - row.drawn));
+            t.clutter = f.effects.clutter && clutter_ != nullptr ? clutter_ + at : nullptr;
+            t.clutter_reach = row.haze_reach;
+            t.clutter_steady = static_cast<float>(1 - row.drawn);
             t.power = power_ + at;
             make_power_row(context_.simd, t);
-            if (f.effects.haze && (k % kHazeCell == kHazeCell - 1 || k == g.samples - 1))
+            if (haze && (k % kHazeCell == kHazeCell - 1 || k == g.samples - 1))
                 spread_haze(k / kHazeCell, haze_level / static_cast<float>(k % kHazeCell + 1),
                             envelope);
         }
@@ -156,11 +167,15 @@ void PhysicalFast::spread_haze(int cell_row, float level, const float* envelope)
 
 // The inputs of a row's compression.
 void PhysicalFast::fill_grey_task(const PhysicalFrame& f, int k, PhysicalGreyTask& t) const {
-    const double per_db = 255 / f.dynamic_range_db;
-    t.per_log2 = static_cast<float>(per_db * 0.5 * kDbPerLog2);
+    const Row& row = tables_.rows[static_cast<std::size_t>(k)];
+    const GreyLine grey = grey_line(tables_.machine.grey, f.dynamic_range_db);
+    const double gain_db =
+        row.unit_db + static_cast<double>(f.row_gain_db[static_cast<std::size_t>(k)]);
+    t.per_log2 = static_cast<float>(grey.per_db * 0.5 * kDbPerLog2);
+    t.offset = static_cast<float>(grey.of_unit + grey.per_db * gain_db);
     t.power = power_ + static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
     t.haze_above = nullptr;
-    if (f.effects.haze) {
+    if (f.effects.haze && has_side_lobes(tables_)) {
         const double at = std::clamp((k + 0.5) / kHazeCell - 0.5, 0.0, cells_k_ - 1.0);
         const int k0 = std::min(static_cast<int>(at), std::max(cells_k_ - 2, 0)),
                   k1 = std::min(k0 + 1, cells_k_ - 1);
@@ -178,8 +193,6 @@ void PhysicalFast::fill_grey_task(const PhysicalFrame& f, int k, PhysicalGreyTas
         t.haze_first = static_cast<float>(level * (1 - mix));
         t.haze_second = static_cast<float>(level * mix);
     }
-    t.offset = static_cast<float>(
-        kGreyOfUnit + per_db * static_cast<double>(f.row_gain_db[static_cast<std::size_t>(k)]));
 }
 
 void PhysicalFast::make_grey(const PhysicalFrame& f) {
@@ -193,6 +206,9 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
         const auto ring_at = [&](int k) {
             return ring + static_cast<std::ptrdiff_t>(k % 3) * stride_;
         };
+        const auto plain_at = [&](int k) {
+            return ring_at(k) + static_cast<std::ptrdiff_t>(3) * stride_;
+        };
         std::uint8_t* shades =
             shade_.data() + static_cast<std::ptrdiff_t>(part) * 2 * (lines_ + kRowSlack);
         const auto shade_at = [&](int k) {
@@ -201,18 +217,28 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
         PhysicalGreyTask t;
         t.lines = lines_;
         t.scanlines = g.scanlines;
-        t.post_filter = f.effects.post_filter;
+        const MachineGrey& grey = tables_.machine.grey;
+        t.logarithm = has_logarithm(tables_);
+        t.low = static_cast<float>(lowest_grey(grey));
+        t.floor = static_cast<float>(grey.floor);
+        t.knee = static_cast<float>(grey.knee);
+        t.knee_slope = static_cast<float>(grey.knee_slope);
+        const auto weight = static_cast<float>(filter_weight(tables_, f.effects));
+        const bool filtered = weight != 0, plain = filtered && weight != 1;
+        t.filtered = filtered;
         t.work = work_.data() + static_cast<std::ptrdiff_t>(part) * 3 * stride_ + kRowMargin;
         const auto fill = [&](int k) {
             fill_grey_task(f, k, t);
             t.out = ring_at(k);
+            t.plain = plain ? plain_at(k) : nullptr;
             make_physical_grey(context_.simd, t);
         };
         const auto shade = [&](int k) {
             const int above = std::max(k - 1, 0), below = std::min(k + 1, g.samples - 1);
             make_physical_shade(context_.simd,
-                                {lines_, ring_at(above), ring_at(k), ring_at(below),
-                                 f.effects.post_filter, f.effects.grey_map, shade_at(k)});
+                                {lines_, ring_at(above), ring_at(k), ring_at(below), filtered,
+                                 f.effects.grey_map && has_logarithm(tables_),
+                                 plain ? plain_at(k) : nullptr, weight, shade_at(k)});
         };
         // Shade row k needs grey rows k - 1 .. k + 1; pair row k needs shade rows k and k + 1.
         int& next = next_row_[static_cast<std::size_t>(part)];

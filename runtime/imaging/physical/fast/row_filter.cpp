@@ -26,6 +26,15 @@ HWY_INLINE hn::Vec<D> smooth_light(D d, const float* light) {
     return hn::Add(sum, hn::Mul(hn::Add(hn::Add(at(-1), at(1)), at(0)), hn::Set(d, 3 / 15.0f)));
 }
 
+// Mean of the clutter over neighbouring beams.
+template <class D>
+HWY_INLINE hn::Vec<D> mean_clutter(D d, const float* row, int reach) {
+    auto sum = hn::LoadU(d, row);
+    for (int j = 1; j <= reach; ++j)
+        sum = hn::Add(sum, hn::Add(hn::LoadU(d, row - j), hn::LoadU(d, row + j)));
+    return hn::Mul(sum, hn::Set(d, 1 / (2 * static_cast<float>(reach) + 1)));
+}
+
 // Adds clutter and electronic noise.
 template <class D, class V>
 HWY_INLINE void add_noise(D d, const PhysicalRowTask& t, int i, V& re, V& im) {
@@ -34,6 +43,10 @@ HWY_INLINE void add_noise(D d, const PhysicalRowTask& t, int i, V& re, V& im) {
     auto power = hn::Set(d, t.near_field * t.near_field);
     if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock])
         power = hn::Add(power, hn::LoadU(d, t.tail + i));
+    if (t.clutter != nullptr) {
+        power = hn::Add(power, hn::Mul(mean_clutter(d, t.clutter + i, t.clutter_reach),
+                                       hn::Set(d, t.clutter_drawn)));
+    }
     const auto level = hn::Mul(hn::Sqrt(hn::Mul(half, power)), unit);
     re = hn::Add(re, hn::Mul(level, noise_of(d, t.clutter_re + i)));
     im = hn::Add(im, hn::Mul(level, noise_of(d, t.clutter_im + i)));
@@ -105,7 +118,7 @@ void filter_across(const PhysicalRowTask& t) {
 
 // Point spread along the beam and gain; the envelope's power, the mean of all looks.
 void make_power(const PhysicalPowerTask& t) {
-    const hn::ScalableTag<float> d;
+    const hn::CappedTag<float, kBeamBlock> d;
     const int lanes = static_cast<int>(hn::Lanes(d));
     const auto gain = hn::Set(d, t.gain * t.gain / static_cast<float>(t.looks));
     for (int i = 0; i < t.lines; i += lanes) {
@@ -121,7 +134,11 @@ void make_power(const PhysicalPowerTask& t) {
             }
             power = hn::Add(power, hn::Add(hn::Mul(re, re), hn::Mul(im, im)));
         }
-        power = hn::Mul(power, gain);
+        power = hn::Add(hn::Mul(power, gain), hn::Set(d, t.steady));
+        if (t.clutter != nullptr) {
+            power = hn::Add(power, hn::Mul(mean_clutter(d, t.clutter + i, t.clutter_reach),
+                                           hn::Set(d, t.clutter_steady)));
+        }
         if (t.envelope_sum != nullptr) {
             hn::StoreU(hn::Add(hn::LoadU(d, t.envelope_sum + i), hn::Sqrt(power)), d,
                        t.envelope_sum + i);

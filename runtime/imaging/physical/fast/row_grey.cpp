@@ -21,9 +21,8 @@ using namespace physical;
 void make_grey_row(const PhysicalGreyTask& t) {
     const hn::ScalableTag<float> d;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    const auto low = hn::Set(d, static_cast<float>(kGreyFloor)),
-               high = hn::Set(d, static_cast<float>(kGreyCeiling));
-    float* grey = t.post_filter ? t.work : t.out;
+    const auto low = hn::Set(d, t.low), high = hn::Set(d, static_cast<float>(kGreyCeiling));
+    float* grey = t.filtered ? t.work : t.out;
     for (int i = 0; i < t.lines; i += lanes) {
         auto power = hn::LoadU(d, t.power + i);
         if (t.haze_above != nullptr) {
@@ -39,12 +38,20 @@ void make_grey_row(const PhysicalGreyTask& t) {
                 hn::Mul(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), hn::Set(d, 0.5f / 1024));
             power = hn::Add(power, hn::Mul(hn::Mul(haze, haze), draw));
         }
-        const auto g = hn::Add(
+        auto g = hn::Add(
             hn::Set(d, t.offset),
             hn::Mul(log2_of(d, hn::Add(power, hn::Set(d, 1e-12f))), hn::Set(d, t.per_log2)));
+        if (!t.logarithm) {
+            const auto most = hn::Set(d, 12.0f);  // 4096 grey
+            const auto knee = hn::Set(d, t.knee);
+            g = hn::Add(exp2_fading(d, hn::Min(g, most)), hn::Set(d, t.floor));
+            const auto over = hn::Max(hn::Sub(g, knee), hn::Zero(d));
+            g = hn::Add(hn::Min(g, knee), hn::Mul(over, hn::Set(d, t.knee_slope)));
+        }
         hn::StoreU(hn::Min(hn::Max(g, low), high), d, grey + i);
     }
-    if (!t.post_filter) return;
+    if (!t.filtered) return;
+    if (t.plain != nullptr) std::copy(grey, grey + t.lines, t.plain);
     grey[-1] = grey[0];
     grey[t.scanlines] = grey[t.scanlines - 1];
     for (int i = 0; i < t.lines; i += lanes) {
@@ -63,9 +70,13 @@ void make_shade_row(const PhysicalShadeTask& s) {
     const auto one = hn::Set(d, 1.0f);
     for (int i = 0; i < s.lines; i += lanes) {
         auto g = hn::LoadU(d, s.here + i);
-        if (s.post_filter) {
+        if (s.filtered) {
             const auto ends = hn::Add(hn::LoadU(d, s.above + i), hn::LoadU(d, s.below + i));
             g = hn::Add(hn::Mul(ends, hn::Set(d, 0.25f)), hn::Mul(g, hn::Set(d, 0.5f)));
+            if (s.plain != nullptr) {
+                const auto own = hn::LoadU(d, s.plain + i);
+                g = hn::Add(own, hn::Mul(hn::Sub(g, own), hn::Set(d, s.filter_weight)));
+            }
         }
         auto t = hn::Min(hn::Max(hn::Mul(g, hn::Set(d, 1.0f / 255)), hn::Zero(d)), one);
         if (s.grey_map) {

@@ -32,8 +32,10 @@ struct PhysicalEffects {
     bool near_field = true;
     bool noise = true;
     bool persistence = true;
-    bool haze = true;
+    bool clutter = true;  // reverberation below what is bright
+    bool haze = true;     // side lobes
     bool post_filter = true;
+    bool edge_enhancement = true;
     bool grey_map = true;
 };
 
@@ -55,6 +57,10 @@ struct PhysicalMet {
     bool needle_given = false;  // there is a needle to draw
     bool needle = false;        // it shows in the slab
     int beams_in_contact = 0;
+    // What the machine has.
+    bool edge_contact = false, compounding = false, receiver_noise = false, blending = false,
+         reverberation = false, side_lobes = false, binomial = false, sharpening = false,
+         logarithm = false;
 };
 
 namespace physical {
@@ -66,11 +72,17 @@ inline const char* nothing_hard(const PhysicalMet& m) {
     return m.hard ? "" : "no bone or gas crossed";
 }
 
+inline const char* only_if(bool machine_has_it) {
+    return machine_has_it ? "" : "the machine has none";
+}
+
 }  // namespace physical
 
-inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 29> kPhysicalEffects{{
+inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 32> kPhysicalEffects{{
     {"contact", Pass::contact, 1, 0, 0, &PhysicalEffects::contact,
-     [](const PhysicalMet& m) { return m.gap ? "" : "the probe touches everywhere"; }},
+     [](const PhysicalMet& m) {
+         return m.gap || m.edge_contact ? "" : "the probe touches everywhere";
+     }},
     {"slice", Pass::beams, 4, 2, 7},
     {"breathing", Pass::beams, 1, 0, 8, &PhysicalEffects::breathing,
      [](const PhysicalMet& m) {
@@ -102,18 +114,29 @@ inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 29> kPhys
     {"bone_tail", Pass::beams, 0.2, 0, 4, &PhysicalEffects::bone_tail, physical::nothing_hard},
     {"gas_ring_down", Pass::beams, 0.2, 0, 4, &PhysicalEffects::gas_ring_down,
      physical::nothing_hard},
+    {"clutter", Pass::beams, 0.4, 0, 4, &PhysicalEffects::clutter,
+     [](const PhysicalMet& m) { return physical::only_if(m.reverberation); }},
     {"needle", Pass::needle, 1, 0, 12, &PhysicalEffects::needle,
      [](const PhysicalMet& m) {
          return !m.needle_given ? "no needle" : m.needle ? "" : "needle outside the slab";
      }},
     {"point_spread", Pass::filter, 5, 0, 0, &PhysicalEffects::point_spread},
+    {"looks", Pass::filter, 3, 0, 8, nullptr,
+     [](const PhysicalMet& m) { return m.compounding ? "" : "the machine takes one look"; }},
     {"near_field", Pass::filter, 0.7, 0, 2, &PhysicalEffects::near_field},
-    {"noise", Pass::filter, 0.7, 0, 2, &PhysicalEffects::noise},
-    {"persistence", Pass::filter, 0.7, 0, 6, &PhysicalEffects::persistence},
-    {"haze", Pass::grey, 1, 0, 4, &PhysicalEffects::haze},
+    {"noise", Pass::filter, 0.7, 0, 2, &PhysicalEffects::noise,
+     [](const PhysicalMet& m) { return m.receiver_noise ? "" : "the machine rejects it"; }},
+    {"persistence", Pass::filter, 0.7, 0, 6, &PhysicalEffects::persistence,
+     [](const PhysicalMet& m) { return m.blending ? "" : "no noise to blend"; }},
+    {"haze", Pass::grey, 1, 0, 4, &PhysicalEffects::haze,
+     [](const PhysicalMet& m) { return physical::only_if(m.side_lobes); }},
     {"compression", Pass::grey, 2, 0, 8},
-    {"post_filter", Pass::grey, 1, 0, 0, &PhysicalEffects::post_filter},
-    {"grey_map", Pass::grey, 0.5, 0, 1, &PhysicalEffects::grey_map},
+    {"post_filter", Pass::grey, 1, 0, 0, &PhysicalEffects::post_filter,
+     [](const PhysicalMet& m) { return physical::only_if(m.binomial); }},
+    {"edge_enhancement", Pass::grey, 1, 0, 0, &PhysicalEffects::edge_enhancement,
+     [](const PhysicalMet& m) { return physical::only_if(m.sharpening); }},
+    {"grey_map", Pass::grey, 0.5, 0, 1, &PhysicalEffects::grey_map,
+     [](const PhysicalMet& m) { return m.logarithm ? "" : "the machine has its own map"; }},
     {"scan_conversion", Pass::convert, 1, 1, 7},
 }};
 

@@ -57,10 +57,6 @@ inline std::uint32_t noise_start(std::uint32_t seed, NoiseUse use, std::uint32_t
                            static_cast<std::uint32_t>(row));
 }
 
-// Weights of the frames whose electronic noise persistence blends, newest first.
-inline constexpr int kPersistedFrames = 4;
-inline constexpr std::array<double, kPersistedFrames> kPersistence{0.40, 0.30, 0.20, 0.10};
-
 // Gap between the probe's face and the skin on the beams [first, last), mm; negative: no skin
 // within kMaxGapMm, so that the beam sees air. raw: # scanlines.
 void find_gaps(const PhysicalScene& scene,

@@ -50,23 +50,20 @@ inline constexpr double kBoneFloor = 0.075, kBoneFloorMm = 90;
 inline constexpr double kGasTail = 1.4, kGasTailMm = 18;
 // A smooth face of gas and the probe's own reflect the pulse back and forth: lines at multiples of
 // the depth (A-lines), each kReverbLoss of the one before; half a line is kReverbWidth pulses wide.
-inline constexpr double kReverb = 7, kReverbLoss = 0.42, kReverbWidth = 4.5;
+inline constexpr double kReverb = 2.5, kReverbLoss = 0.42, kReverbWidth = 3;
 // In fluid the pulse steepens and its harmonics are lost: attenuation in addition to the fluid's
 // own, dB/cm/MHz. Without it, everything behind a full bladder would be white.
 inline constexpr double kFluidSteepening = 0.22;
 
-// Haze: side lobes and reverberation, relative to the mean envelope nearby.
-inline constexpr double kHazeDb = -24;
+// Haze: side lobes, relative to the mean envelope nearby.
 inline constexpr int kHazeCell = 8;   // samples and beams of a cell of the mean
 inline constexpr int kHazeReach = 3;  // cells to each side
 
 inline constexpr int kHazeGrain = 3;  // samples along the beam
 
 // TGC, dB/cm/MHz: abdominal organs for a fan, muscle and fat for a linear probe.
-inline constexpr double kGainSlopeFan = 0.56, kGainSlopeLinear = 0.72;
+inline constexpr double kGainSlopeFan = 0.50, kGainSlopeLinear = 0.72;
 inline constexpr double kMaxNoiseGainDb = 48;
-inline constexpr double kNoiseDb = -70;
-inline constexpr double kGreyOfUnit = 136;
 inline constexpr double kGreyFloor = -25, kGreyCeiling = 290;  // before the post-filter
 // t - kGreyMap t (1 - t)(1 - 2t): close to t - 0.03 sin(2 pi t), without the sine.
 inline constexpr double kGreyMap = 0.31;
@@ -74,6 +71,9 @@ inline constexpr double kGreyMap = 0.31;
 // Echo offsets are baked one per voxel: a random step of this many voxels (one standard deviation)
 // blends them.
 inline constexpr double kLookupJitter = 0.4;
+
+inline constexpr int kMaxPersisted = 8;  // frames
+inline constexpr int kMaxHazeReach = 8;  // beams to each side
 
 inline constexpr int kMaxLateral = 12;  // taps to each side
 inline constexpr int kMaxAxial = 10;

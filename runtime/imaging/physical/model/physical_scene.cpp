@@ -121,7 +121,10 @@ void add_targets(const std::vector<Target>& targets, PhysicalScene& s) {
 }
 
 // Acoustic properties of labels and targets, and the echoes between labels.
-void add_tissues(const CaseBundle& bundle, const std::vector<Target>& targets, PhysicalScene& s) {
+void add_tissues(const CaseBundle& bundle,
+                 const std::vector<Target>& targets,
+                 const std::map<std::string, double>& measured_db,
+                 PhysicalScene& s) {
     const std::vector<int> tissue_of = tissue_of_label(bundle);
     const Tissue nothing{};
     const auto tissue = [&](std::size_t l) -> const Tissue& {
@@ -130,9 +133,12 @@ void add_tissues(const CaseBundle& bundle, const std::vector<Target>& targets, P
     const std::size_t count = bundle.labels.size();
     for (std::size_t l = 0; l < count; ++l) {
         const Tissue& t = tissue(l);
-        s.looks.push_back({t.echo_db, t.attenuation_db_cm_mhz,
-                           l == 0 ? TissueKind::outside : t.kind,
-                           t.name == "skin" ? kWallSkinDb : t.name == "fat" ? kWallFatDb : 0});
+        const auto measured = measured_db.find(bundle.labels[l].name);
+        s.looks.push_back({measured != measured_db.end() ? measured->second : t.echo_db,
+                           t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind,
+                           t.name == "skin"  ? kWallSkinDb
+                           : t.name == "fat" ? kWallFatDb
+                                             : 0});
     }
     s.has_hard = std::any_of(s.looks.begin(), s.looks.end(), [](const AcousticProperties& l) {
         return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
@@ -169,7 +175,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     if (bundle.labels.empty() || bundle.label_bricks.table.empty()) {
         return Error{"the bundle holds no label volume", "", "build the case again"};
     }
-    add_tissues(bundle, targets, s);
+    add_tissues(bundle, targets, options.tissue_db, s);
     Result<BrickTable> words = BrickTable::create(bundle);
     if (!words) return words.error();
     s.words = std::move(*words);

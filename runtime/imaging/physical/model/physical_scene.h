@@ -5,7 +5,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "formats/base/jobs.h"
@@ -71,6 +73,7 @@ struct PhysicalScene {
 struct PhysicalSceneOptions {
     JobRunner* jobs = nullptr;                         // null: one job after the other
     std::shared_ptr<const PhysicalTextures> textures;  // null: made here
+    std::map<std::string, double> tissue_db;           // of labels, instead of the bundle's own
 };
 
 // targets: of the exercise; those that only mark a place do not show in the tissue.

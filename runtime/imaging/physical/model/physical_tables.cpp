@@ -5,13 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/machine/machine_toml.h"
+
 namespace sonocase::runtime::physical {
 namespace {
 
 constexpr double kSigmaPerFwhm = 1 / 2.3548200450309493;
 constexpr double kLayerMm = 0.18;      // deviation of a reflecting layer, about
 constexpr double kPhaseLoss = 0.75;    // measured on the rough face of bone
-constexpr double kCellMm = 0.6;        // edge of the scatterers' lattice at 3.5 MHz,
+constexpr double kCellMm = 0.66;       // edge of the scatterers' lattice at 3.5 MHz,
 constexpr double kCellPerStep = 1.25;  // and at least of a sample
 
 // Deviation that is left to the taps: the blend of the scatterers is a part of the point spread.
@@ -68,16 +70,107 @@ double power_of_taps(const auto& taps, double step) {
     return power;
 }
 
+// Widths of the point spread, full at half height.
+double axial_width(const MachineBeam& beam, double frequency_mhz) {
+    if (beam.axial_mm > 0) return beam.axial_mm * beam.reference_mhz / frequency_mhz;
+    return 0.58 * std::pow(3.5 / frequency_mhz, 0.7);  // 0.33 mm at 8 MHz
+}
+double lateral_width(
+    const MachineBeam& beam, const Probe& probe, bool fan, double frequency_mhz, double r) {
+    const auto grown = [&](double focus, double range) {
+        return std::sqrt(1 + (r - focus) * (r - focus) / (range * range));
+    };
+    if (beam.lateral_mm > 0) {
+        const double focus = beam.lateral_focus_mm > 0 ? beam.lateral_focus_mm : probe.focus_mm;
+        return beam.lateral_mm * beam.reference_mhz / frequency_mhz *
+               grown(focus, beam.lateral_range_mm);
+    }
+    const double wavelength = 1.54 / frequency_mhz;
+    return fan ? 1.05 * wavelength * std::max(2.2, r / 22) * grown(probe.focus_mm, 70)
+               : 1.25 * wavelength * std::max(2.0, r / 14) * grown(probe.focus_mm, 25);
+}
+
+// Looks pass from the near number to the other one by one, over a quarter to each side.
+int looks_at(const MachineLooks& looks, double r) {
+    const double from = 0.75 * looks.near_mm, to = 1.25 * looks.near_mm;
+    const double part = to > from ? std::clamp((r - from) / (to - from), 0.0, 1.0) : 1;
+    return static_cast<int>(
+        std::lround(looks.near_count + part * (looks.count - looks.near_count)));
+}
+
+// Mean of the root of a mean of squared envelopes of unit power: Gamma(L + 1/2) / (Gamma(L) L^1/2).
+double mean_of_looks(int looks) {
+    double mean = 0.8862269254527580;
+    for (int l = 1; l < looks; ++l) mean *= (l + 0.5) / l * std::sqrt(l / (l + 1.0));
+    return mean;
+}
+
+// Amplitude of the ringing of the probe's face, with its lines.
+double near_field(const MachineNearField& n, double r) {
+    double lines = 1;
+    for (int k = 0; k < n.lines; ++k) {
+        const double off = (r - n.first_mm - k * n.spacing_mm) / (n.line_mm * kSigmaPerFwhm);
+        const double over_db = std::max(n.line_db - k * n.line_step_db, 0.0);
+        lines += (std::pow(10.0, over_db / 20) - 1) * std::exp(-0.5 * off * off);
+    }
+    return lines * (n.ring_level * std::exp(-r / n.ring_decay_mm) +
+                    n.tail_level * std::exp(-r / n.tail_decay_mm));
+}
+
+// TGC, the dark start below the face, and what is taken back far away; dB.
+double tgc_db(const MachineGain& gain, bool fan, double frequency_mhz, double r) {
+    const double slope = gain.tgc_db_per_cm_mhz > 0 ? gain.tgc_db_per_cm_mhz
+                         : fan                      ? kGainSlopeFan
+                                                    : kGainSlopeLinear;
+    return 2 * slope * frequency_mhz * r / 10 -
+           std::clamp((r - gain.far_from_mm) / 10 * gain.far_db_per_cm, 0.0, gain.far_limit_db);
+}
+
+// Amplitude of each beam: the outer ones touch badly.
+std::vector<double> edge_contact(const MachineContact& contact, int scanlines) {
+    std::vector<double> edge(static_cast<std::size_t>(scanlines), 1.0);
+    const double reach = contact.edge_fraction * scanlines;
+    for (int l = 0; l < scanlines; ++l) {
+        const double from_edge = std::min(l, scanlines - 1 - l) + 0.5;
+        if (from_edge < reach)
+            edge[static_cast<std::size_t>(l)] =
+                std::pow(10.0, -contact.edge_db * (1 - from_edge / reach) / 20);
+    }
+    return edge;
+}
+
+void set_frame_tables(const ScanGeometry& g, Tables& t) {
+    const Machine& m = t.machine;
+    t.edge = edge_contact(m.contact, g.scanlines);
+    t.haze_keep = std::exp(-g.step_mm / m.haze.decay_mm);
+    t.haze_gain = m.haze.fraction * (1 - t.haze_keep);
+    t.persisted = std::clamp(static_cast<int>(m.persistence.size()), 1, kMaxPersisted);
+    double sum = 0;
+    for (const double w : m.persistence) sum += w;
+    t.persistence[0] = 1;
+    for (int i = 0; i < t.persisted && sum > 0; ++i)
+        t.persistence[static_cast<std::size_t>(i)] =
+            m.persistence[static_cast<std::size_t>(i)] / sum;
+}
+
 }  // namespace
 
-Tables make_tables(const Probe& probe, const ScanGeometry& g) {
+Machine default_machine(const Probe& probe) {
+    if (probe.shape != ProbeShape::linear) return {};
+    return *built_in_machine("modern-linear");
+}
+
+Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometry& g) {
     Tables t;
-    t.frequency_mhz = probe.frequency_mhz;
-    const double wavelength = 1.54 / probe.frequency_mhz;
-    const double axial_fwhm = 0.58 * std::pow(3.5 / probe.frequency_mhz, 0.7);  // 0.33 mm at 8 MHz
+    t.machine = machine;
+    const MachineBeam& beam = machine.beam;
+    const double frequency = beam.frequency_mhz > 0 ? beam.frequency_mhz : probe.frequency_mhz;
+    const double elevation_mm = beam.elevation_mm > 0 ? beam.elevation_mm : probe.elevation_mm;
+    t.frequency_mhz = frequency;
+    const double axial_fwhm = axial_width(beam, frequency);
     t.axial_mm = axial_fwhm;
     // As coarse as the point spread allows, so that samples a beam apart share scatterers.
-    t.cell_mm = std::max(std::min(kCellMm * std::pow(3.5 / probe.frequency_mhz, 0.7), axial_fwhm),
+    t.cell_mm = std::max(std::min(kCellMm * std::pow(3.5 / frequency, 0.7), axial_fwhm),
                          kCellPerStep * g.step_mm);
     t.axial_reach = gaussian(rest_of(axial_fwhm, t.cell_mm) / g.step_mm, kMaxAxial, t.axial);
     const double axial_power = power_of_taps(t.axial, g.step_mm / t.cell_mm);
@@ -88,13 +181,14 @@ Tables make_tables(const Probe& probe, const ScanGeometry& g) {
     const double peak = kPhaseLoss * peak_of_layer(whole, g.step_mm / kLayerMm) /
                         (0.5 * sum(whole) + 0.5 * static_cast<double>(whole[kMaxAxial])) /
                         peak_of_layer(t.axial, g.step_mm / blurred_mm(t, kLayerMm));
+    set_frame_tables(g, t);
 
     // What brings the peak of a smooth layer of that deviation, times interface_scale, to 1.
     const auto layer_scale = [&](double sigma_mm) {
         return 1 / (peak * peak_of_layer(t.axial, g.step_mm / sigma_mm));
     };
-    t.wall = make_wall_tables(probe.frequency_mhz,
-                              rest_of(axial_fwhm, t.cell_mm) / kSigmaPerFwhm, layer_scale);
+    t.wall =
+        make_wall_tables(frequency, rest_of(axial_fwhm, t.cell_mm) / kSigmaPerFwhm, layer_scale);
     t.streak_mm = std::max(kStreakMm, 0.6 * g.step_mm);
     t.streak_scale = layer_scale(t.streak_mm);
     t.dome_scale = layer_scale(kDomeMm);
@@ -104,26 +198,35 @@ Tables make_tables(const Probe& probe, const ScanGeometry& g) {
         Row& row = t.rows[static_cast<std::size_t>(k)];
         const double r = (k + 0.5) * g.step_mm;
         row.r_mm = r;
-        row.gain = std::pow(
-            10.0, 2 * (g.fan ? kGainSlopeFan : kGainSlopeLinear) * probe.frequency_mhz * r / 200);
+        const double gain_db = tgc_db(machine.gain, g.fan, frequency, r);
+        row.gain = std::pow(10.0, gain_db / 20) *
+                   std::min(1.0, machine.near_field.start + r / machine.near_field.start_mm);
         row.contact = std::exp(-r / kGapReachMm);
-        const double off = r - probe.focus_mm;
-        const double lateral_fwhm = g.fan ? 1.05 * wavelength * std::max(2.2, r / 22) *
-                                                std::sqrt(1 + off * off / (70.0 * 70))
-                                          : 1.25 * wavelength * std::max(2.0, r / 14) *
-                                                std::sqrt(1 + off * off / (25.0 * 25));
         const double pitch = g.fan ? (g.radius_mm + r) * g.line_step : g.line_step;
+        const double lateral_fwhm = lateral_width(beam, probe, g.fan, frequency, r);
         row.reach = gaussian(rest_of(lateral_fwhm, t.cell_mm) / pitch, kMaxLateral, row.lateral);
         row.speckle = 1 / std::sqrt(kSpecklePower * axial_power *
                                     power_of_taps(row.lateral, pitch / t.cell_mm));
         row.interface_scale = peak / sum(row.lateral);
-        row.near_field = 1.6 * std::exp(-r / 2.2) + 0.3 * std::exp(-r / 9);
-        const double gain_db = 20 * std::log10(row.gain);
-        row.noise = std::pow(10.0, (kNoiseDb + std::min(gain_db, kMaxNoiseGainDb)) / 20);
-        const double spread = g.fan ? 60.0 : 25.0;
+        row.near_field = near_field(machine.near_field, r);
+        row.noise =
+            std::pow(10.0, (machine.noise.level_db + std::min(gain_db, kMaxNoiseGainDb)) / 20);
+        const double spread = g.fan ? 60.0 : 25.0, off = r - probe.focus_mm;
         row.elevation_mm =
-            probe.elevation_mm * kSigmaPerFwhm * std::sqrt(1 + off * off / (spread * spread));
+            elevation_mm * kSigmaPerFwhm * std::sqrt(1 + off * off / (spread * spread));
         row.spacing_mm = std::max(kSliceReach * row.elevation_mm, t.cell_mm);
+        row.looks = looks_at(machine.looks, r);
+        row.drawn = 1 / std::sqrt(static_cast<double>(row.looks));
+        row.unit_db = -20 * std::log10(mean_of_looks(row.looks));
+        row.haze_reach = std::clamp(static_cast<int>(0.5 * machine.haze.across_mm / pitch + 0.5), 0,
+                                    kMaxHazeReach);
+        t.looks = std::max(t.looks, row.looks);
+    }
+    for (int k = 0; k < g.samples; ++k) {
+        int& drawn = t.rows[static_cast<std::size_t>(k)].looks_drawn;
+        for (int j = std::max(k - t.axial_reach, 0);
+             j <= std::min(k + t.axial_reach, g.samples - 1); ++j)
+            drawn = std::max(drawn, t.rows[static_cast<std::size_t>(j)].looks);
     }
     return t;
 }

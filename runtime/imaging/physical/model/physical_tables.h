@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "formats/exercise/exercise.h"
+#include "formats/machine/machine.h"
 #include "runtime/imaging/physical/model/physical_effects.h"
 #include "runtime/imaging/physical/model/physical_model.h"
 #include "runtime/imaging/physical/model/speckle.h"
@@ -23,12 +24,15 @@ struct Row {
     double contact = 0;          // exp(-r / kGapReachMm)
     double interface_scale = 1;  // keeps an interface's peak through a filter of unit power
     double near_field = 0;       // amplitude
+    double drawn = 1;            // share of clutter that varies: the looks average the rest
     double noise = 0;            // amplitude of the electronic noise
     double elevation_mm = 0;     // standard deviation of the beam across the plane
     double spacing_mm = 1;       // of a column's scatterers, along the scan plane's normal
     double speckle = 1;          // makes the power of the filtered field 1
     int looks = 1;               // fields that are detected and averaged here
     int looks_drawn = 1;         // fields that the filter along the beam reaches
+    double unit_db = 0;          // makes the mean amplitude of e = 1 the unit, dB
+    int haze_reach = 0;          // beams to each side of the clutter's mean
     int reach = 0;               // lateral taps to each side
     std::array<float, 2 * kMaxLateral + 1> lateral{};  // centre at kMaxLateral; unit power
 };
@@ -44,7 +48,48 @@ struct Tables {
     double streak_mm = kStreakMm;                  // deviation of a plate's thickness
     double streak_scale = 1, dome_scale = 1;       // bring their peaks to their amplitudes
     int looks = 1;  // the most of any row
+    Machine machine;
+    std::vector<double> edge;  // # scanlines: amplitude that the contact of a beam leaves
+    double haze_keep = 0;      // of the clutter, from a sample to the next
+    double haze_gain = 0;      // of a sample's power
+    // Weights of the frames whose electronic noise persistence blends, newest first.
+    std::array<double, kMaxPersisted> persistence{};
+    int persisted = 1;
 };
+
+// Whether the machine shows these at all.
+inline bool has_noise(const Tables& t) {
+    return !t.machine.noise.reject && t.machine.noise.level_db > -200;
+}
+inline bool has_side_lobes(const Tables& t) {
+    return t.machine.haze.side_lobe_db > -120;
+}
+inline bool has_clutter(const Tables& t) {
+    return t.machine.haze.fraction > 0;
+}
+inline bool has_logarithm(const Tables& t) {
+    return t.machine.grey.map == GreyMap::log;
+}
+// The grey map over decibels: grey, or log2 of the grey over the floor (map `power`), is
+// of_unit + per_db * dB. The console's knob makes a power map flatter or steeper as it does a
+// logarithm.
+struct GreyLine {
+    double of_unit = 0, per_db = 1;
+};
+inline GreyLine grey_line(const MachineGrey& grey, double dynamic_range_db) {
+    if (grey.map == GreyMap::log) return {grey.level, 255 / dynamic_range_db};
+    return {std::log2(grey.level),
+            grey.exponent * grey.dynamic_range_db / dynamic_range_db / kDbPerLog2};
+}
+// Before the filter, which would otherwise pull black edges up.
+inline double lowest_grey(const MachineGrey& grey) {
+    return grey.floor > 0 ? grey.floor : kGreyFloor;
+}
+// Weight of the binomial filter's output; the rest is the picture's own. 0: no filter.
+inline double filter_weight(const Tables& t, const PhysicalEffects& on) {
+    return (on.post_filter && t.machine.post_filter ? 1 : 0) -
+           (on.edge_enhancement ? t.machine.edge_enhancement : 0);
+}
 
 // The scatterers' blend is a part of the point spread that an echo drawn as such lacks.
 inline double blurred_mm(const Tables& tables, double sigma_mm) {
@@ -64,7 +109,10 @@ inline double face_clutter(const Row& row, const PhysicalEffects& on) {
     return on.near_field ? row.near_field : 0;
 }
 
+// The machine that an exercise's probe is drawn with where none is named.
+Machine default_machine(const Probe& probe);
+
 // Cost: 0.1 ms.
-Tables make_tables(const Probe& probe, const ScanGeometry& geometry);
+Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometry& geometry);
 
 }  // namespace sonocase::runtime::physical

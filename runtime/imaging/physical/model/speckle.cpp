@@ -26,7 +26,10 @@ std::array<Vector3, kSpeckleAxes> speckle_axes() {
 }
 
 SpeckleSide side_of(Vector3 axis, std::uint32_t number, Vector3 normal, double cell_mm) {
-    const Vector3 across = normalized(cross(axis, Vector3{0.36, 0.48, 0.8}));
+    // A row of nodes along the face of a probe that is held along or across the body: beams are
+    // further apart than samples, and along a row the lattice is closest.
+    const Vector3 face = std::abs(axis.x) > std::abs(axis.y) ? Vector3{0, 0, 1} : Vector3{1, 0, 0};
+    const Vector3 across = normalized(face - dot(face, axis) * axis);
     const Vector3 third = cross(axis, across);
     const double skew = 1 / std::sqrt(3.0), along = dot(axis, normal);
     // Triangular lattice: two steps of length 1 that enclose 60 degrees.

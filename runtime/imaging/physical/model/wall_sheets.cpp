@@ -26,9 +26,8 @@ constexpr Sheet kInner[] = {
 };
 // What a pulse of a third of the length shows: septa of fat and fasciae, thin and many.
 constexpr Sheet kOuterFine[] = {
-    {0.5, 12, 0.9},     {1.9, 12, 0.8},  {4.3, 14, 0.9, 0.9}, {7.2, 12, 0.8}, {9.0, 14, 0.9},
-    {12.3, 16, 1, 1.1}, {15.1, 13, 0.9}, {17.0, 12, 0.9},     {20.6, 15, 1},  {23.1, 12, 0.9, 1},
-    {26.9, 14, 1},      {29.4, 12, 1},   {33.2, 13, 1},       {37, 12, 1},
+    {0.5, 12, 0.9}, {4.3, 14, 0.9, 0.9}, {7.2, 12, 0.8}, {12.3, 16, 1, 1.1}, {15.1, 13, 0.9},
+    {20.6, 15, 1},  {23.1, 12, 0.9, 1},  {29.4, 12, 1},  {33.2, 13, 1},      {37, 12, 1},
 };
 constexpr Sheet kInnerFine[] = {
     {1.0, 18, 1.1}, {3.0, 12, 0.9}, {4.6, 15, 1, 1.0}, {8.6, 15, 1, 1.1}, {12.6, 14, 1, 1.2},
@@ -69,13 +68,13 @@ WallTables make_wall_tables(double frequency_mhz,
     const bool fine = frequency_mhz > kFineMhz;
     const double scale = std::pow(3.5 / frequency_mhz, 0.7);
     WallTables t;
-    t.outer = table_of(fine ? std::span<const Sheet>(kOuterFine) : kOuter, scale, axial_mm,
-                       layer_scale);
-    t.inner = table_of(fine ? std::span<const Sheet>(kInnerFine) : kInner, scale, axial_mm,
-                       layer_scale);
+    t.outer =
+        table_of(fine ? std::span<const Sheet>(kOuterFine) : kOuter, scale, axial_mm, layer_scale);
+    t.inner =
+        table_of(fine ? std::span<const Sheet>(kInnerFine) : kInner, scale, axial_mm, layer_scale);
     if (fine) {
-        t.wave_mm = 0.25;
-        t.strength_db = 9;
+        t.wave_mm = 0.15;
+        t.strength_db = 12;
         t.node_mm = 1.25;
     }
     return t;

@@ -67,20 +67,25 @@ void spread_across(const ReferenceInput& in, ComplexPlane& echoes) {
 
 // Clutter and electronic noise as they reach the receiver: before the gain and its filter. One look
 // carries them for all.
-void add_noise(const ReferenceInput& in, const Plane& tail, ComplexPlane& echoes) {
+void add_noise(const ReferenceInput& in,
+               const Plane& tail,
+               const Plane& clutter,
+               ComplexPlane& echoes) {
     const PhysicalEffects& on = in.frame.effects;
     for_samples(in, [&](int k, int l) {
         const Row& row = in.row(k);
         double &re = echoes.re[in.at(k, l)], &im = echoes.im[in.at(k, l)];
         const double face = face_clutter(row, on);
         const double all = std::sqrt(static_cast<double>(row.looks));
-        const double clutter = all * std::sqrt(0.5 * (tail[in.at(k, l)] + face * face)) / row.gain;
-        re += clutter * in.draw(in.noise.streak, NoiseUse::clutter_re, 0, k, l);
-        im += clutter * in.draw(in.noise.streak, NoiseUse::clutter_im, 0, k, l);
-        if (!on.noise) return;
+        const double power = tail[in.at(k, l)] + row.drawn * (face * face + clutter[in.at(k, l)]);
+        const double level = all * std::sqrt(0.5 * power) / row.gain;
+        re += level * in.draw(in.noise.streak, NoiseUse::clutter_re, 0, k, l);
+        im += level * in.draw(in.noise.streak, NoiseUse::clutter_im, 0, k, l);
+        if (!on.noise || !has_noise(in.tables)) return;
         double n_re = 0, n_im = 0;
-        for (int j = 0; j < (on.persistence ? kPersistedFrames : 1); ++j) {
-            const double w = on.persistence ? kPersistence[static_cast<std::size_t>(j)] : 1;
+        for (int j = 0; j < (on.persistence ? in.tables.persisted : 1); ++j) {
+            const double w =
+                on.persistence ? in.tables.persistence[static_cast<std::size_t>(j)] : 1;
             const std::uint32_t number = in.frame.frame - static_cast<std::uint32_t>(j);
             n_re += w * in.draw(in.noise.fine, NoiseUse::electronic_re, number, k, l);
             n_im += w * in.draw(in.noise.fine, NoiseUse::electronic_im, number, k, l);
@@ -111,6 +116,28 @@ Plane envelope_power(const ReferenceInput& in, const ComplexPlane& echoes) {
     return power;
 }
 
+// Mean of the reverberation over neighbouring beams.
+Plane mean_clutter(const ReferenceInput& in, const Plane& clutter) {
+    Plane mean(in.count(), 0.0);
+    if (!in.frame.effects.clutter) return mean;
+    for_samples(in, [&](int k, int l) {
+        const int reach = in.row(k).haze_reach;
+        for (int j = -reach; j <= reach; ++j)
+            mean[in.at(k, l)] +=
+                clutter[in.at(k, reflect(l + j, in.geometry.scanlines))] / (2 * reach + 1);
+    });
+    return mean;
+}
+
+// What the looks leave of the face's ringing and of reverberation: steady power.
+void add_steady(const ReferenceInput& in, const Plane& clutter, Plane& power) {
+    for_samples(in, [&](int k, int l) {
+        const Row& row = in.row(k);
+        const double face = face_clutter(row, in.frame.effects);
+        power[in.at(k, l)] += (1 - row.drawn) * (face * face + clutter[in.at(k, l)]);
+    });
+}
+
 // Looks are detected and averaged.
 void add_look(const ReferenceInput& in, int look, const Plane& of_look, Plane& power) {
     for_samples(in, [&](int k, int l) {
@@ -119,7 +146,7 @@ void add_look(const ReferenceInput& in, int look, const Plane& of_look, Plane& p
     });
 }
 
-// Side lobes and reverberation: the mean envelope nearby, kHazeDb below.
+// Side lobes and reverberation: the mean envelope nearby, some decibels below.
 class Haze {
   public:
     Haze(const ReferenceInput& in, const Plane& power)
@@ -140,7 +167,8 @@ class Haze {
                     s += sum[at(ck, j)];
                     n += number[at(ck, j)];
                 }
-                wide_[at(ck, cl)] = std::pow(10.0, kHazeDb / 20) * s / n;
+                wide_[at(ck, cl)] =
+                    std::pow(10.0, in.tables.machine.haze.side_lobe_db / 20) * s / n;
             }
         }
     }
@@ -179,32 +207,46 @@ void add_haze(const ReferenceInput& in, Plane& power) {
     });
 }
 
-// Log compression, post-filter and grey map: grey in [0, 255], whole numbers.
-Plane grey_of(const ReferenceInput& in, const Plane& power) {
+// Each sample's grey and its eight neighbours', weighted 1 2 1 either way.
+Plane binomial(const ReferenceInput& in, const Plane& grey) {
     const int lines = in.geometry.scanlines, samples = in.geometry.samples;
+    Plane across(in.count()), out(in.count());
+    for_samples(in, [&](int k, int l) {
+        across[in.at(k, l)] = 0.25 * grey[in.at(k, reflect(l - 1, lines))] +
+                              0.5 * grey[in.at(k, l)] +
+                              0.25 * grey[in.at(k, reflect(l + 1, lines))];
+    });
+    for_samples(in, [&](int k, int l) {
+        out[in.at(k, l)] = 0.25 * across[in.at(std::max(k - 1, 0), l)] + 0.5 * across[in.at(k, l)] +
+                           0.25 * across[in.at(std::min(k + 1, samples - 1), l)];
+    });
+    return out;
+}
+
+// The machine's map, post-filter or edge enhancement: grey in [0, 255], whole numbers.
+Plane grey_of(const ReferenceInput& in, const Plane& power) {
+    const MachineGrey& map = in.tables.machine.grey;
+    const GreyLine line = grey_line(map, in.frame.dynamic_range_db);
+    const bool logarithm = has_logarithm(in.tables);
     Plane grey(in.count());
     for_samples(in, [&](int k, int l) {
-        const double db = 10 * std::log10(power[in.at(k, l)] + 1e-12) +
+        const double db = 10 * std::log10(power[in.at(k, l)] + 1e-12) + in.row(k).unit_db +
                           static_cast<double>(in.frame.row_gain_db[static_cast<std::size_t>(k)]);
-        grey[in.at(k, l)] = std::clamp(kGreyOfUnit + 255 * db / in.frame.dynamic_range_db,
-                                       kGreyFloor, kGreyCeiling);
+        double g = line.of_unit + line.per_db * db;
+        if (!logarithm) {
+            g = map.floor + std::exp2(std::min(g, 12.0));
+            if (g > map.knee) g = map.knee + map.knee_slope * (g - map.knee);
+        }
+        grey[in.at(k, l)] = std::clamp(g, lowest_grey(map), kGreyCeiling);
     });
-    if (in.frame.effects.post_filter) {
-        Plane across(in.count());
-        for_samples(in, [&](int k, int l) {
-            across[in.at(k, l)] = 0.25 * grey[in.at(k, reflect(l - 1, lines))] +
-                                  0.5 * grey[in.at(k, l)] +
-                                  0.25 * grey[in.at(k, reflect(l + 1, lines))];
-        });
-        for_samples(in, [&](int k, int l) {
-            grey[in.at(k, l)] = 0.25 * across[in.at(std::max(k - 1, 0), l)] +
-                                0.5 * across[in.at(k, l)] +
-                                0.25 * across[in.at(std::min(k + 1, samples - 1), l)];
-        });
+    const double weight = filter_weight(in.tables, in.frame.effects);
+    if (weight != 0) {
+        const Plane filtered = binomial(in, grey);
+        for (std::size_t i = 0; i < grey.size(); ++i) grey[i] += weight * (filtered[i] - grey[i]);
     }
     for (double& g : grey) {
         double t = std::clamp(g / 255, 0.0, 1.0);
-        if (in.frame.effects.grey_map) t -= kGreyMap * t * (1 - t) * (1 - 2 * t);
+        if (in.frame.effects.grey_map && logarithm) t -= kGreyMap * t * (1 - t) * (1 - 2 * t);
         g = std::nearbyint(255 * t);
     }
     return grey;
@@ -244,15 +286,17 @@ void render_physical_reference(const PhysicalScene& scene,
                                std::span<std::uint8_t> pixels) {
     const ReferenceInput in{scene, geometry, tables, noise, frame};
     const BeamSamples beams = reference_beams(in);
+    const Plane clutter = mean_clutter(in, beams.clutter);
     Plane power(in.count(), 0.0);
     for (int look = 0; look < tables.looks; ++look) {
         ComplexPlane echoes =
             light_echoes(in, beams.light, beams.looks[static_cast<std::size_t>(look)]);
         if (frame.effects.point_spread) spread_across(in, echoes);
-        if (look == 0) add_noise(in, beams.tail, echoes);
+        if (look == 0) add_noise(in, beams.tail, clutter, echoes);
         add_look(in, look, envelope_power(in, echoes), power);
     }
-    if (frame.effects.haze) add_haze(in, power);
+    add_steady(in, clutter, power);
+    if (frame.effects.haze && has_side_lobes(tables)) add_haze(in, power);
     convert(in, grey_of(in, power), pixels);
 }
 

@@ -24,6 +24,7 @@ struct BeamLight {
     double bone = 0, bone_slow = 0, bone_floor = 0, gas = 0, needle_tail = 0;  // tails, amplitudes
     double lit = 0;                           // the last light well before a face of gas
     double reverb = 0, period = 0, next = 0;  // next line: amplitude, mm between lines, its depth
+    double clutter = 0;                       // power
     TissueKind before = TissueKind::soft, before_that = TissueKind::soft;  // of the samples above
 
     void fade(double step_mm) {
@@ -154,6 +155,13 @@ void light_tails(
     t.before = kind;
 }
 
+// Reverberation below what is bright: each sample leaves a part of its power.
+void add_clutter(const ReferenceInput& in, const Sample& p, BeamLight& t) {
+    const double lit = p.here * p.row.gain, re = p.re + p.field_re[0], im = p.im + p.field_im[0];
+    t.clutter =
+        in.tables.haze_keep * t.clutter + in.tables.haze_gain * (re * re + im * im) * lit * lit;
+}
+
 // Mirror, shadow and tail of the needle.
 void meet_needle(const ReferenceInput& in, PlanePoint o, PlanePoint d, Sample& p, BeamLight& t) {
     if (!in.frame.effects.needle || in.frame.needle == nullptr) return;
@@ -234,6 +242,8 @@ class Beams {
         const Vector3 beam = in_.frame.volume_from_probe.rotation * Vector3{d.x, 0, d.z};
         BeamLight t;
         const Face face = face_of(l);
+        if (in_.frame.effects.contact)
+            t.log2_light = std::log2(in_.tables.edge[static_cast<std::size_t>(l)]);
         for (int k = 0; k < g.samples; ++k) {
             const std::size_t at = in_.at(k, l);
             t.fade(g.step_mm);
@@ -262,6 +272,8 @@ class Beams {
             p.here = dead ? 0 : std::exp2(t.log2_light);
             if (dead) p.re = p.im = 0;
             if (dead) p.field_re = p.field_im = {};
+            add_clutter(in_, p, t);
+            out.clutter[at] = t.clutter;
             if (dome) p.loss = past < kDomeReachMm ? 0 : 1e9;
             light_tails(in_, look.kind, face, p, t);
             meet_needle(in_, o, d, p, t);
@@ -406,7 +418,7 @@ BeamSamples reference_beams(const ReferenceInput& input) {
     const std::vector<double> dark(count, 0.0);
     BeamSamples out{
         std::vector<ComplexPlane>(static_cast<std::size_t>(input.tables.looks), {dark, dark}),
-        std::vector<double>(count, 1.0), dark};
+        std::vector<double>(count, 1.0), dark, dark};
     const Beams beams(input);
     for (int l = 0; l < input.geometry.scanlines; ++l) beams.trace(l, out);
     return out;

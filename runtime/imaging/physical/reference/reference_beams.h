@@ -20,6 +20,7 @@ struct BeamSamples {
     std::vector<ComplexPlane> looks;  // echoes, as amplitudes under full light
     std::vector<double> light;        // amplitude that is left, there and back
     std::vector<double> tail;         // power behind bone, gas and needle
+    std::vector<double> clutter;      // power of the reverberation
 };
 
 BeamSamples reference_beams(const ReferenceInput& input);
