@@ -29,8 +29,8 @@ struct MachineBeam {
 
 // Independent speckle fields that are detected and averaged: spatial and frequency compounding.
 struct MachineLooks {
-    int count = 3;        // [1, 16]
-    int near_count = 6;   // above near_mm, [1, 16]
+    int count = 2;        // [1, 16]
+    int near_count = 4;   // above near_mm, [1, 16]
     double near_mm = 30;  // [0, 500]
     bool operator==(const MachineLooks&) const = default;
 };

@@ -47,6 +47,8 @@ Status check_options(const Exercise& exercise, const RenderOptions& o) {
             std::to_string(o.scanlines) + " beams of " + std::to_string(o.samples) + " samples", "",
             "give at most 4096 x 8192"};
     }
+    if (o.looks < 0 || o.looks > 16)
+        return Error{std::to_string(o.looks) + " looks", "", "give 0 to 16"};
     const bool linear = p.shape == ProbeShape::linear;
     const double extent = linear ? p.width_mm : p.field_of_view_rad;
     const bool radius_fits =
@@ -188,7 +190,7 @@ Result<Renderer> Renderer::create(CaseView bundle,
         level.geometry =
             make_scan_geometry(exercise.probe, l, k, options.width_px, options.height_px);
         level.row_gain_db.assign(static_cast<std::size_t>(k), 0.0f);
-        m.formation->add_level(level.geometry);
+        m.formation->add_level(level.geometry, accuracy.looks);
         if (!governed) break;
     }
     return Renderer(std::move(impl));

@@ -53,6 +53,10 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         ->check(CLI::IsMember({"physical", "paper"}))
         ->group("Picture");
     app.add_option("--effects", effects, "auto | all | comma-separated names")->group("Picture");
+    app.add_option("--machine", arguments.machine,
+                   "How the scanner draws, model physical: modern | modern-linear | classic, or a "
+                   "TOML file; default: modern, or modern-linear for a linear probe")
+        ->group("Picture");
     app.add_option("--renderer", arguments.renderer, "fast | reference")
         ->check(CLI::IsMember({"fast", "reference"}))
         ->group("Picture");
@@ -61,6 +65,10 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         ->group("Picture");
     app.add_option("--samples", arguments.samples, "Samples along a beam; default: the model's")
         ->check(CLI::Range(16, 4096))
+        ->group("Picture");
+    app.add_option("--looks", arguments.looks,
+                   "Speckle fields that are averaged; default: the machine's")
+        ->check(CLI::Range(1, 16))
         ->group("Picture");
     app.add_option("--frame-budget", arguments.frame_budget_ms,
                    "In a window: milliseconds per frame above which accuracy is reduced; "

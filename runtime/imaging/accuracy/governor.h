@@ -2,11 +2,11 @@
 
 // Keeps frames within a requested time by giving up accuracy in a fixed order.
 //
-// The levels lie on the front of measured work against precision, along which beams and samples
-// shrink together (docs/effects.md, sonocase_bench Accuracy/*), the finest first. A level is left
-// for a coarser one when the average frame takes longer than the budget, and for a finer one when
-// that one is expected to take less than 85 % of it. Constant time, no clock: the caller reports
-// how long each frame took.
+// The levels lie on the front of measured work against precision, along which beams, samples and
+// looks shrink together (docs/effects.md, sonocase_bench Accuracy/*), the finest first. A level is
+// left for a coarser one when the average frame takes longer than the budget, and for a finer one
+// when that one is expected to take less than 85 % of it. Constant time, no clock: the caller
+// reports how long each frame took.
 #pragma once
 
 #include <algorithm>
@@ -17,11 +17,12 @@ namespace sonocase::runtime {
 
 struct AccuracyLevel {
     double lines, samples;  // relative to full accuracy
+    double looks;           // of the machine's, at least one
     double work;            // measured time of a frame, relative to full accuracy
 };
 
 inline constexpr std::array<AccuracyLevel, 4> kAccuracyLevels{
-    {{1, 1, 1}, {0.83, 0.875, 0.77}, {0.67, 0.75, 0.59}, {0.5, 0.5, 0.35}}};
+    {{1, 1, 1, 1}, {0.83, 0.875, 1, 0.77}, {0.67, 0.75, 0.5, 0.54}, {0.5, 0.5, 0.5, 0.32}}};
 
 class Governor {
   public:

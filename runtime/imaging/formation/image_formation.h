@@ -44,8 +44,9 @@ class ImageFormation {
   public:
     virtual ~ImageFormation() = default;
 
-    // Prepares one more level of accuracy, finest first. All before the first frame.
-    virtual void add_level(const ScanGeometry& geometry) = 0;
+    // Prepares one more level of accuracy, finest first. All before the first frame. looks: share
+    // of those that the machine averages.
+    virtual void add_level(const ScanGeometry& geometry, double looks) = 0;
 
     // pixels: # width * height of the geometry. costs: one per effect, to be filled in. Neither
     // allocates nor throws.

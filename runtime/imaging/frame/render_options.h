@@ -27,6 +27,7 @@ struct RenderOptions {
     int threads = 1;      // [1, 256], the caller's included; see Host
     // How the machine draws, model physical; none: `modern`, or `modern-linear` for a linear probe.
     std::optional<Machine> machine;
+    int looks = 0;  // averaged at all depths, [0, 16]; 0: the machine's numbers
     std::vector<std::string> effects{"auto"};  // "auto", "all", "none", NAME or -NAME
     std::uint32_t seed = 1;
     // Beams [0, 4096] and samples per beam [0, 8192]; 0 takes the model's own number (paper

@@ -23,7 +23,7 @@ class PaperFormation final : public ImageFormation {
           switches_(switches_of<PaperEffects>(kPaperEffects, input.effects.on)),
           context_(input.context) {}
 
-    void add_level(const ScanGeometry& geometry) override {
+    void add_level(const ScanGeometry& geometry, double) override {
         Level& level = levels_.emplace_back();
         level.row_gain.assign(static_cast<std::size_t>(geometry.samples), 1.0f);
         if (reference_) {

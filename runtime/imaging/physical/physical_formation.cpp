@@ -17,8 +17,11 @@ namespace sonocase::runtime {
 namespace {
 
 Machine machine_of(const FormationInput& input) {
-    return input.options.machine ? *input.options.machine
-                                 : physical::default_machine(input.exercise.probe);
+    Machine machine = input.options.machine ? *input.options.machine
+                                            : physical::default_machine(input.exercise.probe);
+    if (input.options.looks > 0)
+        machine.looks.count = machine.looks.near_count = input.options.looks;
+    return machine;
 }
 
 class PhysicalFormation final : public ImageFormation {
@@ -41,10 +44,16 @@ class PhysicalFormation final : public ImageFormation {
             ahead_.emplace(*blocks_, scene_.grid, make_background());
     }
 
-    void add_level(const ScanGeometry& geometry) override {
+    void add_level(const ScanGeometry& geometry, double looks) override {
         Level& level = *levels_.emplace_back(std::make_unique<Level>());
         level.geometry = geometry;
-        level.tables = physical::make_tables(exercise_.probe, machine_, geometry);
+        Machine machine = machine_;
+        const auto share = [looks](int count) {
+            return std::max(1, static_cast<int>(std::lround(looks * count)));
+        };
+        machine.looks.count = share(machine.looks.count);
+        machine.looks.near_count = share(machine.looks.near_count);
+        level.tables = physical::make_tables(exercise_.probe, machine, geometry);
         if (reference_) return;
         level.fast =
             std::make_unique<PhysicalFast>(scene_, geometry, level.tables, noise_, context_);

@@ -22,9 +22,11 @@ struct PlayerArguments {
     std::string trainee;  // a chosen name for the progress book; empty: no progress is kept
     std::string model;    // "paper", "physical"; empty: the exercise's
     std::vector<std::string> effects;  // empty: the exercise's
+    std::string machine;               // name or file; empty: by the probe's shape
     std::string renderer = "fast";     // "fast", "reference"
     int threads = 1;
     int scanlines = 0, samples = 0;         // 0: the model's own
+    int looks = 0;                          // 0: the machine's
     double frame_budget_ms = 15;            // window: time per frame; 0: full accuracy always
     std::vector<std::string> calibrations;  // files
     std::string serve;                      // [ADDRESS:]PORT of the OpenIGTLink server; empty: none

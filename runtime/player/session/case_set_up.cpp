@@ -6,6 +6,7 @@
 #include <thread>
 #include <utility>
 
+#include "formats/files/machine_file.h"
 #include "runtime/tracking/factory/make_tracker.h"
 #include "runtime/workers/thread_host.h"
 
@@ -28,6 +29,7 @@ Result<std::unique_ptr<OpenCase>> open_case_to_render(const std::string& path) {
 ImageChoice initial_image(const PlayerArguments& arguments, const Exercise& exercise) {
     ImageChoice image;
     image.model = arguments.model.empty() ? exercise.model : arguments.model;
+    image.machine = arguments.machine;
     image.effects = arguments.effects.empty() ? exercise.effects : arguments.effects;
     if (arguments.width_px > 0) {
         image.width_px = arguments.width_px;
@@ -54,7 +56,13 @@ Result<ScanEngine> make_engine(const OpenCase& open,
     render.host = thread_host();
     render.scanlines = arguments.scanlines;
     render.samples = arguments.samples;
+    render.looks = arguments.looks;
     render.effects = image.effects;
+    if (!image.machine.empty()) {
+        Result<Machine> machine = load_machine(image.machine);
+        if (!machine) return machine.error();
+        render.machine = std::move(*machine);
+    }
     render.frame_budget_ms = image.frame_budget_ms;
     return ScanEngine::create(open.bundle, exercise, options);
 }

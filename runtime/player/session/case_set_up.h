@@ -23,6 +23,7 @@ Result<std::unique_ptr<OpenCase>> open_case_to_render(const std::string& path);
 // exercise ask for; the console of the window changes it.
 struct ImageChoice {
     std::string model;                 // "paper", "physical"
+    std::string machine;               // name or file; empty: by the probe's shape
     std::vector<std::string> effects;  // as RenderOptions::effects
     int width_px = 512, height_px = 512;
     double depth_mm = 0, focus_mm = 0;  // 0: the exercise's
@@ -30,7 +31,8 @@ struct ImageChoice {
 };
 ImageChoice initial_image(const PlayerArguments& arguments, const Exercise& exercise);
 
-// The engine of an image. The case must outlive it. Errors: those of ScanEngine::create.
+// The engine of an image. The case must outlive it. Errors: those of ScanEngine::create and of
+// load_machine.
 Result<ScanEngine> make_engine(const OpenCase& open,
                                const Exercise& exercise,
                                const PlayerArguments& arguments,

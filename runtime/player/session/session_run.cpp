@@ -72,6 +72,7 @@ Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
     const RenderOptions& render = engine.render_options();
     header.render =
         std::string("model=") + (render.model == ImageModel::paper ? "paper" : "physical") +
+        (render.machine ? " machine=" + render.machine->name : "") +
         " effects=" + joined(render.effects) + " size=" + std::to_string(render.width_px) + "x" +
         std::to_string(render.height_px) + " seed=" + std::to_string(render.seed);
     auto recorder = SessionRecorder::start(path, header, run->exercise_, open.bundle->labels);

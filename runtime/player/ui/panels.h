@@ -20,7 +20,8 @@ std::optional<std::string> draw_bundle_page(BundleChooser& chooser, float scale)
 struct TopBarInput {
     const std::vector<Exercise>& exercises;
     int exercise_index;
-    const std::string& model;  // "paper", "physical"
+    const std::string& model;    // "paper", "physical"
+    const std::string& machine;  // of model physical; empty: by the probe's shape
     const TrackerHealth& tracker;
     const ScanFrame& frame;
     double pictures_per_s;
@@ -28,6 +29,7 @@ struct TopBarInput {
 struct TopBarRequest {
     bool show_bundles = false, toggle_setup = false, toggle_help = false;
     std::optional<int> exercise;
+    std::optional<std::string> machine;  // with model physical
     std::optional<std::string> model;
 };
 TopBarRequest draw_top_bar(const TopBarInput& input, float height, float scale);

@@ -40,13 +40,14 @@ void panel(const char* id, float height, float row_gap, float s, const Draw& dra
 void show_top_bar(App& app, const TrackerHealth& tracker, float height, float s) {
     const CaseState& loaded = app.loaded;
     const TopBarRequest request =
-        draw_top_bar({loaded.open->exercises, loaded.exercise_index, loaded.image.model, tracker,
-                      loaded.frame(), app.view.pictures_per_s},
+        draw_top_bar({loaded.open->exercises, loaded.exercise_index, loaded.image.model,
+                      loaded.image.machine, tracker, loaded.frame(), app.view.pictures_per_s},
                      height, s);
     if (request.show_bundles) show_bundles(app.player, app.view);
     if (request.toggle_setup) app.view.show_setup = !app.view.show_setup;
     if (request.toggle_help) app.view.show_help = !app.view.show_help;
     if (request.exercise) choose_exercise(app, *request.exercise);
+    if (request.machine) app.loaded.image.machine = *request.machine;
     if (request.model) choose_model(app, *request.model);
 }
 

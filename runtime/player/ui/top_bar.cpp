@@ -51,12 +51,25 @@ void draw_choices(const TopBarInput& input, TopBarRequest& request, float s) {
         ImGui::EndCombo();
     }
     ImGui::SameLine();
-    ImGui::SetNextItemWidth(96 * s);
-    constexpr std::pair<const char*, const char*> kModels[] = {{"physical", "Physical"},
-                                                               {"paper", "Paper"}};
-    if (ImGui::BeginCombo("##model", input.model == "paper" ? "Paper" : "Physical")) {
-        for (const auto& [model, name] : kModels) {
-            if (ImGui::Selectable(name, input.model == model)) request.model = model;
+    ImGui::SetNextItemWidth(120 * s);
+    struct Choice {
+        const char *model, *machine, *name;
+    };
+    constexpr Choice kChoices[] = {
+        {"physical", "", "Modern"}, {"physical", "classic", "Classic"}, {"paper", "", "Paper"}};
+    const auto chosen = [&](const Choice& choice) {
+        return input.model == choice.model &&
+               (input.model == "paper" || input.machine == choice.machine);
+    };
+    std::string now = input.machine;  // of the command line
+    for (const Choice& choice : kChoices) {
+        if (chosen(choice)) now = choice.name;
+    }
+    if (ImGui::BeginCombo("##model", now.c_str())) {
+        for (const Choice& choice : kChoices) {
+            if (!ImGui::Selectable(choice.name, chosen(choice))) continue;
+            request.model = choice.model;
+            request.machine = choice.machine;
         }
         ImGui::EndCombo();
     }

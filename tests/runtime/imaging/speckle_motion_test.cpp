@@ -8,6 +8,7 @@
 #include <cmath>
 #include <optional>
 
+#include "formats/machine/machine_toml.h"
 #include "imaging_support.h"
 
 namespace sonocase::runtime {
@@ -189,6 +190,89 @@ TEST(SpeckleMotion, AlongTheFaceAndInDepthAFractionOfABeamKeepsIt) {
                         limit.by_mm.z, c);
             EXPECT_GE(c, limit.least);
         }
+    }
+}
+
+// Rotated in place about the beam, a point 40 mm beside the middle moves 0.35 mm per half degree:
+// no step may redraw the picture, also where the lattice's axes pass.
+TEST(SpeckleMotion, ASlowTurnNeverJumps) {
+    Sweep sweep;
+    for (const Vector3 axis : {Vector3{0, 0, 1}, Vector3{1, 0, 0}}) {
+        std::vector<double> steps;
+        Plane before = sweep.detail({});
+        for (double degrees = 0.25; degrees <= 45; degrees += 0.25) {
+            Plane now = sweep.detail(turned(axis, degrees));
+            // Of a tilt about the face's own line, 35 to 60 mm deep: 0.15 to 0.26 mm a step.
+            steps.push_back(sweep.correlation(before, now, 35, 60));
+            before = std::move(now);
+        }
+        const double least = *std::min_element(steps.begin(), steps.end());
+        std::printf("least correlation of two steps: %.2f\n", least);
+        EXPECT_GT(least, 0.7);
+    }
+}
+
+TEST(SpeckleMotion, OfAProbeHeldStillOnlyTheNoiseMoves) {
+    for (const char* name : {"modern", "classic"}) {
+        RenderOptions options;
+        options.machine = *built_in_machine(name);
+        Sweep sweep(options);
+        const Plane first = sweep.detail({}, 0, 0), later = sweep.detail({}, 0, 100);
+        if (options.machine->noise.reject) {
+            EXPECT_TRUE(first == later);
+        } else {
+            EXPECT_GT(sweep.correlation(first, later, 35, 88), 0.98);
+        }
+    }
+}
+
+// The anatomy moves past a probe that is held still: the same as a probe that moves.
+TEST(SpeckleMotion, BreathingTakesItAlong) {
+    Exercise exercise = sweep_exercise();
+    exercise.breathing.amplitude_mm = 8;
+    Sweep sweep({}, exercise);
+    const Plane rest = sweep.detail({}, 0);
+    double before = 1;
+    for (const double time_s : {0.05, 0.1, 0.2}) {
+        const double c = sweep.correlation(rest, sweep.detail({}, time_s), 35, 60);
+        std::printf("%.2f s of breathing: %.2f\n", time_s, c);
+        EXPECT_LE(c, before + 0.02);
+        before = c;
+    }
+    EXPECT_GT(sweep.correlation(rest, sweep.detail({}, 0.05), 35, 60), 0.85);
+}
+
+// Cells, looks and levels come from the probe and not from the volume.
+TEST(SpeckleMotion, VolumesOfFineAndCoarseVoxelsLookAlike) {
+    const auto statistics = [](double voxel_mm) {
+        PhantomOptions o;
+        o.ribs = o.gas = o.vessels = o.kidney = o.layers = o.structure = false;
+        o.lower = {-60, -8, -15};
+        o.upper = {60, 8, 90};
+        o.voxel_mm = voxel_mm;
+        Exercise e = phantom_exercise();
+        e.probe.depth_mm = 80;
+        RenderOptions options;
+        options.width_px = options.height_px = 256;
+        const auto pixels = draw(e, options, {}, Phantom(o).bundle());
+        double sum = 0, square = 0, n = 0;
+        for (int y = 110; y < 190; ++y) {
+            for (int x = 98; x < 158; ++x, ++n) {
+                const double v = pixels[static_cast<std::size_t>(y * 256 + x)];
+                sum += v;
+                square += v * v;
+            }
+        }
+        return std::pair{sum / n, std::sqrt(square / n - sum / n * sum / n)};
+    };
+    const auto [mean, sd] = statistics(1);
+    for (const double voxel_mm : {0.5, 2.0}) {
+        const auto [other, other_sd] = statistics(voxel_mm);
+        std::printf("%.1f mm: %.1f +- %.1f, 1 mm: %.1f +- %.1f\n", voxel_mm, other, other_sd, mean,
+                    sd);
+        // The lattice begins at the volume's corner: other draws of some 300 grains.
+        EXPECT_NEAR(other, mean, 3);
+        EXPECT_NEAR(other_sd / sd, 1, 0.2);
     }
 }
 

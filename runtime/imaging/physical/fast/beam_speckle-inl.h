@@ -135,13 +135,14 @@ HWY_INLINE Scatterers<D> scatterers_of_row(D d, const PhysicalBlock& b, int beam
         hn::Add(sum, hn::Set(du, kNodeU + kNodeV))};
 
     // Of each node, the scatterer nearest to the plane.
-    const auto depth = hn::Mul(hn::Mul(hn::Sub(foot.height, middle), foot.per_normal),
-                               hn::Set(d, b.per_spacing[k]));
+    const auto depth = hn::Add(hn::Mul(hn::Sub(foot.height, middle),
+                                       hn::Mul(foot.per_normal, hn::Set(d, b.per_spacing[k]))),
+                               one);  // as the beginnings below, which lie in [1, 2)
     Scatterers<D> out;
     for (int i = 0; i < 3; ++i) {
         const auto node = mix_bits(du, sums[i], 0x2C1B3C6Du, hn::ShiftRight<16>(sums[i]));
         const auto begin =
-            hn::Sub(hn::BitCast(d, hn::Or(hn::ShiftRight<9>(node), hn::Set(du, 0x3F800000u))), one);
+            hn::BitCast(d, hn::Or(hn::ShiftRight<9>(node), hn::Set(du, 0x3F800000u)));
         const auto from = hn::Sub(depth, begin);
         const auto step_bits = hn::Add(from, shift);
         const auto off = hn::Sub(from, hn::Sub(step_bits, shift));

@@ -125,12 +125,24 @@ void make_power(const PhysicalPowerTask& t) {
         auto power = hn::Zero(d);
         for (int look = 0; look < t.looks; ++look) {
             const std::ptrdiff_t from = look * t.look_stride + i;
-            auto re = hn::Zero(d), im = hn::Zero(d);
-            for (int j = 0; j < t.axial_count; ++j) {
-                if (t.re[j] == nullptr) continue;
-                const auto tap = hn::Set(d, t.axial[j]);
-                re = hn::Add(re, hn::Mul(hn::LoadU(d, t.re[j] + from), tap));
-                im = hn::Add(im, hn::Mul(hn::LoadU(d, t.im[j] + from), tap));
+            const int centre = t.axial_count / 2;
+            auto tap = hn::Set(d, t.axial[centre]);
+            auto re = hn::Mul(hn::LoadU(d, t.re[centre] + from), tap),
+                 im = hn::Mul(hn::LoadU(d, t.im[centre] + from), tap);
+            for (int j = 1; j <= centre; ++j) {
+                const int above = centre - j, below = centre + j;
+                tap = hn::Set(d, t.axial[below]);
+                auto sum_re = hn::Zero(d), sum_im = hn::Zero(d);
+                if (t.re[above] != nullptr) {
+                    sum_re = hn::LoadU(d, t.re[above] + from);
+                    sum_im = hn::LoadU(d, t.im[above] + from);
+                }
+                if (t.re[below] != nullptr) {
+                    sum_re = hn::Add(sum_re, hn::LoadU(d, t.re[below] + from));
+                    sum_im = hn::Add(sum_im, hn::LoadU(d, t.im[below] + from));
+                }
+                re = hn::Add(re, hn::Mul(sum_re, tap));
+                im = hn::Add(im, hn::Mul(sum_im, tap));
             }
             power = hn::Add(power, hn::Add(hn::Mul(re, re), hn::Mul(im, im)));
         }

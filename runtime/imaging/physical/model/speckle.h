@@ -35,7 +35,7 @@ inline constexpr int kSpeckleSides = 3;        // axes that may share a frame
 inline constexpr int kHeightBlock = 32;        // cells
 inline constexpr double kPatchMm = 5;          // edge of a cube of tissue that changes as one
 inline constexpr double kSliceReach = 5.1;     // distance of a column's scatterers, deviations
-inline constexpr double kSpeckleShare = 0.06;  // difference of cosines over which axes pass
+inline constexpr double kSpeckleShare = 0.03;  // difference of cosines over which axes pass
 inline constexpr int kMaxLooks = 16;
 
 // Mean power of a field per unit of a scatterer's power (2): three barycentric weights squared have

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Machines in the renderer: both renderers agree at the limits of what a machine may be, on every
+// instruction set, and what a machine says shows in the picture.
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "formats/machine/machine_toml.h"
+#include "imaging_support.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using namespace sonocase::testing;
+
+RenderOptions options_of(const Machine& machine) {
+    RenderOptions o;
+    o.width_px = o.height_px = 128;
+    o.scanlines = 64;
+    o.samples = 200;
+    o.machine = machine;
+    return o;
+}
+
+void expect_agreement(const Exercise& exercise,
+                      RenderOptions options,
+                      const std::string& what,
+                      const CaseBundle& bundle = phantom()) {
+    const FrameInput input = needle_input();
+    const auto fast = draw(exercise, options, input, bundle);
+    options.kind = RendererKind::reference;
+    const Difference d = compare(fast, draw(exercise, options, input, bundle));
+    std::printf("%-24s mean %.3f bias %+.3f worst %d\n", what.c_str(), d.mean, d.bias, d.worst);
+    EXPECT_LT(d.mean, 0.35) << what;
+    EXPECT_LT(std::abs(d.bias), 0.1) << what;
+    options.kind = RendererKind::fast;
+    for (const std::string& simd : simd_targets()) {
+        options.simd = simd;
+        EXPECT_TRUE(draw(exercise, options, input, bundle) == fast) << what << ", " << simd;
+    }
+}
+
+TEST(MachineInTheRenderer, BothRenderersAgreeOnEveryBuiltInMachineAndProbe) {
+    for (const std::string& name : machine_names()) {
+        for (const bool linear : {false, true})
+            expect_agreement(linear ? phantom_linear_exercise() : phantom_exercise(),
+                             options_of(*built_in_machine(name)),
+                             name + (linear ? ", linear" : ""));
+    }
+}
+
+TEST(MachineInTheRenderer, BothRenderersAgreeAtTheLimits) {
+    const struct {
+        const char* what;
+        std::function<void(Machine&)> change;
+    } cases[] = {
+        {"16 looks",
+         [](Machine& m) {
+             m.looks = {16, 16, 30};
+         }},
+        {"one look near, 16 far",
+         [](Machine& m) {
+             m.looks = {16, 1, 60};
+         }},
+        {"1 MHz", [](Machine& m) { m.beam.frequency_mhz = 1; }},
+        {"18 MHz", [](Machine& m) { m.beam.frequency_mhz = 18; }},
+        {"thick slice", [](Machine& m) { m.beam.elevation_mm = 20; }},
+        {"edge enhancement", [](Machine& m) { m.edge_enhancement = 2; }},
+        {"enhanced and filtered",
+         [](Machine& m) { m.edge_enhancement = 0.5, m.post_filter = true; }},
+        {"power map with noise",
+         [](Machine& m) {
+             m.noise = {-40, false};
+         }},
+        {"eight frames of noise",
+         [](Machine& m) {
+             m.noise = {-40, false};
+             m.persistence = {1, 1, 1, 1, 1, 1, 1, 1};
+         }},
+        {"strong reverberation",
+         [](Machine& m) {
+             m.haze = {10, 40, 30, -10};
+         }},
+        {"32 lines", [](Machine& m) { m.near_field.lines = 32, m.near_field.line_step_db = 0; }},
+        {"half the face off",
+         [](Machine& m) {
+             m.contact = {40, 0.5};
+         }},
+        {"steep map", [](Machine& m) { m.grey = {GreyMap::power, 0, 255, 4, 255, 1, 120}; }},
+        {"logarithm over a floor",
+         [](Machine& m) { m.grey = {GreyMap::log, 20, 100, 1, 255, 1, 40}; }},
+    };
+    for (const auto& c : cases) {
+        Machine machine;
+        c.change(machine);
+        expect_agreement(phantom_exercise(), options_of(machine), c.what);
+    }
+}
+
+TEST(MachineInTheRenderer, BothRenderersAgreeAtAnyDepthAndWithoutStructure) {
+    Exercise exercise = phantom_exercise();
+    for (const double depth_mm : {30.0, 300.0}) {
+        exercise.probe.depth_mm = depth_mm;
+        exercise.probe.focus_mm = 0.5 * depth_mm;
+        expect_agreement(exercise, options_of({}), std::to_string(depth_mm) + " mm");
+    }
+    PhantomOptions plain;
+    plain.voxel_mm = 2;
+    plain.boundaries = plain.structure = false;
+    expect_agreement(phantom_exercise(), options_of({}), "no structure", Phantom(plain).bundle());
+}
+
+double mean_of(const std::vector<std::uint8_t>& pixels) {
+    double sum = 0;
+    for (const std::uint8_t p : pixels) sum += p;
+    return sum / static_cast<double>(pixels.size());
+}
+
+TEST(MachineInTheRenderer, TheConsoleActsOnEveryMap) {
+    for (const std::string& name : machine_names()) {
+        const RenderOptions options = options_of(*built_in_machine(name));
+        FrameInput input;
+        const double plain = mean_of(draw(phantom_exercise(), options, input));
+        input.settings.gain_db = 10;
+        EXPECT_GT(mean_of(draw(phantom_exercise(), options, input)), 1.15 * plain) << name;
+        input.settings.gain_db = 0;
+        for (double& slider : input.settings.tgc_db) slider = -10;
+        EXPECT_LT(mean_of(draw(phantom_exercise(), options, input)), 0.9 * plain) << name;
+        // A smaller range has more contrast.
+        const auto deviation = [&](double range_db) {
+            FrameInput at;
+            at.settings.dynamic_range_db = range_db;
+            const auto pixels = draw(phantom_exercise(), options, at);
+            const double mean = mean_of(pixels);
+            double square = 0;
+            for (const std::uint8_t p : pixels) square += (p - mean) * (p - mean);
+            return square;
+        };
+        EXPECT_GT(deviation(40), deviation(80)) << name;
+    }
+}
+
+TEST(MachineInTheRenderer, BlackIsBlackWhereNoiseIsRejected) {
+    Machine machine;
+    machine.near_field.ring_level = 0;
+    FrameInput input;
+    input.mannequin_from_probe.translation = {0, 0, -60};  // in air: no beam touches
+    auto renderer = Renderer::create(phantom(), phantom_exercise(), options_of(machine));
+    ASSERT_TRUE(renderer);
+    std::vector<std::uint8_t> pixels(128 * 128);
+    EXPECT_EQ(renderer->render(input, pixels), FrameStatus::no_contact);
+    for (const std::uint8_t p : pixels) ASSERT_TRUE(p == 0 || p == 9) << int(p);
+}
+
+// Looks are independent: the variance of the envelope's power falls with their number.
+TEST(MachineInTheRenderer, MoreLooksAreSmoother) {
+    PhantomOptions o;
+    o.ribs = o.gas = o.vessels = o.kidney = o.layers = o.structure = false;
+    o.lower = {-60, -8, -15};
+    o.upper = {60, 8, 110};
+    o.voxel_mm = 2;
+    const CaseBundle liver = Phantom(o).bundle();
+    Exercise exercise = phantom_exercise();
+    exercise.probe.depth_mm = 90;
+    double before = 1e9;
+    for (const int looks : {1, 2, 4, 16}) {
+        RenderOptions options = options_of({});
+        options.width_px = options.height_px = 256;
+        options.looks = looks;
+        const auto pixels = draw(exercise, options, {}, liver);
+        double sum = 0, square = 0, n = 0;
+        for (int y = 110; y < 190; ++y) {
+            for (int x = 98; x < 158; ++x, ++n) {
+                const double v = pixels[static_cast<std::size_t>(y * 256 + x)] - 9.0;
+                sum += v;
+                square += v * v;
+            }
+        }
+        const double mean = sum / n, relative = std::sqrt(square / n - mean * mean) / mean;
+        std::printf("%2d looks: %.1f +- %.2f\n", looks, mean + 9, relative);
+        EXPECT_NEAR(mean, 39, 6);  // e = 1 on average, whatever their number
+        EXPECT_LT(relative, 0.85 * before);
+        before = relative;
+    }
+}
+
+TEST(MachineInTheRenderer, AMeasuredTissueTakesItsLevel) {
+    Machine machine;
+    const double plain = mean_of(draw(phantom_exercise(), options_of(machine), {}));
+    for (const Label& label : phantom().labels) machine.tissue_db[label.name] = 10;
+    EXPECT_GT(mean_of(draw(phantom_exercise(), options_of(machine), {})), 1.3 * plain);
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
