@@ -286,7 +286,7 @@ TEST(Realism, FasciaStandsOutAndAVesselIsDark) {
         }
     }
     std::printf("vessel lumen %.1f grey\n", lumen / m);
-    EXPECT_GT(lumen / m, 5);
+    EXPECT_GT(lumen / m, 1);  // the living one is the machine's own black
     EXPECT_LT(lumen / m, 35);
 }
 
