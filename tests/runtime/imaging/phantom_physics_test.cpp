@@ -44,6 +44,8 @@ struct Bench {
             scene, geometry, tables, noise,
             RenderContext{workers, serial_jobs(), available_simd_targets().front()});
         frame.row_gain_db = gain;
+        // What organs and the wall add would blur the measures of the physics.
+        frame.effects.parenchyma = frame.effects.streaks = frame.effects.wall = false;
         pixels.resize(512 * 512);
     }
     void run() { renderer->render(frame, {}, false, false, pixels); }

@@ -53,9 +53,11 @@ HWY_NOINLINE void dome_chunk(D d, PhysicalBlock& b, BeamChunk& c) {
             hn::Set(d, static_cast<float>(kDomeTail)));
         const auto echo = hn::IfThenElseZero(near, hn::Mul(peak, hn::Add(line, tail)));
         float *re = c.echo_re.row(row), *im = c.echo_im.row(row);
-        hn::Store(hn::IfThenElse(near, hn::Mul(echo, hn::Set(d, b.interface_scale[c.first + row])),
-                                 hn::Load(d, re)),
-                  d, re);
+        hn::Store(
+            hn::IfThenElse(
+                near, hn::Mul(echo, hn::Set(d, b.dome_scale * b.interface_scale[c.first + row])),
+                hn::Load(d, re)),
+            d, re);
         hn::Store(hn::IfThenZeroElse(near, hn::Load(d, im)), d, im);
         // The scatterers' share, in 1/16 dB.
         const auto gas = hn::Eq(hn::And(hn::Load(di, c.look.row(row)), hn::Set(di, 7 << 16)),

@@ -88,9 +88,9 @@ HWY_INLINE void light_face(D d, const PhysicalBlock& b, int beam, int k, BeamLig
     const auto face = hn::LoadU(d, b.face_mm + beam), r = hn::Set(d, b.r[k]);
     const auto before = hn::Lt(r, hn::Sub(face, hn::Set(d, static_cast<float>(kFaceLightMm))));
     t.lit = hn::IfThenElse(before, hn::Mul(t.light, hn::Set(d, b.gain[k])), t.lit);
-    const auto meets = hn::And(
-        hn::And(hn::Ge(r, face), hn::Lt(hn::Sub(r, hn::Set(d, b.step_mm)), face)),
-        hn::Gt(t.light, hn::Zero(d)));
+    const auto meets =
+        hn::And(hn::And(hn::Ge(r, face), hn::Lt(hn::Sub(r, hn::Set(d, b.step_mm)), face)),
+                hn::Gt(t.light, hn::Zero(d)));
     if (hn::AllFalse(d, meets)) return;
     const auto dome = hn::Gt(hn::LoadU(d, b.face_peak + beam), hn::Zero(d));
     const auto c = hn::LoadU(d, b.cosine + beam), c2 = hn::Mul(c, c);
@@ -103,7 +103,8 @@ HWY_INLINE void light_face(D d, const PhysicalBlock& b, int beam, int k, BeamLig
 // belongs to a neighbour that the random look-up hit. above_mm: depth of the sample above.
 template <class D, class V, class I>
 HWY_INLINE void light_tails(D d,
-                            const PhysicalBlock& b, V light_and_gain,
+                            const PhysicalBlock& b,
+                            V light_and_gain,
                             V facing,
                             I kind,
                             float above_mm,
@@ -181,8 +182,8 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, Beam
             }
         }
         hn::StoreU(t.light, d, b.light + out);
-        if (b.clutter != nullptr) add_clutter(d, b, out, k, t);
         if (b.face_mm != nullptr) light_face(d, b, c.beam, k, t);
+        if (b.clutter != nullptr) add_clutter(d, b, out, k, t);
         if constexpr (kTails) {
             const auto kind = hn::And(hn::Load(di, c.look.row(row)), kind_bits);
             fade_tails(d, b, t);

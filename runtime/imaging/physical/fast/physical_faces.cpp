@@ -36,6 +36,7 @@ void PhysicalFast::show_faces(int line, PhysicalBlock& b) const {
     const float* dome = faces_.dome_mm.data() + line;
     if (std::all_of(dome, dome + kBeamBlock, [](float mm) { return mm >= kNoFace; })) return;
     b.dome_mm = dome;
+    b.dome_scale = static_cast<float>(tables_.dome_scale);
 }
 
 }  // namespace sonocase::runtime

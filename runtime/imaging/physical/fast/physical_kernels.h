@@ -65,7 +65,7 @@ struct PhysicalStreak {
     float amplitude = 0;
     int sample_begin = 0, sample_end = 0;
 };
-inline constexpr int kBlockStreaks = 64;  // in a block of beams
+inline constexpr int kBlockStreaks = 192;  // in a block of beams
 
 struct PhysicalTarget {
     float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels
@@ -104,6 +104,7 @@ struct PhysicalBlock {
     const float* face_mm = nullptr;      // per beam, of gas; null: not known
     const float *face_peak = nullptr, *cosine = nullptr;
     const float* dome_mm = nullptr;  // null: none
+    float dome_scale = 1;
     const PhysicalStreak* streaks = nullptr;
     int streak_count = 0;
     const float* plane = nullptr;  // beams in the plane, `lines` apart: origin x, z, direction x, z

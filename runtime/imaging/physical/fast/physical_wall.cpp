@@ -11,7 +11,11 @@ namespace sonocase::runtime {
 using namespace physical;
 
 namespace {
-constexpr int kEveryBeam = 4;  // beams between nodes; linear in between
+// Beams between nodes, linear in between; few beams are far apart.
+int every_beam(int scanlines) {
+    return scanlines < 96 ? 1 : 4;
+}
+
 }
 
 void PhysicalFast::prepare_wall(const Tables& tables) {
@@ -52,14 +56,20 @@ void PhysicalFast::place_wall(const PhysicalFrame& f,
     w.active = active;
     const double outer_end = w.outer_size / static_cast<double>(kWallSteps) - kWallBeforeMm,
                  inner_end = w.inner_size / static_cast<double>(kWallSteps) - kWallBeforeMm;
+    const int every = every_beam(g.scanlines);
     for (int node = 0; node < nodes; ++node) {
         const double r = (node * w.every + 0.5) * g.step_mm;
         const double contact = std::exp(-r / kGapReachMm);
         WallPlace left;
         bool shows = keep_all;
-        for (int l = 0; l <= kBeamBlock; l += kEveryBeam) {
+        for (int l = 0; l <= kBeamBlock; l += every) {
             const int line = std::min(first + l, g.scanlines - 1);
-            const auto& [o, d] = g.beams[static_cast<std::size_t>(line)];
+            PlanePoint o = g.beams[static_cast<std::size_t>(line)].origin,
+                       d = g.beams[static_cast<std::size_t>(line)].direction;
+            if (line < first + l) {  // beyond the last beam
+                o = g.beam_origin(first + l);
+                d = g.beam_direction(first + l);
+            }
             const double s =
                 r + static_cast<double>(gaps_[static_cast<std::size_t>(line)]) * contact;
             Point3 x = f.volume_from_probe * Point3{o.x + s * d.x, 0, o.z + s * d.z};
@@ -68,9 +78,9 @@ void PhysicalFast::place_wall(const PhysicalFrame& f,
                 wall_place(scene_.layers, tables_.wall, scene_.grid.voxel_from_point(x));
             shows = shows || (right.depth > -kWallBeforeMm && right.above > -kWallBeforeMm &&
                               (right.depth < outer_end || right.above < inner_end));
-            for (int j = 0; l > 0 && j < kEveryBeam; ++j) {
-                const double part = static_cast<double>(j) / kEveryBeam;
-                float* at = out + static_cast<std::ptrdiff_t>(node) * lines_ + l - kEveryBeam + j;
+            for (int j = 0; l > 0 && j < every; ++j) {
+                const double part = static_cast<double>(j) / every;
+                float* at = out + static_cast<std::ptrdiff_t>(node) * lines_ + l - every + j;
                 at[0] = static_cast<float>(left.depth + (right.depth - left.depth) * part);
                 at[plane] = static_cast<float>(left.above + (right.above - left.above) * part);
                 at[2 * plane] = static_cast<float>(left.strength_db +

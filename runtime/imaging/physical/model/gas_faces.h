@@ -5,9 +5,10 @@
 // between an organ and the lung (effect diaphragm).
 //
 // Diaphragm, at distance q from it (negative before it), times Row::interface_scale:
-//     peak (exp(-(q / s)^2 / 2) + 0.12 exp(-|q| / 3.5 mm)),  s = 1.35 mm before, 1.7 mm behind
+//     peak (exp(-(q / s)^2 / 2) + 0.12 exp(-|q| / 3.5 mm)),  s = 1.2 mm before, 1.5 mm behind
 //     peak = kDomeAmplitude (0.4 + 0.6 cos^2) 10^(2.5 dB strength / 20)
-// kDomeShare of it is added to the surfaces' echo and kDomeShare to the scatterers'. Light is kept
+// kDomeShare of it is added to the surfaces' echo, times Tables::dome_scale, and kDomeShare to the
+// scatterers'. Light is kept
 // for kDomeReachMm behind it and then gone: black. Source: recipe 10 of the living sweep.
 #pragma once
 
@@ -24,10 +25,10 @@ inline constexpr float kNoFace = 1e9f;
 inline constexpr int kFaceEvery = 4;       // beams between those that are looked at
 inline constexpr double kFaceStepMm = 2;   // gas thinner than this may be missed
 inline constexpr double kFaceJoinMm = 12;  // neighbours further apart are two faces
-inline constexpr double kDomeFromMm = 25;     // nearer to the face lung lies under the wall
-inline constexpr double kFaceLightMm = 2;     // the light that a face gets: so far before it
-inline constexpr double kDomeAmplitude = 3.6, kDomeStrengthDb = 2.5, kDomeShare = 0.7;
-inline constexpr double kDomeBeforeMm = 1.35, kDomeBehindMm = 1.7;
+inline constexpr double kDomeFromMm = 25;  // nearer to the face lung lies under the wall
+inline constexpr double kFaceLightMm = 2;  // the light that a face gets: so far before it
+inline constexpr double kDomeAmplitude = 3.6, kDomeStrengthDb = 2.5, kDomeShare = 0.55;
+inline constexpr double kDomeBeforeMm = 1.2, kDomeBehindMm = 1.5;
 inline constexpr double kDomeTail = 0.12, kDomeTailMm = 3.5;
 inline constexpr double kDomeReachMm = 8;
 inline constexpr double kDomeGasDb = 8;  // scatterers of the lung count as those of an organ

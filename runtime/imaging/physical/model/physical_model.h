@@ -50,7 +50,7 @@ inline constexpr double kBoneFloor = 0.075, kBoneFloorMm = 90;
 inline constexpr double kGasTail = 1.4, kGasTailMm = 18;
 // A smooth face of gas and the probe's own reflect the pulse back and forth: lines at multiples of
 // the depth (A-lines), each kReverbLoss of the one before; half a line is kReverbWidth pulses wide.
-inline constexpr double kReverb = 9, kReverbLoss = 0.42, kReverbWidth = 2.6;
+inline constexpr double kReverb = 2.5, kReverbLoss = 0.42, kReverbWidth = 3;
 // In fluid the pulse steepens and its harmonics are lost: attenuation in addition to the fluid's
 // own, dB/cm/MHz. Without it, everything behind a full bladder would be white.
 inline constexpr double kFluidSteepening = 0.22;
@@ -97,6 +97,8 @@ inline constexpr double kParenchymaMm = 1.3;
 // Nerves: a fourth cube, bundles of kNerveBundle voxels across, straight along the nerve.
 inline constexpr int kNerveCube = 3;
 inline constexpr int kNerveBundle = 8;
+// Plates in organs, and the diaphragm: deviation of their thickness (streak_plates.h, gas_faces.h).
+inline constexpr double kStreakMm = 0.25, kDomeMm = 1.5;
 
 // Targets of an exercise are balls in the anatomy; their surface is as rough as that of organs.
 inline constexpr double kTargetReachMm = 2;

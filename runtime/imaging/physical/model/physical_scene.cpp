@@ -136,7 +136,9 @@ void add_tissues(const CaseBundle& bundle,
         const auto measured = measured_db.find(bundle.labels[l].name);
         s.looks.push_back({measured != measured_db.end() ? measured->second : t.echo_db,
                            t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind,
-                           t.name == "skin" ? kWallSkinDb : t.name == "fat" ? kWallFatDb : 0});
+                           t.name == "skin"  ? kWallSkinDb
+                           : t.name == "fat" ? kWallFatDb
+                                             : 0});
     }
     s.has_hard = std::any_of(s.looks.begin(), s.looks.end(), [](const AcousticProperties& l) {
         return l.kind == TissueKind::bone || l.kind == TissueKind::gas;

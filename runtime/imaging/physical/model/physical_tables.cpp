@@ -169,7 +169,6 @@ Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometr
     t.frequency_mhz = frequency;
     const double axial_fwhm = axial_width(beam, frequency);
     t.axial_mm = axial_fwhm;
-    t.wall = make_wall_tables(probe.frequency_mhz, axial_fwhm);
     // As coarse as the point spread allows, so that samples a beam apart share scatterers.
     t.cell_mm = std::max(std::min(kCellMm * std::pow(3.5 / frequency, 0.7), axial_fwhm),
                          kCellPerStep * g.step_mm);
@@ -183,6 +182,16 @@ Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometr
                         (0.5 * sum(whole) + 0.5 * static_cast<double>(whole[kMaxAxial])) /
                         peak_of_layer(t.axial, g.step_mm / blurred_mm(t, kLayerMm));
     set_frame_tables(g, t);
+
+    // What brings the peak of a smooth layer of that deviation, times interface_scale, to 1.
+    const auto layer_scale = [&](double sigma_mm) {
+        return 1 / (peak * peak_of_layer(t.axial, g.step_mm / sigma_mm));
+    };
+    t.wall =
+        make_wall_tables(frequency, rest_of(axial_fwhm, t.cell_mm) / kSigmaPerFwhm, layer_scale);
+    t.streak_mm = std::max(kStreakMm, 0.6 * g.step_mm);
+    t.streak_scale = layer_scale(t.streak_mm);
+    t.dome_scale = layer_scale(kDomeMm);
 
     t.rows.resize(static_cast<std::size_t>(g.samples));
     for (int k = 0; k < g.samples; ++k) {

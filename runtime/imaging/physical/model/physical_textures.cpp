@@ -21,6 +21,8 @@ std::uint32_t signed_byte(double v) {
            0xFFu;
 }
 
+constexpr double kGlintMean = 0.156;  // mean amplitude as of a glint of deviation 0.75
+
 std::vector<std::uint32_t> make_rough_surfaces() {
     const RawVector<float> rough = smooth_periodic_noise(kRoughEdge, 2, 11),
                            glint = smooth_periodic_noise(kRoughEdge, 2, 12),
@@ -29,7 +31,9 @@ std::vector<std::uint32_t> make_rough_surfaces() {
     for (std::size_t i = 0; i < rough.size(); ++i) {
         const double p = 0.9 * static_cast<double>(phase[i]);
         out[i] = signed_byte(32 * static_cast<double>(rough[i])) |
-                 signed_byte(32 * 0.5 * 1.4426950408889634 * static_cast<double>(glint[i])) << 8 |
+                 signed_byte(32 * 1.4426950408889634 *
+                             (kGlintMean + 0.5 * static_cast<double>(glint[i])))
+                     << 8 |
                  signed_byte(127 * std::cos(p)) << 16 | signed_byte(127 * std::sin(p)) << 24;
     }
     return out;
@@ -76,9 +80,9 @@ void make_nerve(std::int8_t* out) {
     std::vector<std::pair<int, int>> middles;
     for (std::uint32_t c = 0; c < kCells * kCells; ++c) {
         const std::uint32_t h = hash32(c + 51);
-        middles.emplace_back(static_cast<int>(c % kCells) * kNerveBundle + static_cast<int>(h & 7),
-                             static_cast<int>(c / kCells) * kNerveBundle +
-                                 static_cast<int>(h >> 8 & 7));
+        middles.emplace_back(
+            static_cast<int>(c % kCells) * kNerveBundle + static_cast<int>(h & 7),
+            static_cast<int>(c / kCells) * kNerveBundle + static_cast<int>(h >> 8 & 7));
     }
     RawVector<float> db(static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge);
     for (int v = 0; v < kFineEdge; ++v) {

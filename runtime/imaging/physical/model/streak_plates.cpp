@@ -133,8 +133,8 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     const double in_plane = 1 / std::sqrt(n.x * n.x + n.z * n.z);
     s.normal = {n.x * in_plane, n.z * in_plane};
     s.length_mm = length;
-    s.width_mm = std::max(0.25, 0.6 * g.step_mm);
-    s.amplitude = kStreakAmplitude * kLevels[draw >> 4 & 7] * level;
+    s.width_mm = tables.streak_mm;
+    s.amplitude = kStreakAmplitude * tables.streak_scale * kLevels[draw >> 4 & 7] * level;
     // Beyond 0.9 L from its middle a plate is 0.5 % of itself, beyond three widths 1 %.
     const double reach = 0.9 * length + 3 * s.width_mm;
     const double slope = std::sqrt(std::max(1 - cosine * cosine * in_plane * in_plane, 0.0));

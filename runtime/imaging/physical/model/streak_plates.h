@@ -19,12 +19,12 @@
 namespace sonocase::runtime::physical {
 
 inline constexpr double kStreakCellMm = 8;
-inline constexpr int kStreakTries = 96;         // per cell; pi / 6 of them are plates
+inline constexpr int kStreakTries = 64;         // per cell; pi / 6 of them are plates
 inline constexpr double kStreakFaceSin = 0.35;  // sine of the angle at which a plate is gone
 inline constexpr double kStreakFirstMm = 12;    // none closer to the face
-inline constexpr double kStreakAmplitude = 9;
+inline constexpr double kStreakAmplitude = 6;
 inline constexpr double kStreakFrequencyMhz = 6;  // above it the pulse is finer than these plates
-inline constexpr int kMostStreaks = 256;          // in a frame
+inline constexpr int kMostStreaks = 512;          // in a frame
 
 struct Streak {
     PlanePoint centre;  // of the plate, as seen: contact and breathing have moved it

@@ -56,7 +56,8 @@ std::vector<std::uint8_t> kinds_of_labels(const CaseBundle& bundle) {
     return kinds;
 }
 
-// Shares of body, organ and wall in each cell, from eight of its voxels.
+// Shares of body, organ and wall in each cell: from eight of its voxels, and from 64 where those
+// differ.
 void find_shares(const CaseBundle& bundle,
                  const Cells& c,
                  JobRunner& jobs,
@@ -65,29 +66,41 @@ void find_shares(const CaseBundle& bundle,
                  Field& wall) {
     const std::vector<std::uint8_t> kinds = kinds_of_labels(bundle);
     const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
-    const int near = c.edge / 4, far = c.edge - 1 - c.edge / 4;
+    struct Shares {
+        float body = 0, organ = 0, wall = 0;
+    };
+    const auto shares_of = [&](Int3 first, int samples) {
+        int inside = 0, organs = 0, walls = 0;
+        const auto place = [&](int at, int n, int size) {
+            return std::min(at + c.edge * (2 * n + 1) / (2 * samples), size - 1);
+        };
+        for (int n = 0; n < samples * samples * samples; ++n) {
+            const std::uint8_t kind =
+                kinds[labels.at(place(first.x, n % samples, labels.size.x),
+                                place(first.y, n / samples % samples, labels.size.y),
+                                place(first.z, n / samples / samples, labels.size.z))];
+            inside += kind & 1;
+            organs += kind >> 1 & 1;
+            walls += kind >> 2;
+        }
+        const float unit = 1 / static_cast<float>(samples * samples * samples);
+        return Shares{unit * static_cast<float>(inside), unit * static_cast<float>(organs),
+                      unit * static_cast<float>(walls)};
+    };
+    const auto mixed = [](float share) { return share > 0 && share < 1; };
     parallel_halves(jobs, static_cast<std::size_t>(c.size.z),
                     [&](std::size_t, std::size_t begin, std::size_t end) {
                         std::size_t at = begin * static_cast<std::size_t>(c.stride(2));
                         for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
                             for (int j = 0; j < c.size.y; ++j) {
                                 for (int i = 0; i < c.size.x; ++i, ++at) {
-                                    int inside = 0, organs = 0, walls = 0;
-                                    for (int corner = 0; corner < 8; ++corner) {
-                                        const int x = i * c.edge + (corner & 1 ? far : near),
-                                                  y = j * c.edge + (corner & 2 ? far : near),
-                                                  z = k * c.edge + (corner & 4 ? far : near);
-                                        const std::uint8_t kind =
-                                            kinds[labels.at(std::min(x, labels.size.x - 1),
-                                                            std::min(y, labels.size.y - 1),
-                                                            std::min(z, labels.size.z - 1))];
-                                        inside += kind & 1;
-                                        organs += kind >> 1 & 1;
-                                        walls += kind >> 2;
-                                    }
-                                    body[at] = static_cast<float>(inside) / 8;
-                                    organ[at] = static_cast<float>(organs) / 8;
-                                    wall[at] = static_cast<float>(walls) / 8;
+                                    const Int3 first{i * c.edge, j * c.edge, k * c.edge};
+                                    Shares s = shares_of(first, 2);
+                                    if (mixed(s.body) || mixed(s.organ) || mixed(s.wall))
+                                        s = shares_of(first, 4);
+                                    body[at] = s.body;
+                                    organ[at] = s.organ;
+                                    wall[at] = s.wall;
                                 }
                             }
                         }
@@ -214,6 +227,7 @@ void keep_what_reaches_out(const Cells& c, const Field& body, Field& above) {
     for (std::size_t at = 0; at < body.size(); ++at) {
         if (body[at] < 0.5f) visit(at);
     }
+    if (front.empty()) return;  // a block without surroundings
     while (!front.empty()) {
         const std::size_t at = front.back();
         front.pop_back();

@@ -22,20 +22,22 @@ constexpr Sheet kOuter[] = {
 };
 // Above the organs: the peritoneum, then the sheets of three muscles.
 constexpr Sheet kInner[] = {
-    {1.4, 16, 1.5}, {4.6, 12, 1.2, 1.3}, {8.6, 12, 1.3}, {12.6, 11, 1.3, 1.5}, {17, 8, 1.2},
+    {1.4, 18, 1.5}, {4.6, 12, 1.2, 1.3}, {8.6, 12, 1.3}, {12.6, 11, 1.3, 1.5}, {17, 8, 1.2},
 };
 // What a pulse of a third of the length shows: septa of fat and fasciae, thin and many.
 constexpr Sheet kOuterFine[] = {
-    {0.5, 12, 0.9},     {1.9, 12, 0.8},  {4.3, 14, 0.9, 0.9}, {7.2, 12, 0.8}, {9.0, 14, 0.9},
-    {12.3, 16, 1, 1.1}, {15.1, 13, 0.9}, {17.0, 12, 0.9},     {20.6, 15, 1},  {23.1, 12, 0.9, 1},
-    {26.9, 14, 1},      {29.4, 12, 1},   {33.2, 13, 1},       {37, 12, 1},
+    {0.5, 12, 0.9}, {4.3, 14, 0.9, 0.9}, {7.2, 12, 0.8}, {12.3, 16, 1, 1.1}, {15.1, 13, 0.9},
+    {20.6, 15, 1},  {23.1, 12, 0.9, 1},  {29.4, 12, 1},  {33.2, 13, 1},      {37, 12, 1},
 };
 constexpr Sheet kInnerFine[] = {
     {1.0, 18, 1.1}, {3.0, 12, 0.9}, {4.6, 15, 1, 1.0}, {8.6, 15, 1, 1.1}, {12.6, 14, 1, 1.2},
 };
 constexpr double kFineMhz = 6;
 
-std::vector<float> table_of(std::span<const Sheet> sheets, double scale, double axial_mm) {
+std::vector<float> table_of(std::span<const Sheet> sheets,
+                            double scale,
+                            double axial_mm,
+                            const std::function<double(double)>& layer_scale) {
     const double last = sheets.back().at_mm + 5;
     std::vector<float> table(static_cast<std::size_t>((last + kWallBeforeMm) * kWallSteps), 0.0f);
     const auto add = [&](double at_mm, double db, double width_mm) {
@@ -44,7 +46,7 @@ std::vector<float> table_of(std::span<const Sheet> sheets, double scale, double 
         const double seen = width_mm * scale;
         const double own = std::max(seen * seen - axial_mm * axial_mm, 0.09 * seen * seen);
         const double sigma = std::sqrt(own) / kFwhmPerSigma;
-        const double amplitude = std::pow(10.0, db / 20);
+        const double amplitude = std::pow(10.0, db / 20) * layer_scale(sigma);
         for (std::size_t i = 0; i < table.size(); ++i) {
             const double u = (static_cast<double>(i) / kWallSteps - kWallBeforeMm - at_mm) / sigma;
             if (std::abs(u) < 4) table[i] += static_cast<float>(amplitude * std::exp(-0.5 * u * u));
@@ -60,15 +62,19 @@ std::vector<float> table_of(std::span<const Sheet> sheets, double scale, double 
 
 }  // namespace
 
-WallTables make_wall_tables(double frequency_mhz, double axial_mm) {
+WallTables make_wall_tables(double frequency_mhz,
+                            double axial_mm,
+                            const std::function<double(double)>& layer_scale) {
     const bool fine = frequency_mhz > kFineMhz;
     const double scale = std::pow(3.5 / frequency_mhz, 0.7);
     WallTables t;
-    t.outer = table_of(fine ? std::span<const Sheet>(kOuterFine) : kOuter, scale, axial_mm);
-    t.inner = table_of(fine ? std::span<const Sheet>(kInnerFine) : kInner, scale, axial_mm);
+    t.outer =
+        table_of(fine ? std::span<const Sheet>(kOuterFine) : kOuter, scale, axial_mm, layer_scale);
+    t.inner =
+        table_of(fine ? std::span<const Sheet>(kInnerFine) : kInner, scale, axial_mm, layer_scale);
     if (fine) {
-        t.wave_mm = 0.25;
-        t.strength_db = 9;
+        t.wave_mm = 0.15;
+        t.strength_db = 12;
         t.node_mm = 1.25;
     }
     return t;

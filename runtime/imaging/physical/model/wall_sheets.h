@@ -11,6 +11,7 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <vector>
 
 #include "runtime/imaging/physical/model/tissue_layers.h"
@@ -19,7 +20,7 @@ namespace sonocase::runtime::physical {
 
 inline constexpr double kWallWaveMm = 0.4;     // deviation of a sheet from its even course
 inline constexpr double kWallMostDb = 4;       // its echo along it varies up to so much more
-inline constexpr double kWallStructureDb = 2;  // coarse structure of the wall is no brighter
+inline constexpr double kWallStructureDb = 4;  // coarse structure of the wall is no brighter
 inline constexpr double kWallBlendMm = 3;      // between sheets of the skin and of the organs
 inline constexpr double kWallDepthMm = 60;     // nothing is drawn deeper along a beam
 inline constexpr double kWallFatDb = -3;        // fat between sheets is dark
@@ -37,7 +38,10 @@ struct WallTables {
 };
 
 // frequency_mhz: sheets are as thick as the pulse lets them be. axial_mm: its width at half height.
-WallTables make_wall_tables(double frequency_mhz, double axial_mm);
+// layer_scale: what a sheet of a deviation, mm, is multiplied by so that its peak shows as it is.
+WallTables make_wall_tables(double frequency_mhz,
+                            double axial_mm,
+                            const std::function<double(double)>& layer_scale);
 
 // Index of a distance in a table of `size` steps: the nearest, an end beyond it.
 inline int wall_step(double mm, std::size_t size) {

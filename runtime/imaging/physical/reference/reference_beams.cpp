@@ -22,7 +22,7 @@ struct BeamLight {
     double log2_light = 0;    // left after the tissue, there and back
     double needle_light = 0;  // log2 left after the needle
     double bone = 0, bone_slow = 0, bone_floor = 0, gas = 0, needle_tail = 0;  // tails, amplitudes
-    double lit = 0;  // the last light well before a face of gas
+    double lit = 0;                           // the last light well before a face of gas
     double reverb = 0, period = 0, next = 0;  // next line: amplitude, mm between lines, its depth
     double clutter = 0;                       // power
     TissueKind before = TissueKind::soft, before_that = TissueKind::soft;  // of the samples above
@@ -131,16 +131,18 @@ void light_tails(
         t.bone_floor = std::max(t.bone_floor, kBoneFloor * std::min(here * gain, 1.0));
     }
     // The frame's face, if it is known: with the light shortly before it.
-    const bool known = in.scene.has_gas && (in.frame.effects.diaphragm || in.frame.effects.gas_ring_down);
+    const bool known =
+        in.scene.has_gas && (in.frame.effects.diaphragm || in.frame.effects.gas_ring_down);
     if (p.row.r_mm < face.depth_mm - kFaceLightMm) t.lit = here * gain;
-    const bool starts = kind == TissueKind::gas && t.before == TissueKind::gas &&
-                        t.before_that != TissueKind::gas;
-    const bool meets = p.row.r_mm >= face.depth_mm &&
-                       p.row.r_mm - in.geometry.step_mm < face.depth_mm && here > 0;
+    const bool starts =
+        kind == TissueKind::gas && t.before == TissueKind::gas && t.before_that != TissueKind::gas;
+    const bool meets =
+        p.row.r_mm >= face.depth_mm && p.row.r_mm - in.geometry.step_mm < face.depth_mm && here > 0;
     if (known ? meets && !(face.peak > 0) : starts) {
         const double light = known ? t.lit : here * gain;
-        const double facing =
-            known ? 0.25 * face.cosine + 0.75 * std::pow(face.cosine, 6) : p.facing < 1 ? p.facing : 0;
+        const double facing = known          ? 0.25 * face.cosine + 0.75 * std::pow(face.cosine, 6)
+                              : p.facing < 1 ? p.facing
+                                             : 0;
         t.gas = std::max(t.gas, kGasTail * light);
         const double mirror = kReverb * kReverbLoss * facing * light;
         if (mirror > t.reverb) {
@@ -263,16 +265,16 @@ class Beams {
             meet_surface(in_, beam, p);
             meet_target(in_, p);
             if (std::abs(past) < kDomeReachMm) {
-                p.re = line * p.row.interface_scale;
+                p.re = line * in_.tables.dome_scale * p.row.interface_scale;
                 p.im = 0;
             }
             const bool dead = t.log2_light < kDeadLog2;
             p.here = dead ? 0 : std::exp2(t.log2_light);
             if (dead) p.re = p.im = 0;
             if (dead) p.field_re = p.field_im = {};
-            if (dome) p.loss = past < kDomeReachMm ? 0 : 1e9;
             add_clutter(in_, p, t);
             out.clutter[at] = t.clutter;
+            if (dome) p.loss = past < kDomeReachMm ? 0 : 1e9;
             light_tails(in_, look.kind, face, p, t);
             meet_needle(in_, o, d, p, t);
             for (std::size_t i = 0; i < out.looks.size(); ++i) {

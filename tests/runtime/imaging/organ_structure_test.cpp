@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What organs show: uneven echo, plates that glint, the diaphragm, walls of vessels, nerves.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "block_bench.h"
+#include "runtime/imaging/physical/model/streak_plates.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using namespace physical;
+
+const CaseBundle& liver_block() {
+    static const CaseBundle bundle =
+        block_of(2, [](Point3 p) { return p.z < 0 ? Phantom::outside : Phantom::liver; });
+    return bundle;
+}
+
+TEST(Parenchyma, KeepsTheMeanPowerAndAddsShading) {
+    BlockBench b(liver_block(), block_exercise());
+    b.frame.effects.speckle = true;
+    const auto cells = [&] {  // mean power of cells of 5 mm, dB
+        std::vector<double> out;
+        for (double z = 10; z < 55; z += 5) {
+            for (int l = 16; l + 24 < 180; l += 24) {
+                double power = 0;
+                int n = 0;
+                for (int k = b.row_of(z); k < b.row_of(z + 5); ++k) {
+                    for (int i = l; i < l + 24; ++i, ++n)
+                        power += static_cast<double>(b.renderer->power_row(k)[i]);
+                }
+                out.push_back(10 * std::log10(power / n));
+            }
+        }
+        return out;
+    };
+    const auto mean = [](const std::vector<double>& v) {
+        double sum = 0;
+        for (const double x : v) sum += x;
+        return sum / static_cast<double>(v.size());
+    };
+    const auto deviation = [&](const std::vector<double>& v) {
+        double sum = 0;
+        for (const double x : v) sum += (x - mean(v)) * (x - mean(v));
+        return std::sqrt(sum / static_cast<double>(v.size()));
+    };
+    double level = 0, even = 0, uneven = 0;
+    constexpr int kPoses = 6;  // shading spans 28 mm: one block holds few independent places
+    for (int pose = 0; pose < kPoses; ++pose) {
+        b.frame.volume_from_probe.translation = {-30.0 + 12 * pose, -20.0 + 8 * pose, 0};
+        b.frame.effects.parenchyma = false;
+        b.run();
+        const auto plain = cells();
+        b.frame.effects.parenchyma = true;
+        b.run();
+        const auto shaded = cells();
+        level += (mean(shaded) - mean(plain)) / kPoses;
+        even += deviation(plain) / kPoses;
+        uneven += deviation(shaded) / kPoses;
+    }
+    EXPECT_NEAR(level, -0.7, 1.2);  // the mean of decibels lies below the decibels of the mean
+    EXPECT_GT(uneven, even + 0.6);
+}
+
+// Plates per area of slice against their density in the tissue: a Poisson process of plates with
+// uniform directions, of which those near the slab that face the beam show.
+TEST(Streaks, AreAsManyAsTheirDensitySays) {
+    const Exercise exercise = block_exercise();
+    BlockBench b(liver_block(), exercise);
+    const std::vector<float> gaps(192, 0.0f);
+    std::vector<Streak> out(kMostStreaks);
+    double found = 0;
+    int frames = 0;
+    for (double y = -18; y <= 18; y += 9) {
+        for (double x = -24; x <= 24; x += 12, ++frames) {
+            b.frame.volume_from_probe.translation = {x, y, 0};
+            found += find_streaks(b.scene, b.geometry, b.tables, b.frame, nullptr, gaps, out);
+        }
+    }
+    const double area_cm2 = frames * 4.0 * (6.0 - 0.1 * kStreakFirstMm);
+    // The same by counting: a share of random plates within 10 mm of the slab.
+    const double plates_per_mm3 =
+        kStreakTries * 3.14159265 / 6 / (kStreakCellMm * kStreakCellMm * kStreakCellMm);
+    constexpr std::array<double, 16> kLengths{0.74, 1.25, 1.63, 1.97, 2.3,  2.63, 2.96, 3.3,
+                                              3.67, 4.06, 4.51, 5.01, 5.62, 6.4,  7.53, 9.82};
+    const double slab = b.tables.rows[256].elevation_mm;
+    Random random(5);
+    constexpr int kDraws = 400000;
+    int shown = 0;
+    for (int n = 0; n < kDraws; ++n) {
+        const double y = random.uniform(-10, 10), cosine = random.uniform(-1, 1);
+        const double own = 0.25 * kLengths[static_cast<std::size_t>(random.uniform(0, 15.999))];
+        const double off = y / (2.9 * std::hypot(slab, own));
+        const double slope = (1 - cosine * cosine) / (kStreakFaceSin * kStreakFaceSin);
+        if (std::pow(std::max(1 - off * off, 0.0) * std::max(1 - slope, 0.0), 4) >= 0.1) ++shown;
+    }
+    const double expected_per_cm2 = plates_per_mm3 * 20 * shown / kDraws * 100;
+    std::printf("streaks: %.2f per cm2, expected %.2f\n", found / area_cm2, expected_per_cm2);
+    // 1 % of the count; the slab is up to a tenth thicker away from the focus.
+    EXPECT_NEAR(found / area_cm2, expected_per_cm2, 0.15 * expected_per_cm2);
+}
+
+TEST(Streaks, StayWhereTheyAreInTheTissue) {
+    BlockBench b(liver_block(), block_exercise());
+    const std::vector<float> gaps(192, 0.0f);
+    std::vector<Streak> here(kMostStreaks), there(kMostStreaks);
+    const int n = find_streaks(b.scene, b.geometry, b.tables, b.frame, nullptr, gaps, here);
+    b.frame.volume_from_probe.translation = {3, 0, 0};
+    const int m = find_streaks(b.scene, b.geometry, b.tables, b.frame, nullptr, gaps, there);
+    ASSERT_GT(n, 5);
+    int again = 0, inside = 0;
+    for (int i = 0; i < n; ++i) {
+        const Streak& s = here[static_cast<std::size_t>(i)];
+        if (std::abs(s.centre.x - 3) > 18) continue;
+        ++inside;
+        for (int j = 0; j < m; ++j) {
+            const Streak& t = there[static_cast<std::size_t>(j)];
+            again += std::abs(t.centre.x + 3 - s.centre.x) < 1e-6 &&
+                     std::abs(t.centre.z - s.centre.z) < 1e-6 &&
+                     std::abs(t.amplitude - s.amplitude) < 1e-9;
+        }
+    }
+    EXPECT_EQ(again, inside);
+    // None in air, none without an organ.
+    b.frame.volume_from_probe.translation = {0, 0, -300};
+    EXPECT_EQ(find_streaks(b.scene, b.geometry, b.tables, b.frame, nullptr, gaps, here), 0);
+}
+
+// A liver whose far side, at 60 mm and a slope, touches the lung.
+CaseBundle dome_block(double slope) {
+    CaseBundle b = block_of(1, [&](Point3 p) {
+        return p.z < 0 ? Phantom::outside : p.z < 60 + slope * p.x ? Phantom::liver : Phantom::gas;
+    });
+    for (Tissue& t : b.tissues) {
+        if (t.kind == TissueKind::gas) t.name = "lung";
+    }
+    b.labels[Phantom::gas].tissue = "lung";
+    return b;
+}
+
+TEST(Diaphragm, IsASoftLineAtAnySlopeWithBlackBehind) {
+    double straight = 0;
+    for (const double slope : {0.0, 0.6, 1.2}) {
+        const CaseBundle bundle = dome_block(slope);
+        Exercise exercise = block_exercise();
+        exercise.probe.depth_mm = 110;
+        BlockBench b(bundle, exercise);
+        // Attenuation ends what lies behind: the liver's own is left out of the measure.
+        for (AcousticProperties& look : b.scene.looks) {
+            if (look.kind == TissueKind::soft) look.attenuation = 0;
+        }
+        b.frame.effects.diaphragm = b.frame.effects.gas_ring_down = b.frame.effects.speckle = true;
+        b.run();
+        // Peak and width across the line, mean over beams along it.
+        const double cosine = 1 / std::sqrt(1 + slope * slope);
+        const auto profile = [&](double q) {
+            double sum = 0;
+            int n = 0;
+            for (int l = 40; l < 152; ++l, ++n) {
+                const double x = b.geometry.beams[static_cast<std::size_t>(l)].origin.x;
+                sum += b.envelope(b.row_of(60 + slope * x + q / cosine), l);
+            }
+            return sum / n;
+        };
+        const double liver = profile(-14);
+        double peak = 0, width = 0;
+        for (double q = -6; q < 6; q += 0.1) peak = std::max(peak, profile(q));
+        for (double q = -6; q < 6; q += 0.1) width += profile(q) > 0.5 * peak ? 0.1 : 0;
+        std::printf("diaphragm, slope %.1f: peak %.1f dB, width %.1f mm, behind %.0f dB\n", slope,
+                    20 * std::log10(peak / liver), width,
+                    20 * std::log10(profile(14) / liver + 1e-9));
+        EXPECT_GT(20 * std::log10(peak / liver), 7);
+        EXPECT_LT(20 * std::log10(peak / liver), 15);
+        EXPECT_GT(width, 2.5);
+        EXPECT_LT(width, 5);
+        EXPECT_LT(20 * std::log10(profile(14) / liver + 1e-9), -60);
+        if (slope == 0) straight = peak;
+        EXPECT_GT(peak, 0.45 * straight);  // living: 105 grey at 50 to 70 degrees, 116 at none
+    }
+}
+
+// Single bright beams used to stay behind a lung.
+TEST(Diaphragm, NoBeamBehindALungIsBrighterThanItsNeighbours) {
+    const CaseBundle bundle = dome_block(0.6);
+    Exercise exercise = block_exercise();
+    exercise.probe.depth_mm = 110;
+    BlockBench b(bundle, exercise);
+    b.frame.effects = {};
+    b.frame.effects.near_field = b.frame.effects.noise = b.frame.effects.haze = false;
+    b.run();
+    for (int l = 0; l < 192; ++l) EXPECT_LT(b.envelope(b.row_of(100), l), 1e-3) << l;
+}
+
+TEST(VesselWalls, PortalVeinsAndArteriesAreBrightHepaticVeinsHaveNone) {
+    CaseBundle b = block_of(2, [](Point3) { return Phantom::liver; });
+    const auto echo = [&](const char* name) {
+        b.labels[Phantom::blood].name = name;
+        const PhysicalScene s = *make_physical_scene(b);
+        const auto at = [&](int a, int c) {
+            return s.pairs[static_cast<std::size_t>(a * s.labels() + c)].amplitude;
+        };
+        EXPECT_EQ(at(Phantom::liver, Phantom::blood), at(Phantom::blood, Phantom::liver));
+        return at(Phantom::liver, Phantom::blood);
+    };
+    const double plain = echo("vessel");
+    EXPECT_GT(echo("portal_vein_and_splenic_vein"), 2 * plain);
+    EXPECT_GT(echo("hepatic_artery_1p5mm"), 2 * plain);
+    EXPECT_EQ(echo("hepatic_vein_3mm"), 0);
+    EXPECT_EQ(echo("inferior_vena_cava"), 0);
+}
+
+TEST(Capsule, IsTwoLinesBetweenAnOrganAndItsSurroundings) {
+    const CaseBundle b = block_of(2, [](Point3) { return Phantom::liver; });
+    const PhysicalScene s = *make_physical_scene(b);
+    const auto split = [&](int a, int c) {
+        return s.pairs[static_cast<std::size_t>(a * s.labels() + c)].split_mm;
+    };
+    EXPECT_EQ(split(Phantom::liver, Phantom::fat), kCapsuleMm);
+    EXPECT_EQ(split(Phantom::muscle, Phantom::kidney), kCapsuleMm);
+    EXPECT_EQ(split(Phantom::liver, Phantom::kidney), 0);
+    EXPECT_EQ(split(Phantom::liver, Phantom::gas), 0);
+}
+
+TEST(Nerves, AreBundlesInSheathsWhereALabelSaysSo) {
+    CaseBundle b = block_of(2, [](Point3 p) {
+        return p.z < 0                         ? Phantom::outside
+               : std::hypot(p.x, p.z - 40) < 6 ? Phantom::kidney
+                                               : Phantom::muscle;
+    });
+    for (Tissue& t : b.tissues) {
+        if (t.name == "kidney_cortex") t.name = "nerve";
+    }
+    b.labels[Phantom::kidney].tissue = "nerve";
+    const PhysicalScene s = *make_physical_scene(b);
+    const FineFrame& frame = s.fine.frames[Phantom::kidney];
+    EXPECT_EQ(frame.cube, kNerveCube);
+    // Straight along the nerve, which runs along y.
+    EXPECT_GT(std::abs(frame.cube_from_voxel[1]), 10 * std::abs(frame.cube_from_voxel[0]));
+    // Dark bundles fill more than bright sheaths do.
+    const std::int8_t* cube =
+        s.textures->fine.data() + kNerveCube * kFineEdge * kFineEdge * kFineEdge;
+    int dark = 0;
+    for (int i = 0; i < kFineEdge * kFineEdge * kFineEdge; ++i) dark += cube[i] < 0;
+    EXPECT_GT(dark, kFineEdge * kFineEdge * kFineEdge / 2);
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
