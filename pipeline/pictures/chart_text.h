@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Words of a chart, drawn and measured by FreeType through VTK: the same pixels on every machine,
-// without a display. Internal to pipeline/pictures.
+// without a display.
 #pragma once
 
 #include <string>

@@ -114,7 +114,8 @@ WarpFit fit_warp(const FitContext& s,
     FoldProof proof = prove_no_fold(w.registration);
     w.registration.min_det_jacobian = proof.least_bound;
     w.quadratic_fit = measure_fit(s.skin, s.target, w.registration);
-    if (options.residual_warp && !options.paper_warp && !w.kept_rigid) {
+    if (options.residual_warp && !options.paper_warp && !w.kept_rigid &&
+        options.path != "elastic") {
         report_progress(progress, 0.7, "residual warp");
         w.residual = fit_residual(s.fine, s.target, s.readings, s.inside, options.residual,
                                   &w.registration, progress);

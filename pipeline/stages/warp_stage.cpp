@@ -117,7 +117,8 @@ void add_elastic(OptionsOf<Fit>& options) {
             "rounds of matching of the elastic warp")
         .number(
             "cg_iterations", [](auto& o) { return &o.elastic.iterations; }, 1, 1000, "",
-            "conjugate gradients in each of those rounds");
+            "conjugate gradients in each of those rounds")
+        .sweep({"elastic", {"8", "30", "60"}, "how near each round comes to its minimum", ""});
 }
 
 OptionGroup options() {

@@ -16,6 +16,8 @@ namespace sonocase::pipeline {
 // Fit of the demo torso's skin to its mannequin: distance of inner points from where the known warp
 // puts them.
 Suite register_suite();
+// Fit of the demo torso to a mannequin of another build: what becomes of its organs.
+Suite elastic_suite();
 // Inverse map and resampling of the demo torso through its known warp: displacement of surfaces.
 Suite warp_suite();
 // Smoothing: the same measure, on slices 6 mm thick, with the paper's eq. (10) as comparison.

@@ -41,15 +41,20 @@ RegisterArguments::RegisterArguments() {
     recipe.settings = StageSettings(built_in_stages());
 }
 
-void add_register_options(CLI::App& app, RegisterArguments& a) {
+void add_register_options(CLI::App& app, RegisterArguments& a, bool several) {
     RecipeInputs& in = a.recipe.inputs;
     app.add_option("--labels", in.labels,
                    "Label map: NIfTI, NRRD, MetaImage, DICOM or a folder of masks")
         ->type_name("FILE")
         ->required();
-    app.add_option("--surface", in.surface, "Mannequin: PLY, STL, OBJ, VTP, or CSV of readings")
-        ->type_name("FILE")
-        ->required();
+    auto* surface =
+        app.add_option("--surface", a.surfaces,
+                       several ? "Mannequin: PLY, STL, OBJ, VTP, or CSV of readings; of several, "
+                                 "the one that fits best is taken"
+                               : "Mannequin: PLY, STL, OBJ, VTP, or CSV of readings")
+            ->type_name("FILE")
+            ->required();
+    surface->expected(1, several ? 100 : 1);
     app.add_option("--table", in.label_table, "CSV of value,name[,tissue_class] for the label map")
         ->type_name("FILE.csv");
     app.add_option("--up", a.up, "The patient's head direction in the surface's frame")
@@ -68,6 +73,7 @@ void add_register_options(CLI::App& app, RegisterArguments& a) {
 Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Progress& progress) {
     const Stopwatch watch;
     const RecipeInputs& in = a.recipe.inputs;
+    const std::string mannequin = a.surfaces.front();
     RegisterInputs inputs;
     inputs.options = a.recipe.settings.of<RegisterOptions>("warp");
     inputs.options.seed = case_seed(a.recipe);
@@ -82,7 +88,7 @@ Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Pr
         inputs.options.landmarks = std::move(*landmarks);
     }
     StageReport surface_report;
-    Result<Surface> surface = import_surface(in.surface, {in.surface_scale}, &surface_report);
+    Result<Surface> surface = import_surface(mannequin, {in.surface_scale}, &surface_report);
     if (!surface) return surface.error();
     inputs.mannequin = std::move(*surface);
     ImportOptions import;
@@ -105,6 +111,17 @@ Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Pr
     inputs.warnings.insert(inputs.warnings.end(), inputs.skin.report.warnings.begin(),
                            inputs.skin.report.warnings.end());
     return inputs;
+}
+
+Status read_other_mannequin(const RegisterArguments& a,
+                            const std::string& path,
+                            RegisterInputs& inputs) {
+    StageReport report;
+    Result<Surface> surface = import_surface(path, {a.recipe.inputs.surface_scale}, &report);
+    if (!surface) return surface.error();
+    inputs.mannequin = std::move(*surface);
+    inputs.warnings.insert(inputs.warnings.end(), report.warnings.begin(), report.warnings.end());
+    return Done{};
 }
 
 void add_input_reports(const RegisterInputs& inputs, StageReport& report) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "formats/base/result.h"
 #include "pipeline/command_line/command_line.h"
@@ -15,13 +16,15 @@ namespace sonocase::pipeline {
 struct RegisterArguments {
     RegisterArguments();  // options at their defaults
 
-    Recipe recipe;  // inputs, and the options of the stage "warp"
+    Recipe recipe;                      // inputs, and the options of the stage "warp"
+    std::vector<std::string> surfaces;  // mannequins; the first is that of the recipe
     std::string out, up;
     CommonOptions common;
 };
 
 // Inputs, every option of the stage "warp", --seed, and what all verbs have.
-void add_register_options(CLI::App& app, RegisterArguments& arguments);
+// several  --surface takes more than one
+void add_register_options(CLI::App& app, RegisterArguments& arguments, bool several);
 
 // Label map, skin and mannequin as read, hints parsed; with the warnings of all of them.
 struct RegisterInputs {
@@ -34,6 +37,11 @@ struct RegisterInputs {
 };
 Result<RegisterInputs> read_register_inputs(const RegisterArguments& arguments,
                                             const Progress& progress);
+
+// The same for another mannequin: the patient stays.
+Status read_other_mannequin(const RegisterArguments& arguments,
+                            const std::string& path,
+                            RegisterInputs& inputs);
 
 // Adds to the stage's report what was reported when the inputs were read and the skin extracted.
 void add_input_reports(const RegisterInputs& inputs, StageReport& report);

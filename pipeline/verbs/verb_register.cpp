@@ -3,6 +3,7 @@
 // sonocase register, align, warp: the patient's skin onto the mannequin, in one call or stage by
 // stage.
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <functional>
 #include <optional>
 
@@ -11,6 +12,8 @@
 #include "pipeline/base/parallel.h"
 #include "pipeline/command_line/verbs.h"
 #include "pipeline/registration/fit_pictures.h"
+#include "pipeline/registration/organ_pictures.h"
+#include "pipeline/registration/rank_mannequins.h"
 #include "pipeline/verbs/register_inputs.h"
 
 namespace sonocase::pipeline {
@@ -38,7 +41,7 @@ void add_options(CLI::App& app, const FitVerb& verb, FitArguments& arguments) {
         app.add_option("registration", arguments.rigid, "What align wrote")
             ->type_name("REG.json")
             ->required();
-    add_register_options(app, arguments.common);
+    add_register_options(app, arguments.common, verb.whole);
     app.add_option("-o,--output", arguments.common.out, verb.writes)
         ->type_name("REG.json")
         ->required(!verb.whole);
@@ -51,6 +54,45 @@ struct Fitted {
     RegisterInputs inputs;
     RegisterResult result;
 };
+
+// Fits the other mannequins as well; the best fit and its mannequin stay. The report has the order.
+Status try_others(const FitVerb& verb,
+                  const FitArguments& arguments,
+                  const Registration& rigid,
+                  const Progress& progress,
+                  RegisterInputs& inputs,
+                  RegisterResult& fitted) {
+    const std::vector<std::string>& names = arguments.common.surfaces;
+    if (names.size() < 2) return Done{};
+    std::vector<RegisterResult> results{std::move(fitted)};
+    std::vector<Surface> mannequins{inputs.mannequin};
+    for (std::size_t n = 1; n < names.size(); ++n) {
+        if (auto status = read_other_mannequin(arguments.common, names[n], inputs); !status)
+            return status;
+        mannequins.push_back(inputs.mannequin);
+        auto other = verb.fit(inputs, rigid, progress);
+        if (!other) {
+            Error error = other.error();
+            if (error.where.empty()) error.where = names[n];
+            return error;
+        }
+        results.push_back(std::move(*other));
+    }
+    const std::vector<std::size_t> order = rank_results(results);
+    MeasureGroup ranking{"misfit", {}};
+    std::printf("misfit  skin  volume  shape  coverage  (1 or less is good; best first)\n");
+    for (const std::size_t n : order) {
+        const Misfit m = misfit_of(results[n]);
+        std::printf("%6.2f  %4.2f  %6.2f  %5.2f  %8.2f  %s%s\n", m.worst(), m.skin, m.volume,
+                    m.shape, m.coverage, names[n].c_str(), m.proven ? "" : "  (not proven)");
+        ranking.values.push_back({names[n], m.worst()});
+    }
+    inputs.mannequin = std::move(mannequins[order[0]]);
+    fitted = std::move(results[order[0]]);
+    fitted.report.notes.push_back({"mannequin", names[order[0]]});
+    fitted.report.groups.push_back(std::move(ranking));
+    return Done{};
+}
 
 Result<Fitted> fit(const FitVerb& verb, const FitArguments& arguments) {
     ProgressBar bar(arguments.common.common);
@@ -65,9 +107,11 @@ Result<Fitted> fit(const FitVerb& verb, const FitArguments& arguments) {
     auto fitted = verb.fit(*inputs, rigid, bar.progress());
     if (!fitted) {
         Error error = fitted.error();
-        if (error.where.empty()) error.where = arguments.common.recipe.inputs.surface;
+        if (error.where.empty()) error.where = arguments.common.surfaces.front();
         return error;
     }
+    if (auto status = try_others(verb, arguments, rigid, bar.progress(), *inputs, *fitted); !status)
+        return status.error();
     std::vector<StageReport>& reports = fitted->registration.reports;
     reports.insert(reports.begin(), rigid.reports.begin(), rigid.reports.end());
     return Fitted{std::move(*inputs), std::move(*fitted)};
@@ -78,6 +122,9 @@ Status write_fit(const FitArguments& arguments, Fitted& fitted) {
     if (!arguments.pictures.empty()) {
         auto status = write_fit_pictures(fitted.inputs.skin, fitted.inputs.mannequin, registration,
                                          arguments.pictures);
+        if (!status) return status;
+        status = write_organ_pictures(fitted.inputs.labels, fitted.inputs.mannequin, registration,
+                                      fitted.result.organs, arguments.pictures);
         if (!status) return status;
     }
     // The file holds no seconds, so that the same inputs give the same bytes; they go to --report.

@@ -63,6 +63,7 @@ struct NamedSuite {
 std::vector<NamedSuite> suites() {
     return {
         {"register", register_suite},
+        {"elastic", elastic_suite},
         {"warp", warp_suite},
         {"smooth", smooth_suite},
         {"texture", texture_suite},

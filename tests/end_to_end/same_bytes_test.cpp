@@ -26,10 +26,10 @@ using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
 // Recorded at commit aa0be5b.
-constexpr const char* kDraft = "ebea602c5d21bfd284c881fad28fd68c";
-constexpr const char* kBalanced = "e2d74bb720fb202823065be030fcc66c";
-constexpr const char* kSlender = "b2d650a02feb71987f8bad13eaec9d3d";
-constexpr const char* kReal = "36223f17a1ce0b24ff365e3b5b55e7f5";
+constexpr const char* kDraft = "815e6c7d170369bed23df5dca4fe3f95";
+constexpr const char* kBalanced = "e46af3964f7c4342a663f60bf968a1e7";
+constexpr const char* kSlender = "04744c53c83a77f9827edb9fb7719fa7";
+constexpr const char* kReal = "f7a4c9a5ace9b12a5d9c0432ebfeb718";
 constexpr const char* kDraftPhysical = "499f1c59572465b049a7452d0ea24ca1";
 constexpr const char* kDraftPaper = "1628db3a0fe630d2e2b3a86b0621208a";
 constexpr const char* kRealPhysical = "fc1889f0cbfbd0356dec98ed2b480630";
