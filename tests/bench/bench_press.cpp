@@ -3,6 +3,7 @@
 // What pressed tissue costs and how near it comes to itself.
 //   Press/solve          a pose from look-ups to tables, 8 mm deep; quiet_ms: the fastest run
 //   Press/PART           samples, elastic, stretch, table: its parts
+//   Press/bundle         a convex face 8 mm deep in the case of the other benchmarks, pose by pose
 //   Press/nothing        a probe in the air; Press/TARGET: another instruction set
 //   Press/pull_back      of a point
 //   Accuracy/press/INCREMENTSxITERATIONS
@@ -18,6 +19,8 @@
 #include <memory>
 #include <string>
 
+#include "bench_bundle.h"
+#include "runtime/imaging/press/press_bundle.h"
 #include "runtime/imaging/press/press_support.h"
 
 namespace sonocase::bench {
@@ -76,6 +79,19 @@ void whole(benchmark::State& state, double pressed_mm, SimdTarget target = best(
     PressField field({});
     const PressScene scene = voxels.scene();
     quietly(state, [&] { benchmark::DoNotOptimize(field.press(target, scene)); });
+}
+
+void in_bundle(benchmark::State& state) {
+    PressBundle body(bench_bundle());
+    PressField field({36, 6, 60});
+    const SimdTarget target = best();
+    Rigid deeper;
+    deeper.translation = {0, 0, 8};
+    std::size_t i = 0;
+    quietly(state, [&] {
+        const Rigid pose = bench_poses()[i++ % bench_poses().size()] * deeper;
+        benchmark::DoNotOptimize(field.press(target, body.scene(pose)));
+    });
 }
 
 void part(benchmark::State& state, const std::string& name) {
@@ -146,6 +162,7 @@ void accuracy(benchmark::State& state, int increments, int iterations) {
     for (const SimdTarget target : runtime::available_simd_targets())
         add(std::string("Press/") + target.name,
             [target](benchmark::State& s) { whole(s, 8, target); });
+    add("Press/bundle", in_bundle);
     add("Press/nothing", [](benchmark::State& s) { whole(s, -5); });
     for (const char* name : {"samples", "elastic", "stretch", "table"})
         add(std::string("Press/") + name, [name](benchmark::State& s) { part(s, name); });
