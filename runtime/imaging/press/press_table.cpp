@@ -19,6 +19,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Lanes = hn::CappedTag<float, 16>;
 
 constexpr float kMostSqueezed = 0.95f;
+// Parts of the rows that are all equally high.
+constexpr int kEvenParts = 30 * kParts;
+static_assert(kFineEdge[kEvenParts] == kEvenParts * kFineEdge[1]);
 
 // Rows of the table that are nearest to a row of the sideways shift.
 inline float rows_near(int n) {
@@ -31,6 +34,9 @@ void invert(const PressSamples& s, const PressColumns& columns, PressTable& t) {
     const hn::RebindToSigned<Lanes> di;
     const auto one = hn::Set(d, 1.0f), zero = hn::Zero(d);
     const auto most = hn::Set(d, kMostSqueezed);
+    const auto even = hn::Set(d, static_cast<float>(kFineEdge[1]));
+    bool lumens = false;
+    for (const bool lumen : s.lumen) lumens = lumens || lumen;
     std::array<float, kFineRows + 1> edges{};
     for (std::size_t j = 0; j < edges.size(); ++j) edges[j] = static_cast<float>(kFineEdge[j]);
     t.bulge_mm.values.fill(0);
@@ -47,8 +53,13 @@ void invert(const PressSamples& s, const PressColumns& columns, PressTable& t) {
             const auto above = hn::GatherIndex(d, columns.pressed_mm.row(0), place);
             const auto below = hn::GatherIndex(d, columns.pressed_mm.row(1), place);
             const auto l = hn::GatherIndex(d, columns.stretch.row(0), place);
-            const auto edge = hn::GatherIndex(d, edges.data(), part);
-            const auto next = hn::GatherIndex(d, edges.data() + 1, part);
+            // Most parts are of the even rows, whose edges need no look-up; both ways are exact.
+            auto edge = hn::Mul(hn::ConvertTo(d, part), even);
+            auto next = hn::Add(edge, even);
+            if (!hn::AllTrue(di, hn::Lt(part, hn::Set(di, kEvenParts)))) {
+                edge = hn::GatherIndex(d, edges.data(), part);
+                next = hn::GatherIndex(d, edges.data() + 1, part);
+            }
             const auto within = hn::Sub(r, above), past = hn::Sub(r, below);
             // Above the skin and below the last row nothing is stretched.
             auto rest = hn::Add(edge, hn::Div(within, l));
@@ -58,8 +69,8 @@ void invert(const PressSamples& s, const PressColumns& columns, PressTable& t) {
                        t.rest_mm.row(m) + i);
             const auto body = hn::And(hn::Ge(within, zero), hn::Le(past, zero));
             const auto squeezed = hn::Min(hn::Max(hn::Sub(one, l), zero), most);
-            const auto tissue = hn::Sub(one, hn::GatherIndex(d, s.drains.row(0), place));
-            const auto e = hn::IfThenElseZero(body, hn::Mul(hn::Mul(squeezed, tissue), weight));
+            auto e = hn::IfThenElseZero(body, hn::Mul(squeezed, weight));
+            if (lumens) e = hn::Mul(e, hn::Sub(one, hn::GatherIndex(d, s.drains.row(0), place)));
             float* bulge = t.bulge_mm.row(near) + i;
             hn::StoreU(hn::Add(hn::LoadU(d, bulge), e), d, bulge);
         });
