@@ -16,7 +16,7 @@ find_package(Threads REQUIRED)
 include(CMakePackageConfigHelpers)
 
 string(CONCAT core_rooms "^(formats/(base|text|volume|container|bundle|bundle/codec|registration|exercise|machine|recording|"
-  "calibration|calibration/solve|scoring)|runtime/(imaging|imaging/.*|engine))$")
+  "calibration|calibration/solve|scoring)|runtime/(imaging|imaging/.*|needle|engine))$")
 set(formats_rooms "^formats/(threads|files|progress_book)$")
 # Rooms whose headers a program may include, and headers of theirs that are for the room's neighbours alone.
 string(CONCAT public_rooms "^(formats/(base|volume|bundle|registration|exercise|machine|recording|calibration|"

@@ -133,11 +133,12 @@ void stretch_columns(SimdTarget simd,
     for (int i = 0; i < kColumns; ++i) {
         const auto at = static_cast<std::size_t>(i);
         if (!samples.touching[at]) continue;
-        double column = 0;
-        for (int k = 1; k <= 3; ++k)
-            column += field_width_mm(face.half_height_mm, row_middle(k)) *
-                      static_cast<double>(elastic.stress_kpa.row(k)[i]) / 3;
-        newtons += column * static_cast<double>(out.factor[at]);
+        const auto over_width = [&](int k) {
+            return field_width_mm(face.half_height_mm, row_middle(k)) *
+                   static_cast<double>(elastic.stress_kpa.row(k)[i]);
+        };
+        newtons += static_cast<double>(out.factor[at]) *
+                   ((1 - kSkinShare) * over_width(kBelowSkinRow) + kSkinShare * over_width(0));
     }
     const double root_pi = 1.7724538509055159;
     out.force_n = std::max(0.0, 1e-3 * root_pi * column_width_mm(face) * newtons);

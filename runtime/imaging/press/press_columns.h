@@ -18,9 +18,8 @@ struct PressColumns {
 // multiplied by one factor (Newton), so that its stretches add up to what is pressed, and its
 // heights by another, which makes that exact; both are near 1. A lumen of small stretch closes.
 //
-// Every stretch is positive, so depth rises along each column: it can be inverted. Force: the mean
-// stress of rows 1 to 3 over the width of the field, F = sqrt(pi) h sum_i s q, in newtons.
-// Cost: 30 us.
+// Every stretch is positive, so depth rises along each column: it can be inverted. Force in
+// newtons: F = sqrt(pi) h sum_i q_i over the columns that touch, q as in press_law.h. Cost: 15 us.
 void stretch_columns(SimdTarget simd,
                      const PressSamples& samples,
                      const PressFace& face,

@@ -90,7 +90,7 @@ void set_couplings(const PressSamples& s, const PressFace& face, PressElastic& w
 // column by itself.
 void set_moduli(const PressSamples& s, const PressFace& face, PressElastic& w) {
     const Lanes d;
-    const auto one = hn::Set(d, 1.0f), quarter = hn::Set(d, 1.0f / kParts);
+    const auto quarter = hn::Set(d, 1.0f / kParts);
     for (int k = 0; k < kRows; ++k) {
         const double t = row_middle(k), spread = face.radius_mm > 0 ? 1 + t / face.radius_mm : 1;
         const auto scale =
@@ -119,15 +119,15 @@ void set_moduli(const PressSamples& s, const PressFace& face, PressElastic& w) {
                                  hn::LoadU(d, w.ground.row(k) + i));
             if (k > 0) {
                 const auto up = hn::LoadU(d, w.down.row(k - 1) + i);
-                const auto both = hn::Mul(up, hn::LoadU(d, w.free.row(k - 1) + i));
                 pivot = hn::Sub(hn::Add(pivot, up),
-                                hn::Mul(hn::Mul(both, up), hn::LoadU(d, w.pivot.row(k - 1) + i)));
+                                hn::Mul(hn::Mul(up, up), hn::LoadU(d, w.pivot.row(k - 1) + i)));
             }
-            hn::StoreU(hn::Div(one, pivot), d, w.pivot.row(k) + i);
+            // Zero where a node does not move: whatever force is on it, it stays.
+            hn::StoreU(hn::Div(hn::LoadU(d, w.free.row(k) + i), pivot), d, w.pivot.row(k) + i);
         });
 }
 
-// out = A v, where it moves; returns v . A v.
+// out = A v; returns v . A v.
 float apply(const PressElastic& w, const Plane<kRows + 1>& v, Plane<kRows>& out) {
     const Lanes d;
     std::array<float, kColumns> each{};
@@ -147,7 +147,6 @@ float apply(const PressElastic& w, const Plane<kRows + 1>& v, Plane<kRows>& out)
             if (k > 0)
                 force = hn::Add(force, hn::Mul(hn::LoadU(d, w.down.row(k - 1) + i),
                                                hn::Sub(here, hn::LoadU(d, v.row(k - 1) + i))));
-            force = hn::Mul(force, hn::LoadU(d, w.free.row(k) + i));
             hn::StoreU(force, d, out.row(k) + i);
             sum = hn::Add(sum, hn::Mul(force, here));
         }
@@ -156,18 +155,21 @@ float apply(const PressElastic& w, const Plane<kRows + 1>& v, Plane<kRows>& out)
     return sum_columns(each);
 }
 
-// relaxed = the residual with every column solved by itself; returns residual . relaxed.
-float relax(PressElastic& w) {
+// Takes `step` times the product off the residual, then relaxed = the residual with every column
+// solved by itself; returns residual . relaxed.
+float relax(float step, PressElastic& w) {
     const Lanes d;
+    const auto off = hn::Set(d, step);
     for (int k = 0; k < kRows; ++k)
         for_columns(d, [&](int i) HWY_ATTR {
-            auto force = hn::LoadU(d, w.residual.row(k) + i);
+            const auto residual = hn::Sub(hn::LoadU(d, w.residual.row(k) + i),
+                                          hn::Mul(off, hn::LoadU(d, w.product.row(k) + i)));
+            hn::StoreU(residual, d, w.residual.row(k) + i);
+            auto force = residual;
             if (k > 0)
                 force = hn::Add(force, hn::Mul(hn::LoadU(d, w.down.row(k - 1) + i),
                                                hn::LoadU(d, w.relaxed.row(k - 1) + i)));
-            hn::StoreU(hn::Mul(hn::Mul(force, hn::LoadU(d, w.pivot.row(k) + i)),
-                               hn::LoadU(d, w.free.row(k) + i)),
-                       d, w.relaxed.row(k) + i);
+            hn::StoreU(hn::Mul(force, hn::LoadU(d, w.pivot.row(k) + i)), d, w.relaxed.row(k) + i);
         });
     std::array<float, kColumns> each{};
     for (int k = kRows - 1; k >= 0; --k)
@@ -176,8 +178,7 @@ float relax(PressElastic& w) {
             if (k + 1 < kRows) {
                 const auto pull = hn::Mul(hn::LoadU(d, w.down.row(k) + i),
                                           hn::LoadU(d, w.relaxed.row(k + 1) + i));
-                value = hn::Add(value, hn::Mul(hn::Mul(pull, hn::LoadU(d, w.pivot.row(k) + i)),
-                                               hn::LoadU(d, w.free.row(k) + i)));
+                value = hn::Add(value, hn::Mul(pull, hn::LoadU(d, w.pivot.row(k) + i)));
                 hn::StoreU(value, d, w.relaxed.row(k) + i);
             }
             const auto sum = hn::LoadU(d, each.data() + i);
@@ -187,46 +188,38 @@ float relax(PressElastic& w) {
     return sum_columns(each);
 }
 
-// to = to + scale * by
-template <int kTo, int kBy>
-HWY_INLINE void add_scaled(Plane<kTo>& to, float scale, const Plane<kBy>& by) {
+// shift += step * search, then search = relaxed + keep * search
+void turn(float step, float keep, PressElastic& w) {
     const Lanes d;
-    const auto s = hn::Set(d, scale);
+    const auto s = hn::Set(d, step), kept = hn::Set(d, keep);
     for (int k = 0; k < kRows; ++k)
         for_columns(d, [&](int i) HWY_ATTR {
-            hn::StoreU(
-                hn::Add(hn::LoadU(d, to.row(k) + i), hn::Mul(s, hn::LoadU(d, by.row(k) + i))), d,
-                to.row(k) + i);
+            const auto search = hn::LoadU(d, w.search.row(k) + i);
+            hn::StoreU(hn::Add(hn::LoadU(d, w.shift.row(k) + i), hn::Mul(s, search)), d,
+                       w.shift.row(k) + i);
+            hn::StoreU(hn::Add(hn::LoadU(d, w.relaxed.row(k) + i), hn::Mul(kept, search)), d,
+                       w.search.row(k) + i);
         });
 }
 
 void solve_increment(int iterations, PressElastic& w) {
-    const Lanes d;
-    (void)apply(w, w.shift, w.residual);
-    for (int k = 0; k < kRows; ++k)
-        for_columns(d, [&](int i) HWY_ATTR {
-            hn::StoreU(hn::Neg(hn::LoadU(d, w.residual.row(k) + i)), d, w.residual.row(k) + i);
-            hn::StoreU(hn::Zero(d), d, w.search.row(k) + i);
-        });
-    float before = 0;
+    (void)apply(w, w.shift, w.product);
+    w.residual.values.fill(0);
+    w.search.values.fill(0);
+    float before = 1, step = 1;  // the first residual is 0 - A shift
     for (int n = 0; n < iterations; ++n) {
-        const float now = relax(w);
-        if (!(now > 1e-12f)) return;
-        const float keep = n == 0 ? 0.0f : now / before;
+        const float now = relax(step, w);
+        if (n == 0) step = 0;
+        if (!(now > 1e-12f)) break;
+        turn(step, n == 0 ? 0.0f : now / before, w);
         before = now;
-        const auto kept = hn::Set(d, keep);
-        for (int k = 0; k < kRows; ++k)
-            for_columns(d, [&](int i) HWY_ATTR {
-                hn::StoreU(hn::Add(hn::LoadU(d, w.relaxed.row(k) + i),
-                                   hn::Mul(kept, hn::LoadU(d, w.search.row(k) + i))),
-                           d, w.search.row(k) + i);
-            });
+        step = 0;
         const float curvature = apply(w, w.search, w.product);
         if (!(curvature > 0)) return;
-        add_scaled(w.shift, now / curvature, w.search);
-        add_scaled(w.residual, -(now / curvature), w.product);
+        step = now / curvature;
         ++w.iterations_done;
     }
+    turn(step, 0, w);
 }
 
 // The stress that the increment's strain adds at the moduli it was solved with.

@@ -30,6 +30,11 @@ inline constexpr double kLumenGain = 2, kLumenGrowth = 1;
 // A lumen's stretch of 0.3 and less falls linearly to 0.02 at 0.2: its walls touch.
 inline constexpr double kClosing = 0.3, kClosed = 0.2, kLeastLumen = 0.02;
 
+// Force on the face: the stress below the skin and a part of what the skin spreads to its sides,
+// q = (1 - 0.12) q_2 + 0.12 q_0 with q_k the stress of row k over the width of the field there.
+inline constexpr double kSkinShare = 0.12;
+inline constexpr int kBelowSkinRow = 2;
+
 // What is squeezed along the beam goes sideways within this length, and the rest across the plane.
 inline constexpr double kBulgeLateral_mm = 20, kBulgeAxial_mm = 4;
 

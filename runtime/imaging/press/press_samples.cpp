@@ -9,10 +9,9 @@
 namespace sonocase::runtime::press {
 namespace {
 
-constexpr double kSkinStep_mm = 0.5;
-constexpr int kSkinSteps = static_cast<int>((kReach_mm + kSearch_mm) / kSkinStep_mm);
-constexpr int kSkinRun = 20;  // steps looked up at a time: most skins lie in the first few
-constexpr int kSideRows = kRows * 2;
+constexpr double kSkinStep_mm = 2;  // no part of a body that is pressed is thinner
+constexpr int kSkinSteps = static_cast<int>((kReach_mm + kSearch_mm) / kSkinStep_mm) + 1;
+constexpr int kHalvings = 10;       // of such a step: 0.002 mm
 constexpr double kSidePlane = 1.5;  // times half the face's height
 
 constexpr std::array<float, kFineRows> part_middles() {
@@ -23,6 +22,7 @@ constexpr std::array<float, kFineRows> part_middles() {
 }
 constexpr std::array<float, kFineRows> kPartMiddle = part_middles();
 
+constexpr int kSideRows = kRows * 2;
 constexpr std::array<float, kSideRows> half_middles() {
     std::array<float, kSideRows> t{};
     for (int k = 0; k < kRows; ++k)
@@ -33,8 +33,33 @@ constexpr std::array<float, kSideRows> half_middles() {
 }
 constexpr std::array<float, kSideRows> kHalfMiddle = half_middles();
 
+constexpr std::array<float, kSkinSteps> skin_steps() {
+    std::array<float, kSkinSteps> t{};
+    for (int n = 0; n < kSkinSteps; ++n)
+        t[static_cast<std::size_t>(n)] = static_cast<float>(n * kSkinStep_mm - kReach_mm);
+    return t;
+}
+constexpr std::array<float, kSkinSteps> kSkinSteps_mm = skin_steps();
+
+// A tissue as the means take it; four numbers side by side, so that they are added at once.
+struct alignas(16) Figures {
+    std::array<float, 4> value{};  // stiffness, stiffness along the skin, drains, rigid
+};
+using FigureTable = std::array<Figures, kMaxPressTissues>;
+
+void set_figures(std::span<const PressTissue> tissues, float scale, FigureTable& table) {
+    for (std::size_t n = 0; n < tissues.size() && n < table.size(); ++n) {
+        const PressTissue& t = tissues[n];
+        const float stiffness = scale * t.stiffness_kpa;
+        const float along = t.membrane ? static_cast<float>(kMembrane) : 1.0f;
+        table[n].value = {stiffness, stiffness * along, t.drains ? 1.0f : 0.0f,
+                          t.rigid ? 1.0f : 0.0f};
+    }
+}
+
 struct Looker {
     const PressScene& scene;
+    const FigureTable& figures;
     Vector3 shift;  // of the face, for a probe that bone has stopped
 
     void along(Point3 from,
@@ -51,49 +76,38 @@ struct Looker {
 };
 
 // Depth of the skin from the face, negative behind it: the first step that lies in the body, then
-// halved to 0.002 mm. kSearch_mm where there is none.
+// halved. kSearch_mm where there is none.
 double find_skin(const Looker& look, const PressBeam& beam, bool& out_of_reach) {
-    std::array<float, kSkinRun> depth{};
-    std::array<std::uint8_t, kSkinRun> tissue{};
-    for (int begin = 0; begin <= kSkinSteps; begin += kSkinRun) {
-        for (int n = 0; n < kSkinRun; ++n)
-            depth[static_cast<std::size_t>(n)] =
-                static_cast<float>((begin + n) * kSkinStep_mm - kReach_mm);
-        look.along(beam.origin, beam.direction, depth, tissue.data());
-        for (int n = 0; n < kSkinRun; ++n) {
-            if (look.scene.tissues[tissue[static_cast<std::size_t>(n)]].outside) continue;
-            float in = depth[static_cast<std::size_t>(n)];
-            if (begin + n == 0) {
-                out_of_reach = true;
-                return in;
-            }
-            float out = in - static_cast<float>(kSkinStep_mm);
-            for (int halving = 0; halving < 8; ++halving) {
-                const float middle = (in + out) / 2;
-                (look.inside(beam.origin, beam.direction, middle) ? in : out) = middle;
-            }
+    std::array<std::uint8_t, kSkinSteps> tissue{};
+    look.along(beam.origin, beam.direction, kSkinSteps_mm, tissue.data());
+    for (std::size_t n = 0; n < kSkinSteps; ++n) {
+        if (look.scene.tissues[tissue[n]].outside) continue;
+        float in = kSkinSteps_mm[n];
+        if (n == 0) {
+            out_of_reach = true;
             return in;
         }
+        float out = kSkinSteps_mm[n - 1];
+        for (int halving = 0; halving < kHalvings; ++halving) {
+            const float middle = (in + out) / 2;
+            (look.inside(beam.origin, beam.direction, middle) ? in : out) = middle;
+        }
+        return in;
     }
     return kSearch_mm;
 }
 
-struct Mean {
-    float stiffness = 0, lateral = 0, drains = 0;
-    void add(const PressTissue& t, float weight) {
-        stiffness += weight * t.stiffness_kpa;
-        lateral += weight * t.stiffness_kpa * (t.membrane ? static_cast<float>(kMembrane) : 1.0f);
-        drains += t.drains ? weight : 0.0f;
+// Whether the body lies at the face anywhere: all that a frame costs while nothing is pressed.
+bool touches(const Looker& look, const PressFace& face) {
+    for (int i = kSideColumns; i < kSideColumns + kFaceColumns; ++i) {
+        const PressBeam beam = press_beam(face, column_lateral_mm(face, i));
+        if (look.inside(beam.origin, beam.direction, 0)) return true;
     }
-};
+    return false;
+}
 
-void sample_column(const Looker& look,
-                   const PressFace& face,
-                   double skin_mm,
-                   int i,
-                   float scale,
-                   PressSamples& out) {
-    const std::span<const PressTissue> tissues = look.scene.tissues;
+void sample_column(
+    const Looker& look, const PressFace& face, double skin_mm, int i, PressSamples& out) {
     const double lateral = column_lateral_mm(face, i), width = column_width_mm(face);
     std::array<std::array<std::uint8_t, kFineRows>, 2> plane{};
     std::array<std::array<std::uint8_t, kSideRows>, 2> side{};
@@ -113,21 +127,23 @@ void sample_column(const Looker& look,
         for (int part = 0; part < kParts; ++part) {
             const int j = k * kParts + part;
             const auto row = static_cast<std::size_t>(j), half = static_cast<std::size_t>(j / 2);
-            Mean mean;
+            Figures sum;
+            float rigid = 0;
             for (std::size_t s = 0; s < 2; ++s) {
-                const PressTissue& here = tissues[plane[s][row]];
-                const PressTissue& there = tissues[side[s][half]];
-                mean.add(here, 0.25f);
-                mean.add(there.outside ? here : there, 0.25f);
-                if (here.rigid) out.bone_part[at] = std::min(out.bone_part[at], j);
+                const std::uint8_t here = plane[s][row], there = side[s][half];
+                const Figures& a = look.figures[here];
+                const Figures& b = look.figures[look.scene.tissues[there].outside ? here : there];
+                for (std::size_t n = 0; n < 4; ++n) sum.value[n] += a.value[n] + b.value[n];
+                rigid += a.value[3];
             }
-            out.stiffness_kpa.row(j)[i] = mean.stiffness * scale;
-            const float tissue = 1 - mean.drains;
+            if (rigid > 0 && j < out.bone_part[at]) out.bone_part[at] = j;
+            out.stiffness_kpa.row(j)[i] = 0.25f * sum.value[0];
+            const float tissue = 1 - 0.25f * sum.value[2];
             out.drains.row(j)[i] = 1 - tissue * tissue;
-            out.lumen[row] = out.lumen[row] || mean.drains > 0;
-            along_skin += mean.lateral * scale / kParts;
+            out.lumen[row] = out.lumen[row] || sum.value[2] > 0;
+            along_skin += sum.value[1];
         }
-        out.lateral_kpa.row(k)[i] = along_skin;
+        out.lateral_kpa.row(k)[i] = along_skin * (0.25f / kParts);
     }
     out.fixed_row[at] = (out.bone_part[at] + kParts - 1) / kParts;
     out.bone_mm[at] = static_cast<float>(kFineEdge[static_cast<std::size_t>(out.bone_part[at])]);
@@ -142,13 +158,13 @@ double excess_of(const PressSamples& s) {
     return excess;
 }
 
-void sample_at(const Looker& look, const PressFace& face, float scale, PressSamples& out) {
+void sample_at(const Looker& look, const PressFace& face, PressSamples& out) {
     out.lumen.fill(false);
     for (int i = 0; i < kColumns; ++i) {
         const PressBeam beam = press_beam(face, column_lateral_mm(face, i));
         const double skin = find_skin(look, beam, out.out_of_reach);
         out.pressed_mm[static_cast<std::size_t>(i)] = static_cast<float>(-skin);
-        sample_column(look, face, skin, i, scale, out);
+        sample_column(look, face, skin, i, out);
     }
 }
 
@@ -187,16 +203,19 @@ void sample_tissue(const PressScene& scene,
                    const PressFace& face,
                    double stiffness_scale,
                    PressSamples& out) {
-    const float scale = static_cast<float>(stiffness_scale);
-    Looker look{scene, {}};
-    out.out_of_reach = false;
-    sample_at(look, face, scale, out);
+    FigureTable figures{};
+    set_figures(scene.tissues, static_cast<float>(stiffness_scale), figures);
+    Looker look{scene, figures, {}};
+    out.out_of_reach = out.any_touch = false;
+    out.excess_mm = 0;
+    if (!touches(look, face)) return;
+    sample_at(look, face, out);
     out.excess_mm = excess_of(out);
     if (out.excess_mm > 0 && face.radius_mm > 0) {
         // The beams of a curved face have moved over the body as well. What the bone under them
         // still lacks is small, and is taken from the pressed depth alone.
         look.shift = {0, 0, -out.excess_mm};
-        sample_at(look, face, scale, out);
+        sample_at(look, face, out);
         for (std::size_t i = kSideColumns; i < kSideColumns + kFaceColumns; ++i)
             out.pressed_mm[i] =
                 std::min(out.pressed_mm[i], static_cast<float>(kGreatestShare) * out.bone_mm[i]);

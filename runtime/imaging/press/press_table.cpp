@@ -18,6 +18,65 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Lanes = hn::CappedTag<float, 16>;
 
+constexpr float kMostSqueezed = 0.95f;
+// Parts of the rows that are all equally high.
+constexpr int kEvenParts = 30 * kParts;
+static_assert(kFineEdge[kEvenParts] == kEvenParts * kFineEdge[1]);
+
+// Rows of the table that are nearest to a row of the sideways shift.
+inline float rows_near(int n) {
+    return n == 0 || n == kBulgeRows - 1 ? kBulgeEvery / 2 + 1 : kBulgeEvery;
+}
+
+// Rest depth from the face at every node, and what is squeezed there.
+void invert(const PressSamples& s, const PressColumns& columns, PressTable& t) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    const auto one = hn::Set(d, 1.0f), zero = hn::Zero(d);
+    const auto most = hn::Set(d, kMostSqueezed);
+    const auto even = hn::Set(d, static_cast<float>(kFineEdge[1]));
+    bool lumens = false;
+    for (const bool lumen : s.lumen) lumens = lumens || lumen;
+    std::array<float, kFineRows + 1> edges{};
+    for (std::size_t j = 0; j < edges.size(); ++j) edges[j] = static_cast<float>(kFineEdge[j]);
+    t.bulge_mm.values.fill(0);
+    for (int m = 0; m < kTableRows; ++m) {
+        const auto r = hn::Set(d, static_cast<float>(m * kTableStep_mm));
+        const int near = (m + kBulgeEvery / 2) / kBulgeEvery;
+        const auto weight = hn::Set(d, 1 / rows_near(near));
+        std::int32_t* parts = t.part.data() + m * kStride;
+        for_columns(d, [&](int i) HWY_ATTR {
+            auto part = hn::LoadU(di, parts + i);
+            if (m > 0) part = hn::Max(part, hn::LoadU(di, parts - kStride + i));
+            hn::StoreU(part, di, parts + i);
+            const auto place = hn::Add(hn::Mul(part, hn::Set(di, kStride)), hn::Iota(di, i));
+            const auto above = hn::GatherIndex(d, columns.pressed_mm.row(0), place);
+            const auto below = hn::GatherIndex(d, columns.pressed_mm.row(1), place);
+            const auto l = hn::GatherIndex(d, columns.stretch.row(0), place);
+            // Most parts are of the even rows, whose edges need no look-up; both ways are exact.
+            auto edge = hn::Mul(hn::ConvertTo(d, part), even);
+            auto next = hn::Add(edge, even);
+            if (!hn::AllTrue(di, hn::Lt(part, hn::Set(di, kEvenParts)))) {
+                edge = hn::GatherIndex(d, edges.data(), part);
+                next = hn::GatherIndex(d, edges.data() + 1, part);
+            }
+            const auto within = hn::Sub(r, above), past = hn::Sub(r, below);
+            // Above the skin and below the last row nothing is stretched.
+            auto rest = hn::Add(edge, hn::Div(within, l));
+            rest = hn::IfThenElse(hn::Lt(within, zero), hn::Add(edge, within), rest);
+            rest = hn::IfThenElse(hn::Gt(past, zero), hn::Add(next, past), hn::Min(rest, next));
+            hn::StoreU(hn::Sub(rest, hn::LoadU(d, s.pressed_mm.data() + i)), d,
+                       t.rest_mm.row(m) + i);
+            const auto body = hn::And(hn::Ge(within, zero), hn::Le(past, zero));
+            const auto squeezed = hn::Min(hn::Max(hn::Sub(one, l), zero), most);
+            auto e = hn::IfThenElseZero(body, hn::Mul(squeezed, weight));
+            if (lumens) e = hn::Mul(e, hn::Sub(one, hn::GatherIndex(d, s.drains.row(0), place)));
+            float* bulge = t.bulge_mm.row(near) + i;
+            hn::StoreU(hn::Add(hn::LoadU(d, bulge), e), d, bulge);
+        });
+    }
+}
+
 // Solves (1 - length^2 d_rr) e' = e down every column, in place; no flow over the ends.
 void smooth_down(Plane<kBulgeRows>& e) {
     const Lanes d;
@@ -67,44 +126,24 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace sonocase::runtime::press {
 
+HWY_EXPORT(invert);
 HWY_EXPORT(smooth_down);
 HWY_EXPORT(least_rise);
 
 namespace {
 
-// Rows of the table that are nearest to a row of the sideways shift.
-constexpr float rows_near(int n) {
-    return n == 0 || n == kBulgeRows - 1 ? kBulgeEvery / 2 + 1 : kBulgeEvery;
-}
-
-constexpr float kMostSqueezed = 0.95f;
-
-// Rest depth from the face at every row of the table, and what is squeezed there.
-void invert_column(const PressSamples& s, const PressColumns& columns, int i, PressTable& t) {
-    const auto at = static_cast<std::size_t>(i);
-    const float skin = -s.pressed_mm[at];
-    int j = 0;
-    float above = columns.pressed_mm.row(0)[i], below = columns.pressed_mm.row(1)[i];
-    for (int m = 0; m < kTableRows; ++m) {
-        const float r = static_cast<float>(m * kTableStep_mm);
-        while (below <= r && j + 1 < kFineRows) {
-            ++j;
-            above = below;
-            below = columns.pressed_mm.row(j + 1)[i];
+// The last part of a row that begins at or above each node. Each part is written where it begins,
+// later ones over earlier ones; the nodes between take what is above them, in invert().
+void mark_parts(const PressColumns& columns, PressTable& t) {
+    t.part.fill(0);
+    constexpr float kInverse = static_cast<float>(1 / kTableStep_mm);
+    for (int j = 1; j < kFineRows; ++j) {
+        const float* edge = columns.pressed_mm.row(j);
+        for (int i = 0; i < kColumns; ++i) {
+            // The first node at or below the edge; edges above the face belong to the first node.
+            const int m = std::max(0, static_cast<int>(edge[i] * kInverse + 0.99999f));
+            if (m < kTableRows) t.part[static_cast<std::size_t>(m * kStride + i)] = j;
         }
-        const auto edge = static_cast<float>(kFineEdge[static_cast<std::size_t>(j)]);
-        const float l = columns.stretch.row(j)[i];
-        const float height = static_cast<float>(fine_height(j));
-        const float inside = r - above;
-        // Above the skin and below the last row nothing is stretched.
-        float t_rest = edge + inside / l;
-        if (inside < 0) t_rest = edge + inside;
-        if (t_rest > edge + height) t_rest = edge + height + (r - below);
-        t.rest_mm.row(m)[i] = t_rest + skin;
-        const float squeezed =
-            inside >= 0 && r < below ? std::clamp(1 - l, 0.0f, kMostSqueezed) : 0.0f;
-        const int near = (m + kBulgeEvery / 2) / kBulgeEvery;
-        t.bulge_mm.row(near)[i] += squeezed * (1 - s.drains.row(j)[i]) / rows_near(near);
     }
 }
 
@@ -113,24 +152,33 @@ void invert_column(const PressSamples& s, const PressColumns& columns, int i, Pr
 void sum_sideways(const PressFace& face, Plane<kBulgeRows>& e) {
     const double width = column_width_mm(face);
     const double k = kBulgeLateral_mm * kBulgeLateral_mm / (width * width);
-    std::array<double, kColumns> pivot{}, carry{}, mean{};
+    std::array<double, kColumns> pivot{}, carry{};
     for (std::size_t i = 0; i < kColumns; ++i) {
         const bool end = i == 0 || i == kColumns - 1;
         pivot[i] = 1 / (1 + (end ? k : 2 * k) - (i == 0 ? 0 : k * carry[i - 1]));
         carry[i] = k * pivot[i];
     }
-    for (int m = 0; m < kBulgeRows; ++m) {
-        float* row = e.row(m);
-        mean[0] = double{row[0]} * pivot[0];
-        for (std::size_t i = 1; i < kColumns; ++i)
-            mean[i] = (double{row[i]} + k * mean[i - 1]) * pivot[i];
-        for (std::size_t i = kColumns - 1; i-- > 0;) mean[i] += carry[i] * mean[i + 1];
-        double sum = 0;
-        for (std::size_t i = 0; i < kColumns; ++i) {
-            const double half = 0.5 * (double{row[i]} - mean[i]) * width;
-            row[i] = static_cast<float>(sum + half);
-            sum += 2 * half;
-        }
+    // Some rows at a time: each is one long chain of additions, and a processor works on several.
+    constexpr int kTogether = 7;
+    static_assert(kBulgeRows % kTogether == 0);
+    using Numbers = std::array<double, kTogether>;
+    std::array<Numbers, kColumns> mean{};
+    for (int m = 0; m < kBulgeRows; m += kTogether) {
+        for (std::size_t i = 0; i < kColumns; ++i)
+            for (std::size_t n = 0; n < kTogether; ++n) {
+                const double left = i > 0 ? k * mean[i - 1][n] : 0;
+                mean[i][n] = (double{e.row(m + static_cast<int>(n))[i]} + left) * pivot[i];
+            }
+        for (std::size_t i = kColumns - 1; i-- > 0;)
+            for (std::size_t n = 0; n < kTogether; ++n) mean[i][n] += carry[i] * mean[i + 1][n];
+        Numbers sum{};
+        for (std::size_t i = 0; i < kColumns; ++i)
+            for (std::size_t n = 0; n < kTogether; ++n) {
+                float& value = e.row(m + static_cast<int>(n))[i];
+                const double half = 0.5 * (double{value} - mean[i][n]) * width;
+                value = static_cast<float>(sum[n] + half);
+                sum[n] += 2 * half;
+            }
     }
 }
 
@@ -150,8 +198,8 @@ void build_table(SimdTarget simd,
                  const PressFace& face,
                  const PressColumns& columns,
                  PressTable& out) {
-    out.bulge_mm.values.fill(0);
-    for (int i = 0; i < kColumns; ++i) invert_column(samples, columns, i, out);
+    mark_parts(columns, out);
+    HWY_DISPATCH_TABLE(invert)[simd.index](samples, columns, out);
     HWY_DISPATCH_TABLE(smooth_down)[simd.index](out.bulge_mm);
     sum_sideways(face, out.bulge_mm);
     const float rise = HWY_DISPATCH_TABLE(least_rise)[simd.index](out.rest_mm);

@@ -3,6 +3,9 @@
 // The map from the pressed picture to the tissue at rest, as tables over columns and depths.
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "runtime/imaging/press/press_columns.h"
 
 namespace sonocase::runtime::press {
@@ -18,8 +21,10 @@ inline constexpr int kBulgeEvery = 5, kBulgeRows = (kTableRows - 1) / kBulgeEver
 //
 // V and R bilinear between their nodes, which lie under the columns.
 struct PressTable {
-    Plane<kBulgeRows> bulge_mm;   // V, at r = n * kBulgeEvery * kTableStep_mm
-    Plane<kTableRows> rest_mm;    // R, at r = m * kTableStep_mm
+    Plane<kBulgeRows> bulge_mm;  // V, at r = n * kBulgeEvery * kTableStep_mm
+    Plane<kTableRows> rest_mm;   // R, at r = m * kTableStep_mm
+    std::array<std::int32_t, kTableRows * kStride>
+        part;                     // for building it: part of a row at a node
     float least_determinant = 1;  // lower bound of that of the map, everywhere
 };
 

@@ -80,6 +80,7 @@ PressTissue tissue_of(const Json& material, std::string& name) {
     name = material.is_string() ? material.get<std::string>() : material.value("name", "");
     Tissue tissue;
     tissue.name = name == "kidney" ? "kidney_cortex" : name == "fluid" ? "urine" : name;
+    if (vessel_of_label(name) != Vessel::unknown) tissue.kind = TissueKind::fluid;
     TissueMechanics m = mechanics_of(tissue, name);
     if (material.is_object()) {
         m.stiffness_kpa = material.value("stiffness_kpa", m.stiffness_kpa);
@@ -205,7 +206,7 @@ Result<FemBlock> read_fem_block(const std::string& folder) {
         if (at < 1 || at > 254) return Error{"has material " + index, folder, "1 to 254"};
         block.tissues[static_cast<std::size_t>(at)] = tissue_of(material, name);
         if (block.tissues[static_cast<std::size_t>(at)].drains) block.vein = at;
-        if (name == "artery") block.artery = at;
+        if (vessel_of_label(name) == Vessel::artery) block.artery = at;
     }
     const Json& spacing = json["spacing_mm"];
     block.spacing_mm = {spacing[0], spacing[1], spacing[2]};

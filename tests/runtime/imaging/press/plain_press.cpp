@@ -152,9 +152,11 @@ void PlainPress::stretch() {
             }
             const double scale = wanted / length_of(factor, true);
             for (int j = 0; j < s_.bone_part[at(i)]; ++j) stretch_[at(i)][at(j)] *= scale;
-            for (int k = 1; k <= 3; ++k)
-                newtons += field_width_mm(face_.half_height_mm, row_middle(k)) * factor *
-                           stress_[at(i)][at(k)] / 3;
+            const auto over_width = [&](int k) {
+                return field_width_mm(face_.half_height_mm, row_middle(k)) * stress_[at(i)][at(k)];
+            };
+            newtons += factor *
+                       ((1 - kSkinShare) * over_width(kBelowSkinRow) + kSkinShare * over_width(0));
         } else {
             (void)length_of(1, true);
         }

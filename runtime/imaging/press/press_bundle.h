@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// A case's bundle as a body to press: its voxels' own labels with the figures of
+// formats/volume/tissue_mechanics.h.
+#pragma once
+
+#include <vector>
+
+#include "formats/bundle/case_bundle.h"
+#include "runtime/imaging/press/press_scene.h"
+
+namespace sonocase::runtime::press {
+
+struct PressBundleOptions {
+    // Veins are as stiff as this pressure makes them, > 0; 8 mmHg is what the table is for.
+    double venous_pressure_mmhg = 8;
+};
+
+class PressBundle {
+  public:
+    // The bundle must outlive this object. Allocates; done when a scene is opened.
+    explicit PressBundle(const CaseBundle& bundle, const PressBundleOptions& options = {});
+
+    // The body under a probe at this pose; a finite rigid motion. The scene refers to this object
+    // and is good until the next call. Beyond the volume its border goes on.
+    PressScene scene(const Rigid& mannequin_from_probe);
+
+    // Index of the label at a point of the frame `mannequin`.
+    std::uint8_t label(Point3 mannequin) const;
+    std::span<const PressTissue> tissues() const { return tissues_; }  // # labels
+
+  private:
+    static void along(const void* context,
+                      Point3 from,
+                      Vector3 direction,
+                      std::span<const float> depth_mm,
+                      std::uint8_t* tissue);
+    std::uint8_t voxel(double x, double y, double z) const;
+
+    const CaseBundle* bundle_;
+    std::vector<PressTissue> tissues_;
+    Int3 bricks_;
+    Rigid mannequin_from_probe_;
+};
+
+}  // namespace sonocase::runtime::press
