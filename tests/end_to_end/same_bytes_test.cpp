@@ -32,7 +32,7 @@ constexpr const char* kSlender = "04744c53c83a77f9827edb9fb7719fa7";
 constexpr const char* kReal = "f7a4c9a5ace9b12a5d9c0432ebfeb718";
 constexpr const char* kDraftPhysical = "499f1c59572465b049a7452d0ea24ca1";
 constexpr const char* kDraftPaper = "1628db3a0fe630d2e2b3a86b0621208a";
-constexpr const char* kRealPhysical = "fc1889f0cbfbd0356dec98ed2b480630";
+constexpr const char* kRealPhysical = "7515492e3719b6eb5086bdcb8078cffb";
 constexpr const char* kRealPaper = "83a09d20a889780ad24fa8f66478cdef";
 
 class SameBytes : public ::testing::Test {
