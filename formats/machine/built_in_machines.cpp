@@ -15,7 +15,7 @@ Machine classic() {
     m.beam.lateral_focus_mm = 0;
     m.looks = {1, 1, 0};
     m.grey = {GreyMap::log, 0, 131.5, 1, 255, 1, 60};
-    m.noise = {-67, false};
+    m.noise = {-70, false};
     m.gain = {0, 500, 0, 0};
     m.near_field = {1.6, 2.2, 0.3, 9, 0, 0.5, 1.9, 0, 0, 0.8, 1, 3};
     m.haze = {0, 4.5, 2, -24};

