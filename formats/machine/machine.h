@@ -20,7 +20,7 @@ struct MachineBeam {
     double frequency_mhz = 0;      // 0: the exercise's; else [0.5, 50]
     double reference_mhz = 3.5;    // [0.5, 50]
     double axial_mm = 0.74;        // along the beam; 0: from the frequency alone; [0, 10]
-    double lateral_mm = 1.5;       // along the face, at the focus; 0: from the frequency; [0, 20]
+    double lateral_mm = 1.25;      // along the face, at the focus; 0: from the frequency; [0, 20]
     double lateral_focus_mm = 60;  // 0: the exercise's; [0, 500]
     double lateral_range_mm = 60;  // width = lateral_mm sqrt(1 + ((r - focus) / range)^2); [1, 1e4]
     double elevation_mm = 0;       // slice thickness at the focus; 0: the exercise's; [0, 50]

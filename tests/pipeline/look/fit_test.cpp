@@ -36,11 +36,12 @@ TEST(LookFit, AModernFanComesBack) {
     truth.contact.edge_db = 0;
     const LookResult r = look_at(truth, clip_fan());
     const Machine& m = r.fit.machine;
-    // Some hundred grains a patch and a quarter of a sample of blur: a tenth of the width.
-    EXPECT_NEAR(m.beam.axial_mm, truth.beam.axial_mm, 0.1);
+    // A point spread of two samples (0.35 mm) is half hidden by the pixels' blur and by the
+    // tissue's own fine structure; of wider ones the tradeoff of `look` gives a few per cent.
+    EXPECT_NEAR(m.beam.axial_mm, truth.beam.axial_mm, 0.25);
     const BeamImage grid = beam_grid(r.place);
     for (const double depth : {40.0, 60.0})
-        EXPECT_NEAR(lateral_width_mm(m, grid, depth), lateral_width_mm(truth, grid, depth), 0.25);
+        EXPECT_NEAR(lateral_width_mm(m, grid, depth), lateral_width_mm(truth, grid, depth), 0.4);
     EXPECT_NEAR(m.grey.floor, truth.grey.floor, 1);
     EXPECT_NEAR(grey_of_one(m), grey_of_one(truth), 3);
     // Looks and exponent are fitted together: neighbours look nearly alike.
