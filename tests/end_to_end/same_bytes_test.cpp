@@ -30,9 +30,9 @@ constexpr const char* kDraft = "ebea602c5d21bfd284c881fad28fd68c";
 constexpr const char* kBalanced = "e2d74bb720fb202823065be030fcc66c";
 constexpr const char* kSlender = "b2d650a02feb71987f8bad13eaec9d3d";
 constexpr const char* kReal = "36223f17a1ce0b24ff365e3b5b55e7f5";
-constexpr const char* kDraftPhysical = "499f1c59572465b049a7452d0ea24ca1";
+constexpr const char* kDraftPhysical = "d2d67058ce911d6b22a3a0fce0e7a780";
 constexpr const char* kDraftPaper = "1628db3a0fe630d2e2b3a86b0621208a";
-constexpr const char* kRealPhysical = "fc1889f0cbfbd0356dec98ed2b480630";
+constexpr const char* kRealPhysical = "7515492e3719b6eb5086bdcb8078cffb";
 constexpr const char* kRealPaper = "83a09d20a889780ad24fa8f66478cdef";
 
 class SameBytes : public ::testing::Test {
