@@ -35,8 +35,8 @@ TEST(TissueLayers, DistancesToPlaneLayersAreExactOnEveryVoxelAndSlope) {
                     const double depth = std::cos(angle) * z + std::sin(angle) * x;
                     const LayerPoint p = layers.at(b.grid.voxel_from_point({x, 1, z}));
                     if (depth < 2 || depth > kOrgansMm + 4) continue;
-                    // Labels change up to half a voxel from the plane; shares of cells come from eight
-                    // voxels each.
+                    // Labels change up to half a voxel from the plane; shares of cells come from
+                    // eight voxels each.
                     EXPECT_NEAR(p.depth, depth, 0.5 * voxel_mm + 0.7)
                         << voxel_mm << " " << angle << " at " << depth;
                     EXPECT_NEAR(p.above_organs, kOrgansMm - depth, 0.5 * voxel_mm + 0.7)

@@ -33,7 +33,8 @@ void expect_agreement(const Exercise& exercise,
     const Difference d = compare(fast, draw(exercise, options, input, bundle));
     std::printf("%-24s mean %.3f bias %+.3f worst %d\n", what.c_str(), d.mean, d.bias, d.worst);
     EXPECT_LT(d.mean, 0.35) << what;
-    EXPECT_LT(std::abs(d.bias), 0.1) << what;
+    // Strong reverberation sums many echoes of eight bits.
+    EXPECT_LT(std::abs(d.bias), 0.2) << what;
     options.kind = RendererKind::fast;
     for (const std::string& simd : simd_targets()) {
         options.simd = simd;
@@ -173,6 +174,7 @@ TEST(MachineInTheRenderer, MoreLooksAreSmoother) {
         RenderOptions options = options_of({});
         options.width_px = options.height_px = 256;
         options.looks = looks;
+        options.effects = {"-parenchyma", "-streaks"};  // speckle alone
         const auto pixels = draw(exercise, options, {}, liver);
         double sum = 0, square = 0, n = 0;
         for (int y = 110; y < 190; ++y) {

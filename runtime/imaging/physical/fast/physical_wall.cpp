@@ -16,7 +16,7 @@ int every_beam(int scanlines) {
     return scanlines < 96 ? 1 : 4;
 }
 
-}
+}  // namespace
 
 void PhysicalFast::prepare_wall(const Tables& tables) {
     const ScanGeometry& g = geometry_;

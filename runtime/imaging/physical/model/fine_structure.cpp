@@ -90,7 +90,9 @@ Kinds kinds_of_labels(const CaseBundle& bundle) {
         const std::string& tissue = bundle.tissues[static_cast<std::size_t>(tissue_of[l])].name;
         kinds.cube[l] = tissue == "muscle"      ? kFibres
                         : tissue == "fat"       ? kSepta
-                        : is_parenchyma(tissue) ? kParenchymaCube : tissue == "nerve" ? kNerveCube : kNeither;
+                        : is_parenchyma(tissue) ? kParenchymaCube
+                        : tissue == "nerve"     ? kNerveCube
+                                                : kNeither;
         kinds.spine[l] = bundle.labels[l].name.rfind("vertebra", 0) == 0;
     }
     return kinds;

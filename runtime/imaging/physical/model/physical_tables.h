@@ -45,9 +45,9 @@ struct Tables {
     double cell_mm = 0.6;                          // of the scatterers' lattice
     double frequency_mhz = 3.5;
     WallTables wall;
-    double streak_mm = kStreakMm;                  // deviation of a plate's thickness
-    double streak_scale = 1, dome_scale = 1;       // bring their peaks to their amplitudes
-    int looks = 1;  // the most of any row
+    double streak_mm = kStreakMm;             // deviation of a plate's thickness
+    double streak_scale = 1, dome_scale = 1;  // bring their peaks to their amplitudes
+    int looks = 1;                            // the most of any row
     Machine machine;
     std::vector<double> edge;  // # scanlines: amplitude that the contact of a beam leaves
     double haze_keep = 0;      // of the clutter, from a sample to the next
