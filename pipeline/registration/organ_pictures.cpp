@@ -33,6 +33,30 @@ constexpr CanvasColour kInk{30, 30, 30, 255}, kAlarm{190, 20, 20, 255};
 constexpr std::array<std::uint8_t, 3> kReading{0, 190, 220}, kFitted{250, 250, 250},
     kUnfitted{255, 90, 40};
 
+struct TissueColour {
+    std::string_view tissue;
+    std::array<std::uint8_t, 3> colour;
+};
+// As an anatomist paints them; structures of other tissues keep the colour of their label.
+constexpr TissueColour kColours[] = {
+    {"fat", {228, 204, 120}},     {"skin", {214, 170, 130}},  {"soft_tissue", {214, 180, 130}},
+    {"muscle", {150, 62, 74}},    {"bone", {240, 236, 220}},  {"cartilage", {206, 214, 216}},
+    {"liver", {156, 84, 52}},     {"spleen", {112, 58, 104}}, {"kidney_cortex", {196, 92, 60}},
+    {"pancreas", {232, 160, 96}}, {"bowel", {200, 160, 96}},  {"gas", {70, 70, 78}},
+    {"lung", {96, 112, 128}},     {"blood", {214, 44, 44}},   {"urine", {82, 126, 220}},
+    {"bile", {76, 148, 84}},      {"nerve", {236, 220, 90}}};
+
+std::vector<std::array<std::uint8_t, 3>> colours_of(const LabelVolume& labels) {
+    std::vector<std::array<std::uint8_t, 3>> colours;
+    for (const Label& label : labels.labels) {
+        const auto known =
+            std::find_if(std::begin(kColours), std::end(kColours),
+                         [&](const TissueColour& c) { return c.tissue == label.tissue; });
+        colours.push_back(known != std::end(kColours) ? known->colour : label.colour);
+    }
+    return colours;
+}
+
 using Pixels = std::vector<std::uint8_t>;  // RGB, rows from the top down
 
 // An axial plane of the mannequin, turned so that the patient's axes are those of the page: right
@@ -80,6 +104,7 @@ void draw_cut(const LabelVolume& labels,
             }
         }
     });
+    const auto colours = colours_of(labels);
     const auto at = [&](int x, int y) {
         return x < 0 || y < 0 || x >= kPanelWidth || y >= kPanelHeight
                    ? 0
@@ -89,7 +114,7 @@ void draw_cut(const LabelVolume& labels,
         for (int x = 0; x < kPanelWidth; ++x) {
             const int label = at(x, y);
             std::array<std::uint8_t, 3> colour{20, 20, 24};
-            if (label > 0) colour = labels.labels[static_cast<std::size_t>(label)].colour;
+            if (label > 0) colour = colours[static_cast<std::size_t>(label)];
             const bool border = at(x + 1, y) != label || at(x, y + 1) != label;
             if (border && label > 0) {
                 for (std::uint8_t& c : colour) c = static_cast<std::uint8_t>(c * 0.45);

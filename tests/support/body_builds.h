@@ -16,7 +16,7 @@ namespace sonocase::testing {
 
 enum class Build { belly, wide, slim, pear, gaunt, huge };
 
-inline const char* build_name(Build build) {
+inline std::string build_name(Build build) {
     switch (build) {
         case Build::belly:
             return "belly";

@@ -111,6 +111,29 @@ TEST(RegisterVerb, FiftyReadingsOfTheFrontGiveAnAnswerAndTheHintsToAdd) {
     EXPECT_GT(load_registration(folder / "r.json")->min_det_jacobian, 0.2);
 }
 
+TEST(RegisterVerb, OfSeveralMannequinsTheOneThatFitsBestIsTaken) {
+    NEEDS_SWEEP();
+    const TemporaryFolder folder;
+    std::vector<Point3> near = sweep(), broad = sweep();
+    for (Point3& p : broad) p = {1.3 * p.x, 1.3 * p.y, 1.3 * p.z};
+    write_points(folder, "near.csv", near);
+    write_points(folder, "broad.csv", broad);
+    const CommandResult r =
+        run("register --labels " + kLabels +
+                " --surface broad.csv near.csv --path residual -o r.json --report rep.json",
+            folder);
+    ASSERT_EQ(r.status, 0) << r.error;
+    const auto report = nlohmann::json::parse(read_text(folder / "rep.json"));
+    EXPECT_EQ(report["mannequin"], "near.csv");
+    EXPECT_LT(report["misfit"]["near.csv"].get<double>(),
+              report["misfit"]["broad.csv"].get<double>());
+    EXPECT_LT(report["misfit"]["near.csv"].get<double>(), 1);
+    EXPECT_EQ(report["path"], "residual");
+    EXPECT_EQ(report["open_side"], "none");
+    EXPECT_GT(report["least_minor"].get<double>(), 0);
+    EXPECT_NEAR(report["volume_change"]["liver"].get<double>(), 1, 0.08);
+}
+
 // y_x = x^2 / 250 - 100 over x in [0, 250]: points with y_x < -100 have no preimage at all.
 TEST(MapVerb, AFifthOfTheTargetsWithoutPreimageAndPointsOnTheFoldAreMarked) {
     const TemporaryFolder folder;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <tuple>
 
 #include "formats/registration/registration_json.h"
 #include "pipeline/base/parallel.h"
@@ -67,10 +68,11 @@ double rim_error_mm(const BuiltMannequin& mannequin, const RegisterResult& resul
     return off.empty() ? -1 : off[off.size() * 95 / 100];
 }
 
-class BodyBuilds : public ::testing::TestWithParam<Build> {};
+class BodyBuilds : public ::testing::TestWithParam<std::tuple<Build, std::uint64_t>> {};
 
 TEST_P(BodyBuilds, AreReachedAndOrgansKept) {
-    const BuiltMannequin mannequin = built_mannequin(GetParam(), 1, usual_sweep(GetParam()));
+    const auto [build, seed] = GetParam();
+    const BuiltMannequin mannequin = built_mannequin(build, seed, usual_sweep(build));
     const auto result = register_surfaces(
         {torso_patient().skin, mannequin.sweep, &torso_patient().labels}, hints(mannequin));
     ASSERT_TRUE(result) << result.error().message();
@@ -103,9 +105,14 @@ TEST_P(BodyBuilds, AreReachedAndOrgansKept) {
         EXPECT_LT(distance(back, p), 1e-3);
     }
 }
-INSTANTIATE_TEST_SUITE_P(All, BodyBuilds, ::testing::ValuesIn(kBuilds), [](const auto& build) {
-    return build_name(build.param);
-});
+INSTANTIATE_TEST_SUITE_P(All,
+                         BodyBuilds,
+                         ::testing::Combine(::testing::ValuesIn(kBuilds),
+                                            ::testing::Values<std::uint64_t>(1, 2, 3)),
+                         [](const auto& one) {
+                             return build_name(std::get<0>(one.param)) +
+                                    std::to_string(std::get<1>(one.param));
+                         });
 
 TEST(ElasticPath, GivesTheSameBytesForAnyNumberOfThreads) {
     const BuiltMannequin mannequin = built_mannequin(Build::wide, 2, usual_sweep(Build::wide));
