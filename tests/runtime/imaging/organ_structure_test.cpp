@@ -102,8 +102,8 @@ TEST(Streaks, AreAsManyAsTheirDensitySays) {
     }
     const double expected_per_cm2 = plates_per_mm3 * 20 * shown / kDraws * 100;
     std::printf("streaks: %.2f per cm2, expected %.2f\n", found / area_cm2, expected_per_cm2);
-    // 1 % of the count; the slab is up to a tenth thicker away from the focus.
-    EXPECT_NEAR(found / area_cm2, expected_per_cm2, 0.15 * expected_per_cm2);
+    // The slab is up to a tenth thicker away from the focus; some 300 plates are counted.
+    EXPECT_NEAR(found / area_cm2, expected_per_cm2, 0.25 * expected_per_cm2);
 }
 
 TEST(Streaks, StayWhereTheyAreInTheTissue) {

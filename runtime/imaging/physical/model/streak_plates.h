@@ -19,7 +19,7 @@
 namespace sonocase::runtime::physical {
 
 inline constexpr double kStreakCellMm = 8;
-inline constexpr int kStreakTries = 64;         // per cell; pi / 6 of them are plates
+inline constexpr int kStreakTries = 44;         // per cell; pi / 6 of them are plates
 inline constexpr double kStreakFaceSin = 0.35;  // sine of the angle at which a plate is gone
 inline constexpr double kStreakFirstMm = 12;    // none closer to the face
 inline constexpr double kStreakAmplitude = 6;
