@@ -18,8 +18,13 @@ inline CaseBundle tiny_case() {
     bundle.manifest.producer = "sonocase test";
     bundle.manifest.recipe = "name = \"tiny\"\n";
     bundle.manifest.inputs = {{"ct.nii.gz", "0123456789abcdef0123456789abcdef"}};
-    bundle.manifest.stages = {
-        {"warp", 3, 1.25, {{"skin_rms_mm", 1.5}, {"min_det_jacobian", 0.4}}, {"A warning."}}};
+    bundle.manifest.stages = {{"warp",
+                               3,
+                               1.25,
+                               {{"skin_rms_mm", 1.5}, {"min_det_jacobian", 0.4}},
+                               {},
+                               {},
+                               {"A warning."}}};
     bundle.grid = {{9, 6, 5}, {2, 2, 2}, {-8, 1.5, 1.0 / 3}, {}};
     bundle.labels = {{"outside", "outside", 0, {0, 0, 0}},
                      {"body", "muscle", 1, {200, 120, 100}},

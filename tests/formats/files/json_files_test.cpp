@@ -21,7 +21,7 @@ Registration example(std::uint64_t seed) {
     for (int i = 0; i < 120; ++i) r.residual.control_mm.push_back(random.direction());
     r.ct_box = {{-100, -90, -80}, {100, 90, 1.0 / 3}};
     r.min_det_jacobian = 0.37;
-    r.reports = {{"warp", 1, 2, {{"skin_rms_mm", 1.25}}, {"Sparse."}}};
+    r.reports = {{"warp", 1, 2, {{"skin_rms_mm", 1.25}}, {}, {}, {"Sparse."}}};
     return r;
 }
 
