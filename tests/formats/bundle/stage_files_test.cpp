@@ -75,7 +75,7 @@ TEST(StageFiles, OneKindIsNotTakenForAnother) {
 
 TEST(StageFiles, ReportsComeBackWithNumbersThatWereNotMeasured) {
     const StageReport report{
-        "align", 2, 0.5, {{"rms_mm", 1.0 / 3}, {"p95_mm", NAN}}, {"One.", "Two."}};
+        "align", 2, 0.5, {{"rms_mm", 1.0 / 3}, {"p95_mm", NAN}}, {}, {}, {"One.", "Two."}};
     const auto back = parse_stage_report(stage_report_json(report), "report");
     ASSERT_TRUE(back) << back.error().message();
     EXPECT_EQ(back->stage, "align");
