@@ -25,14 +25,14 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Recorded at commit aa0be5b.
+// Bundles recorded when fits came to report volumes, physical frames when machines came; paper at aa0be5b.
 constexpr const char* kDraft = "815e6c7d170369bed23df5dca4fe3f95";
 constexpr const char* kBalanced = "e46af3964f7c4342a663f60bf968a1e7";
 constexpr const char* kSlender = "04744c53c83a77f9827edb9fb7719fa7";
 constexpr const char* kReal = "f7a4c9a5ace9b12a5d9c0432ebfeb718";
-constexpr const char* kDraftPhysical = "499f1c59572465b049a7452d0ea24ca1";
+constexpr const char* kDraftPhysical = "9b0098324bc2cdc6cccec08969a2ccdf";
 constexpr const char* kDraftPaper = "1628db3a0fe630d2e2b3a86b0621208a";
-constexpr const char* kRealPhysical = "7515492e3719b6eb5086bdcb8078cffb";
+constexpr const char* kRealPhysical = "14787e6e050cc9b2e04ab33ab0b7c385";
 constexpr const char* kRealPaper = "83a09d20a889780ad24fa8f66478cdef";
 
 class SameBytes : public ::testing::Test {
