@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Bundles recorded when fits came to report volumes, physical frames when machines came; paper at aa0be5b.
+// Bundles: since fits report volumes. Physical frames: since machines. Paper: commit aa0be5b.
 constexpr const char* kDraft = "815e6c7d170369bed23df5dca4fe3f95";
 constexpr const char* kBalanced = "e46af3964f7c4342a663f60bf968a1e7";
 constexpr const char* kSlender = "04744c53c83a77f9827edb9fb7719fa7";
