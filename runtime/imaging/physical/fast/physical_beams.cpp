@@ -119,6 +119,7 @@ int PhysicalFast::choose_streaks(int first, std::span<PhysicalStreak> out) const
                                                   static_cast<float>(s.normal.z),
                                                   static_cast<float>(1 / s.width_mm),
                                                   static_cast<float>(2 / s.length_mm),
+                                                  static_cast<float>(s.bend),
                                                   static_cast<float>(s.amplitude),
                                                   s.sample_begin,
                                                   s.sample_end};

@@ -62,6 +62,7 @@ struct PhysicalWall {
 struct PhysicalStreak {
     float x = 0, z = 0, normal_x = 0, normal_z = 1;  // mm, in the plane
     float per_width = 1, per_length = 1;             // 1 / deviation; 2 / length
+    float bend = 0;                                  // deviations, at half its length
     float amplitude = 0;
     int sample_begin = 0, sample_end = 0;
 };

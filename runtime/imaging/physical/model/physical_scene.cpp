@@ -185,6 +185,9 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.fine = make_fine_structure(bundle, jobs);
     s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
                                    [](const FineFrame& f) { return f.cube == kParenchymaCube; });
+    s.has_septa = std::any_of(s.fine.frames.begin(), s.fine.frames.end(), [](const FineFrame& f) {
+        return f.cube == kFibreCube || f.cube == kSeptaCube;
+    });
     s.layers = make_tissue_layers(bundle, jobs);
     return s;
 }
