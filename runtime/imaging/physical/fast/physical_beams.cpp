@@ -280,6 +280,10 @@ void PhysicalFast::meet_machine(const PhysicalFrame& f) {
     met_.binomial = m.post_filter;
     met_.sharpening = m.edge_enhancement > 0;
     met_.logarithm = has_logarithm(tables_);
+    met_.shows_parenchyma = m.structures.parenchyma;
+    met_.shows_streaks = m.structures.streaks;
+    met_.shows_diaphragm = m.structures.diaphragm;
+    met_.shows_wall = m.structures.wall;
 }
 
 double PhysicalFast::sample_beams(const PhysicalFrame& f,
