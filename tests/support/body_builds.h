@@ -18,18 +18,12 @@ enum class Build { belly, wide, slim, pear, gaunt, huge };
 
 inline std::string build_name(Build build) {
     switch (build) {
-        case Build::belly:
-            return "belly";
-        case Build::wide:
-            return "wide";
-        case Build::slim:
-            return "slim";
-        case Build::pear:
-            return "pear";
-        case Build::gaunt:
-            return "gaunt";
-        default:
-            return "huge";
+        case Build::belly: return "belly";
+        case Build::wide: return "wide";
+        case Build::slim: return "slim";
+        case Build::pear: return "pear";
+        case Build::gaunt: return "gaunt";
+        default: return "huge";
     }
 }
 
@@ -49,18 +43,12 @@ inline double build_offset_mm(
         return std::exp(-0.5 * t * t);
     };
     switch (build) {
-        case Build::belly:
-            return 45 * bump(-20, 80) * front * front;
-        case Build::wide:
-            return 15 + 15 * side2 * bump(-20, 150);
-        case Build::slim:
-            return -25 * (0.55 + 0.45 * bump(0, 110)) * (0.75 + 0.25 * side2);
-        case Build::pear:
-            return 40 * bump(-130, 75) * (0.55 + 0.45 * side2) - 8 * bump(90, 80);
-        case Build::gaunt:
-            return -50 * bump(-10, 75) * front * front - 14 * side2 - 4;
-        default:
-            return 45 + 45 * bump(-20, 110) * (0.4 + 0.6 * front);
+        case Build::belly: return 45 * bump(-20, 80) * front * front;
+        case Build::wide: return 15 + 15 * side2 * bump(-20, 150);
+        case Build::slim: return -25 * (0.55 + 0.45 * bump(0, 110)) * (0.75 + 0.25 * side2);
+        case Build::pear: return 40 * bump(-130, 75) * (0.55 + 0.45 * side2) - 8 * bump(90, 80);
+        case Build::gaunt: return -50 * bump(-10, 75) * front * front - 14 * side2 - 4;
+        default: return 45 + 45 * bump(-20, 110) * (0.4 + 0.6 * front);
     }
 }
 
