@@ -13,9 +13,6 @@ namespace {
 // Sixteen equally likely values of a gamma distribution of mean 4 and shape 2.5.
 constexpr std::array<double, 16> kLengthsMm{0.74, 1.25, 1.63, 1.97, 2.3,  2.63, 2.96, 3.3,
                                             3.67, 4.06, 4.51, 5.01, 5.62, 6.4,  7.53, 9.82};
-// Eight equally likely amplitudes of mean 0 dB, deviation 2 dB.
-constexpr std::array<double, 8> kLevels{0.70, 0.82, 0.89, 0.96, 1.04, 1.12, 1.22, 1.43};
-
 constexpr std::uint32_t kHashX = 0x9E3779B1u, kHashY = 0x85EBCA77u, kHashZ = 0xC2B2AE3Du;
 
 // (1 - x)^4, close to a Gaussian, 0 from x = 1 on.
@@ -27,6 +24,7 @@ double bump(double x) {
 // Where the skin's surface lies: the direction in which the depth below it grows most.
 Vector3 layer_normal(const PhysicalScene& scene, Point3 x) {
     constexpr double kReachMm = 4;
+    if (scene.layers.empty()) return {};
     const auto depth = [&](double i, double j, double k) {
         return scene.layers.at(scene.grid.voxel_from_point(x + kReachMm * Vector3{i, j, k})).depth;
     };
@@ -34,7 +32,7 @@ Vector3 layer_normal(const PhysicalScene& scene, Point3 x) {
     const double a = depth(1, 1, 1), b = depth(1, -1, -1), c = depth(-1, 1, -1),
                  d = depth(-1, -1, 1);
     const Vector3 n{a + b - c - d, a - b + c - d, a - b - c + d};
-    const double size = norm(n);
+    const double size = norm(n);  // 0: not known
     return size > 1e-6 ? n / size : Vector3{};
 }
 
@@ -49,6 +47,7 @@ struct Search {
     std::span<const float> gaps;
     std::span<Streak> out;
     Rigid probe_from_volume;
+    double thickest_mm = 0;  // of the slab: deviation at the face or at the far end
     int found = 0;
 
     // The label that holds plates there; negative: none.
@@ -149,6 +148,18 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     Point3 p = seen(centre);
     double r = 0;
     PlanePoint beam = beam_at({p.x, p.z}, r);
+    const double length = kind.length_scale * kLengthsMm[draw & 15], own = 0.25 * length;
+    const double inverse = 1 / norm(normal);
+    const Vector3 n = probe_from_volume.rotation * (inverse * normal);
+    const double cosine = n.x * beam.x + n.z * beam.z;
+    const double facing =
+        bump(std::max(1 - cosine * cosine, 0.0) / (kind.face_sin * kind.face_sin));
+    // Most plates are too far from the plane or turned away: their most comes before their place.
+    const auto level_in = [&](double slab) {
+        const double off = p.y / (2.9 * std::sqrt(slab * slab + own * own));
+        return bump(off * off) * facing;
+    };
+    if (level_in(thickest_mm) < 0.1) return;
     double line = 0, sample = 0;
     g.locate({p.x, p.z}, line, sample);
     const int nearest = static_cast<int>(std::clamp(line + 0.5, 0.0, g.scanlines - 1.0));
@@ -163,14 +174,7 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     for (int step = 0; step < 3; ++step) shown = r - gap * row_at(shown).contact;
     if (shown < kind.first_mm || shown > g.depth_mm) return;
     const Row& row = row_at(shown);
-    const double length = kind.length_scale * kLengthsMm[draw & 15];
-    const double own = 0.25 * length, slab = row.elevation_mm;
-    const double off = p.y / (2.9 * std::sqrt(slab * slab + own * own));
-    const double inverse = 1 / norm(normal);
-    const Vector3 n = probe_from_volume.rotation * (inverse * normal);
-    const double cosine = n.x * beam.x + n.z * beam.z;
-    const double level = bump(off * off) *
-                         bump(std::max(1 - cosine * cosine, 0.0) / (kind.face_sin * kind.face_sin));
+    const double level = level_in(row.elevation_mm);
     if (level < 0.1 || found >= static_cast<int>(out.size()) || plates_at(centre) < 0) return;
     Streak& s = out[static_cast<std::size_t>(found)];
     s.centre = {p.x + (shown - r) * beam.x, p.z + (shown - r) * beam.z};
@@ -178,8 +182,7 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     s.normal = {n.x * in_plane, n.z * in_plane};
     s.length_mm = length;
     s.width_mm = tables.streak_mm;
-    s.amplitude = kind.amplitude * tables.streak_scale *
-                  std::pow(kLevels[draw >> 4 & 7], kind.level_power) * level;
+    s.amplitude = kind.amplitude * tables.streak_scale * kind.levels[draw >> 4 & 7] * level;
     constexpr std::array<double, 4> kBends{-1, -0.4, 0.4, 1};
     const double sunk_mm = kind.most_bend * kBends[draw >> 8 & 3] * 0.125 * length * length;
     s.bend = sunk_mm / s.width_mm;
@@ -198,8 +201,10 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
 }  // namespace
 
 const PlateKind& plate_kind(double frequency_mhz) {
-    static constexpr PlateKind kOrgans{8, 44, 0.5, 12, 6, 2.5, 1, 0.01, 0};
-    static constexpr PlateKind kSepta{4, 9, 0.45, 1.5, 3.2, 4.5, 1.4, 0.04, 0.3};
+    static constexpr PlateKind kOrgans{
+        8, 44, 0.5, 12, 6, {0.41, 0.61, 0.75, 0.9, 1.1, 1.33, 1.64, 2.45}, 1, 0.01, 0};
+    static constexpr PlateKind kSepta{
+        4, 9, 0.45, 1.5, 3.2, {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5}, 1.4, 0.04, 0.3};
     return frequency_mhz > kSeptaFrequencyMhz ? kSepta : kOrgans;
 }
 
@@ -213,8 +218,17 @@ int find_streaks(const PhysicalScene& scene,
     const bool septa = tables.frequency_mhz > kSeptaFrequencyMhz;
     if (!(septa ? scene.has_septa : scene.has_parenchyma)) return 0;
     const PlateKind& kind = plate_kind(tables.frequency_mhz);
-    Search search{kind, septa,     scene, g,   tables,
-                  f,    breathing, gaps,  out, inverse(f.volume_from_probe)};
+    Search search{kind,
+                  septa,
+                  scene,
+                  g,
+                  tables,
+                  f,
+                  breathing,
+                  gaps,
+                  out,
+                  inverse(f.volume_from_probe),
+                  std::max(tables.rows.front().elevation_mm, tables.rows.back().elevation_mm)};
     const double shift_mm = norm(f.motion.breathing_mm);
     // Columns of cells along the axis that the plane's normal follows most.
     const Vector3 normal = f.volume_from_probe.rotation * Vector3{0, 1, 0};

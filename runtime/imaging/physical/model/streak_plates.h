@@ -23,14 +23,14 @@ namespace sonocase::runtime::physical {
 // and the perimysium of muscle, which follows its fibres.
 struct PlateKind {
     double cell_mm = 8;
-    int tries = 44;           // per cell; pi / 6 of them are plates
-    double face_sin = 0.35;   // sine of the angle at which a plate is gone
-    double first_mm = 12;     // none closer to the face
-    double amplitude = 6;     // of the middle one
-    double level_power = 1;   // spread of the amplitudes: 2 dB times this
-    double length_scale = 1;  // of a mean length of 4 mm
-    double most_bend = 0;     // curvature in the picture, 1/mm
-    double scatter = 0;       // of the normals of septa about the skin's
+    int tries = 44;                  // per cell; pi / 6 of them are plates
+    double face_sin = 0.35;          // sine of the angle at which a plate is gone
+    double first_mm = 12;            // none closer to the face
+    double amplitude = 6;            // of the middle one
+    std::array<double, 8> levels{};  // equally likely factors of it
+    double length_scale = 1;         // of a mean length of 4 mm
+    double most_bend = 0;            // curvature in the picture, 1/mm
+    double scatter = 0;              // of the normals of septa about the skin's
 };
 inline constexpr double kSeptaFrequencyMhz = 6;
 const PlateKind& plate_kind(double frequency_mhz);
