@@ -111,6 +111,23 @@ std::vector<float> echo_factor(const BeamImage& grid, const Parenchyma& t, std::
     return factor;
 }
 
+// The point spread across the beams: a Gaussian and its skirt, of unit power in sum.
+std::vector<float> lateral_taps(const MachineBeam& beam, double sigma, int lines) {
+    std::vector<float> core = unit_power_taps(sigma);
+    if (!(beam.skirt > 0)) return core;
+    std::vector<float> taps = unit_power_taps(std::min(beam.skirt_width * sigma, lines / 4.0));
+    const float skirt = static_cast<float>(beam.skirt);
+    const std::size_t first = (taps.size() - core.size()) / 2;
+    double power = 0;
+    for (std::size_t i = 0; i < taps.size(); ++i) {
+        taps[i] *= skirt;
+        if (i >= first && i < first + core.size()) taps[i] += core[i - first];
+        power += static_cast<double>(taps[i]) * static_cast<double>(taps[i]);
+    }
+    for (float& tap : taps) tap = static_cast<float>(static_cast<double>(tap) / std::sqrt(power));
+    return taps;
+}
+
 double frequency_scale(const Machine& m) {
     return m.beam.frequency_mhz > 0 ? m.beam.reference_mhz / m.beam.frequency_mhz : 1;
 }
@@ -144,7 +161,7 @@ std::vector<float> speckle_power(const Machine& machine,
     for (int k = 0; k < grid.samples; ++k) {
         const double sigma =
             lateral_width_mm(machine, grid, grid.depth_mm(k)) * kSigmaPerWidth / grid.pitch_mm(k);
-        across.push_back(unit_power_taps(std::min(sigma, grid.lines / 4.0)));
+        across.push_back(lateral_taps(machine.beam, std::min(sigma, grid.lines / 4.0), grid.lines));
         longest = std::max(longest, across.back().size());
     }
     const int pad = static_cast<int>(longest) / 2;
