@@ -37,7 +37,7 @@ def test_the_skin_is_where_the_cylinder_ends(case):
     assert abs(np.hypot(point[0], point[2]) - 60) < 2  # a voxel
     normal = case.skin_normal(point)
     expected = np.array([point[0], 0, point[2]]) / np.hypot(point[0], point[2])
-    assert normal @ expected > np.cos(np.radians(5))
+    assert normal @ expected > np.cos(np.radians(8))  # voxels of 2 mm, averaged over 12 mm
     assert case.skin_point((500, 0, 0), (0, 1, 0)) is None
 
 

@@ -11,6 +11,7 @@ Millimetres, seconds, radians; right-handed frames; poses are 4 x 4 arrays `mann
 `sonocase.Error` with one line that says what, where and what was expected.
 """
 
+from . import _core
 from . import pose as Pose
 from ._core import (
     Case,
@@ -22,7 +23,6 @@ from ._core import (
     Renderer,
     Target,
     __version__,
-    read_session,
     simd_targets,
 )
 
@@ -30,6 +30,13 @@ __all__ = [
     "Case", "Error", "Exercise", "Label", "Needle", "Pose", "Probe", "Renderer", "Target",
     "__version__", "read_session", "score", "simd_targets",
 ]
+
+
+def read_session(path):
+    """Poses, times and frame numbers of a recorded session, as a dict of arrays."""
+    import os
+
+    return _core.read_session(os.fspath(path))
 
 
 def score(case, session, exercise=None):
