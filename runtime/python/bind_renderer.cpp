@@ -9,7 +9,7 @@
 #include "bindings.h"
 #include "formats/files/machine_file.h"
 #include "frame_renderer.h"
-#include "numpy_values.h"
+#include "truth_values.h"
 
 namespace sonocase::python {
 namespace {
@@ -69,13 +69,32 @@ class PyRenderer {
         return picture;
     }
 
+    // The last frame's: (planes, facts).
+    py::tuple truth(const std::vector<std::string>& names) {
+        FrameTask task;
+        task.input = last();
+        const TruthArrays arrays = TruthArrays::make(names, -1, height(), width());
+        task.planes = arrays.planes(0, static_cast<std::size_t>(width() * height()));
+        const Turn turn(busy_);
+        check(usable(renderer_->opened()));
+        check(renderer_->prepare_truth());
+        {
+            const py::gil_scoped_release free_to_run;
+            renderer_->describe(task);
+        }
+        check(usable(renderer_->opened()));
+        return py::make_tuple(
+            arrays, facts_of(task.truth, renderer_->opened().bundle->labels, renderer_->exercise()));
+    }
+
     py::object render_batch(py::handle poses,
                             py::handle needles,
                             py::handle times_s,
                             std::int64_t first_frame,
                             double gain_db,
                             py::object out,
-                            int threads) {
+                            int threads,
+                            const std::optional<std::vector<std::string>>& truth) {
         if (threads < 1 || threads > 256) throw py::value_error("threads: give 1 to 256");
         std::vector<FrameTask> tasks = batch_tasks(poses, needles, times_s, first_frame, gain_db);
         const auto count = static_cast<py::ssize_t>(tasks.size());
@@ -83,7 +102,13 @@ class PyRenderer {
                                             : checked_out(out, {count, height(), width()});
         std::uint8_t* to = static_cast<Bytes&>(pictures).mutable_data();
         const auto area = static_cast<std::size_t>(width() * height());
-        for (std::size_t n = 0; n < tasks.size(); ++n) tasks[n].pixels = {to + n * area, area};
+        TruthArrays arrays;
+        if (truth) arrays = TruthArrays::make(*truth, count, height(), width());
+        for (std::size_t n = 0; n < tasks.size(); ++n) {
+            tasks[n].pixels = {to + n * area, area};
+            tasks[n].wants_truth = truth.has_value();
+            tasks[n].planes = arrays.planes(n, area);
+        }
         const Turn turn(busy_);
         check(usable(renderer_->opened()));
         std::optional<Result<bool>> whole;
@@ -97,7 +122,12 @@ class PyRenderer {
         if (!value_of(*whole)) throw py::error_already_set();  // Ctrl-C, as Python's own exception
         check(usable(renderer_->opened()));
         if (!tasks.empty()) last_ = tasks.back().input;
-        return pictures;
+        if (!truth) return pictures;
+        py::list facts;
+        for (const FrameTask& task : tasks)
+            facts.append(
+                facts_of(task.truth, renderer_->opened().bundle->labels, renderer_->exercise()));
+        return py::make_tuple(pictures, arrays, facts);
     }
 
     const runtime::FrameInput& last() const {
@@ -241,10 +271,15 @@ void bind_renderer(py::module_& module) {
              "sonoplay counts 0, 1, 2, ... out: written to instead of a new array.")
         .def("render_batch", &PyRenderer::render_batch, "poses"_a, "needles"_a = py::none(),
              "times_s"_a = py::none(), py::kw_only(), "first_frame"_a = 0, "gain_db"_a = 0.0,
-             "out"_a = py::none(), "threads"_a = 1,
+             "out"_a = py::none(), "threads"_a = 1, "truth"_a = py::none(),
              "Many frames: uint8 array (n, height, width). poses: (n, 4, 4). needles: a sequence "
              "of what render() takes. Frame i has number first_frame + i. The pixels do not "
-             "depend on `threads`. Ctrl-C raises KeyboardInterrupt after the frames in hand.")
+             "depend on `threads`. truth: names of planes; then (pictures, TruthPlanes, list of "
+             "facts) is returned. Ctrl-C raises KeyboardInterrupt after the frames in hand.")
+        .def("truth", &PyRenderer::truth,
+             "planes"_a = std::vector<std::string>{"labels", "needle", "shadowed", "skin_depth_mm"},
+             "What the last frame shows: (TruthPlanes, facts). facts: a dict of `visible` organs "
+             "with their areas, `targets` with their distances, the needle's `tip`, `contact`.")
         .def_property_readonly("contact", &PyRenderer::contact,
                                "Whether the probe of the last render() touched the skin.")
         .def_property_readonly("size", [](const PyRenderer& r) {

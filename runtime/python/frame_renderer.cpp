@@ -21,27 +21,44 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::create(
         static const auto textures = runtime::make_physical_textures();
         renderer->options_.textures = textures;
     }
-    if (const Status added = renderer->add_engine(); !added) return added.error();
+    if (const Status added = renderer->add_worker(); !added) return added.error();
     return renderer;
 }
 
-Status FrameRenderer::add_engine() {
+Status FrameRenderer::add_worker() {
     runtime::EngineOptions options;
     options.render = options_;
     auto engine = runtime::ScanEngine::create(opened_->bundle, exercise_, options);
     if (!engine) return engine.error();
-    engines_.push_back(std::make_unique<runtime::ScanEngine>(std::move(*engine)));
+    workers_.push_back(std::make_unique<Worker>(std::move(*engine)));
     return Done{};
 }
 
-void FrameRenderer::render_with(runtime::ScanEngine& engine, FrameTask& task) {
+Status FrameRenderer::add_truth(Worker& worker) {
+    if (worker.truth != nullptr) return Done{};
+    auto truth = runtime::TruthRenderer::create(opened_->bundle, exercise_, options_);
+    if (!truth) return truth.error();
+    worker.truth = std::make_unique<runtime::TruthRenderer>(std::move(*truth));
+    return Done{};
+}
+
+Status FrameRenderer::prepare_truth() {
+    return add_truth(*workers_.front());
+}
+
+void FrameRenderer::render_with(Worker& worker, FrameTask& task) {
     runtime::FrameRecord record;
     record.input = task.input;
-    task.status = engine.frame_again(record, task.pixels);
+    task.status = worker.engine.frame_again(record, task.pixels);
+    if (task.wants_truth) task.truth = worker.truth->render(task.input, task.planes);
 }
 
 void FrameRenderer::render(FrameTask& task) {
-    render_with(*engines_.front(), task);
+    render_with(*workers_.front(), task);
+}
+
+void FrameRenderer::describe(FrameTask& task) {
+    task.truth = workers_.front()->truth->render(task.input, task.planes);
 }
 
 Result<bool> FrameRenderer::render_all(std::span<FrameTask> tasks,
@@ -49,8 +66,13 @@ Result<bool> FrameRenderer::render_all(std::span<FrameTask> tasks,
                                        const std::function<bool()>& interrupted) {
     const std::size_t wanted =
         std::clamp<std::size_t>(static_cast<std::size_t>(threads), 1, std::max<std::size_t>(tasks.size(), 1));
-    while (engines_.size() < wanted) {
-        if (const Status added = add_engine(); !added) return added.error();
+    while (workers_.size() < wanted) {
+        if (const Status added = add_worker(); !added) return added.error();
+    }
+    if (!tasks.empty() && tasks.front().wants_truth) {
+        for (std::size_t part = 0; part < wanted; ++part) {
+            if (const Status added = add_truth(*workers_[part]); !added) return added.error();
+        }
     }
     std::atomic<std::size_t> next{0};
     std::atomic<bool> stop{false};
@@ -59,7 +81,7 @@ Result<bool> FrameRenderer::render_all(std::span<FrameTask> tasks,
             if (asks && done % 8 == 7 && interrupted()) stop = true;
             const std::size_t n = stop ? tasks.size() : next++;
             if (n >= tasks.size()) return;
-            render_with(*engines_[part], tasks[n]);
+            render_with(*workers_[part], tasks[n]);
         }
     };
     std::vector<std::thread> helpers;

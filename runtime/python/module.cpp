@@ -15,5 +15,6 @@ PYBIND11_MODULE(_core, module) {
         "expected.";
     bind_exercise(module);
     bind_case(module);
+    bind_truth(module);
     bind_renderer(module);
 }
