@@ -98,7 +98,7 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
     const ImageSettings& s = input.settings;
     const bool changed = first_ || s.gain_db != settings_.gain_db ||
                          s.dynamic_range_db != settings_.dynamic_range_db ||
-                         s.tgc_db != settings_.tgc_db ||
+                         s.tgc_db != settings_.tgc_db || s.press_mm != settings_.press_mm ||
                          s.flip_left_right != settings_.flip_left_right;
     if (changed) {
         const std::string text = settings_text(s);  // short, and only while a setting changes

@@ -27,6 +27,7 @@ class PhysicalFast {
                  const ScanGeometry& geometry,
                  const physical::Tables& tables,
                  const PhysicalNoise& noise,
+                 const press::PressFace& face,
                  const RenderContext& context);
 
     PhysicalFast(const PhysicalFast&) = delete;
@@ -82,6 +83,7 @@ class PhysicalFast {
     const physical::Tables& tables_;
     const PhysicalNoise& noise_;
     const RenderContext context_;
+    press::PressView press_;
     ScanConversionTable conversion_;
     int lines_ = 0, stride_ = 0, pair_stride_ = 0, cells_k_ = 0, cells_l_ = 0;
 

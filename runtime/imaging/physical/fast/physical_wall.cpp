@@ -64,15 +64,9 @@ void PhysicalFast::place_wall(const PhysicalFrame& f,
         bool shows = keep_all;
         for (int l = 0; l <= kBeamBlock; l += every) {
             const int line = std::min(first + l, g.scanlines - 1);
-            PlanePoint o = g.beams[static_cast<std::size_t>(line)].origin,
-                       d = g.beams[static_cast<std::size_t>(line)].direction;
-            if (line < first + l) {  // beyond the last beam
-                o = g.beam_origin(first + l);
-                d = g.beam_direction(first + l);
-            }
-            const double s =
-                r + static_cast<double>(gaps_[static_cast<std::size_t>(line)]) * contact;
-            Point3 x = f.volume_from_probe * Point3{o.x + s * d.x, 0, o.z + s * d.z};
+            // Also beyond the last beam.
+            const double gap = static_cast<double>(gaps_[static_cast<std::size_t>(line)]);
+            Point3 x = point_on_beam(g, f, first + l, r, gap * contact);
             if (breathing != nullptr) x = x - breathing->weight(x) * f.motion.breathing_mm;
             const WallPlace right =
                 wall_place(scene_.layers, tables_.wall, scene_.grid.voxel_from_point(x));

@@ -8,6 +8,7 @@
 
 #include "runtime/imaging/physical/model/physical_model.h"
 #include "runtime/imaging/physical/model/wall_sheets.h"
+#include "runtime/imaging/press/closed_label.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -186,6 +187,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
                                    [](const FineFrame& f) { return f.cube == kParenchymaCube; });
     s.layers = make_tissue_layers(bundle, jobs);
+    s.closed_label = press::closed_labels(bundle);
     return s;
 }
 

@@ -33,6 +33,7 @@ struct Search {
     std::span<const float> gaps;
     std::span<Streak> out;
     Rigid probe_from_volume;
+    double pressed_mm = 0;  // tissue shows so much nearer to the face than it lies at rest
     int found = 0;
 
     bool is_parenchyma(Point3 x) const {
@@ -43,10 +44,16 @@ struct Search {
         return scene.fine.frames[static_cast<std::size_t>(label)].cube == kParenchymaCube;
     }
 
-    // Where a point of the tissue shows, in the probe's frame.
-    Point3 seen(Point3 x) const {
+    // Where a point of the tissue shows, in the probe's frame, before anything is pressed.
+    Point3 seen_at_rest(Point3 x) const {
         if (breathing != nullptr) x = x + breathing->weight(x) * frame.motion.breathing_mm;
         return probe_from_volume * x;
+    }
+    Point3 seen(Point3 x) const {
+        const Point3 p = seen_at_rest(x);
+        if (frame.press == nullptr) return p;
+        const PlanePoint q = press::shown_point(*frame.press, {p.x, p.z});
+        return {q.x, p.y, q.z};
     }
 
     // The beam at a place: its direction, and how far the place lies along it.
@@ -70,10 +77,10 @@ void Search::add_cell(int i, int j, int k) {
     const Point3 corner =
         scene.grid.origin_mm + kStreakCellMm * Vector3{double(i), double(j), double(k)};
     const Point3 middle = corner + 0.5 * kStreakCellMm * Vector3{1, 1, 1};
-    const Point3 p = seen(middle);
+    const Point3 p = seen_at_rest(middle);
     double r = 0;
     const PlanePoint beam = beam_at({p.x, p.z}, r);
-    if (r < kStreakFirstMm - kStreakCellMm || r > g.depth_mm + kStreakCellMm) return;
+    if (r < kStreakFirstMm - kStreakCellMm || r > g.depth_mm + kStreakCellMm + pressed_mm) return;
     if (!is_parenchyma(middle)) return;
     const Vector3 along = frame.volume_from_probe.rotation * Vector3{beam.x, 0, beam.z};
     const auto bx = static_cast<float>(along.x), by = static_cast<float>(along.y),
@@ -158,6 +165,7 @@ int find_streaks(const PhysicalScene& scene,
                  std::span<Streak> out) {
     if (!scene.has_parenchyma || tables.frequency_mhz > kStreakFrequencyMhz) return 0;
     Search search{scene, g, tables, f, breathing, gaps, out, inverse(f.volume_from_probe)};
+    if (f.press != nullptr) search.pressed_mm = f.press->state().farthest_mm;
     const double shift_mm = norm(f.motion.breathing_mm);
     // Columns of cells along the axis that the plane's normal follows most.
     const Vector3 normal = f.volume_from_probe.rotation * Vector3{0, 1, 0};
