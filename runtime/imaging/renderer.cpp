@@ -138,8 +138,14 @@ class Pressing {
         pose_ = pose;
         solved_ = true;
         const press::PressState& s = field_.state();
-        report_ = {s.pressed,    s.force_n,   s.pressed ? s.pressure_kpa : 0,
-                   s.deepest_mm, s.excess_mm, s.out_of_reach};
+        report_ = {
+            true,         s.vein_open, s.pressed,     s.force_n, s.pressed ? s.pressure_kpa : 0,
+            s.deepest_mm, s.excess_mm, s.out_of_reach};
+    }
+    double force_at(Rigid pose, double deeper_mm) {
+        pose.translation = pose.translation + deeper_mm * pose.rotation.column(2);
+        at(pose);
+        return report_.force_n;
     }
     const press::PressField* pressed() const { return field_.state().pressed ? &field_ : nullptr; }
     const press::PressField& field() const { return field_; }
@@ -301,6 +307,26 @@ const PressReport& Renderer::press() const {
 
 const Rigid& Renderer::shown_pose() const {
     return impl_->shown_pose;
+}
+
+double Renderer::press_mm_for(const Rigid& pose, double force_n, double start_mm) {
+    if (!impl_->probe || !(force_n > 0) || !valid_pose(pose)) return 0;
+    // Force grows about as the square of depth: between bounds, by the roots of their forces.
+    double low = 0, high = kMostPress_mm, at = std::clamp(start_mm, 0.5, 30.0);
+    double low_n = 0, high_n = -1;
+    for (int step = 0; step < 6; ++step) {
+        const double n = impl_->probe->force_at(pose, at);
+        if (std::abs(n - force_n) < 0.02 * force_n) break;
+        (n < force_n ? low : high) = at;
+        (n < force_n ? low_n : high_n) = n;
+        if (high_n < 0) {
+            at = std::min(2 * at + 1, 0.5 * (at + kMostPress_mm));
+        } else {
+            const double a = std::sqrt(low_n), b = std::sqrt(high_n), f = std::sqrt(force_n);
+            at = low + (high - low) * std::clamp((f - a) / std::max(b - a, 1e-9), 0.05, 0.95);
+        }
+    }
+    return at;
 }
 
 Point3 Renderer::at_rest(Point3 now) const {

@@ -45,6 +45,10 @@ enum class FrameStatus : std::uint8_t {
 
 // What the probe does to the tissue under it (effect deformation).
 struct PressReport {
+    bool solved = false;  // the effect is on
+    // Height of the draining lumens under the face over that at rest; negative: there are none, or
+    // nothing is pressed.
+    double vein_open = -1;
     bool pressed = false;       // else all is 0
     double force_n = 0;         // on the whole face
     double pressure_kpa = 0;    // over the part of it that touches

@@ -14,23 +14,40 @@ void mark_closed(const PressSamples& samples, const PressColumns& columns, Press
         out.row.fill(false);
     }
     out.any = false;
+    const auto shut = [&](int j, int i) {
+        if (j < 0 || j >= kFineRows || i < 0 || i >= kColumns) return false;
+        if (!samples.lumen[static_cast<std::size_t>(j)]) return false;
+        const float share = samples.drains.row(j)[i];
+        return share >= 0.5f &&
+               columns.stretch.row(j)[i] < share * static_cast<float>(kClosed) + (1 - share);
+    };
+    // A round lumen reaches less far up and down beside its middle: look two parts around, and one
+    // in the columns beside.
+    const auto near = [&](int j, int i) {
+        for (int n = j - 2; n <= j + 2; ++n)
+            if (shut(n, i)) return true;
+        for (int n = j - 1; n <= j + 1; ++n)
+            if (shut(n, i - 1) || shut(n, i + 1)) return true;
+        return false;
+    };
+    const auto nearest = [](float mm) {
+        return std::clamp(static_cast<int>(double{mm} / kTableStep_mm + 0.5), 0, kTableRows - 1);
+    };
     for (int j = 0; j < kFineRows; ++j) {
-        if (!samples.lumen[static_cast<std::size_t>(j)]) continue;
+        bool lumens = false;
+        for (int n = std::max(j - 2, 0); n <= std::min(j + 2, kFineRows - 1); ++n)
+            lumens = lumens || samples.lumen[static_cast<std::size_t>(n)];
+        if (!lumens) continue;
         for (int i = 0; i < kColumns; ++i) {
-            const float share = samples.drains.row(j)[i];
-            const float open = share * static_cast<float>(kClosed) + (1 - share);
-            if (share < 0.5f || columns.stretch.row(j)[i] >= open) continue;
-            // From the node above the part to the one below it.
-            const double above = double{columns.pressed_mm.row(j)[i]} / kTableStep_mm,
-                         below = double{columns.pressed_mm.row(j + 1)[i]} / kTableStep_mm;
-            const int first = std::clamp(static_cast<int>(above), 0, kTableRows - 1);
-            const int last = std::clamp(static_cast<int>(below) + 1, 0, kTableRows - 1);
+            if (!near(j, i)) continue;
+            out.any = true;
+            // Each place of the part has one of these nodes nearest to it.
+            const int first = nearest(columns.pressed_mm.row(j)[i]),
+                      last = nearest(columns.pressed_mm.row(j + 1)[i]);
             for (int m = first; m <= last; ++m) {
-                for (int c = std::max(i - 1, 0); c <= std::min(i + 1, kColumns - 1); ++c)
-                    out.row_of(m)[c] = 1;
+                out.row_of(m)[i] = 1;
                 out.row[static_cast<std::size_t>(m)] = true;
             }
-            out.any = true;
         }
     }
 }

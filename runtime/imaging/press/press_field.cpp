@@ -65,6 +65,23 @@ double skin_mm(const PressFace& face, const PressSamples& samples, double latera
     return -(left + (x - static_cast<double>(i)) * (right - left));
 }
 
+// Height of the draining lumens under the face over their height at rest; -1 where there are none
+// to speak of.
+double lumen_height(const PressSamples& samples, const PressColumns& columns, double width_mm) {
+    constexpr double kLeast_mm2 = 4;
+    double rest = 0, pressed = 0;
+    for (int j = 0; j < kFineRows; ++j) {
+        if (!samples.lumen[static_cast<std::size_t>(j)]) continue;
+        for (int i = kSideColumns; i < kSideColumns + kFaceColumns; ++i) {
+            const double share = double{samples.drains.row(j)[i]};
+            if (share < 0.5) continue;
+            rest += fine_height(j);
+            pressed += fine_height(j) * double{columns.stretch.row(j)[i]};
+        }
+    }
+    return rest * width_mm < kLeast_mm2 ? -1 : pressed / rest;
+}
+
 }  // namespace
 
 PressField::PressField(const PressFace& face) : face_(face), work_(std::make_unique<Work>()) {
@@ -98,6 +115,7 @@ bool PressField::press(SimdTarget simd, const PressScene& scene, const PressOpti
     const double area_mm2 = touching * column_width_mm(face_) * 2 * face_.half_height_mm;
     state_.pressure_kpa = 1e3 * state_.force_n / area_mm2;
     state_.least_determinant = work_->table.least_determinant;
+    state_.vein_open = lumen_height(samples, work_->columns, column_width_mm(face_));
     float sideways = 0;
     for (const float v : work_->table.bulge_mm.values) sideways = std::max(sideways, std::abs(v));
     state_.farthest_mm = state_.deepest_mm + double{sideways};

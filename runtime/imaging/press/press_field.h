@@ -24,13 +24,14 @@ struct PressOptions {
 };
 
 struct PressState {
-    bool pressed = false;         // else nothing moves, and the field is the identity
-    double force_n = 0;           // on the whole face
-    double pressure_kpa = 0;      // over the part of it that touches
-    double excess_mm = 0;         // by how much bone held the probe back, along z
-    double deepest_mm = 0;        // greatest pressed depth, after the excess
-    double farthest_mm = 0;       // no tissue of the plane moves further
-    bool out_of_reach = false;    // more than 30 mm inside the body: as if 30
+    bool pressed = false;       // else nothing moves, and the field is the identity
+    double force_n = 0;         // on the whole face
+    double pressure_kpa = 0;    // over the part of it that touches
+    double excess_mm = 0;       // by how much bone held the probe back, along z
+    double deepest_mm = 0;      // greatest pressed depth, after the excess
+    double farthest_mm = 0;     // no tissue of the plane moves further
+    double vein_open = -1;      // height of the lumens under the face over that at rest; < 0: none
+    bool out_of_reach = false;  // more than 30 mm inside the body: as if 30
     float least_determinant = 1;  // of the map from the picture to the tissue: never 0 or less
 };
 

@@ -32,6 +32,29 @@ PressView::PressView(const ScanGeometry& g, const PressFace& face)
     }
 }
 
+PressView::Shift PressView::at(int line, int k) const {
+    if (!columns_follow_beams) {
+        const PlaneShift s =
+            plane_shift(*field, *geometry, geometry->beams[static_cast<std::size_t>(line)], line,
+                        (k + 0.5) * geometry->step_mm);
+        return {static_cast<float>(s.along_mm), static_cast<float>(s.side_mm)};
+    }
+    constexpr float kPerRow = static_cast<float>(1 / (kBulgeEvery * kTableStep_mm));
+    const float r = (static_cast<float>(k) + 0.5f) * step_mm;
+    const float row = std::min(r * kPerRow, kBulgeRows - 1.0f);
+    const int n = std::min(static_cast<int>(row), kBulgeRows - 2);
+    const float* above = bulge.data() + static_cast<std::ptrdiff_t>(n) * lines + line;
+    const float v = share[static_cast<std::size_t>(k)] *
+                    (above[0] + (row - static_cast<float>(n)) * (above[lines] - above[0]));
+    const float c = std::clamp(column[static_cast<std::size_t>(line)] + v * columns_per_mm, 0.0f,
+                               kColumns - 1.0f);
+    const int i = std::min(static_cast<int>(c), kColumns - 2);
+    const float left = shift_row(k)[i], right = shift_row(k)[i + 1];
+    const float deeper = left + (c - static_cast<float>(i)) * (right - left);
+    const float grow = 1 + (r + deeper) * per_radius_mm;
+    return {deeper - 0.5f * v * v * per_radius_mm * grow, v * grow};
+}
+
 void PressView::show(const PressField& pressed) {
     field = &pressed;
     if (!columns_follow_beams) return;

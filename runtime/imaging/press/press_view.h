@@ -35,6 +35,12 @@ class PressView {
     // us.
     void show(const PressField& field);
 
+    // The shift of one sample, k < active.
+    struct Shift {
+        float along_mm = 0, side_mm = 0;
+    };
+    Shift at(int line, int k) const;
+
     // What press_chunk() reads.
     const PressField* field = nullptr;
     const ScanGeometry* geometry = nullptr;

@@ -26,21 +26,16 @@ struct PressedBlock {
     // Negative inside; later shapes cover earlier ones.
     double distance(int shape, Point3 p) const {
         switch (shape) {
-            case skin:
-                return -p.z;
-            case fat:
-                return 2 - p.z;
-            case muscle:
-                return 12 - p.z;
+            case skin: return -p.z;
+            case fat: return 2 - p.z;
+            case muscle: return 12 - p.z;
             case vein_label:
                 return vessels ? std::hypot(p.x - vein.x, p.z - vein.z) - vein_radius_mm : 1e3;
             case artery_label:
                 return vessels ? std::hypot(p.x - artery.x, p.z - artery.z) - artery_radius_mm
                                : 1e3;
-            case bone:
-                return bone_mm - p.z;
-            default:
-                return 1e3;
+            case bone: return bone_mm - p.z;
+            default: return 1e3;
         }
     }
     std::uint8_t label(Point3 p) const {
