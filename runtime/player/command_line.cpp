@@ -79,6 +79,11 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
                    "0: never reduced. Recordings are always at full accuracy")
         ->check(CLI::Range(0.0, 1000.0))
         ->group("Picture");
+    app.add_option("--press", arguments.press_mm,
+                   "Millimetres by which the probe presses deeper than its pose; default: the "
+                   "exercise's")
+        ->check(CLI::Range(0.0, 40.0))
+        ->group("Picture");
     app.add_option("--threads", arguments.threads, "Rendering threads")
         ->check(CLI::Range(1, 256))
         ->group("Picture");
