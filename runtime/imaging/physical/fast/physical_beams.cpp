@@ -357,7 +357,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         }
         tail_from_[static_cast<std::size_t>(block)] = b.tail_from;
     });
-    mirror_rows(light_, 3);  // for the boxes of the aperture
+    mirror_rows(light_, 6);  // for the boxes of the aperture
     if (clutter) mirror_rows(clutter_, kMaxHazeReach);
     met_.pressed = f.press != nullptr;
     met_.breathes = f.motion.breathes();

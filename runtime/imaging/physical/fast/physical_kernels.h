@@ -46,7 +46,7 @@ enum BeamNumber {
 };
 
 inline constexpr int kRowSlack = 64;   // behind rows and buffers: lanes of the widest vector
-inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 3
+inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 6
 
 inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
 

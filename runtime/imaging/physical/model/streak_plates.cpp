@@ -211,7 +211,7 @@ const PlateKind& plate_kind(double frequency_mhz) {
     static constexpr PlateKind kOrgans{
         8, 44, 0.5, 12, 6, {0.41, 0.61, 0.75, 0.9, 1.1, 1.33, 1.64, 2.45}, 1, 0.01, 0};
     static constexpr PlateKind kSepta{
-        4, 9, 0.45, 1.5, 3.2, {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5}, 1.4, 0.04, 0.3};
+        4, 9, 0.45, 1.5, 4, {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5}, 1.4, 0.04, 0.3};
     return frequency_mhz > kSeptaFrequencyMhz ? kSepta : kOrgans;
 }
 
