@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <tuple>
+#include <unordered_map>
 #include <vector>
 
 namespace sonocase::pipeline {
@@ -53,15 +54,15 @@ std::vector<Cube> cubes_of(const std::vector<Point3>& points) {
     return cubes;
 }
 
-// Of each cube the size of the cube in which the middle reading of its block lies.
-std::vector<std::size_t> usual_sizes(const std::vector<Cube>& cubes) {
+// Of each block the size of the cube in which its middle reading lies.
+std::unordered_map<std::uint64_t, std::size_t> usual_sizes(const std::vector<Cube>& cubes) {
     std::vector<std::size_t> order(cubes.size());
     for (std::size_t n = 0; n < order.size(); ++n) order[n] = n;
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
         return std::tie(cubes[a].block, cubes[a].readings, a) <
                std::tie(cubes[b].block, cubes[b].readings, b);
     });
-    std::vector<std::size_t> usual(cubes.size(), 0);
+    std::unordered_map<std::uint64_t, std::size_t> usual;
     for (std::size_t n = 0; n < order.size();) {
         std::size_t end = n, readings = 0;
         for (; end < order.size() && cubes[order[end]].block == cubes[order[n]].block; ++end)
@@ -71,10 +72,22 @@ std::vector<std::size_t> usual_sizes(const std::vector<Cube>& cubes) {
             seen += cubes[order[middle]].readings;
             if (2 * seen >= readings) break;
         }
-        for (std::size_t m = n; m < end; ++m) usual[order[m]] = cubes[order[middle]].readings;
+        usual[cubes[order[n]].block] = cubes[order[middle]].readings;
         n = end;
     }
     return usual;
+}
+
+// The largest usual size in the blocks round a cube.
+std::size_t usual_near(const std::unordered_map<std::uint64_t, std::size_t>& usual, Point3 p) {
+    constexpr double kEdge_mm = kBlock * kCube_mm;
+    std::size_t largest = 0;
+    for (int n = 0; n < 27; ++n) {
+        const Vector3 aside{double(n % 3 - 1), double(n / 3 % 3 - 1), double(n / 9 - 1)};
+        const auto found = usual.find(key_of(p + kEdge_mm * aside, kEdge_mm));
+        if (found != usual.end()) largest = std::max(largest, found->second);
+    }
+    return largest;
 }
 
 }  // namespace
@@ -83,15 +96,15 @@ void reduce_points(Surface& cloud, StageReport* report) {
     if (!cloud.triangles.empty() || cloud.points.size() <= kDensePoints) return;
     const std::size_t given = cloud.points.size();
     const std::vector<Cube> cubes = cubes_of(cloud.points);
-    const std::vector<std::size_t> usual = usual_sizes(cubes);
+    const auto usual = usual_sizes(cubes);
     std::size_t sparse = 0;
     cloud.points.clear();
     cloud.normals.clear();
-    for (std::size_t n = 0; n < cubes.size(); ++n) {
-        if (cubes[n].readings <= kFew && kTimesAsMany * cubes[n].readings <= usual[n]) {
-            sparse += cubes[n].readings;
+    for (const Cube& cube : cubes) {
+        if (cube.readings <= kFew && kTimesAsMany * cube.readings <= usual_near(usual, cube.mean)) {
+            sparse += cube.readings;
         } else {
-            cloud.points.push_back(cubes[n].mean);
+            cloud.points.push_back(cube.mean);
         }
     }
     cloud.points.shrink_to_fit();
