@@ -221,6 +221,7 @@ Status HeadlessRun::render(int i, double now_s) {
     const double after_s = steady_seconds();
     if (Status read = bundle_health(*open_); !read) return read;
     stats_.add((after_s - before_s) * 1e3, engine_->renderer().costs());
+    stats_.count_unfitted(engine_->last().skin_not_fitted);
     if (device) pose_to_pixel_.add((clock_() - reading_.time_s) * 1e3);
     if (session_) session_->observe(engine_->last(), pixels_, !device);
     if (server_) {

@@ -86,6 +86,7 @@ void expect_same(const CaseBundle& a, const CaseBundle& b) {
     EXPECT_EQ(a.speckle.edge, b.speckle.edge);
     EXPECT_EQ(a.speckle.voxels, b.speckle.voxels);
     expect_same(a.patient_skin, b.patient_skin);
+    EXPECT_EQ(a.skin_unfitted, b.skin_unfitted);
     expect_same(a.mannequin_skin, b.mannequin_skin);
     EXPECT_EQ(a.preview_png, b.preview_png);
 }
@@ -109,6 +110,22 @@ TEST(CaseBundle, ComesBackAsItWas) {
     expect_same(*back, bundle);
     EXPECT_EQ(write_bundle(*back), bytes);
     EXPECT_EQ(container_kind(bytes), "CASE");
+}
+
+TEST(CaseBundle, TheMarkOfUnfittedSkinComesBackAndHasOneEntryPerPoint) {
+    CaseBundle bundle = tiny_case();
+    const Bytes without = write_bundle(bundle);
+    const std::size_t points = bundle.patient_skin.points.size();
+    ASSERT_GT(points, 1u);
+    bundle.skin_unfitted.assign(points, 0);
+    bundle.skin_unfitted[1] = 1;
+    const auto back = read_bundle(write_bundle(bundle), "marked");
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(*back, bundle);
+    bundle.skin_unfitted.pop_back();
+    EXPECT_FALSE(read_bundle(write_bundle(bundle), "short"));
+    bundle.skin_unfitted.clear();
+    EXPECT_EQ(write_bundle(bundle), without);  // nothing is stored where all is fitted
 }
 
 TEST(CaseBundle, AnEmptyOneComesBackToo) {
@@ -148,7 +165,7 @@ Bytes with_chunk(const Bytes& file, const std::string& type, Change change) {
         "manifest", "lab.t",    "lab.u",    "lab.p",    "echo.t",  "echo.u",  "echo.p",
         "bnd.t",    "bnd.u",    "bnd.p",    "vox.kind", "vox.one", "vox.mix", "vox.pair",
         "vox.low",  "vox.high", "vox.fix",  "ofs.kind", "ofs.one", "ofs.val", "textures",
-        "speckle",  "skin.pat", "skin.man", "preview"};
+        "speckle",  "skin.pat", "skin.fit", "skin.man", "preview"};
     const auto reader = ChunkReader::open(file, "CASE", known, "test");
     EXPECT_TRUE(reader);
     ChunkWriter writer("CASE");
@@ -313,63 +330,6 @@ TEST(CaseBundle, ContentsThatWouldBreakTheRendererAreRefused) {
     b = tiny_case();
     b.labels.clear();
     expect_refused(b, "1 to 255");
-}
-
-std::string manifest_with(const std::string& mechanics) {
-    return R"({"grid":{"size":[1,1,1],"spacing_mm":[1,1,1],"origin_mm":[0,0,0],)"
-           R"("direction":[1,0,0,0,1,0,0,0,1]},"labels":[{"name":"o","tissue":"t"}],)"
-           R"("tissues":[{"name":"t","kind":"soft","mechanics":)" +
-           mechanics + R"(}],"textures":[],"speckle_edge":0})";
-}
-
-TEST(CaseBundle, ATissuesMechanicsComeBackAndImpossibleOnesAreRefusedByName) {
-    CaseBundle bundle = tiny_case();
-    const Bytes without = write_bundle(bundle);
-    bundle.tissues[1].mechanics = TissueMechanics{0.6, true, 0.4, false};
-    const auto back = read_bundle(write_bundle(bundle), "a");
-    ASSERT_TRUE(back) << back.error().message();
-    expect_same(bundle, *back);
-    // Where no recipe gave figures nothing is written: older bundles keep their bytes.
-    const std::string text(without.begin(), without.end());
-    EXPECT_EQ(text.find("stiffness"), std::string::npos);
-    for (const char* bad :
-         {R"({"stiffness_kpa":0})", R"({"stiffness_kpa":null})", R"({"stiffness_kpa":-3})",
-          R"({"stiffness_kpa":1e5})", R"({"drains":true})", R"({"stiffness_kpa":"soft"})",
-          R"({"stiffness_kpa":8,"puncture_n":-1})", R"({"stiffness_kpa":8,"puncture_n":101})",
-          "[]"}) {
-        const std::string manifest = manifest_with(bad);
-        ChunkWriter writer("CASE");
-        writer.add("manifest", true, Bytes(manifest.begin(), manifest.end()));
-        const auto refused = read_bundle(writer.write(), "bad");
-        ASSERT_FALSE(refused) << bad;
-        EXPECT_NE(refused.error().message().find("mechanics"), std::string::npos)
-            << refused.error().message();
-    }
-}
-
-TEST(CaseBundle, RandomBytesInAManifestNeverCrash) {
-    testing::Random random(5);
-    const std::string text =
-        R"({"grid":{"size":[1,1,1],"spacing_mm":[1,1,1],"origin_mm":[0,0,0],)"
-        R"("direction":[1,0,0,0,1,0,0,0,1]},"labels":[{"name":"o","tissue":"t"}],)"
-        R"("tissues":[{"name":"t","kind":"soft"}],"textures":[],"speckle_edge":0})";
-    for (int i = 0; i < 3000; ++i) {
-        std::string changed = text;
-        for (int k = 0; k < 1 + i % 3; ++k) {
-            changed[static_cast<std::size_t>(random.uniform(0, static_cast<double>(text.size())))] =
-                static_cast<char>(random.uniform(0, 256));
-        }
-        ChunkWriter writer("CASE");
-        writer.add("manifest", true, Bytes(changed.begin(), changed.end()));
-        (void)read_bundle(writer.write(), "fuzz");
-    }
-}
-
-TEST(CaseBundle, DeeplyNestedManifestIsAnErrorNotAnOverflow) {
-    const std::string text = "{\"a\":" + std::string(200000, '[');
-    ChunkWriter writer("CASE");
-    writer.add("manifest", true, Bytes(text.begin(), text.end()));
-    EXPECT_FALSE(read_bundle(writer.write(), "deep"));
 }
 
 TEST(CaseBundle, TissueOfLabelFollowsTheNames) {
