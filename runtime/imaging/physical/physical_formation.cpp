@@ -24,6 +24,14 @@ Machine machine_of(const FormationInput& input) {
     return machine;
 }
 
+PhysicalEffects shown_by(PhysicalEffects on, const MachineStructures& machine) {
+    on.parenchyma = on.parenchyma && machine.parenchyma;
+    on.streaks = on.streaks && machine.streaks;
+    on.diaphragm = on.diaphragm && machine.diaphragm;
+    on.wall = on.wall && machine.wall;
+    return on;
+}
+
 class PhysicalFormation final : public ImageFormation {
   public:
     PhysicalFormation(PhysicalScene scene, PhysicalNoise noise, const FormationInput& input)
@@ -35,6 +43,7 @@ class PhysicalFormation final : public ImageFormation {
           reference_(input.options.kind == RendererKind::reference),
           keep_all_(input.effects.keep_all),
           switches_(switches_of<PhysicalEffects>(kPhysicalEffects, input.effects.on)),
+          shown_(shown_by(switches_, machine_of(input).structures)),
           context_(input.context),
           machine_(machine_of(input)) {
         if (exercise_.breathing.amplitude_mm != 0) breathing_ = BreathingField(*input.bundle);
@@ -55,8 +64,8 @@ class PhysicalFormation final : public ImageFormation {
         machine.looks.near_count = share(machine.looks.near_count);
         level.tables = physical::make_tables(exercise_.probe, machine, geometry);
         if (reference_) return;
-        level.fast =
-            std::make_unique<PhysicalFast>(scene_, geometry, level.tables, noise_, context_);
+        level.fast = std::make_unique<PhysicalFast>(scene_, geometry, level.tables, noise_,
+                                                    press::press_face(exercise_.probe), context_);
         level.reach = ScanReach(geometry, level.tables, scene_.voxel_mm);
     }
 
@@ -67,7 +76,8 @@ class PhysicalFormation final : public ImageFormation {
         Level& at = *levels_[static_cast<std::size_t>(level)];
         const PhysicalFrame frame = frame_of(request);
         if (blocks_ != nullptr) {
-            const double shift_mm = norm(frame.motion.breathing_mm);
+            const double shift_mm = norm(frame.motion.breathing_mm) +
+                                    (frame.press != nullptr ? frame.press->state().farthest_mm : 0);
             if (ahead_) ahead_->frame(at.reach, frame.volume_from_probe, shift_mm);
             at.reach.ensure_loaded(*blocks_, scene_.grid, frame.volume_from_probe, shift_mm);
             at.reach.ensure_loaded(scene_.words, scene_.grid, frame.volume_from_probe, shift_mm);
@@ -114,7 +124,8 @@ class PhysicalFormation final : public ImageFormation {
                                      : 60.0;
         frame.motion = motion_at(exercise_.breathing, exercise_.pulsation,
                                  std::isfinite(input.time_s) ? input.time_s : 0);
-        frame.effects = switches_;
+        frame.effects = shown_;
+        frame.press = shown_.deformation ? request.press : nullptr;
         return frame;
     }
 
@@ -125,7 +136,7 @@ class PhysicalFormation final : public ImageFormation {
     VoxelBlocks* const blocks_;
     const std::uint32_t seed_;
     const bool reference_, keep_all_;
-    const PhysicalEffects switches_;
+    const PhysicalEffects switches_, shown_;  // what is asked for; what the machine shows of it
     const RenderContext context_;
     const Machine machine_;
     std::vector<std::unique_ptr<Level>> levels_;
@@ -141,8 +152,9 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
     std::optional<Result<PhysicalScene>> scene;
     jobs.run(2, [&](std::size_t job) {
         if (job == 0) {  // the longer one, on the caller's thread, whose memory it keeps
+            const Machine machine = machine_of(input);
             scene = make_physical_scene(input.bundle, input.exercise.targets,
-                                        {&jobs, textures, machine_of(input).tissue_db});
+                                        {&jobs, textures, machine.tissue_db, machine.structures});
         } else {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,
                                         input.scanlines + kNoiseSlack);

@@ -51,8 +51,14 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
                            const ScanGeometry& geometry,
                            const Tables& tables,
                            const PhysicalNoise& noise,
+                           const press::PressFace& face,
                            const RenderContext& context)
-    : scene_(scene), geometry_(geometry), tables_(tables), noise_(noise), context_(context) {
+    : scene_(scene),
+      geometry_(geometry),
+      tables_(tables),
+      noise_(noise),
+      context_(context),
+      press_(geometry_, face) {
     const auto samples = static_cast<std::size_t>(geometry.samples);
     lines_ = (geometry.scanlines + kBeamBlock - 1) / kBeamBlock * kBeamBlock;
     stride_ = kMargin + lines_ + kMargin + kSlack;
@@ -117,9 +123,8 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     gaps_.assign(lines + kSlack, 0.0f);
     beams_.assign(kBeamNumbers * lines + kSlack, 0.0f);
     breathing_.assign((samples / kBreathingNode + 2) * lines + kSlack, 0.0f);
-    prepare_wall(tables);
+    prepare_nodes(tables);
     streaks_.resize(kMostStreaks);
-    face_nodes_.resize(face_node_count(geometry));
     for (auto* per_beam : {&faces_.depth_mm, &faces_.dome_mm, &faces_.peak, &faces_.cosine})
         per_beam->assign(lines + kSlack, 0.0f);
     plane_beams_.assign(4 * lines + kSlack, 0.0f);

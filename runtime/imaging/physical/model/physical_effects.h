@@ -9,7 +9,8 @@
 namespace sonocase::runtime {
 
 struct PhysicalEffects {
-    bool contact = true;  // gel gap closed, air gap dark
+    bool contact = true;      // gel gap closed, air gap dark
+    bool deformation = true;  // tissue yields to the probe
     bool breathing = true;
     bool pulsation = true;
     bool elevation = true;       // beam thickness across the plane
@@ -41,6 +42,7 @@ struct PhysicalEffects {
 
 // What a frame met.
 struct PhysicalMet {
+    bool pressed = false;       // the face lies below the resting skin
     bool gap = false;           // between the probe's face and the skin
     bool breathes = false;      // the anatomy is shifted
     bool pulses = false;        // arteries are wider or narrower than at rest
@@ -61,6 +63,9 @@ struct PhysicalMet {
     bool edge_contact = false, compounding = false, receiver_noise = false, blending = false,
          reverberation = false, side_lobes = false, binomial = false, sharpening = false,
          logarithm = false;
+    // Structures that it shows.
+    bool shows_parenchyma = false, shows_streaks = false, shows_diaphragm = false,
+         shows_wall = false;
 };
 
 namespace physical {
@@ -75,14 +80,20 @@ inline const char* nothing_hard(const PhysicalMet& m) {
 inline const char* only_if(bool machine_has_it) {
     return machine_has_it ? "" : "the machine has none";
 }
+// A structure: what the machine does not show at all, and why there is none in a frame.
+inline const char* structure_if(bool machine_shows_it, bool met, const char* none) {
+    return !machine_shows_it ? "the machine shows none" : met ? "" : none;
+}
 
 }  // namespace physical
 
-inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 32> kPhysicalEffects{{
+inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 33> kPhysicalEffects{{
     {"contact", Pass::contact, 1, 0, 0, &PhysicalEffects::contact,
      [](const PhysicalMet& m) {
          return m.gap || m.edge_contact ? "" : "the probe touches everywhere";
      }},
+    {"deformation", Pass::beams, 0.5, 2, 9, &PhysicalEffects::deformation,
+     [](const PhysicalMet& m) { return m.pressed ? "" : "nothing is pressed"; }},
     {"slice", Pass::beams, 4, 2, 7},
     {"breathing", Pass::beams, 1, 0, 8, &PhysicalEffects::breathing,
      [](const PhysicalMet& m) {
@@ -97,15 +108,23 @@ inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 32> kPhys
     {"fine_structure", Pass::beams, 1, 1, 1, &PhysicalEffects::fine_structure,
      [](const PhysicalMet& m) { return m.fine ? "" : "no muscle or fat crossed"; }},
     {"parenchyma", Pass::beams, 1, 1, 1, &PhysicalEffects::parenchyma,
-     [](const PhysicalMet& m) { return m.parenchyma ? "" : "no parenchyma crossed"; }},
+     [](const PhysicalMet& m) {
+         return physical::structure_if(m.shows_parenchyma, m.parenchyma, "no parenchyma crossed");
+     }},
     {"targets", Pass::beams, 0.5, 1, 4, &PhysicalEffects::targets,
      [](const PhysicalMet& m) { return m.target ? "" : "no target near the slab"; }},
     {"streaks", Pass::beams, 0.3, 0, 0, &PhysicalEffects::streaks,
-     [](const PhysicalMet& m) { return m.streaks ? "" : "no plate faces the beams"; }},
+     [](const PhysicalMet& m) {
+         return physical::structure_if(m.shows_streaks, m.streaks, "no plate faces the beams");
+     }},
     {"diaphragm", Pass::beams, 0.1, 0, 0, &PhysicalEffects::diaphragm,
-     [](const PhysicalMet& m) { return m.dome ? "" : "no organ before a lung"; }},
+     [](const PhysicalMet& m) {
+         return physical::structure_if(m.shows_diaphragm, m.dome, "no organ before a lung");
+     }},
     {"wall", Pass::beams, 0.3, 2, 0.5, &PhysicalEffects::wall,
-     [](const PhysicalMet& m) { return m.wall ? "" : "no body wall near the face"; }},
+     [](const PhysicalMet& m) {
+         return physical::structure_if(m.shows_wall, m.wall, "no body wall near the face");
+     }},
     {"speckle", Pass::beams, 2, 1, 2, &PhysicalEffects::speckle},
     {"interfaces", Pass::beams, 1, 1, 4, &PhysicalEffects::interfaces, physical::no_interface},
     {"edge_shadow", Pass::beams, 0.3, 0, 0, &PhysicalEffects::edge_shadow,
