@@ -159,7 +159,7 @@ StageDescriptor resample_stage() {
     stage.codec = label_codec();
     stage.reports = label_reports;
     stage.share = 0.4;
-    stage.cost = {2, 340, 0, 10, 6};
+    stage.cost = {2, 260, 0, 85, 3};
     stage.verb = verb();
     return stage;
 }

@@ -20,6 +20,7 @@
 #include "pipeline/command_line/verbs.h"
 #include "pipeline/cook/case_size.h"
 #include "pipeline/cook/cook_case.h"
+#include "pipeline/cook/memory_need.h"
 #include "pipeline/recipe/read_recipe.h"
 #include "pipeline/tradeoff/boundary_error.h"
 #include "pipeline/tradeoff/choose_settings.h"
@@ -32,7 +33,7 @@ struct BuildOptions {
     std::string recipe;
     std::string out;
     std::string cache;
-    double cache_limit_mb = 0;
+    double cache_limit_mb = 0, memory_mb = 0;
     std::string until;
     std::string plan_key;
     std::string preview;
@@ -174,6 +175,11 @@ int build_one(const BuildOptions& options) {
     if (!recipe) return fail("build", recipe.error());
     const auto choice = choose(options.target, *recipe);
     if (!choice) return fail("build", choice.error());
+    const MemoryNeed need = memory_need(*recipe);
+    if (const Status s = check_memory(need, options.memory_mb); !s) return fail("build", s.error());
+    if (!options.common.quiet)
+        std::printf("to cook: %.1f million voxels, about %.0f MB (%s)\n", need.size.cooked_voxels,
+                    need.mb, need.stage.c_str());
     const auto cooked = cook(options, *recipe);
     if (!cooked) return fail("build", cooked.error());
     if (!cooked->digest.empty()) {  // stopped before the bundle
@@ -285,6 +291,10 @@ int verb_build(int argc, char** argv) {
         ->type_name("DIR");
     app.add_option("--cache-limit-mb", options.cache_limit_mb,
                    "Limit of the cache folder's size; 0 means none")
+        ->check(CLI::NonNegativeNumber)
+        ->type_name("MB");
+    app.add_option("--memory-mb", options.memory_mb,
+                   "Refuse a case that needs more; 0 means what this machine has")
         ->check(CLI::NonNegativeNumber)
         ->type_name("MB");
     app.add_option("--preview", options.preview, "Write the case's picture as well")
