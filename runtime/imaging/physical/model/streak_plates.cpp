@@ -67,9 +67,7 @@ struct Search {
         if (breathing != nullptr) x = x + breathing->weight(x) * frame.motion.breathing_mm;
         return probe_from_volume * x;
     }
-    Point3 seen(Point3 x) const {
-        const Point3 p = seen_at_rest(x);
-        if (frame.press == nullptr) return p;
+    Point3 pressed(Point3 p) const {
         const PlanePoint q = press::shown_point(*frame.press, {p.x, p.z});
         return {q.x, p.y, q.z};
     }
@@ -152,10 +150,16 @@ void Search::add_cell(int i, int j, int k) {
 }
 
 void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
-    Point3 p = seen(centre);
+    const double length = kind.length_scale * kLengthsMm[draw & 15], own = 0.25 * length;
+    Point3 p = seen_at_rest(centre);
+    if (frame.press != nullptr) {
+        // Pressing moves nothing across the plane, and costs most for plates that are too far.
+        const double off = p.y / (2.9 * std::sqrt(thickest_mm * thickest_mm + own * own));
+        if (bump(off * off) < 0.1) return;
+        p = pressed(p);
+    }
     double r = 0;
     PlanePoint beam = beam_at({p.x, p.z}, r);
-    const double length = kind.length_scale * kLengthsMm[draw & 15], own = 0.25 * length;
     const double inverse = 1 / norm(normal);
     const Vector3 n = probe_from_volume.rotation * (inverse * normal);
     const double cosine = n.x * beam.x + n.z * beam.z;

@@ -1,13 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// press_block DIR: how far the press field is from the finite elements of a block. Prints one JSON
-// object: states[] {pressed_mm, mean_mm, p95_mm, vein_area, artery_area, force_n}, with the same of
-// the finite elements as fem_*; an area is null where there is no such vessel.
+// press_block DIR: DIR is a block's folder, or a folder of such folders; then the object has
+// blocks{} by name, each as below.
+//
+// How far the press field is from the finite elements of a block. Prints one JSON object: states[]
+// {pressed_mm, mean_mm, p95_mm, vein_area, artery_area, force_n}, with the same of the finite
+// elements as fem_*; an area is null where there is no such vessel.
+#include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "runtime/imaging/press/fem_block.h"
+
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -16,21 +24,10 @@ nlohmann::ordered_json area(double value) {
     return value;
 }
 
-}  // namespace
-
-int main(int count, char** words) {
+sonocase::Result<nlohmann::ordered_json> errors_of(const std::string& folder) {
     using namespace sonocase;
-    if (count != 2 || std::string(words[1]).rfind("-", 0) == 0) {
-        std::fprintf(
-            stderr,
-            "usage: press_block DIR, a folder with block.json, materials and displacements\n");
-        return 2;
-    }
-    const auto block = testing::read_fem_block(words[1]);
-    if (!block) {
-        std::fprintf(stderr, "press_block: %s\n", block.error().message().c_str());
-        return 1;
-    }
+    const auto block = testing::read_fem_block(folder);
+    if (!block) return block.error();
     nlohmann::ordered_json out;
     out["half_face_mm"] = {block->face.half_width_mm, block->face.half_height_mm};
     out["states"] = nlohmann::ordered_json::array();
@@ -49,6 +46,43 @@ int main(int count, char** words) {
                                  {"fem_artery_area", area(e.fem_artery_area)},
                                  {"fem_force_n", e.fem_force_n},
                                  {"least_determinant", field.state().least_determinant}});
+    }
+    return out;
+}
+
+// The folders of blocks in a folder, by name; none if it is a block's own.
+std::vector<fs::path> blocks_in(const std::string& folder) {
+    std::vector<fs::path> blocks;
+    std::error_code failed;
+    if (fs::exists(fs::path(folder) / "block.json", failed)) return blocks;
+    for (const auto& entry : fs::directory_iterator(folder, failed))
+        if (fs::exists(entry.path() / "block.json", failed)) blocks.push_back(entry.path());
+    std::sort(blocks.begin(), blocks.end());
+    return blocks;
+}
+
+}  // namespace
+
+int main(int count, char** words) {
+    if (count != 2 || std::string(words[1]).rfind("-", 0) == 0) {
+        std::fprintf(stderr,
+                     "usage: press_block DIR, a folder with block.json, materials and "
+                     "displacements, or a folder of such folders\n");
+        return 2;
+    }
+    nlohmann::ordered_json out;
+    const std::vector<fs::path> blocks = blocks_in(words[1]);
+    for (const fs::path& folder : blocks.empty() ? std::vector<fs::path>{words[1]} : blocks) {
+        const auto errors = errors_of(folder.string());
+        if (!errors) {
+            std::fprintf(stderr, "press_block: %s\n", errors.error().message().c_str());
+            return 1;
+        }
+        if (blocks.empty()) {
+            out = *errors;
+        } else {
+            out["blocks"][folder.filename().string()] = *errors;
+        }
     }
     std::printf("%s\n", out.dump(1).c_str());
     return 0;
