@@ -27,8 +27,9 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     CLI::App app{"Scan a case bundle with a tracked probe, the mouse or a script.", "sonoplay"};
     std::string facts = build_facts();
     facts.pop_back();  // the last end of line is printed by the library
-    app.footer("sonoplay dataset RECIPE.toml -o DIR --frames N renders whole data sets; see "
-               "sonoplay dataset --help.");
+    app.footer(
+        "sonoplay dataset RECIPE.toml -o DIR --frames N renders whole data sets; see "
+        "sonoplay dataset --help.");
     app.set_version_flag("--version", facts);
     std::string size, effects;
     app.add_option("bundle", arguments.bundle,

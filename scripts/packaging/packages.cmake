@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Two Debian packages: sonocase (the pipeline, with recipes and documents) and sonoplay (the player, which needs none of
-# the pipeline's libraries).
+# Three Debian packages: sonocase (the pipeline, with recipes and documents), sonoplay (the player, which needs none of
+# the pipeline's libraries) and python3-sonocase (the Python package, which needs neither).
 #   cpack --config build/release/CPackConfig.cmake -B build/release/packages
 # scripts/packaging/test-packages makes them, installs them in a clean Debian and runs them there.
 set(share ${CMAKE_INSTALL_DATADIR})
@@ -29,6 +29,10 @@ if(SONOCASE_RUNTIME)
   install(FILES docs/training.md docs/metrics.md DESTINATION ${share}/doc/sonoplay COMPONENT sonoplay)
   install(DIRECTORY docs/pictures/training DESTINATION ${share}/doc/sonoplay/pictures COMPONENT sonoplay)
 endif()
+if(TARGET sonocase_python)
+  install(FILES ${packaging}/copyright DESTINATION ${share}/doc/python3-sonocase COMPONENT python)
+  install(FILES docs/python.md DESTINATION ${share}/doc/python3-sonocase COMPONENT python)
+endif()
 if(SONOCASE_PIPELINE)
   install_manuals(sonocase)
   install(DIRECTORY scenarios DESTINATION ${share}/sonocase COMPONENT sonocase)
@@ -52,6 +56,9 @@ endif()
 if(SONOCASE_RUNTIME)
   list(APPEND CPACK_COMPONENTS_ALL sonoplay)
 endif()
+if(TARGET sonocase_python)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+endif()
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 # The libraries that the programs link, found by dpkg-shlibdeps. What they open while they run is named here.
@@ -65,6 +72,19 @@ set(CPACK_DEBIAN_SONOPLAY_PACKAGE_SECTION education)
 set(CPACK_DEBIAN_SONOPLAY_PACKAGE_DEPENDS "libgl1, fonts-dejavu-core")
 set(CPACK_DEBIAN_SONOPLAY_PACKAGE_RECOMMENDS "libgl1-mesa-dri, shared-mime-info, udev")
 set(CPACK_DEBIAN_SONOPLAY_PACKAGE_SUGGESTS "sonocase")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-sonocase)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+# The module's file is named after the version of Python that it fits.
+if(TARGET sonocase_python)
+  math(EXPR next_python "${Python_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+      "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next_python}), python3-numpy")
+endif()
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "sonoplay")
+set(CPACK_COMPONENT_PYTHON_DESCRIPTION
+    "Ultrasound frames, labels and scores of case bundles in Python
+Renders what a probe sees in a case bundle as NumPy arrays, with the label,
+needle, shadow and depth of every pixel, and environments for learning.")
 set(CPACK_COMPONENT_SONOCASE_DESCRIPTION
     "Case bundles for ultrasound-guided needle placement training
 Turns a segmented CT and a digitised mannequin into a case bundle: fits the

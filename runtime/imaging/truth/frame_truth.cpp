@@ -11,14 +11,12 @@
 
 #include "formats/scoring/anatomy.h"
 #include "formats/scoring/image_region.h"
-#include "formats/volume/boundary_record.h"
-#include "formats/volume/brick_volume.h"
 #include "runtime/imaging/formation/effect_choice.h"
 #include "runtime/imaging/paper/paper_formation.h"
 #include "runtime/imaging/physical/physical_formation.h"
-#include "runtime/imaging/simd/gather_slack.h"
 #include "runtime/imaging/truth/plane_look_up.h"
 #include "runtime/imaging/truth/truth_planes.h"
+#include "runtime/imaging/truth/truth_voxels.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -36,10 +34,6 @@ bool near_enough(const Grid& grid, const Rigid& pose, const ScanGeometry& g) {
     const Point3 v = grid.voxel_from_point(Point3{} + pose.translation);
     const double most = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
     return most + reach_mm / grid.spacing_mm.x < 1e5;
-}
-
-bool is_artery(const std::string& name) {  // as model `physical` has it
-    return name.find("aorta") != std::string::npos || name.find("arter") != std::string::npos;
 }
 
 // Which of an image model's effects move tissue.
@@ -65,15 +59,9 @@ Result<Moves> moves_of(const RenderOptions& options) {
 }
 
 ScanGeometry geometry_of(const Exercise& exercise, const RenderOptions& o) {
-    const ImageModelInfo& info =
-        o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
+    const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
     return make_scan_geometry(exercise.probe, o.scanlines > 0 ? o.scanlines : info.scanlines,
                               o.samples > 0 ? o.samples : info.samples, o.width_px, o.height_px);
-}
-
-template <class T>
-const std::int32_t* words_of(const T& values) {
-    return reinterpret_cast<const std::int32_t*>(values.data());
 }
 
 template <class T>
@@ -93,36 +81,22 @@ struct TruthRenderer::Impl {
           simd(s),
           geometry(geometry_of(e, o)),
           pixels(geometry),
-          look_up(view, exercise, moves.contact, moves.breathing, moves.pulsation, geometry,
+          look_up(view,
+                  exercise,
+                  moves.contact,
+                  moves.breathing,
+                  moves.pulsation,
+                  geometry,
                   pixels.rays()),
           anatomy(view, moves.breathing ? e.breathing : BreathingMotion{}),
           needle(e.needle),
+          voxels(*view, o.model == ImageModel::physical),
           first_hard_mm(static_cast<std::size_t>(pixels.rays())) {
-        const ImageModelInfo& info =
-            o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
+        const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
         if (!(needle.slab_mm > 0)) needle.slab_mm = info.needle_slab_mm(exercise);
-        // A palette has 255 entries at most; 256 let a look-up of any byte stay inside.
-        label_uniform.assign(256, 0);
-        for (std::size_t i = 0; i < view->label_bricks.uniform.size() && i < 256; ++i)
-            label_uniform[i] = view->label_bricks.uniform[i];
-        // At least one, so that a vector in which no brick is uniform has something to read.
-        boundary_uniform.assign(view->boundary.uniform.begin(), view->boundary.uniform.end());
-        boundary_uniform.push_back(kNoBoundary);
-        summarise_bricks();
-        swells.assign(256, 0);
-        hard.assign(256, 0);
-        const std::vector<int> tissues = tissue_of_label(*view);
-        for (std::size_t i = 0; i < view->labels.size(); ++i) {
-            const Tissue& tissue = view->tissues[static_cast<std::size_t>(tissues[i])];
-            swells[i] = is_artery(view->labels[i].name);
-            hard[i] = o.model == ImageModel::physical
-                          ? tissue.kind == TissueKind::bone || tissue.kind == TissueKind::gas
-                          : tissue.casts_shadow;
-        }
         truth.targets.resize(exercise.targets.size());
     }
 
-    void summarise_bricks();
     // Blocks of the bundle that the plane meets, for bundles that are unpacked on demand.
     void ensure_loaded(const Rigid& pose);
     void lay_out_rows(const Rigid& pose);
@@ -142,30 +116,11 @@ struct TruthRenderer::Impl {
     PlaneLookUp look_up;
     CaseAnatomy anatomy;
     NeedleModel needle;
-    std::vector<std::int32_t> label_uniform, swells, hard;
-    std::vector<std::uint32_t> boundary_uniform;
-    std::vector<std::uint8_t> brick_label;
+    TruthVoxels voxels;
     std::vector<float> first_hard_mm;
     TruthFrameRows rows{};
     FrameTruth truth;
 };
-
-void TruthRenderer::Impl::summarise_bricks() {
-    const auto& labels = bundle->label_bricks;
-    const auto& surfaces = bundle->boundary;
-    brick_label.assign(labels.table.size() + kGatherSlack, 255);
-    for (std::size_t n = 0; n < labels.table.size(); ++n) {
-        const std::uint32_t entry = labels.table[n];
-        if (!(entry & kUniformBrick)) continue;
-        if (!surfaces.table.empty()) {
-            const std::uint32_t word = surfaces.table[n];
-            if (!(word & kUniformBrick) ||
-                surfaces.uniform[word & ~kUniformBrick] != kNoBoundary)
-                continue;
-        }
-        brick_label[n] = labels.uniform[entry & ~kUniformBrick];
-    }
-}
 
 void TruthRenderer::Impl::ensure_loaded(const Rigid& pose) {
     VoxelBlocks* blocks = bundle.blocks();
@@ -175,19 +130,18 @@ void TruthRenderer::Impl::ensure_loaded(const Rigid& pose) {
     const Rigid probe_from_mannequin = inverse(pose);
     const double voxel_mm = bundle->grid.spacing_mm.x;
     const double half = 0.5 * (blocks->edge() - 1);
-    const double ball_mm = 0.87 * blocks->edge() * voxel_mm + 2 * voxel_mm +
-                           norm(look_up.motion().breathing_mm);
+    const double ball_mm =
+        0.87 * blocks->edge() * voxel_mm + 2 * voxel_mm + norm(look_up.motion().breathing_mm);
     const double radius = geometry.fan ? geometry.radius_mm : 0;
-    const double across =
-        geometry.fan ? (radius + geometry.depth_mm) : geometry.half_extent;
+    const double across = geometry.fan ? (radius + geometry.depth_mm) : geometry.half_extent;
     const double middle_z = 0.5 * geometry.depth_mm;
-    const double seen_mm = std::hypot(across, 0.5 * geometry.depth_mm + radius) + 25;  // a gap is closed by this at most
+    const double seen_mm = std::hypot(across, 0.5 * geometry.depth_mm + radius) +
+                           25;  // a gap is closed by this at most
     blocks->ensure_loaded([&](Int3 lower) {
-        const Point3 centre = bundle->grid.point_from_voxel(
-            {lower.x + half, lower.y + half, lower.z + half});
+        const Point3 centre =
+            bundle->grid.point_from_voxel({lower.x + half, lower.y + half, lower.z + half});
         const Point3 p = probe_from_mannequin * centre;
-        return std::abs(p.y) < ball_mm &&
-               std::hypot(p.x, p.z - middle_z) < seen_mm + ball_mm;
+        return std::abs(p.y) < ball_mm && std::hypot(p.x, p.z - middle_z) < seen_mm + ball_mm;
     });
 }
 
@@ -207,21 +161,8 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
         f.beam_z[a] = static_cast<float>(z[a]);
         f.shift_vx[a] = static_cast<float>(look_up.motion().breathing_mm[a] * per_mm);
     }
-    f.label_table = words_of(b.label_bricks.table);
-    f.brick_label = words_of(brick_label);
-    f.label_pool = words_of(b.label_bricks.pool);
-    f.label_uniform = label_uniform.data();
-    const bool surfaces = !b.boundary.table.empty();
-    f.boundary_table = surfaces ? words_of(b.boundary.table) : nullptr;
-    f.boundary_pool = surfaces ? words_of(b.boundary.pool) : nullptr;
-    f.boundary_uniform = surfaces ? words_of(boundary_uniform) : nullptr;
-    const Int3 bricks = brick_count(b.grid.size);
-    f.bricks_x = bricks.x;
-    f.bricks_xy = bricks.x * bricks.y;
-    f.label_count = static_cast<std::int32_t>(b.labels.size());
+    voxels.fill(f);
     f.pulse_vx = static_cast<float>(look_up.motion().pulse_mm * per_mm);
-    f.swells = swells.data();
-    f.hard = hard.data();
     f.gap_mm = look_up.contact().any_gap ? look_up.contact().gap_mm.data() : nullptr;
     f.per_reach = static_cast<float>(1.4426950408889634 / look_up.contact_reach_mm());
     f.fan = geometry.fan;
@@ -280,8 +221,8 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
                 truth.pixels_of_label[0] += static_cast<std::uint32_t>(run.count);
                 return;
             }
-            truth_labels(simd, rows, run, planes.labels.data() + at,
-                         truth.pixels_of_label.data(), dark, pixels.rays_per_px_at_face());
+            truth_labels(simd, rows, run, planes.labels.data() + at, truth.pixels_of_label.data(),
+                         dark, pixels.rays_per_px_at_face());
         });
         if (!planes.shadowed.empty()) shadows(planes);
     }
@@ -315,8 +256,7 @@ bool TruthRenderer::Impl::needle_shape_of(const FrameInput& input, NeedleShape& 
                         std::isfinite(d.x) && std::isfinite(d.y) && std::isfinite(d.z);
     if (!input.has_needle || !finite || !(norm(d) > 0.5)) return false;
     const Rigid probe_from_mannequin = inverse(input.mannequin_from_probe);
-    shape = needle_shape(needle, probe_from_mannequin * tip,
-                         normalized(probe_from_mannequin * d));
+    shape = needle_shape(needle, probe_from_mannequin * tip, normalized(probe_from_mannequin * d));
     return shape.radius_mm > 0 && std::isfinite(shape.slab_mm);
 }
 
@@ -330,11 +270,10 @@ void TruthRenderer::Impl::needle_facts(const FrameInput& input) {
     truth.needle = {input.needle.tip, normalized(input.needle.direction)};
     truth.tip_probe = shape.tip;
     const double half_slab = 0.5 * shape.slab_mm;
-    truth.tip_in_plane = std::abs(shape.tip.y) <= half_slab &&
-                         in_image(exercise.probe, shape.tip.x, shape.tip.z);
-    truth.needle_in_image_mm =
-        length_in_image(exercise.probe, shape.tip - shape.length_mm * shape.axis, shape.tip,
-                        half_slab);
+    truth.tip_in_plane =
+        std::abs(shape.tip.y) <= half_slab && in_image(exercise.probe, shape.tip.x, shape.tip.z);
+    truth.needle_in_image_mm = length_in_image(
+        exercise.probe, shape.tip - shape.length_mm * shape.axis, shape.tip, half_slab);
     truth.tip_label = anatomy.label(anatomy.at_rest(input.needle.tip, truth.time_s));
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The truth of a run's frames as files of one folder (--truth): labels_00000.png and so on, and one
-// line of JSON per frame in truth.jsonl. docs/truth.md lists the keys.
+// line of JSON per frame in truth.jsonl. docs/python.md lists the keys.
 #pragma once
 
 #include <memory>
@@ -22,8 +22,8 @@ std::string truth_json(const FrameTruth& truth,
                        const Exercise& exercise);
 
 // Writes the planes of a frame: STEMlabels_NNNNN.png (16 bits, palette index), needle_NNNNN.png,
-// shadow_NNNNN.png (8 bits), depth_NNNNN.png (16 bits, hundredths of a millimetre below the skin; 0:
-// none), each before `name` as `folder/KIND_name.png`.
+// shadow_NNNNN.png (8 bits), depth_NNNNN.png (16 bits, hundredths of a millimetre below the skin;
+// 0: none), each before `name` as `folder/KIND_name.png`.
 struct TruthPlaneBuffers {
     TruthPlaneBuffers(int width, int height);
     TruthPlanes planes();

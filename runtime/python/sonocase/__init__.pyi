@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+import os
+from typing import Any, Iterable, Mapping, Optional, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import environment as environment
+from . import pose as Pose
+
+__version__: str
+
+Path = Union[str, "os.PathLike[str]"]
+# Rigid motions, 4 x 4, mm. A needle: mannequin_from_needle, or (tip, direction).
+PoseArray = npt.ArrayLike
+NeedleArray = Union[npt.ArrayLike, tuple[npt.ArrayLike, npt.ArrayLike], None]
+
+class Error(Exception): ...
+
+class Label:
+    name: str
+    tissue: str
+    colour: tuple[int, int, int]
+
+class Probe:
+    shape: str
+    radius_mm: float
+    field_of_view_rad: float
+    width_mm: float
+    depth_mm: float
+    frequency_mhz: float
+    focus_mm: float
+    elevation_mm: float
+    def __init__(self, *, shape: str = ..., radius_mm: float = ..., field_of_view_rad: float = ...,
+                 width_mm: float = ..., depth_mm: float = ..., frequency_mhz: float = ...,
+                 focus_mm: float = ..., elevation_mm: float = ...) -> None: ...
+
+class Needle:
+    gauge: float
+    diameter_mm: float
+    length_mm: float
+
+class Target:
+    name: str
+    centre_mm: npt.NDArray[np.float64]
+    radius_mm: float
+    hit_radius_mm: float
+    inside: str
+
+class Exercise:
+    name: str
+    title: str
+    description: str
+    kind: str
+    difficulty: int
+    model: str
+    effects: list[str]
+    probe: Probe
+    needle: Needle
+    targets: list[Target]
+    no_go: list[str]
+    start_pose: npt.NDArray[np.float64]
+    breathing: Mapping[str, float]
+    sweeps: list[str]
+    def sweep_poses(self, name: str) -> list[npt.NDArray[np.float64]]: ...
+
+class Case:
+    path: str
+    name: str
+    closed: bool
+    warnings: list[str]
+    labels: list[Label]
+    exercises: list[Exercise]
+    size: tuple[int, int, int]
+    voxel_mm: float
+    origin_mm: npt.NDArray[np.float64]
+    @staticmethod
+    def open(path: Path) -> Case: ...
+    def close(self) -> None: ...
+    def __enter__(self) -> Case: ...
+    def __exit__(self, *args: Any) -> None: ...
+    def exercise(self, name: str = ...) -> Exercise: ...
+    def label_volume(self) -> npt.NDArray[np.uint8]: ...
+    def labels_at(self, points: npt.ArrayLike) -> list[int]: ...
+    def skin_point(self, near: npt.ArrayLike, direction: npt.ArrayLike,
+                   reach_mm: float = ...) -> Optional[npt.NDArray[np.float64]]: ...
+    def skin_normal(self, point: npt.ArrayLike,
+                    radius_mm: float = ...) -> Optional[npt.NDArray[np.float64]]: ...
+
+class TruthPlanes:
+    labels: Optional[npt.NDArray[np.uint8]]
+    needle: Optional[npt.NDArray[np.uint8]]
+    shadowed: Optional[npt.NDArray[np.uint8]]
+    skin_depth_mm: Optional[npt.NDArray[np.float32]]
+
+class Renderer:
+    size: tuple[int, int]
+    contact: bool
+    exercise: Exercise
+    mm_per_px: float
+    origin_px: tuple[float, float]
+    def __init__(self, case: Case, exercise: Union[str, Exercise, None] = ...,
+                 probe: Optional[Probe] = ..., *, model: str = ..., machine: str = ...,
+                 effects: Union[str, Sequence[str], None] = ..., size: tuple[int, int] = ...,
+                 seed: int = ..., renderer: str = ...) -> None: ...
+    def render(self, pose: PoseArray, needle: NeedleArray = ..., time_s: float = ..., *,
+               frame: int = ..., gain_db: float = ...,
+               out: Optional[npt.NDArray[np.uint8]] = ...) -> npt.NDArray[np.uint8]: ...
+    # With truth: (pictures, TruthPlanes, list of facts).
+    def render_batch(self, poses: npt.ArrayLike, needles: Optional[Sequence[NeedleArray]] = ...,
+                     times_s: Optional[npt.ArrayLike] = ..., *, first_frame: int = ...,
+                     gain_db: float = ..., out: Optional[npt.NDArray[np.uint8]] = ...,
+                     threads: int = ..., truth: Optional[Sequence[str]] = ...) -> Any: ...
+    def truth(self, planes: Iterable[str] = ...) -> tuple[TruthPlanes, dict[str, Any]]: ...
+
+def read_session(path: Path) -> dict[str, Any]: ...
+def score(case: Case, session: Path, exercise: Optional[Exercise] = ...) -> dict[str, Any]: ...
+def simd_targets() -> list[str]: ...

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The build back end of pyproject.toml (PEP 517): the Python package as a wheel, by cmake alone."""
+
+import base64
+import hashlib
+import pathlib
+import re
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import zipfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def _version():
+    return re.search(r"project\(sonocase VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+
+
+def _tag():
+    python = f"cp{sys.version_info.major}{sys.version_info.minor}"
+    return f"{python}-{python}-{re.sub('[-.]', '_', sysconfig.get_platform())}"
+
+
+def _built(prefix):
+    """Builds and installs the package below `prefix`."""
+    build = ROOT / "build" / f"wheel-{_tag()}"
+    off = [f"-DSONOCASE_{part}=OFF" for part in ("PIPELINE", "TESTS", "BENCH")]
+    subprocess.run(["cmake", "-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
+                    f"-DPython_EXECUTABLE={sys.executable}", "-DSONOCASE_PYTHON_FOLDER=.", *off],
+                   check=True)
+    subprocess.run(["cmake", "--build", build, "--target", "sonocase_python"], check=True)
+    subprocess.run(["cmake", "--install", build, "--component", "python", "--prefix", prefix,
+                    "--strip"], check=True)
+
+
+def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    version, tag = _version(), _tag()
+    info = f"sonocase-{version}.dist-info"
+    files = {
+        f"{info}/METADATA": "Metadata-Version: 2.1\nName: sonocase\nVersion: " + version +
+                            "\nSummary: Ultrasound frames, labels and scores of case bundles\n"
+                            "License: Apache-2.0\nRequires-Python: >=3.9\nRequires-Dist: numpy\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: sonocase\nRoot-Is-Purelib: false\n"
+                         f"Tag: {tag}\n",
+        f"{info}/LICENSE": (ROOT / "LICENSE").read_text(),
+    }
+    name = f"sonocase-{version}-{tag}.whl"
+    with tempfile.TemporaryDirectory() as prefix:
+        _built(prefix)
+        for path in sorted(pathlib.Path(prefix, "sonocase").rglob("*")):
+            if path.is_file():
+                files[str(path.relative_to(prefix))] = path.read_bytes()
+        record = ""
+        with zipfile.ZipFile(pathlib.Path(wheel_directory, name), "w", zipfile.ZIP_DEFLATED) as wheel:
+            for path, content in files.items():
+                content = content.encode() if isinstance(content, str) else content
+                digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).decode().rstrip("=")
+                record += f"{path},sha256={digest},{len(content)}\n"
+                wheel.writestr(path, content)
+            wheel.writestr(f"{info}/RECORD", record + f"{info}/RECORD,,\n")
+    return name
+
+
+def build_sdist(sdist_directory, config_settings=None):
+    raise NotImplementedError("sonocase is installed from a checkout: pip install .")
