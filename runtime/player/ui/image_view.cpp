@@ -93,11 +93,12 @@ void draw_grey_bar(const ImagePlace& place, float s) {
 }
 
 // A sentence on the picture where the frame is not one of tissue.
-void draw_status(const ImagePlace& place, FrameStatus status) {
+void draw_status(const ImagePlace& place, FrameStatus status, bool waiting) {
     const bool no_contact = status == FrameStatus::no_contact;
-    if (!no_contact && status != FrameStatus::held_bad_pose) return;
-    const char* words = no_contact ? "No contact: press the probe onto the skin"
-                                   : "Pose is not usable: picture held";
+    if (!waiting && !no_contact && status != FrameStatus::held_bad_pose) return;
+    const char* words = waiting      ? "No reading from the tracker yet"
+                        : no_contact ? "No contact: press the probe onto the skin"
+                                     : "Pose is not usable: picture held";
     const ImVec2 wide = ImGui::CalcTextSize(words);
     text_at(ImGui::GetWindowDrawList(), place.x + 0.5f * (place.side_x - wide.x),
             place.y + 0.55f * place.side_y, no_contact ? colour::kDim : colour::kWarn, words);
@@ -221,7 +222,7 @@ ImagePlace draw_image_view(float width, float height, const ImageViewInput& inpu
         draw_depth_scale(place, input);
         draw_orientation_mark(place, input);
         draw_grey_bar(place, input.scale);
-        draw_status(place, frame.status);
+        draw_status(place, frame.status, frame.waiting);
         ImGui::PopFont();
         draw_measurements(place, input);
         draw->PopClipRect();
