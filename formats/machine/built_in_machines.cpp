@@ -13,6 +13,7 @@ Machine classic() {
     m.title = "Classic scanner, single look, logarithmic grey";
     m.beam.axial_mm = m.beam.lateral_mm = 0;
     m.beam.lateral_focus_mm = 0;
+    m.beam.skirt = 0;
     m.looks = {1, 1, 0};
     m.grey = {GreyMap::log, 0, 131.5, 1, 255, 1, 60};
     m.noise = {-70, false};
@@ -20,6 +21,7 @@ Machine classic() {
     m.near_field = {1.6, 2.2, 0.3, 9, 0, 0.5, 1.9, 0, 0, 0.8, 1, 3};
     m.haze = {0, 4.5, 2, -24};
     m.contact = {0, 0};
+    m.structures = {false, false, false, false, false};
     m.post_filter = true;
     return m;
 }
@@ -31,11 +33,14 @@ Machine modern_linear() {
     m.name = "modern-linear";
     m.title = "Modern scanner, linear probe";
     m.beam.reference_mhz = 9;
-    m.beam.axial_mm = 0.3;
-    m.beam.lateral_mm = 0.6;
+    m.beam.axial_mm = 0.27;
+    m.beam.lateral_mm = 0.45;
     m.beam.lateral_focus_mm = 20;
     m.beam.lateral_range_mm = 25;
+    m.beam.skirt = 0.4;
+    m.beam.skirt_width = 4;
     m.looks.near_mm = 8;
+    m.grey.level = 65;
     m.gain = {0, 14, 3, 10};
     m.near_field = {1, 0.9, 0, 9, 3, 0.3, 0.8, 4, 2.2, 0.35, 0.5, 1.5};
     m.haze = {0.2, 1.6, 0.8, -120};

@@ -26,6 +26,8 @@ void visit_machine(M& m, V& v) {
     v.number("lateral_mm", m.beam.lateral_mm, 0.01, 20, true);
     v.number("lateral_focus_mm", m.beam.lateral_focus_mm, 1, 500, true);
     v.number("lateral_range_mm", m.beam.lateral_range_mm, 1, 1e4);
+    v.number("skirt", m.beam.skirt, 0, 4);
+    v.number("skirt_width", m.beam.skirt_width, 1, 10);
     v.number("elevation_mm", m.beam.elevation_mm, 0.01, 50, true);
     v.table("looks");
     v.whole("count", m.looks.count, 1, 16);
@@ -68,6 +70,12 @@ void visit_machine(M& m, V& v) {
     v.table("contact");
     v.number("edge_db", m.contact.edge_db, 0, 120);
     v.number("edge_fraction", m.contact.edge_fraction, 0, 0.5);
+    v.table("structures");
+    v.flag("parenchyma", m.structures.parenchyma);
+    v.flag("streaks", m.structures.streaks);
+    v.flag("diaphragm", m.structures.diaphragm);
+    v.flag("wall", m.structures.wall);
+    v.flag("linings", m.structures.linings);
 }
 
 class Reader {

@@ -119,8 +119,12 @@ FrameStatus ScanEngine::frame(double now_s,
     input.time_s = time_s;
     input.frame = frame_++;
     input.settings = settings;
+    const FrameStatus status = finish(input, renderer_.render(input, pixels), pixels);
+    record.skin_not_fitted =
+        status == FrameStatus::rendered &&
+        skin_fit_.not_fitted(Point3{} + input.mannequin_from_probe.translation);
     last_ = record;
-    return finish(input, renderer_.render(input, pixels), pixels);
+    return status;
 }
 
 void ScanEngine::begin_session(double now_s) {

@@ -50,6 +50,10 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         ->group("Headless");
     app.add_option("--size", size, "Size WxH of the picture or the window")->group("Headless");
     app.add_option("--out", arguments.out, "Folder for PNG frames")->group("Headless");
+    app.add_option("--truth", arguments.truth,
+                   "Folder for what each frame shows: labels, needle, shadow and depth as PNG, and "
+                   "truth.jsonl")
+        ->group("Headless");
     app.add_option("--stats", arguments.stats,
                    "Write times and costs as JSON; - for standard output");
     app.add_option("--record", arguments.record, "Record the session to FILE.igs.mha");

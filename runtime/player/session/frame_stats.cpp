@@ -97,6 +97,7 @@ std::string FrameStats::json(const std::string& score_json,
         a["dropped_samples"] = accuracy_.full_samples - accuracy_.samples;
         a["reduced_frames"] = reduced_frames_;
     }
+    if (unfitted_frames_ > 0) out["frames_not_fitted"] = unfitted_frames_;
     out["effects"] = nlohmann::ordered_json::array();
     for (const Effect& effect : effects_) {
         nlohmann::ordered_json entry;
