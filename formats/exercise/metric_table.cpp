@@ -42,6 +42,11 @@ constexpr MetricInfo kTable[] = {
     {"time_in_tissue_s", "needle", "Time with the tip in tissue", kLess},
     {"tissue_damage_mm2", "needle", "Area swept by the inserted shaft", kLess, kYeo},
     {"depth_perception_mm", "needle", "Tip motion along the needle, both directions", kLess},
+    {"correct_vessel_punctured", "needle", "First vessel punctured was the target's", kMore,
+     kOutcome},
+    {"vein_collapse_at_puncture_percent", "needle", "Loss of the vein's height at its puncture",
+     kLess},
+    {"posterior_wall_punctures", "needle", "Punctures of a vessel's far wall", kLess, kOutcome},
     {"no_go_contacts", "needle", "Critical structures touched", kLess, kOutcome},
     {"no_go_time_s", "needle", "Time in critical structures", kLess, kOutcome},
     {"needle_elapsed_time_s", "needle", "Time from its first reading to its last", kLess},
@@ -69,6 +74,11 @@ constexpr MetricInfo kTable[] = {
     {"needle_plane_angle_mean_deg", "guidance",
      "Angle between needle and scan plane, mean in tissue", kNeutral},
 
+    {"probe_force_mean_n", "probe", "Force on the probe while it presses, mean", kLess},
+    {"probe_force_max_n", "probe", "Force on the probe, greatest", kLess},
+    {"probe_pressure_mean_kpa", "probe", "Pressure of the probe while it presses, mean", kLess},
+    {"press_time_over_limit_s", "probe", "Time above the exercise's limit of force", kLess},
+    {"compressions_done", "probe", "Veins pressed shut and opened again", kMore},
     {"probe_usage_time_s", "probe", "Time with the probe on the skin", kNeutral},
     {"probe_elapsed_time_s", "probe", "Time from its first reading to its last", kLess},
     {"probe_path_length_mm", "probe", "Probe path length", kLess, kChin},
@@ -100,8 +110,8 @@ const char* metric_range(std::string_view name) {
     const auto ends = [&](std::string_view ending) {
         return name.size() > ending.size() && name.substr(name.size() - ending.size()) == ending;
     };
-    if (ends("_fraction")) return "0 to 1";
-    if (ends("_scanned_percent")) return "0 to 100";
+    if (name == "correct_vessel_punctured" || ends("_fraction")) return "0 to 1";
+    if (name == "vein_collapse_at_puncture_percent" || ends("_scanned_percent")) return "0 to 100";
     if (name == "needle_plane_angle_mean_deg") return "0 to 90";
     if (name == "final_angle_deg") return "0 to 180";
     return "0 and up";
@@ -111,9 +121,16 @@ std::string metric_unit(std::string_view name) {
     static constexpr struct {
         std::string_view ending;
         const char* unit;
-    } kUnits[] = {{"_mm_s3", "mm/s\u00b3"}, {"_mm_s", "mm/s"}, {"_mm3", "mm\u00b3"},
-                  {"_mm2", "mm\u00b2"},     {"_mm", "mm"},     {"_s", "s"},
-                  {"_deg", "\u00b0"},       {"_percent", "%"}};
+    } kUnits[] = {{"_mm_s3", "mm/s\u00b3"},
+                  {"_mm_s", "mm/s"},
+                  {"_mm3", "mm\u00b3"},
+                  {"_mm2", "mm\u00b2"},
+                  {"_mm", "mm"},
+                  {"_s", "s"},
+                  {"_n", "N"},
+                  {"_kpa", "kPa"},
+                  {"_deg", "\u00b0"},
+                  {"_percent", "%"}};
     for (const auto& [ending, unit] : kUnits) {
         if (name.size() > ending.size() && name.substr(name.size() - ending.size()) == ending)
             return unit;

@@ -28,6 +28,9 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     CLI::App app{"Scan a case bundle with a tracked probe, the mouse or a script.", "sonoplay"};
     std::string facts = build_facts();
     facts.pop_back();  // the last end of line is printed by the library
+    app.footer(
+        "sonoplay dataset RECIPE.toml -o DIR --frames N renders whole data sets; see "
+        "sonoplay dataset --help.");
     app.set_version_flag("--version", facts);
     std::string size, effects;
     app.add_option("bundle", arguments.bundle,
@@ -84,6 +87,11 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
                    "In a window: milliseconds per frame above which accuracy is reduced; "
                    "0: never reduced. Recordings are always at full accuracy")
         ->check(CLI::Range(0.0, 1000.0))
+        ->group("Picture");
+    app.add_option("--press", arguments.press_mm,
+                   "Millimetres by which the probe presses deeper than its pose; default: the "
+                   "exercise's")
+        ->check(CLI::Range(0.0, 40.0))
         ->group("Picture");
     app.add_option("--threads", arguments.threads, "Rendering threads")
         ->check(CLI::Range(1, 256))

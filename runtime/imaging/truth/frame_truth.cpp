@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <string>
 
@@ -15,6 +16,7 @@
 #include "runtime/imaging/formation/effect_choice.h"
 #include "runtime/imaging/paper/paper_formation.h"
 #include "runtime/imaging/physical/physical_formation.h"
+#include "runtime/imaging/simd/gather_slack.h"
 #include "runtime/imaging/truth/plane_look_up.h"
 #include "runtime/imaging/truth/truth_planes.h"
 
@@ -26,6 +28,14 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 bool valid_pose(const Rigid& t) {
     return is_finite(t) && orthonormality_error(t.rotation) < 1e-3 && determinant(t.rotation) > 0;
+}
+
+// Beyond this many voxels single precision no longer tells neighbours apart, and nothing is there.
+bool near_enough(const Grid& grid, const Rigid& pose, const ScanGeometry& g) {
+    const double reach_mm = 2 * (g.radius_mm + g.depth_mm + g.half_extent);
+    const Point3 v = grid.voxel_from_point(Point3{} + pose.translation);
+    const double most = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    return most + reach_mm / grid.spacing_mm.x < 1e5;
 }
 
 bool is_artery(const std::string& name) {  // as model `physical` has it
@@ -101,6 +111,7 @@ struct TruthRenderer::Impl {
         // At least one, so that a vector in which no brick is uniform has something to read.
         boundary_uniform.assign(view->boundary.uniform.begin(), view->boundary.uniform.end());
         boundary_uniform.push_back(kNoBoundary);
+        summarise_bricks();
         swells.assign(256, 0);
         hard.assign(256, 0);
         const std::vector<int> tissues = tissue_of_label(*view);
@@ -114,6 +125,7 @@ struct TruthRenderer::Impl {
         truth.targets.resize(exercise.targets.size());
     }
 
+    void summarise_bricks();
     // Blocks of the bundle that the plane meets, for bundles that are unpacked on demand.
     void ensure_loaded(const Rigid& pose);
     void lay_out_rows(const Rigid& pose);
@@ -135,10 +147,27 @@ struct TruthRenderer::Impl {
     NeedleModel needle;
     std::vector<std::int32_t> label_uniform, swells, hard;
     std::vector<std::uint32_t> boundary_uniform;
+    std::vector<std::uint8_t> brick_label;
     std::vector<float> first_hard_mm;
     TruthFrameRows rows{};
     FrameTruth truth;
 };
+
+void TruthRenderer::Impl::summarise_bricks() {
+    const auto& labels = bundle->label_bricks;
+    const auto& surfaces = bundle->boundary;
+    brick_label.assign(labels.table.size() + kGatherSlack, 255);
+    for (std::size_t n = 0; n < labels.table.size(); ++n) {
+        const std::uint32_t entry = labels.table[n];
+        if (!(entry & kUniformBrick)) continue;
+        if (!surfaces.table.empty()) {
+            const std::uint32_t word = surfaces.table[n];
+            if (!(word & kUniformBrick) || surfaces.uniform[word & ~kUniformBrick] != kNoBoundary)
+                continue;
+        }
+        brick_label[n] = labels.uniform[entry & ~kUniformBrick];
+    }
+}
 
 void TruthRenderer::Impl::ensure_loaded(const Rigid& pose) {
     VoxelBlocks* blocks = bundle.blocks();
@@ -180,6 +209,7 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
         f.shift_vx[a] = static_cast<float>(look_up.motion().breathing_mm[a] * per_mm);
     }
     f.label_table = words_of(b.label_bricks.table);
+    f.brick_label = words_of(brick_label);
     f.label_pool = words_of(b.label_bricks.pool);
     f.label_uniform = label_uniform.data();
     const bool surfaces = !b.boundary.table.empty();
@@ -221,12 +251,14 @@ void TruthRenderer::Impl::shadows(const TruthPlanes& planes) {
         truth_shadows(simd, run, first_hard_mm.data(), planes.shadowed.data() + at);
     });
     if (planes.labels.empty()) return;
-    pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
-        for (int i = 0; i < run.count; ++i) {
-            const std::size_t n = at + static_cast<std::size_t>(i);
-            truth.shadowed_pixels_of_label[planes.labels[n]] += planes.shadowed[n];
-        }
-    });
+    for (std::size_t n = 0; n < planes.shadowed.size();) {
+        std::uint64_t eight = 0;
+        const std::size_t left = std::min<std::size_t>(8, planes.shadowed.size() - n);
+        std::memcpy(&eight, planes.shadowed.data() + n, left);
+        for (std::size_t i = n; eight != 0 && i < n + left; ++i)
+            truth.shadowed_pixels_of_label[planes.labels[i]] += planes.shadowed[i];
+        n += left;
+    }
 }
 
 void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& planes) {
@@ -243,7 +275,12 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
         std::span<float> dark;
         if (!planes.shadowed.empty()) dark = first_hard_mm;
         std::fill(dark.begin(), dark.end(), kNoHardMm);
+        const bool near = near_enough(bundle->grid, input.mannequin_from_probe, geometry);
         pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
+            if (!near) {
+                truth.pixels_of_label[0] += static_cast<std::uint32_t>(run.count);
+                return;
+            }
             truth_labels(simd, rows, run, planes.labels.data() + at, truth.pixels_of_label.data(),
                          dark, pixels.rays_per_px_at_face());
         });

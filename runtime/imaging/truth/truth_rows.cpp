@@ -138,24 +138,26 @@ template <class D>
 HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) {
     const hn::RebindToSigned<D> di;
     using I = IntOf<D>;
-    const auto limited = [&](auto v) HWY_ATTR {
-        return hn::Min(hn::Max(v, hn::Set(d, -4.0f)), hn::Set(d, 1e6f));
-    };
-    const auto half = hn::Set(d, 0.5f);
-    const auto fx = hn::Floor(hn::Add(limited(p.x), half)),
-               fy = hn::Floor(hn::Add(limited(p.y), half)),
-               fz = hn::Floor(hn::Add(limited(p.z), half));
-    const I i = hn::ConvertTo(di, fx), j = hn::ConvertTo(di, fy), k = hn::ConvertTo(di, fz);
+    // The nearest voxel; TruthRenderer leaves frames further away than this is exact to none.
+    const hn::RebindToUnsigned<D> du;
+    const auto shift = hn::Set(d, kRoundingShift);
+    const auto bits = hn::Set(di, kRoundingBits);
+    const auto hx = hn::Add(p.x, shift), hy = hn::Add(p.y, shift), hz = hn::Add(p.z, shift);
+    const I i = hn::Sub(hn::BitCast(di, hx), bits), j = hn::Sub(hn::BitCast(di, hy), bits),
+            k = hn::Sub(hn::BitCast(di, hz), bits);
     const auto in = [&](I v, int axis) HWY_ATTR {
-        return hn::And(hn::Gt(v, hn::Set(di, -1)), hn::Lt(v, hn::Set(di, f.size[axis])));
+        return hn::Lt(hn::BitCast(du, v), hn::Set(du, static_cast<std::uint32_t>(f.size[axis])));
     };
-    const auto inside = hn::And(in(i, 0), hn::And(in(j, 1), in(k, 2)));
-    if (hn::AllFalse(di, inside)) return hn::Zero(di);
+    const auto inside = hn::RebindMask(di, hn::And(in(i, 0), hn::And(in(j, 1), in(k, 2))));
     const auto three = hn::Set(di, 3);
     const I brick = hn::IfThenElseZero(
         inside, hn::Add(hn::ShiftRight<2>(i),
                         hn::Add(hn::Mul(hn::ShiftRight<2>(j), hn::Set(di, f.bricks_x)),
                                 hn::Mul(hn::ShiftRight<2>(k), hn::Set(di, f.bricks_xy)))));
+    // Bricks of one label and no surface: most of a body.
+    const I whole = hn::And(pool_byte(di, f.brick_label, brick), hn::Set(di, 0xFF));
+    if (hn::AllFalse(di, hn::And(inside, hn::Eq(whole, hn::Set(di, 0xFF)))))
+        return hn::IfThenElseZero(inside, whole);
     const I cell = hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
                                                     hn::ShiftLeft<4>(hn::And(k, three))));
     const I low = hn::Set(di, 0x7FFFFFFF);
@@ -179,8 +181,10 @@ HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) 
         record = hn::IfThenElse(alike, record, hn::GatherIndex(di, f.boundary_pool, at));
     }
     record = hn::IfThenElse(inside, record, hn::Set(di, static_cast<std::int32_t>(kNoBoundary)));
-    return side_of_surface(d, f, record, label,
-                           Places<D>{hn::Sub(p.x, fx), hn::Sub(p.y, fy), hn::Sub(p.z, fz)});
+    return side_of_surface(
+        d, f, record, label,
+        Places<D>{hn::Sub(p.x, hn::Sub(hx, shift)), hn::Sub(p.y, hn::Sub(hy, shift)),
+                  hn::Sub(p.z, hn::Sub(hz, shift))});
 }
 
 // Rays that a hard pixel covers are dark from it on.

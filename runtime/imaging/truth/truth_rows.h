@@ -21,6 +21,8 @@ struct TruthFrameRows {
     // words. Null boundary_table: no surfaces.
     const std::int32_t *label_table, *label_pool, *label_uniform;
     const std::int32_t *boundary_table, *boundary_pool, *boundary_uniform;
+    // One byte per brick: its label, or 255 where it holds several labels or a surface.
+    const std::int32_t* brick_label;
     std::int32_t bricks_x, bricks_xy;
     std::int32_t label_count;
     float pulse_vx = 0;          // outward shift of arterial walls

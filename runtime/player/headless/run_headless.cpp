@@ -146,6 +146,8 @@ Status HeadlessRun::set_up_case() {
     if (!engine) return engine.error();
     engine_.emplace(std::move(*engine));
     engine_->set_calibrations(calibrations_);
+    settings_.press_mm =
+        arguments_.press_mm >= 0 ? arguments_.press_mm : exercise_->deformation.press_offset_mm;
     stats_.set_effects(engine_->renderer().costs());
     return Done{};
 }
@@ -233,6 +235,7 @@ Status HeadlessRun::render(int i, double now_s) {
     if (Status read = bundle_health(*open_); !read) return read;
     stats_.add((after_s - before_s) * 1e3, engine_->renderer().costs());
     stats_.count_unfitted(engine_->last().skin_not_fitted);
+    stats_.set_press(engine_->renderer().press());
     if (device) pose_to_pixel_.add((clock_() - reading_.time_s) * 1e3);
     if (session_) session_->observe(engine_->last(), pixels_, !device);
     if (server_) {

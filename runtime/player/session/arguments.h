@@ -29,6 +29,7 @@ struct PlayerArguments {
     std::vector<std::string> effects;  // empty: the exercise's
     std::string machine;               // name or file; empty: by the probe's shape
     std::string renderer = "fast";     // "fast", "reference"
+    double press_mm = -1;              // that the probe is pressed in; negative: the exercise's
     int threads = 1;
     int scanlines = 0, samples = 0;         // 0: the model's own
     int looks = 0;                          // 0: the machine's

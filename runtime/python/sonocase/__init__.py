@@ -50,3 +50,12 @@ def score(case, session, exercise=None):
     import os
 
     return json.loads(case._score(os.fspath(session), exercise))
+
+
+def __getattr__(name):
+    # Only programs that use environments pay for them.
+    if name == "environment":
+        import importlib
+
+        return importlib.import_module(".environment", __name__)
+    raise AttributeError(f"module 'sonocase' has no attribute {name!r}")

@@ -8,6 +8,7 @@
 
 #include "runtime/imaging/physical/model/physical_model.h"
 #include "runtime/imaging/physical/model/wall_sheets.h"
+#include "runtime/imaging/press/closed_label.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -194,6 +195,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     if (options.structures.wall || options.structures.diaphragm ||
         (options.structures.streaks && s.has_septa))
         s.layers = make_tissue_layers(bundle, jobs);
+    s.closed_label = press::closed_labels(bundle);
     return s;
 }
 

@@ -48,6 +48,7 @@ struct Search {
     std::span<Streak> out;
     Rigid probe_from_volume;
     double thickest_mm = 0;  // of the slab: deviation at the face or at the far end
+    double pressed_mm = 0;   // tissue shows so much nearer to the face than it lies at rest
     int found = 0;
 
     // The label that holds plates there; negative: none.
@@ -61,10 +62,16 @@ struct Search {
                                                                                             : -1;
     }
 
-    // Where a point of the tissue shows, in the probe's frame.
-    Point3 seen(Point3 x) const {
+    // Where a point of the tissue shows, in the probe's frame, before anything is pressed.
+    Point3 seen_at_rest(Point3 x) const {
         if (breathing != nullptr) x = x + breathing->weight(x) * frame.motion.breathing_mm;
         return probe_from_volume * x;
+    }
+    Point3 seen(Point3 x) const {
+        const Point3 p = seen_at_rest(x);
+        if (frame.press == nullptr) return p;
+        const PlanePoint q = press::shown_point(*frame.press, {p.x, p.z});
+        return {q.x, p.y, q.z};
     }
 
     // The beam at a place: its direction, and how far the place lies along it.
@@ -94,10 +101,10 @@ void Search::add_cell(int i, int j, int k) {
     const Point3 corner =
         scene.grid.origin_mm + kind.cell_mm * Vector3{double(i), double(j), double(k)};
     const Point3 middle = corner + 0.5 * kind.cell_mm * Vector3{1, 1, 1};
-    const Point3 p = seen(middle);
+    const Point3 p = seen_at_rest(middle);
     double r = 0;
     const PlanePoint beam = beam_at({p.x, p.z}, r);
-    if (r < kind.first_mm - kind.cell_mm || r > g.depth_mm + kind.cell_mm) return;
+    if (r < kind.first_mm - kind.cell_mm || r > g.depth_mm + kind.cell_mm + pressed_mm) return;
     const int label = plates_at(middle);
     if (label < 0) return;
     const Vector3 along = frame.volume_from_probe.rotation * Vector3{beam.x, 0, beam.z};
@@ -204,7 +211,7 @@ const PlateKind& plate_kind(double frequency_mhz) {
     static constexpr PlateKind kOrgans{
         8, 44, 0.5, 12, 6, {0.41, 0.61, 0.75, 0.9, 1.1, 1.33, 1.64, 2.45}, 1, 0.01, 0};
     static constexpr PlateKind kSepta{
-        4, 9, 0.45, 1.5, 3.2, {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5}, 1.4, 0.04, 0.3};
+        4, 9, 0.45, 1.5, 4, {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5}, 1.4, 0.04, 0.3};
     return frequency_mhz > kSeptaFrequencyMhz ? kSepta : kOrgans;
 }
 
@@ -229,6 +236,7 @@ int find_streaks(const PhysicalScene& scene,
                   out,
                   inverse(f.volume_from_probe),
                   std::max(tables.rows.front().elevation_mm, tables.rows.back().elevation_mm)};
+    if (f.press != nullptr) search.pressed_mm = f.press->state().farthest_mm;
     const double shift_mm = norm(f.motion.breathing_mm);
     // Columns of cells along the axis that the plane's normal follows most.
     const Vector3 normal = f.volume_from_probe.rotation * Vector3{0, 1, 0};
