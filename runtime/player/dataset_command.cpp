@@ -41,11 +41,13 @@ int run_dataset_command(int argc, char** argv) {
     }
     // Progress on a terminal; quiet in a pipe.
     const bool shows = isatty(2) != 0;
-    const Status done = make_dataset(arguments, [&](std::uint64_t chunks, std::uint64_t of) {
-        if (shows)
-            std::fprintf(stderr, "\r%llu of %llu chunks%s", static_cast<unsigned long long>(chunks),
-                         static_cast<unsigned long long>(of), chunks == of ? "\n" : "");
-    });
+    const Status done =
+        make_dataset(arguments, [&](std::uint64_t chunks, std::uint64_t of) {
+            if (shows)
+                std::fprintf(stderr, "\r%llu of %llu chunks%s",
+                             static_cast<unsigned long long>(chunks),
+                             static_cast<unsigned long long>(of), chunks == of ? "\n" : "");
+        });
     if (done) return 0;
     std::fprintf(stderr, "%ssonoplay: %s\n", shows ? "\n" : "", done.error().message().c_str());
     return 1;

@@ -38,7 +38,8 @@ py::object skin_point(const OpenedCase& opened,
                       py::handle direction,
                       double reach_mm) {
     const runtime::Skin skin(bundle_of(opened));
-    if (!(reach_mm > 0 && reach_mm <= 1000)) throw py::value_error("reach_mm: give 0 to 1000 mm");
+    if (!(reach_mm > 0 && reach_mm <= 1000))
+        throw py::value_error("reach_mm: give 0 to 1000 mm");
     const auto found = skin.project(point_from(near, "near"),
                                     normalized(vector_from(direction, "direction")), reach_mm);
     return found ? py::object(array_of(*found)) : py::none();
@@ -82,7 +83,8 @@ std::string score_text(const OpenedCase& opened,
 // Poses and times of a recorded session.
 py::dict read_session(const std::string& path) {
     const Sequence sequence = value_of(load_sequence(path));
-    const Session session = value_of(session_from_sequence(sequence, guess_names(sequence), path));
+    const Session session =
+        value_of(session_from_sequence(sequence, guess_names(sequence), path));
     const auto count = static_cast<py::ssize_t>(session.samples.size());
     py::array_t<double> time_s(count), probe({count, py::ssize_t{4}, py::ssize_t{4}}),
         needle({count, py::ssize_t{4}, py::ssize_t{4}});
@@ -112,8 +114,7 @@ void bind_label(py::module_& module) {
         .def_readonly("name", &Label::name)
         .def_readonly("tissue", &Label::tissue)
         .def_property_readonly(
-            "colour",
-            [](const Label& l) { return py::make_tuple(l.colour[0], l.colour[1], l.colour[2]); },
+            "colour", [](const Label& l) { return py::make_tuple(l.colour[0], l.colour[1], l.colour[2]); },
             "sRGB, 0 to 255.")
         .def("__repr__",
              [](const Label& l) { return "<sonocase.Label " + l.name + " (" + l.tissue + ")>"; });
@@ -133,9 +134,8 @@ void bind_case(py::module_& module) {
                 return value_of(open_case(text));
             },
             "path"_a, "Opens a bundle; raises sonocase.Error where it is none.")
-        .def(
-            "close", [](OpenedCase& c) { c.closed = true; },
-            "Ends the use of the case: it, and renderers made from it, raise from then on.")
+        .def("close", [](OpenedCase& c) { c.closed = true; },
+             "Ends the use of the case: it, and renderers made from it, raise from then on.")
         .def_property_readonly("closed", [](const OpenedCase& c) { return c.closed.load(); })
         .def("__enter__", [](Shared c) { return c; })
         .def("__exit__", [](OpenedCase& c, const py::args&) { c.closed = true; })
@@ -154,14 +154,13 @@ void bind_case(py::module_& module) {
             },
             "name"_a = "", "By name; the first by default.")
         .def_property_readonly(
-            "size",
-            [](const OpenedCase& c) {
+            "size", [](const OpenedCase& c) {
                 const Int3 s = bundle_of(c).grid.size;
                 return py::make_tuple(s.x, s.y, s.z);
             },
             "Voxels along x, y, z.")
-        .def_property_readonly("voxel_mm",
-                               [](const OpenedCase& c) { return bundle_of(c).grid.spacing_mm.x; })
+        .def_property_readonly(
+            "voxel_mm", [](const OpenedCase& c) { return bundle_of(c).grid.spacing_mm.x; })
         .def_property_readonly(
             "origin_mm", [](const OpenedCase& c) { return array_of(bundle_of(c).grid.origin_mm); },
             "Centre of voxel (0, 0, 0), frame `mannequin`; shape (3,).")

@@ -10,7 +10,7 @@ namespace sonocase::python {
 namespace {
 
 const char* shape_name(ProbeShape shape) {
-    return shape == ProbeShape::linear   ? "linear"
+    return shape == ProbeShape::linear ? "linear"
            : shape == ProbeShape::phased ? "phased"
                                          : "curvilinear";
 }

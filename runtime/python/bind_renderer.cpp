@@ -35,7 +35,8 @@ class Turn {
 
 class PyRenderer {
   public:
-    explicit PyRenderer(std::unique_ptr<FrameRenderer> renderer) : renderer_(std::move(renderer)) {}
+    explicit PyRenderer(std::unique_ptr<FrameRenderer> renderer)
+        : renderer_(std::move(renderer)) {}
 
     const FrameRenderer& inner() const { return *renderer_; }
     py::ssize_t width() const { return renderer_->options().width_px; }
@@ -82,8 +83,8 @@ class PyRenderer {
             renderer_->describe(task);
         }
         check(usable(renderer_->opened()));
-        return py::make_tuple(arrays, facts_of(task.truth, renderer_->opened().bundle->labels,
-                                               renderer_->exercise()));
+        return py::make_tuple(
+            arrays, facts_of(task.truth, renderer_->opened().bundle->labels, renderer_->exercise()));
     }
 
     py::object render_batch(py::handle poses,
@@ -189,8 +190,9 @@ class PyRenderer {
         }
         for (std::size_t n = 0; n < tasks.size(); ++n) {
             runtime::FrameInput& input = tasks[n].input;
-            input.mannequin_from_probe = rigid_from(rows.data(static_cast<py::ssize_t>(n)),
-                                                    "poses[" + std::to_string(n) + "]");
+            input.mannequin_from_probe =
+                rigid_from(rows.data(static_cast<py::ssize_t>(n)),
+                           "poses[" + std::to_string(n) + "]");
             if (!needles.is_none()) set_needle(py::object(needle_of[n]), input);
             set_scalars(times ? times->at(static_cast<py::ssize_t>(n)) : 0,
                         first_frame + static_cast<std::int64_t>(n), gain_db, input);
@@ -229,10 +231,12 @@ std::unique_ptr<PyRenderer> make_renderer(const std::shared_ptr<OpenedCase>& ope
     const std::string wanted = model.empty() ? chosen.model : model;
     if (wanted != "paper" && wanted != "physical")
         throw py::value_error("model: no model " + wanted + "; give physical or paper");
-    options.model = wanted == "paper" ? runtime::ImageModel::paper : runtime::ImageModel::physical;
+    options.model =
+        wanted == "paper" ? runtime::ImageModel::paper : runtime::ImageModel::physical;
     if (kind != "fast" && kind != "reference")
         throw py::value_error("renderer: no renderer " + kind + "; give fast or reference");
-    options.kind = kind == "fast" ? runtime::RendererKind::fast : runtime::RendererKind::reference;
+    options.kind =
+        kind == "fast" ? runtime::RendererKind::fast : runtime::RendererKind::reference;
     options.width_px = size.first;
     options.height_px = size.second;
     options.seed = seed;
@@ -252,9 +256,10 @@ std::unique_ptr<PyRenderer> make_renderer(const std::shared_ptr<OpenedCase>& ope
 
 void bind_renderer(py::module_& module) {
     py::class_<PyRenderer>(module, "Renderer", "Renders frames of a case, as sonoplay does.")
-        .def(py::init(&make_renderer), "case"_a, "exercise"_a = py::none(), "probe"_a = py::none(),
-             py::kw_only(), "model"_a = "", "machine"_a = "", "effects"_a = py::none(),
-             "size"_a = std::pair<int, int>(512, 512), "seed"_a = 1u, "renderer"_a = "fast",
+        .def(py::init(&make_renderer), "case"_a, "exercise"_a = py::none(),
+             "probe"_a = py::none(), py::kw_only(), "model"_a = "", "machine"_a = "",
+             "effects"_a = py::none(), "size"_a = std::pair<int, int>(512, 512), "seed"_a = 1u,
+             "renderer"_a = "fast",
              "exercise: a name or an Exercise, the case's first by default; probe: instead of the "
              "exercise's; model, machine, effects: as on sonoplay's command line, by default the "
              "exercise's; size: (width, height) in pixels; seed: of the noise.")
@@ -277,9 +282,11 @@ void bind_renderer(py::module_& module) {
              "with their areas, `targets` with their distances, the needle's `tip`, `contact`.")
         .def_property_readonly("contact", &PyRenderer::contact,
                                "Whether the probe of the last render() touched the skin.")
-        .def_property_readonly(
-            "size", [](const PyRenderer& r) { return py::make_tuple(r.width(), r.height()); })
-        .def_property_readonly("exercise", [](const PyRenderer& r) { return r.inner().exercise(); })
+        .def_property_readonly("size", [](const PyRenderer& r) {
+            return py::make_tuple(r.width(), r.height());
+        })
+        .def_property_readonly("exercise",
+                               [](const PyRenderer& r) { return r.inner().exercise(); })
         .def_property_readonly(
             "mm_per_px",
             [](const PyRenderer& r) { return r.inner().engine().renderer().layout().mm_per_px; })

@@ -20,10 +20,10 @@ py::list organs_of(const runtime::FrameTruth& truth, const std::vector<Label>& l
     py::list organs;
     for (std::size_t i = 1; i < labels.size(); ++i) {
         if (truth.pixels_of_label[i] == 0) continue;
-        organs.append(
-            py::dict("index"_a = i, "name"_a = labels[i].name,
-                     "area_mm2"_a = truth.pixels_of_label[i] * truth.mm2_per_px,
-                     "shadowed_mm2"_a = truth.shadowed_pixels_of_label[i] * truth.mm2_per_px));
+        organs.append(py::dict(
+            "index"_a = i, "name"_a = labels[i].name,
+            "area_mm2"_a = truth.pixels_of_label[i] * truth.mm2_per_px,
+            "shadowed_mm2"_a = truth.shadowed_pixels_of_label[i] * truth.mm2_per_px));
     }
     return organs;
 }
@@ -76,15 +76,16 @@ runtime::TruthPlanes TruthArrays::planes(std::size_t n, std::size_t area) const 
 py::dict facts_of(const runtime::FrameTruth& truth,
                   const std::vector<Label>& labels,
                   const Exercise& exercise) {
-    py::dict facts(
-        "time_s"_a = truth.time_s, "mannequin_from_probe"_a = array_of(truth.mannequin_from_probe),
-        "contact"_a = truth.beams > 0 ? static_cast<double>(truth.beams_touching) / truth.beams : 0,
-        "visible"_a = organs_of(truth, labels), "targets"_a = targets_of(truth, exercise),
-        "tip"_a = py::none());
+    py::dict facts("time_s"_a = truth.time_s,
+                   "mannequin_from_probe"_a = array_of(truth.mannequin_from_probe),
+                   "contact"_a =
+                       truth.beams > 0 ? static_cast<double>(truth.beams_touching) / truth.beams : 0,
+                   "visible"_a = organs_of(truth, labels),
+                   "targets"_a = targets_of(truth, exercise), "tip"_a = py::none());
     if (truth.has_needle) {
-        facts["tip"] =
-            py::dict("probe_mm"_a = array_of(truth.tip_probe), "in_plane"_a = truth.tip_in_plane,
-                     "label"_a = truth.tip_label, "shaft_in_image_mm"_a = truth.needle_in_image_mm);
+        facts["tip"] = py::dict("probe_mm"_a = array_of(truth.tip_probe),
+                                "in_plane"_a = truth.tip_in_plane, "label"_a = truth.tip_label,
+                                "shaft_in_image_mm"_a = truth.needle_in_image_mm);
     }
     return facts;
 }

@@ -64,8 +64,8 @@ void FrameRenderer::describe(FrameTask& task) {
 Result<bool> FrameRenderer::render_all(std::span<FrameTask> tasks,
                                        int threads,
                                        const std::function<bool()>& interrupted) {
-    const std::size_t wanted = std::clamp<std::size_t>(static_cast<std::size_t>(threads), 1,
-                                                       std::max<std::size_t>(tasks.size(), 1));
+    const std::size_t wanted =
+        std::clamp<std::size_t>(static_cast<std::size_t>(threads), 1, std::max<std::size_t>(tasks.size(), 1));
     while (workers_.size() < wanted) {
         if (const Status added = add_worker(); !added) return added.error();
     }

@@ -39,10 +39,9 @@ class FrameRenderer {
     Status prepare_truth();
     // Of a frame that was rendered before.
     void describe(FrameTask& task);
-    // Renders all, with truth where tasks want it, on `threads` threads, the caller's included;
-    // each has an engine of its own, which is kept for the next time. interrupted: asked by the
-    // caller's thread every now and then; true ends the batch, and false is returned. Errors: an
-    // engine cannot be made.
+    // Renders all, with truth where tasks want it, on `threads` threads, the caller's included; each has an engine of its own, which
+    // is kept for the next time. interrupted: asked by the caller's thread every now and then; true
+    // ends the batch, and false is returned. Errors: an engine cannot be made.
     Result<bool> render_all(std::span<FrameTask> tasks,
                             int threads,
                             const std::function<bool()>& interrupted);

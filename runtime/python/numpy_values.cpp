@@ -42,7 +42,8 @@ py::array numbers_from(py::handle value, const char* name) {
     const char kind = a.dtype().kind();
     if (kind != 'f' && kind != 'i' && kind != 'u')
         throw py::type_error(std::string(name) + ": an array of dtype " +
-                             py::cast<std::string>(py::str(a.dtype())) + "; give real numbers");
+                             py::cast<std::string>(py::str(a.dtype())) +
+                             "; give real numbers");
     return a;
 }
 
@@ -51,15 +52,13 @@ Rigid rigid_from(const double* rows, const std::string& name) {
     bool finite = true;
     for (int i = 0; i < 16; ++i) finite = finite && std::isfinite(rows[i]);
     if (!finite)
-        throw py::value_error(name +
-                              ": holds a number that is not finite; give a rigid motion in mm");
+        throw py::value_error(name + ": holds a number that is not finite; give a rigid motion in mm");
     for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 3; ++c) pose.rotation(r, c) = rows[4 * r + c];
         pose.translation[r] = rows[4 * r + 3];
     }
     if (rows[12] != 0 || rows[13] != 0 || rows[14] != 0 || rows[15] != 1)
-        throw py::value_error(
-            name + ": its last row is not 0 0 0 1; the translation, in mm, is the last column");
+        throw py::value_error(name + ": its last row is not 0 0 0 1; the translation, in mm, is the last column");
     const double off = orthonormality_error(pose.rotation);
     if (!(off < 1e-3) || !(determinant(pose.rotation) > 0)) {
         char text[64];

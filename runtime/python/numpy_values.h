@@ -38,10 +38,10 @@ inline void check(const Status& status) {
 // name: of the argument, for messages. Raise TypeError where `value` is no array of numbers and
 // ValueError where its shape or its numbers do not fit.
 py::array numbers_from(py::handle value, const char* name);
-Rigid rigid_from(py::handle value, const char* name);           // 4 x 4, last row 0 0 0 1
+Rigid rigid_from(py::handle value, const char* name);  // 4 x 4, last row 0 0 0 1
 Rigid rigid_from(const double* rows, const std::string& name);  // 16 numbers, row by row
-Point3 point_from(py::handle value, const char* name);          // 3
-Vector3 vector_from(py::handle value, const char* name);        // 3, not zero
+Point3 point_from(py::handle value, const char* name);  // 3
+Vector3 vector_from(py::handle value, const char* name);  // 3, not zero
 
 // None: no needle. 4 x 4 mannequin_from_needle (origin at the tip, z from hub to tip), or a pair
 // (tip, direction) of three numbers each.

@@ -12,8 +12,8 @@
 
 namespace sonocase::python {
 
-// Arrays for the planes of `count` frames, of shape (count, height, width), or (height, width)
-// where count is 0. Named as TruthPlanes; those that are not asked for stay None.
+// Arrays for the planes of `count` frames, of shape (count, height, width), or (height, width) where
+// count is 0. Named as TruthPlanes; those that are not asked for stay None.
 struct TruthArrays {
     py::object labels = py::none(), needle = py::none(), shadowed = py::none(),
                skin_depth_mm = py::none();

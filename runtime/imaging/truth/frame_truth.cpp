@@ -65,7 +65,8 @@ Result<Moves> moves_of(const RenderOptions& options) {
 }
 
 ScanGeometry geometry_of(const Exercise& exercise, const RenderOptions& o) {
-    const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
+    const ImageModelInfo& info =
+        o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
     return make_scan_geometry(exercise.probe, o.scanlines > 0 ? o.scanlines : info.scanlines,
                               o.samples > 0 ? o.samples : info.samples, o.width_px, o.height_px);
 }
@@ -92,17 +93,13 @@ struct TruthRenderer::Impl {
           simd(s),
           geometry(geometry_of(e, o)),
           pixels(geometry),
-          look_up(view,
-                  exercise,
-                  moves.contact,
-                  moves.breathing,
-                  moves.pulsation,
-                  geometry,
+          look_up(view, exercise, moves.contact, moves.breathing, moves.pulsation, geometry,
                   pixels.rays()),
           anatomy(view, moves.breathing ? e.breathing : BreathingMotion{}),
           needle(e.needle),
           first_hard_mm(static_cast<std::size_t>(pixels.rays())) {
-        const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
+        const ImageModelInfo& info =
+            o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
         if (!(needle.slab_mm > 0)) needle.slab_mm = info.needle_slab_mm(exercise);
         // A palette has 255 entries at most; 256 let a look-up of any byte stay inside.
         label_uniform.assign(256, 0);
@@ -162,7 +159,8 @@ void TruthRenderer::Impl::summarise_bricks() {
         if (!(entry & kUniformBrick)) continue;
         if (!surfaces.table.empty()) {
             const std::uint32_t word = surfaces.table[n];
-            if (!(word & kUniformBrick) || surfaces.uniform[word & ~kUniformBrick] != kNoBoundary)
+            if (!(word & kUniformBrick) ||
+                surfaces.uniform[word & ~kUniformBrick] != kNoBoundary)
                 continue;
         }
         brick_label[n] = labels.uniform[entry & ~kUniformBrick];
@@ -177,18 +175,19 @@ void TruthRenderer::Impl::ensure_loaded(const Rigid& pose) {
     const Rigid probe_from_mannequin = inverse(pose);
     const double voxel_mm = bundle->grid.spacing_mm.x;
     const double half = 0.5 * (blocks->edge() - 1);
-    const double ball_mm =
-        0.87 * blocks->edge() * voxel_mm + 2 * voxel_mm + norm(look_up.motion().breathing_mm);
+    const double ball_mm = 0.87 * blocks->edge() * voxel_mm + 2 * voxel_mm +
+                           norm(look_up.motion().breathing_mm);
     const double radius = geometry.fan ? geometry.radius_mm : 0;
-    const double across = geometry.fan ? (radius + geometry.depth_mm) : geometry.half_extent;
+    const double across =
+        geometry.fan ? (radius + geometry.depth_mm) : geometry.half_extent;
     const double middle_z = 0.5 * geometry.depth_mm;
-    const double seen_mm = std::hypot(across, 0.5 * geometry.depth_mm + radius) +
-                           25;  // a gap is closed by this at most
+    const double seen_mm = std::hypot(across, 0.5 * geometry.depth_mm + radius) + 25;  // a gap is closed by this at most
     blocks->ensure_loaded([&](Int3 lower) {
-        const Point3 centre =
-            bundle->grid.point_from_voxel({lower.x + half, lower.y + half, lower.z + half});
+        const Point3 centre = bundle->grid.point_from_voxel(
+            {lower.x + half, lower.y + half, lower.z + half});
         const Point3 p = probe_from_mannequin * centre;
-        return std::abs(p.y) < ball_mm && std::hypot(p.x, p.z - middle_z) < seen_mm + ball_mm;
+        return std::abs(p.y) < ball_mm &&
+               std::hypot(p.x, p.z - middle_z) < seen_mm + ball_mm;
     });
 }
 
@@ -281,8 +280,8 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
                 truth.pixels_of_label[0] += static_cast<std::uint32_t>(run.count);
                 return;
             }
-            truth_labels(simd, rows, run, planes.labels.data() + at, truth.pixels_of_label.data(),
-                         dark, pixels.rays_per_px_at_face());
+            truth_labels(simd, rows, run, planes.labels.data() + at,
+                         truth.pixels_of_label.data(), dark, pixels.rays_per_px_at_face());
         });
         if (!planes.shadowed.empty()) shadows(planes);
     }
@@ -316,7 +315,8 @@ bool TruthRenderer::Impl::needle_shape_of(const FrameInput& input, NeedleShape& 
                         std::isfinite(d.x) && std::isfinite(d.y) && std::isfinite(d.z);
     if (!input.has_needle || !finite || !(norm(d) > 0.5)) return false;
     const Rigid probe_from_mannequin = inverse(input.mannequin_from_probe);
-    shape = needle_shape(needle, probe_from_mannequin * tip, normalized(probe_from_mannequin * d));
+    shape = needle_shape(needle, probe_from_mannequin * tip,
+                         normalized(probe_from_mannequin * d));
     return shape.radius_mm > 0 && std::isfinite(shape.slab_mm);
 }
 
@@ -330,10 +330,11 @@ void TruthRenderer::Impl::needle_facts(const FrameInput& input) {
     truth.needle = {input.needle.tip, normalized(input.needle.direction)};
     truth.tip_probe = shape.tip;
     const double half_slab = 0.5 * shape.slab_mm;
-    truth.tip_in_plane =
-        std::abs(shape.tip.y) <= half_slab && in_image(exercise.probe, shape.tip.x, shape.tip.z);
-    truth.needle_in_image_mm = length_in_image(
-        exercise.probe, shape.tip - shape.length_mm * shape.axis, shape.tip, half_slab);
+    truth.tip_in_plane = std::abs(shape.tip.y) <= half_slab &&
+                         in_image(exercise.probe, shape.tip.x, shape.tip.z);
+    truth.needle_in_image_mm =
+        length_in_image(exercise.probe, shape.tip - shape.length_mm * shape.axis, shape.tip,
+                        half_slab);
     truth.tip_label = anatomy.label(anatomy.at_rest(input.needle.tip, truth.time_s));
 }
 

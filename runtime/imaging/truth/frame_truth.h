@@ -8,8 +8,7 @@
 // A pixel shows the tissue at its place in the middle of the scan plane, after the contact that
 // closes a gap to the skin and the breathing that moves the tissue (model `physical`, where these
 // effects are on), and on the side of the surface in its voxel where that place lies. What makes
-// the picture uneven is left out: the beam's thickness, the roughness of surfaces, the point
-// spread.
+// the picture uneven is left out: the beam's thickness, the roughness of surfaces, the point spread.
 //
 // Part of the portable core: no files, no clock, no thread; render() neither throws nor allocates.
 // docs/truth.md
@@ -41,27 +40,27 @@ struct TruthPlanes {
 inline constexpr double kTipLengthMm = 2;
 
 struct TargetTruth {
-    Point3 centre;          // where it is now, frame `mannequin`
-    double plane_mm = 0;    // distance of the centre to the scan plane, along the probe's y
-    bool in_image = false;  // its ball meets the plane inside the scanned area
-    double tip_mm = 0;      // from the needle's tip to the centre; NaN without a needle
+    Point3 centre;              // where it is now, frame `mannequin`
+    double plane_mm = 0;        // distance of the centre to the scan plane, along the probe's y
+    bool in_image = false;      // its ball meets the plane inside the scanned area
+    double tip_mm = 0;          // from the needle's tip to the centre; NaN without a needle
 };
 
 struct FrameTruth {
     bool posed = false;  // false: the pose was not rigid, and everything else is empty
     Rigid mannequin_from_probe;
     double time_s = 0;
-    std::array<std::uint32_t, 256> pixels_of_label{};           // in the scanned area
+    std::array<std::uint32_t, 256> pixels_of_label{};  // in the scanned area
     std::array<std::uint32_t, 256> shadowed_pixels_of_label{};  // 0 without the plane `shadowed`
     double mm2_per_px = 0;
     int beams_touching = 0, beams = 0;  // model `physical`, effect contact on; else all touch
 
     bool has_needle = false;
-    NeedlePose needle;          // as drawn
-    Point3 tip_probe;           // frame `probe`: y is the distance to the scan plane
-    bool tip_in_plane = false;  // inside the slab that the needle shows in, and the scanned area
-    double needle_in_image_mm = 0;     // length of the shaft that the slab shows
-    int tip_label = 0;                 // what the tip is in; 0: outside the body
+    NeedlePose needle;  // as drawn
+    Point3 tip_probe;             // frame `probe`: y is the distance to the scan plane
+    bool tip_in_plane = false;    // inside the slab that the needle shows in, and the scanned area
+    double needle_in_image_mm = 0;  // length of the shaft that the slab shows
+    int tip_label = 0;            // what the tip is in; 0: outside the body
     std::vector<TargetTruth> targets;  // # of the exercise's
     int nearest_target = -1;           // to the tip; -1: no needle or no target
 };

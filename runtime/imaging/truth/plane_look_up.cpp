@@ -86,16 +86,17 @@ void PlaneLookUp::find_gaps_of_rays() {
     contact_.touching = smooth_gaps(geometry_.scanlines, raw_, gaps_);
     const auto rays = contact_.gap_mm.size();
     for (std::size_t i = 0; i < rays; ++i) {
-        const double line =
-            (static_cast<double>(i) + 0.5) * geometry_.scanlines / static_cast<double>(rays) - 0.5;
+        const double line = (static_cast<double>(i) + 0.5) * geometry_.scanlines /
+                                static_cast<double>(rays) -
+                            0.5;
         const double at = std::clamp(line, 0.0, geometry_.scanlines - 1.0);
         const auto l = static_cast<std::size_t>(at);
         const std::size_t next = std::min(l + 1, gaps_.size() - 1);
         const float part = static_cast<float>(at - static_cast<double>(l));
         // Beside a beam in air the nearer one decides.
         const bool air = gaps_[l] < 0 || gaps_[next] < 0;
-        const float gap =
-            air ? gaps_[part < 0.5f ? l : next] : gaps_[l] + part * (gaps_[next] - gaps_[l]);
+        const float gap = air ? gaps_[part < 0.5f ? l : next]
+                              : gaps_[l] + part * (gaps_[next] - gaps_[l]);
         contact_.gap_mm[i] = gap;
         contact_.any_gap = contact_.any_gap || gap != 0;
     }
@@ -114,7 +115,8 @@ bool PlaneLookUp::body_at(Point3 p) const {
 
 double PlaneLookUp::entry_along(PlanePoint origin, PlanePoint direction) const {
     const auto body = [&](double s) {
-        return body_at(pose_ * Point3{origin.x + s * direction.x, 0, origin.z + s * direction.z});
+        return body_at(pose_ *
+                       Point3{origin.x + s * direction.x, 0, origin.z + s * direction.z});
     };
     // Outwards from a face inside the body, inwards from one outside.
     const bool inside = body(0);
@@ -137,7 +139,8 @@ double PlaneLookUp::entry_along(PlanePoint origin, PlanePoint direction) const {
 void PlaneLookUp::find_entries() {
     const auto rays = static_cast<int>(contact_.entry_mm.size());
     const auto entry_of = [&](int ray) {
-        const double line = (ray + 0.5) * geometry_.scanlines / static_cast<double>(rays) - 0.5;
+        const double line =
+            (ray + 0.5) * geometry_.scanlines / static_cast<double>(rays) - 0.5;
         return entry_along(geometry_.beam_origin(line), geometry_.beam_direction(line));
     };
     double before = entry_of(0);
@@ -182,8 +185,9 @@ Point3 PlaneLookUp::shown(PlanePoint p, double gap_mm) const {
     if (!(gap_mm > 0)) return pose_ * Point3{p.x, 0, p.z};
     const double radius = geometry_.fan ? geometry_.radius_mm : 0;
     const double away = geometry_.fan ? std::hypot(p.x, p.z + radius) : 1;
-    const PlanePoint d = geometry_.fan && away > 0 ? PlanePoint{p.x / away, (p.z + radius) / away}
-                                                   : PlanePoint{0, 1};
+    const PlanePoint d = geometry_.fan && away > 0
+                             ? PlanePoint{p.x / away, (p.z + radius) / away}
+                             : PlanePoint{0, 1};
     const double r = geometry_.fan ? away - radius : p.z;
     const double shift = gap_mm * std::exp(-r / physical::kGapReachMm);
     return pose_ * Point3{p.x + shift * d.x, 0, p.z + shift * d.z};

@@ -12,7 +12,8 @@ constexpr std::size_t kVectorSlack = 64;
 
 // One ray per pixel where a row of pixels meets most beams: at the greatest depth.
 int ray_count(const ScanGeometry& g) {
-    const double across_mm = 2 * g.half_extent * (g.fan ? g.radius_mm + g.depth_mm : 1.0);
+    const double across_mm =
+        2 * g.half_extent * (g.fan ? g.radius_mm + g.depth_mm : 1.0);
     return std::clamp(static_cast<int>(std::ceil(across_mm / g.mm_per_px)), 64, 16384);
 }
 
@@ -45,9 +46,10 @@ TruthPixels::TruthPixels(const ScanGeometry& g) : width_px_(g.width_px), rays_(r
 }
 
 bool TruthPixels::scanned(int column, int row) const {
-    const auto after = std::partition_point(runs_.begin(), runs_.end(), [&](const PixelRun& r) {
-        return r.row < row || (r.row == row && r.end <= column);
-    });
+    const auto after = std::partition_point(
+        runs_.begin(), runs_.end(), [&](const PixelRun& r) {
+            return r.row < row || (r.row == row && r.end <= column);
+        });
     return after != runs_.end() && after->row == row && after->begin <= column;
 }
 

@@ -35,8 +35,8 @@ class TruthPixels {
   private:
     int width_px_ = 0, rays_ = 0;
     float rays_per_px_at_face_ = 0;
-    std::vector<PixelRun> runs_;      // by row, then from the left
-    std::vector<std::uint16_t> ray_;  // per scanned pixel, and slack for a vector
+    std::vector<PixelRun> runs_;       // by row, then from the left
+    std::vector<std::uint16_t> ray_;   // per scanned pixel, and slack for a vector
     std::vector<float> r_mm_;
 };
 

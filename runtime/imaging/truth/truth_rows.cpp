@@ -42,16 +42,16 @@ HWY_INLINE void close_gap(
     const auto r = hn::LoadU(d, run.r_mm + first);
     const auto gap = hn::GatherIndex(d, f.gap_mm, rays_of(d, run, first));
     air = hn::Min(gap, hn::Zero(d));  // below 0: air
-    const auto shift =
-        hn::Mul(hn::Max(gap, hn::Zero(d)), exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach))));
+    const auto shift = hn::Mul(hn::Max(gap, hn::Zero(d)),
+                               exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach))));
     auto along_x = hn::Zero(d), along_z = shift;
     if (f.fan) {
         const auto away = hn::Max(hn::Add(r, hn::Set(d, f.radius_mm)), hn::Set(d, 1e-3f));
         const auto part = hn::Div(shift, away);
         const float z_mm =
             (static_cast<float>(run.row) - f.origin_y_px) * f.mm_per_px + f.radius_mm;
-        along_x = hn::Mul(
-            part, hn::Mul(hn::Sub(column, hn::Set(d, f.origin_x_px)), hn::Set(d, f.mm_per_px)));
+        along_x = hn::Mul(part, hn::Mul(hn::Sub(column, hn::Set(d, f.origin_x_px)),
+                                        hn::Set(d, f.mm_per_px)));
         along_z = hn::Mul(part, hn::Set(d, z_mm));
     }
     const auto moved = [&](V v, int axis) HWY_ATTR {
@@ -66,9 +66,10 @@ template <class D>
 HWY_INLINE void breathe_back(D d, const TruthFrameRows& f, Places<D>& p) {
     const hn::RebindToSigned<D> di;
     using V = hn::Vec<D>;
-    const V at[3] = {hn::Mul(hn::Sub(p.x, hn::Set(d, f.first_vx[0])), hn::Set(d, f.per_voxel)),
-                     hn::Mul(hn::Sub(p.y, hn::Set(d, f.first_vx[1])), hn::Set(d, f.per_voxel)),
-                     hn::Mul(hn::Sub(p.z, hn::Set(d, f.first_vx[2])), hn::Set(d, f.per_voxel))};
+    const V at[3] = {
+        hn::Mul(hn::Sub(p.x, hn::Set(d, f.first_vx[0])), hn::Set(d, f.per_voxel)),
+        hn::Mul(hn::Sub(p.y, hn::Set(d, f.first_vx[1])), hn::Set(d, f.per_voxel)),
+        hn::Mul(hn::Sub(p.z, hn::Set(d, f.first_vx[2])), hn::Set(d, f.per_voxel))};
     const V bounded[3] = {hn::Min(hn::Max(at[0], hn::Set(d, -2.0f)), hn::Set(d, 1e6f)),
                           hn::Min(hn::Max(at[1], hn::Set(d, -2.0f)), hn::Set(d, 1e6f)),
                           hn::Min(hn::Max(at[2], hn::Set(d, -2.0f)), hn::Set(d, 1e6f))};
@@ -88,8 +89,8 @@ HWY_INLINE void breathe_back(D d, const TruthFrameRows& f, Places<D>& p) {
         for (int a = 2; a >= 0; --a) {
             const bool upper = (corner >> a & 1) != 0;
             const auto c = upper ? hn::Add(cell[a], hn::Set(di, 1)) : cell[a];
-            inside = hn::And(
-                inside, hn::And(hn::Gt(c, hn::Set(di, -1)), hn::Lt(c, hn::Set(di, f.lattice[a]))));
+            inside = hn::And(inside, hn::And(hn::Gt(c, hn::Set(di, -1)),
+                                             hn::Lt(c, hn::Set(di, f.lattice[a]))));
             index = hn::Add(hn::Mul(index, hn::Set(di, f.lattice[a])), c);
             share = hn::Mul(share, upper ? part[a] : hn::Sub(one, part[a]));
         }
@@ -103,7 +104,8 @@ HWY_INLINE void breathe_back(D d, const TruthFrameRows& f, Places<D>& p) {
 
 // On which side of the plane in its voxel each point lies; off: from the voxel's centre.
 template <class D, class I>
-HWY_INLINE I side_of_surface(D d, const TruthFrameRows& f, I record, I own, const Places<D>& off) {
+HWY_INLINE I side_of_surface(
+    D d, const TruthFrameRows& f, I record, I own, const Places<D>& off) {
     const hn::RebindToSigned<D> di;
     const auto second = hn::And(record, hn::Set(di, 0xFF));
     const auto near = hn::Lt(second, hn::Set(di, f.label_count));
@@ -126,7 +128,8 @@ HWY_INLINE I side_of_surface(D d, const TruthFrameRows& f, I record, I own, cons
         const auto one = hn::Set(di, 1);
         const auto swells = hn::Eq(hn::GatherIndex(di, f.swells, own), one);
         const auto yields = hn::AndNot(
-            swells, hn::Eq(hn::GatherIndex(di, f.swells, hn::IfThenElseZero(near, second)), one));
+            swells,
+            hn::Eq(hn::GatherIndex(di, f.swells, hn::IfThenElseZero(near, second)), one));
         side = hn::Add(side, hn::IfThenElseZero(hn::RebindMask(d, swells), pulse));
         side = hn::Sub(side, hn::IfThenElseZero(hn::RebindMask(d, yields), pulse));
     }
@@ -146,7 +149,8 @@ HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) 
     const I i = hn::Sub(hn::BitCast(di, hx), bits), j = hn::Sub(hn::BitCast(di, hy), bits),
             k = hn::Sub(hn::BitCast(di, hz), bits);
     const auto in = [&](I v, int axis) HWY_ATTR {
-        return hn::Lt(hn::BitCast(du, v), hn::Set(du, static_cast<std::uint32_t>(f.size[axis])));
+        return hn::Lt(hn::BitCast(du, v),
+                      hn::Set(du, static_cast<std::uint32_t>(f.size[axis])));
     };
     const auto inside = hn::RebindMask(di, hn::And(in(i, 0), hn::And(in(j, 1), in(k, 2))));
     const auto three = hn::Set(di, 3);
@@ -163,28 +167,27 @@ HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) 
     const I low = hn::Set(di, 0x7FFFFFFF);
     const I entry = hn::GatherIndex(di, f.label_table, brick);
     const auto uniform = hn::Lt(entry, hn::Zero(di));
-    I label =
-        hn::GatherIndex(di, f.label_uniform, hn::IfThenElseZero(uniform, hn::And(entry, low)));
+    I label = hn::GatherIndex(di, f.label_uniform,
+                              hn::IfThenElseZero(uniform, hn::And(entry, low)));
     if (!hn::AllTrue(di, uniform)) {
         const I at = hn::IfThenZeroElse(uniform, hn::Or(hn::ShiftLeft<6>(entry), cell));
-        label = hn::IfThenElse(uniform, label,
-                               hn::And(pool_byte(di, f.label_pool, at), hn::Set(di, 0xFF)));
+        label = hn::IfThenElse(
+            uniform, label, hn::And(pool_byte(di, f.label_pool, at), hn::Set(di, 0xFF)));
     }
     label = hn::IfThenElseZero(inside, label);
     if (f.boundary_table == nullptr) return label;
     const I word = hn::GatherIndex(di, f.boundary_table, brick);
     const auto alike = hn::Lt(word, hn::Zero(di));
-    I record =
-        hn::GatherIndex(di, f.boundary_uniform, hn::IfThenElseZero(alike, hn::And(word, low)));
+    I record = hn::GatherIndex(di, f.boundary_uniform,
+                               hn::IfThenElseZero(alike, hn::And(word, low)));
     if (!hn::AllTrue(di, alike)) {
         const I at = hn::IfThenZeroElse(alike, hn::Or(hn::ShiftLeft<6>(word), cell));
         record = hn::IfThenElse(alike, record, hn::GatherIndex(di, f.boundary_pool, at));
     }
     record = hn::IfThenElse(inside, record, hn::Set(di, static_cast<std::int32_t>(kNoBoundary)));
-    return side_of_surface(
-        d, f, record, label,
-        Places<D>{hn::Sub(p.x, hn::Sub(hx, shift)), hn::Sub(p.y, hn::Sub(hy, shift)),
-                  hn::Sub(p.z, hn::Sub(hz, shift))});
+    return side_of_surface(d, f, record, label,
+                           Places<D>{hn::Sub(p.x, hn::Sub(hx, shift)), hn::Sub(p.y, hn::Sub(hy, shift)),
+                                     hn::Sub(p.z, hn::Sub(hz, shift))});
 }
 
 // Rays that a hard pixel covers are dark from it on.
@@ -231,16 +234,17 @@ void labels_of_run(const TruthFrameRows& f,
     const int lanes = static_cast<int>(hn::Lanes(d));
     const auto iota = hn::Iota(d, 0.0f);
     const auto base = [&](int a) HWY_ATTR {
-        return hn::Set(
-            d, static_cast<float>(f.origin[a] + run.row * f.down[a] + run.begin * f.across[a]));
+        return hn::Set(d, static_cast<float>(f.origin[a] + run.row * f.down[a] +
+                                             run.begin * f.across[a]));
     };
     const auto base_x = base(0), base_y = base(1), base_z = base(2);
     const auto step = [&](int a) HWY_ATTR { return hn::Set(d, static_cast<float>(f.across[a])); };
     const auto step_x = step(0), step_y = step(1), step_z = step(2);
     for (int first = 0; first < run.count; first += lanes) {
         const auto n = hn::Add(iota, hn::Set(d, static_cast<float>(first)));
-        Places<D> p{hn::Add(base_x, hn::Mul(n, step_x)), hn::Add(base_y, hn::Mul(n, step_y)),
-                    hn::Add(base_z, hn::Mul(n, step_z))};
+        Places<D> p{hn::Add(base_x, hn::Mul(n, step_x)),
+                              hn::Add(base_y, hn::Mul(n, step_y)),
+                              hn::Add(base_z, hn::Mul(n, step_z))};
         auto air = hn::Zero(d);
         if (f.gap_mm != nullptr) {
             const auto column = hn::Add(n, hn::Set(d, static_cast<float>(run.begin)));
@@ -291,8 +295,7 @@ void depths_of_run(const TruthFrameRows& f,
         auto depth = hn::Sub(r, hn::GatherIndex(d, entry_mm, ray));
         if (f.gap_mm != nullptr) {
             const auto gap = hn::Max(hn::GatherIndex(d, f.gap_mm, ray), hn::Zero(d));
-            depth =
-                hn::Add(depth, hn::Mul(gap, exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach)))));
+            depth = hn::Add(depth, hn::Mul(gap, exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach)))));
         }
         if (first + lanes <= run.count) {
             hn::StoreU(depth, d, depth_mm + first);
@@ -321,8 +324,8 @@ void truth_labels(SimdTarget simd,
                   std::uint32_t* count_of_label,
                   std::span<float> first_hard_mm,
                   float rays_per_px_at_face) {
-    HWY_DISPATCH_TABLE(labels_of_run)
-    [simd.index](frame, run, labels, count_of_label, first_hard_mm, rays_per_px_at_face);
+    HWY_DISPATCH_TABLE(labels_of_run)[simd.index](frame, run, labels, count_of_label,
+                                                  first_hard_mm, rays_per_px_at_face);
 }
 
 void truth_shadows(SimdTarget simd,

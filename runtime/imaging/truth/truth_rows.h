@@ -25,14 +25,14 @@ struct TruthFrameRows {
     const std::int32_t* brick_label;
     std::int32_t bricks_x, bricks_xy;
     std::int32_t label_count;
-    float pulse_vx = 0;          // outward shift of arterial walls
-    const std::int32_t* swells;  // # labels: 1 for arteries
-    const std::int32_t* hard;    // # labels: 1 for what casts a shadow
+    float pulse_vx = 0;                  // outward shift of arterial walls
+    const std::int32_t* swells;          // # labels: 1 for arteries
+    const std::int32_t* hard;            // # labels: 1 for what casts a shadow
 
     // Contact; null gap: no beam has one. Per ray.
     const float* gap_mm = nullptr;
-    float per_reach = 0;         // log2 e / reach, 1/mm
-    float beam_x[3], beam_z[3];  // voxels per mm along the probe's x and z
+    float per_reach = 0;                 // log2 e / reach, 1/mm
+    float beam_x[3], beam_z[3];          // voxels per mm along the probe's x and z
     bool fan = true;
     float radius_mm = 0, mm_per_px = 0, origin_x_px = 0, origin_y_px = 0;
 

@@ -16,14 +16,7 @@ Status write_npy(const std::string& path,
     // Magic, version and length take ten bytes; the values begin at a multiple of 64.
     while ((header.size() + 11) % 64 != 0) header += ' ';
     header += '\n';
-    std::vector<std::uint8_t> file{0x93,
-                                   'N',
-                                   'U',
-                                   'M',
-                                   'P',
-                                   'Y',
-                                   1,
-                                   0,
+    std::vector<std::uint8_t> file{0x93, 'N', 'U', 'M', 'P', 'Y', 1, 0,
                                    static_cast<std::uint8_t>(header.size() & 0xFF),
                                    static_cast<std::uint8_t>(header.size() >> 8)};
     file.insert(file.end(), header.begin(), header.end());

@@ -99,12 +99,14 @@ struct ChunkArrays {
                    height = static_cast<std::size_t>(plan.recipe.height_px);
         const std::vector<std::size_t> shape{images.size() / (width * height), height, width};
         const auto one = [&](const char* kind, const char* type, const auto& bytes) {
-            return write_npy(plan.folder + "/arrays/" + kind + "_" + numbered(chunk, 6) + ".npy",
-                             type, shape, bytes);
+            return write_npy(
+                plan.folder + "/arrays/" + kind + "_" + numbered(chunk, 6) + ".npy", type, shape,
+                bytes);
         };
-        for (const Status& done : {one("images", "|u1", images), one("labels", "|u1", labels),
-                                   one("needle", "|u1", needle), one("shadow", "|u1", shadowed),
-                                   one("depth", "<f4", depth)}) {
+        for (const Status& done :
+             {one("images", "|u1", images), one("labels", "|u1", labels),
+              one("needle", "|u1", needle), one("shadow", "|u1", shadowed),
+              one("depth", "<f4", depth)}) {
             if (!done) return done;
         }
         return Done{};
@@ -130,8 +132,8 @@ Status make_chunk(const DatasetPlan& plan, const DatasetSource& source, std::uin
     image.height_px = r.height_px;
     Result<ScanEngine> engine = make_engine(*source.open, set_up->exercise, arguments, image);
     if (!engine) return engine.error();
-    auto truth =
-        TruthRenderer::create(source.open->bundle, engine->exercise(), engine->render_options());
+    auto truth = TruthRenderer::create(source.open->bundle, engine->exercise(),
+                                       engine->render_options());
     if (!truth) return truth.error();
 
     std::vector<std::uint8_t> pixels(static_cast<std::size_t>(r.width_px) *
@@ -140,8 +142,8 @@ Status make_chunk(const DatasetPlan& plan, const DatasetSource& source, std::uin
     ChunkArrays arrays;
     std::string records;
     for (std::uint64_t frame = plan.first(chunk); frame < plan.last(chunk); ++frame) {
-        const DrawnFrame drawn =
-            draw_frame(r, *source.open->bundle, *source.areas, set_up->exercise, plan.seed, frame);
+        const DrawnFrame drawn = draw_frame(r, *source.open->bundle, *source.areas,
+                                            set_up->exercise, plan.seed, frame);
         FrameRecord again;
         again.input = drawn.input;
         const FrameStatus status = engine->frame_again(again, pixels);

@@ -40,7 +40,7 @@ struct DatasetRecipe {
     std::vector<double> depths_mm;      // empty: the exercise's
     Range gain_db{0, 0};
 
-    double needle_share = 0;  // of the frames
+    double needle_share = 0;         // of the frames
     std::vector<double> gauges{18};
     Range tip_depth_mm{20, 80};      // below the probe's face
     Range needle_angle_deg{25, 65};  // between shaft and beam

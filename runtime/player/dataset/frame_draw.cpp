@@ -38,7 +38,10 @@ Stand on_sweep(const Exercise& exercise, Draw& draw) {
             a.lateral + part * (b.lateral - a.lateral), true};
 }
 
-Stand on_surface(const CaseBundle& bundle, const SkinAreas& areas, const Skin& skin, Draw& draw) {
+Stand on_surface(const CaseBundle& bundle,
+                 const SkinAreas& areas,
+                 const Skin& skin,
+                 Draw& draw) {
     const Surface& surface = bundle.patient_skin;
     if (areas.sums.empty() || !(areas.sums.back() > 0)) return {};
     const double at = draw.uniform(0, areas.sums.back());
@@ -149,8 +152,8 @@ DrawnFrame draw_frame(const DatasetRecipe& r,
     DrawnFrame drawn;
     Rigid pose = turned(exercise.start_probe, exercise.start_beam, {1, 0, 0}, r, draw);
     for (int n = 0; n < kTries && !drawn.on_skin; ++n) {
-        const Stand stand =
-            r.region == "skin" ? on_surface(bundle, areas, skin, draw) : on_sweep(exercise, draw);
+        const Stand stand = r.region == "skin" ? on_surface(bundle, areas, skin, draw)
+                                               : on_sweep(exercise, draw);
         if (!stand.found) continue;
         const Vector3 z = normalized(stand.beam);
         const Vector3 x = any_perpendicular(z), y = cross(z, x);

@@ -40,8 +40,7 @@ struct SkinAreas {
 
 struct DrawnFrame {
     FrameInput input;
-    bool on_skin =
-        false;  // false: no skin was found, and the probe stands where the exercise begins
+    bool on_skin = false;  // false: no skin was found, and the probe stands where the exercise begins
 };
 
 // exercise: with the chunk's probe and needle. Cost: some thousand look-ups of the skin.

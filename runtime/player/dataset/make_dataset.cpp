@@ -106,8 +106,8 @@ Status write_manifest(const DatasetPlan& plan) {
 }
 
 Status make_folders(const DatasetPlan& plan) {
-    for (const std::string& name :
-         {std::string("records"), std::string(plan.recipe.format == "png" ? "frames" : "arrays")}) {
+    for (const std::string& name : {std::string("records"),
+                                    std::string(plan.recipe.format == "png" ? "frames" : "arrays")}) {
         std::error_code failed;
         fs::create_directories(plan.folder + "/" + name, failed);
         if (failed) {

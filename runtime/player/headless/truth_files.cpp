@@ -19,8 +19,8 @@ using Json = nlohmann::ordered_json;
 Json pose_json(const Rigid& pose) {
     Json rows = Json::array();
     for (int r = 0; r < 3; ++r) {
-        rows.push_back(
-            {pose.rotation(r, 0), pose.rotation(r, 1), pose.rotation(r, 2), pose.translation[r]});
+        rows.push_back({pose.rotation(r, 0), pose.rotation(r, 1), pose.rotation(r, 2),
+                        pose.translation[r]});
     }
     rows.push_back({0.0, 0.0, 0.0, 1.0});
     return rows;
@@ -118,7 +118,8 @@ Status TruthPlaneBuffers::write(const std::string& folder, const std::string& na
     const auto path = [&](const char* kind) { return folder + "/" + kind + "_" + name + ".png"; };
     const std::vector<std::uint16_t> wide(labels.begin(), labels.end());
     if (Status done = write_png16(path("labels"), width_px, height_px, wide); !done) return done;
-    if (Status done = write_png(path("needle"), width_px, height_px, 1, needle); !done) return done;
+    if (Status done = write_png(path("needle"), width_px, height_px, 1, needle); !done)
+        return done;
     if (Status done = write_png(path("shadow"), width_px, height_px, 1, shadowed); !done)
         return done;
     return write_png16(path("depth"), width_px, height_px, hundredths(skin_depth_mm));
@@ -145,7 +146,8 @@ Result<std::unique_ptr<TruthFiles>> TruthFiles::in(const std::string& folder,
     }
     auto truth = TruthRenderer::create(bundle, engine.exercise(), engine.render_options());
     if (!truth) return truth.error();
-    return std::unique_ptr<TruthFiles>(new TruthFiles(folder, bundle, std::move(*truth), engine));
+    return std::unique_ptr<TruthFiles>(
+        new TruthFiles(folder, bundle, std::move(*truth), engine));
 }
 
 Status TruthFiles::add(int frame, const FrameInput& input, FrameStatus status) {

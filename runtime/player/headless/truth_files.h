@@ -22,8 +22,8 @@ std::string truth_json(const FrameTruth& truth,
                        const Exercise& exercise);
 
 // Writes the planes of a frame: STEMlabels_NNNNN.png (16 bits, palette index), needle_NNNNN.png,
-// shadow_NNNNN.png (8 bits), depth_NNNNN.png (16 bits, hundredths of a millimetre below the skin;
-// 0: none), each before `name` as `folder/KIND_name.png`.
+// shadow_NNNNN.png (8 bits), depth_NNNNN.png (16 bits, hundredths of a millimetre below the skin; 0:
+// none), each before `name` as `folder/KIND_name.png`.
 struct TruthPlaneBuffers {
     TruthPlaneBuffers(int width, int height);
     TruthPlanes planes();

@@ -124,9 +124,8 @@ TEST(Truth, LabelsAreThoseOfTheVolumeForEveryProbeAndPose) {
             input.time_s = n < 2 ? 0 : random.uniform(0, 8);
             Planes planes(options);
             ASSERT_TRUE(truth.render(input, planes.spans()).posed);
-            const double share =
-                compare_labels(bundle, exercise, options, input, renderer->layout(), planes,
-                               exercise.breathing, 0.1);
+            const double share = compare_labels(bundle, exercise, options, input,
+                                                renderer->layout(), planes, exercise.breathing, 0.1);
             EXPECT_GT(share, 0.8);  // surfaces are that rare
         }
     }
@@ -302,8 +301,7 @@ TEST(Truth, ShadowsLieBehindBoneAndGasAlongTheBeam) {
                 const double r = depth_along(exercise.probe, x, z);
                 if (r < 0) continue;
                 ++scanned;
-                const double radius =
-                    shape == ProbeShape::curvilinear ? exercise.probe.radius_mm : 0;
+                const double radius = shape == ProbeShape::curvilinear ? exercise.probe.radius_mm : 0;
                 const double away = std::max(r + radius, 1e-9);
                 const double dx = shape == ProbeShape::linear ? 0 : x / away,
                              dz = shape == ProbeShape::linear ? 1 : (z + radius) / away;
@@ -382,7 +380,8 @@ TEST(Truth, DepthBelowTheSkinIsThatOfTheFlatBlock) {
         for (int row = 20; row < 190; row += 17) {
             const PixelTruth pixel = truth.at(input, 64, row);
             if (!pixel.scanned) continue;
-            const double expected = pixel.shown.z - (pixel.shown.x * pixel.shown.x) / 900;
+            const double expected =
+                pixel.shown.z - (pixel.shown.x * pixel.shown.x) / 900;
             EXPECT_NEAR(pixel.skin_depth_mm, expected, 0.6);  // whole voxels of 1 mm
         }
     }
