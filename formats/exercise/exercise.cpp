@@ -28,6 +28,11 @@ const std::vector<std::string>& look_names() {
     return names;
 }
 
+const std::vector<std::string>& mode_names() {
+    static const std::vector<std::string> names{"practice", "exam"};
+    return names;
+}
+
 void read_probe(const TomlTable& table, Probe& probe) {
     if (const auto shape = table.choice("shape", shape_names()))
         probe.shape = static_cast<ProbeShape>(*shape);
@@ -75,6 +80,8 @@ void read_target(const TomlTable& table, std::vector<Target>& targets) {
     if (const auto look = table.choice("look", look_names()))
         target.look = static_cast<TargetLook>(*look);
     table.text("inside", target.inside);
+    table.number("spread_mm", target.spread_mm, 0, 200);
+    table.number("clearance_mm", target.clearance_mm, 0, 100);
     table.finish();
     targets.push_back(std::move(target));
 }
@@ -171,6 +178,10 @@ Exercise read_exercise(const TomlTable& root) {
     e.description = flowed(e.description);
     root.text("kind", e.kind, {"biopsy", "drainage", "nephrostomy", "vascular", "scan"});
     root.whole("difficulty", e.difficulty, 1, 5);
+    if (const auto mode = root.choice("mode", mode_names()))
+        e.mode = static_cast<ExerciseMode>(*mode);
+    root.texts("hints", e.hints, true);
+    root.whole("mastery", e.mastery, 1, 100);
     root.text("model", e.model, {"physical", "paper"});
     root.texts("effects", e.effects, true);
     if (auto table = root.table("probe")) read_probe(*table, e.probe);
@@ -179,6 +190,7 @@ Exercise read_exercise(const TomlTable& root) {
     root.texts("no_go", e.no_go);
     root.point("start_probe", e.start_probe);
     root.direction("start_beam", e.start_beam);
+    root.number("start_spread_mm", e.start_spread_mm, 0, 500);
     for (const TomlTable& table : root.tables("sweeps")) read_sweep(table, e.sweeps);
     if (auto table = root.table("breathing")) {
         table->number("amplitude_mm", e.breathing.amplitude_mm, 0, 100);

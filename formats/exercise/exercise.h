@@ -52,6 +52,10 @@ struct Target {
     double hit_radius_mm = 5;  // a tip this near the centre is a hit
     TargetLook look = TargetLook::marker;
     std::string inside;  // label that it must lie in; empty: anywhere
+    // Where an attempt may draw it (formats/attempt): anywhere in this ball about `centre`, with
+    // nothing but `inside` within clearance_mm. 0: the target stays at its centre.
+    double spread_mm = 0;
+    double clearance_mm = -1;  // negative: the target's radius
 };
 
 // One pose of a scripted path, to be reached at a given time; positions and directions are
@@ -83,6 +87,10 @@ struct Pulsation {
     double rate_per_min = 70;
 };
 
+// Practice shows the targets once all hints have been asked for; an exam shows neither hints nor
+// targets nor the distance that is left.
+enum class ExerciseMode { practice, exam };
+
 // How tissue yields to the probe (effect deformation; docs/deformation.md).
 struct Deformation {
     double venous_pressure_mmhg = 8;  // veins are as stiff as this pressure makes them
@@ -95,8 +103,11 @@ struct Exercise {
     std::string name;
     std::string title;  // shown to the trainee
     std::string description;
-    std::string kind = "biopsy";               // biopsy | drainage | nephrostomy | vascular | scan
-    int difficulty = 1;                        // 1 easy .. 5 hard
+    std::string kind = "biopsy";  // biopsy | drainage | nephrostomy | vascular | scan
+    int difficulty = 1;           // 1 easy .. 5 hard
+    ExerciseMode mode = ExerciseMode::practice;
+    std::vector<std::string> hints;            // in the order in which a trainee gets them
+    int mastery = 3;                           // passes in a row that count as mastered
     std::string model = "physical";            // physical | paper
     std::vector<std::string> effects{"auto"};  // "auto", "all", or names of the effects table
     Probe probe;
@@ -105,6 +116,7 @@ struct Exercise {
     std::vector<std::string> no_go;  // labels that must not be touched
     Point3 start_probe;              // where the mouse tracker begins
     Vector3 start_beam{0, 0, -1};
+    double start_spread_mm = 0;  // an attempt begins half to all of this away from start_probe
     std::vector<Sweep> sweeps;
     BreathingMotion breathing;
     Pulsation pulsation;

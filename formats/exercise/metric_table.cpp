@@ -9,54 +9,66 @@ constexpr MetricSense kLess = MetricSense::less_is_better;
 constexpr MetricSense kMore = MetricSense::more_is_better;
 constexpr MetricSense kNeutral = MetricSense::neutral;
 
+// Hand motion of experts and novices in nerve blocks: Chin et al., Reg. Anesth. Pain Med. 36:213.
+constexpr const char* kChin = "Chin 2011";
+// What novices do wrong, above all advancing an unseen needle: Sites et al., Reg. Anesth. Pain Med.
+// 32:107.
+constexpr const char* kSites = "Sites 2007";
+// Training of facet joint injections: Yeo et al., IEEE Trans. Biomed. Eng. 58:2031.
+constexpr const char* kYeo = "Yeo 2011";
+// Complications rise with the number of passes: Mansfield et al., N. Engl. J. Med. 331:1735.
+constexpr const char* kMansfield = "Mansfield 1994";
+constexpr const char* kOutcome = "outcome";
+
 constexpr MetricInfo kTable[] = {
-    {"elapsed_time_s", "session", "Time from the first reading to the last", kLess},
+    {"elapsed_time_s", "session", "Total time", kLess, kChin},
     {"tracking_gap_s", "session", "Longest time without the needle's pose", kLess},
 
-    {"targets_hit", "targets", "Targets that the tip reached", kMore},
-    {"targets_hit_fraction", "targets", "Fraction of the targets that were hit", kMore},
+    {"targets_hit", "targets", "Targets reached", kMore, kOutcome},
+    {"targets_hit_fraction", "targets", "Share of the targets reached", kMore, kOutcome},
     {"targets_scanned_percent", "targets", "Targets whose centre was in the image", kMore},
     {"structures_scanned_percent", "targets", "Targets of which any part was in the image", kMore},
-    {"final_tip_to_target_mm", "targets", "Tip to target centre at the end", kLess},
+    {"final_tip_to_target_mm", "targets", "Tip to target centre at the end", kLess, kOutcome},
     {"final_angle_deg", "targets", "Angle between needle and the line from entry to target", kLess},
     {"targeting_error_mm", "targets", "Tip to nearest target, mean over insertions", kLess},
-    {"trajectory_deviation_mm", "targets", "Greatest distance of the tip from the straight path",
-     kLess},
-    {"trajectory_deviation_mean_mm", "targets", "Mean distance of the tip from the straight path",
-     kLess},
+    {"trajectory_deviation_mm", "targets", "Maximum deviation from straight path", kLess},
+    {"trajectory_deviation_mean_mm", "targets", "Mean deviation from straight path", kLess},
 
-    {"insertions", "needle", "Insertions through the skin", kLess},
+    {"insertions", "needle", "Skin punctures", kLess, kMansfield},
     {"skin_contacts", "needle", "Separate touches of the skin by the tip", kLess},
-    {"tissue_punctures", "needle", "Passes of the tip zone from outside to inside", kLess},
+    {"tissue_punctures", "needle", "Entries of the tip into the body", kLess},
     {"deepest_mm", "needle", "Greatest inserted length", kNeutral},
-    {"path_in_tissue_mm", "needle", "Path length of the tip inside the body", kLess},
-    {"time_in_tissue_s", "needle", "Time with the tip inside the body", kLess},
-    {"tissue_damage_mm2", "needle", "Area swept by the inserted shaft", kLess},
-    {"depth_perception_mm", "needle", "Motion of the tip along the needle, in both directions",
-     kLess},
-    {"correct_vessel_punctured", "needle", "The first vessel that was punctured was the target's",
-     kMore},
+    {"path_in_tissue_mm", "needle", "Tip path length in tissue", kLess, kYeo},
+    {"time_in_tissue_s", "needle", "Time with the tip in tissue", kLess},
+    {"tissue_damage_mm2", "needle", "Area swept by the inserted shaft", kLess, kYeo},
+    {"depth_perception_mm", "needle", "Tip motion along the needle, both directions", kLess},
+    {"correct_vessel_punctured", "needle", "First vessel punctured was the target's", kMore,
+     kOutcome},
     {"vein_collapse_at_puncture_percent", "needle", "Loss of the vein's height at its puncture",
      kLess},
-    {"posterior_wall_punctures", "needle", "Punctures of a vessel's far wall", kLess},
-    {"no_go_contacts", "needle", "Contacts of the needle with structures to be spared", kLess},
-    {"no_go_time_s", "needle", "Time inside structures to be spared", kLess},
+    {"posterior_wall_punctures", "needle", "Punctures of a vessel's far wall", kLess, kOutcome},
+    {"no_go_contacts", "needle", "Critical structures touched", kLess, kOutcome},
+    {"no_go_time_s", "needle", "Time in critical structures", kLess, kOutcome},
     {"needle_elapsed_time_s", "needle", "Time from its first reading to its last", kLess},
-    {"needle_path_length_mm", "needle", "Path length of the tip", kLess},
+    {"needle_path_length_mm", "needle", "Tip path length", kLess, kChin},
     {"needle_filtered_path_length_mm", "needle", "Path length of the tip, jitter removed", kLess},
     {"needle_average_velocity_mm_s", "needle", "Mean speed of the tip", kNeutral},
-    {"needle_motion_smoothness_mm_s3", "needle", "Root of the integrated squared jerk", kLess},
+    {"needle_motion_smoothness_mm_s3", "needle", "Jerkiness of the needle (lower is smoother)",
+     kLess},
     {"needle_path_inefficiency_percent", "needle", "Path length in excess of the straight line",
      kLess},
-    {"needle_translational_actions", "needle", "Periods of movement", kLess},
-    {"needle_rotational_actions", "needle", "Periods of rotation", kLess},
+    {"needle_translational_actions", "needle", "Movements of the needle", kLess, kChin},
+    {"needle_rotational_actions", "needle", "Rotations of the needle", kLess},
     {"needle_rotation_total_deg", "needle", "Total rotation", kLess},
     {"needle_bounding_box_mm3", "needle", "Bounding box of the path of the tip", kLess},
 
-    {"needle_in_beam_fraction", "guidance", "Inserted length in the image, mean over time", kMore},
-    {"needle_in_beam_mm", "guidance", "Inserted length in the image, mean", kMore},
-    {"tip_in_view_fraction", "guidance", "Time in tissue with the tip in the image", kMore},
-    {"tip_in_view_at_advance_fraction", "guidance", "Advance with the tip in the image", kMore},
+    {"needle_in_beam_fraction", "guidance", "Share of the inserted needle that is visible", kMore,
+     kSites},
+    {"needle_in_beam_mm", "guidance", "Visible inserted length, mean", kMore},
+    {"tip_in_view_fraction", "guidance", "Share of the time in tissue with the tip visible", kMore,
+     kSites},
+    {"tip_in_view_at_advance_fraction", "guidance", "Share of the advance with the tip visible",
+     kMore, kSites},
     {"needle_plane_distance_mean_mm", "guidance", "Tip to scan plane, mean in tissue", kLess},
     {"needle_plane_distance_max_mm", "guidance", "Tip to scan plane, greatest in tissue", kLess},
     {"needle_plane_angle_mean_deg", "guidance",
@@ -69,14 +81,14 @@ constexpr MetricInfo kTable[] = {
     {"compressions_done", "probe", "Veins pressed shut and opened again", kMore},
     {"probe_usage_time_s", "probe", "Time with the probe on the skin", kNeutral},
     {"probe_elapsed_time_s", "probe", "Time from its first reading to its last", kLess},
-    {"probe_path_length_mm", "probe", "Path length of the probe", kLess},
+    {"probe_path_length_mm", "probe", "Probe path length", kLess, kChin},
     {"probe_filtered_path_length_mm", "probe", "Path length of the probe, jitter removed", kLess},
     {"probe_average_velocity_mm_s", "probe", "Mean speed of the probe", kNeutral},
-    {"probe_motion_smoothness_mm_s3", "probe", "Root of the integrated squared jerk", kLess},
+    {"probe_motion_smoothness_mm_s3", "probe", "Jerkiness of the probe (lower is smoother)", kLess},
     {"probe_path_inefficiency_percent", "probe", "Path length in excess of the straight line",
      kLess},
-    {"probe_translational_actions", "probe", "Periods of movement", kLess},
-    {"probe_rotational_actions", "probe", "Periods of rotation", kLess},
+    {"probe_translational_actions", "probe", "Movements of the probe", kLess, kChin},
+    {"probe_rotational_actions", "probe", "Rotations of the probe", kLess},
     {"probe_rotation_total_deg", "probe", "Total rotation", kLess},
     {"probe_bounding_box_mm3", "probe", "Bounding box of the path of the probe", kLess},
 };
@@ -92,6 +104,17 @@ const MetricInfo* find_metric(std::string_view name) {
         if (name == info.name) return &info;
     }
     return nullptr;
+}
+
+const char* metric_range(std::string_view name) {
+    const auto ends = [&](std::string_view ending) {
+        return name.size() > ending.size() && name.substr(name.size() - ending.size()) == ending;
+    };
+    if (name == "correct_vessel_punctured" || ends("_fraction")) return "0 to 1";
+    if (name == "vein_collapse_at_puncture_percent" || ends("_scanned_percent")) return "0 to 100";
+    if (name == "needle_plane_angle_mean_deg") return "0 to 90";
+    if (name == "final_angle_deg") return "0 to 180";
+    return "0 and up";
 }
 
 std::string metric_unit(std::string_view name) {

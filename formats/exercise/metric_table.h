@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Every score by name: its meaning in one line, and whether more or less of it is better.
-// docs/metrics.md defines each; the name ends in the unit.
+// Every score by name: its meaning in one line, whether more or less of it is better, and what
+// shows that it means something. The window, the review page and docs/metrics.md, part 8, all show
+// this table. docs/metrics.md defines each; the name ends in the unit.
 #pragma once
 
 #include <span>
@@ -18,7 +19,13 @@ struct MetricInfo {
     const char* group;  // "session", "needle", "probe", "targets", "guidance"
     const char* title;
     MetricSense sense;
+    // The study in which it told experts from novices or went with harm, or "outcome": it is what
+    // the task is about. Empty: none is known; it is then shown folded.
+    const char* evidence = "";
 };
+
+// What a score can be: "0 to 1", "0 and up", ...
+const char* metric_range(std::string_view name);
 
 std::span<const MetricInfo> metric_table();            // in the order in which scores list them
 const MetricInfo* find_metric(std::string_view name);  // nullptr: no such metric

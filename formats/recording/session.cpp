@@ -3,6 +3,7 @@
 #include "formats/recording/session.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
 #include "formats/text/number_text.h"
@@ -26,7 +27,8 @@ constexpr HeaderField kHeaderFields[] = {
     {"SonocaseTrainee", &SessionHeader::trainee},
     {"SonocaseStarted", &SessionHeader::started},
     {"SonocaseProgram", &SessionHeader::program},
-    {"SonocaseRender", &SessionHeader::render}};
+    {"SonocaseRender", &SessionHeader::render},
+    {"SonocaseAttempt", &SessionHeader::attempt}};
 
 bool has_word(const std::string& text, std::initializer_list<const char*> words) {
     return std::any_of(words.begin(), words.end(),
@@ -206,6 +208,13 @@ std::vector<SequenceField> fields_from_header(const SessionHeader& header) {
         if (!(header.*field.value).empty()) fields.push_back({field.name, header.*field.value});
     }
     return fields;
+}
+
+std::uint64_t attempt_seed(const SessionHeader& header) {
+    const std::string text = detail_value(header.attempt, "seed");
+    std::uint64_t seed = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+    return error == std::errc{} && end == text.data() + text.size() ? seed : 0;
 }
 
 Sequence sequence_from_session(const Session& session) {

@@ -28,6 +28,9 @@ struct SessionHeader {
     // What replay needs besides poses, as "key=value" words: model, effects, seed, size. Written by
     // the player.
     std::string render;
+    // How the attempt was set, as "key=value" words: seed of its target positions, mode. Empty: the
+    // exercise as written.
+    std::string attempt;
 };
 
 // What the probe did to the tissue in a frame (effect deformation).
@@ -96,6 +99,9 @@ Sequence sequence_from_session(const Session& session);
 SequenceFrame frame_from_sample(const SessionSample& sample,
                                 const std::vector<SessionEvent>& events);
 std::vector<SequenceField> fields_from_header(const SessionHeader& header);
+
+// Seed of the attempt's target positions (formats/attempt); 0: the exercise as written.
+std::uint64_t attempt_seed(const SessionHeader& header);
 
 // Value of a key in "key=value key=value"; empty if the key is missing.
 std::string detail_value(const std::string& detail, const std::string& key);

@@ -12,6 +12,22 @@ namespace sonocase {
 CaseAnatomy::CaseAnatomy(CaseView bundle, const BreathingMotion& breathing)
     : bundle_(bundle), breathing_(breathing) {
     if (breathing.amplitude_mm != 0) field_ = BreathingField(*bundle);
+    const std::vector<int> tissues = tissue_of_label(*bundle);
+    for (std::size_t i = 0; i < tissues.size() && i < blocks_sound_.size(); ++i) {
+        const auto t = static_cast<std::size_t>(tissues[i]);
+        if (tissues[i] < 0 || t >= bundle->tissues.size()) continue;
+        const TissueKind kind = bundle->tissues[t].kind;
+        blocks_sound_[i] = kind == TissueKind::bone || kind == TissueKind::gas;
+    }
+}
+
+bool CaseAnatomy::at_edge(Point3 p) const {
+    const Point3 v = bundle_->grid.voxel_from_point(p);
+    const Int3 size = bundle_->label_bricks.size;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (!(v[axis] >= 1) || !(v[axis] <= size[axis] - 2)) return true;
+    }
+    return false;
 }
 
 Point3 CaseAnatomy::at_rest(Point3 p, double time_s) const {

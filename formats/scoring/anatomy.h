@@ -33,6 +33,11 @@ class Anatomy {
     virtual Point3 at_rest(Point3 p, double /*time_s*/) const { return p; }
     virtual Point3 moved(Point3 rest, double /*time_s*/) const { return rest; }
     virtual double greatest_shift_mm() const { return 0; }
+    // True if labels say where sound passes: then blocks_sound() and shadows mean something.
+    virtual bool knows_tissue() const { return false; }
+    virtual bool blocks_sound(int /*label*/) const { return false; }  // bone or gas
+    // True where the body is cut off and does not end: a surface there is no skin.
+    virtual bool at_edge(Point3 /*p*/) const { return false; }
 };
 
 // The cooked labels: a voxel's own label, or the second one beyond its boundary plane; the renderer
@@ -48,8 +53,14 @@ class CaseAnatomy final : public Anatomy {
     Point3 at_rest(Point3 p, double time_s) const override;
     Point3 moved(Point3 rest, double time_s) const override;
     double greatest_shift_mm() const override { return std::abs(breathing_.amplitude_mm); }
+    bool knows_tissue() const override { return true; }
+    bool blocks_sound(int label) const override {
+        return blocks_sound_[static_cast<std::size_t>(label)];
+    }
+    bool at_edge(Point3 p) const override;
 
   private:
+    std::array<bool, 256> blocks_sound_{};
     CaseView bundle_;
     BreathingMotion breathing_;
     BreathingField field_;  // empty: at rest

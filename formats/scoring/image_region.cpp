@@ -40,10 +40,9 @@ double distance_to_image(const Probe& probe, double x, double z) {
     return std::hypot(u - along * std::sin(half), w - along * std::cos(half));
 }
 
-double length_in_image(const Probe& probe, Point3 a, Point3 b, double half_slab_mm) {
+ImageInterval interval_in_image(const Probe& probe, Point3 a, Point3 b, double half_slab_mm) {
     const Vector3 d = b - a;
-    const double length = norm(d);
-    if (!(length > 0)) return 0;
+    if (!(norm(d) > 0)) return {};
     double low = 0, high = 1;
     // Keeps the part where offset + t * slope <= 0.
     const auto clip = [&](double offset, double slope) {
@@ -58,7 +57,7 @@ double length_in_image(const Probe& probe, Point3 a, Point3 b, double half_slab_
         clip(-a.x - 0.5 * probe.width_mm, -d.x);
         clip(-a.z, -d.z);
         clip(a.z - probe.depth_mm, d.z);
-        return std::max(high - low, 0.0) * length;
+        return {low, high};
     }
     const double radius = radius_of(probe), outer = radius + probe.depth_mm;
     const double sine = std::sin(0.5 * probe.field_of_view_rad);
@@ -70,12 +69,16 @@ double length_in_image(const Probe& probe, Point3 a, Point3 b, double half_slab_
     clip(radius * cosine - w, -d.z);
     const double qa = d.x * d.x + d.z * d.z, qb = a.x * d.x + w * d.z,
                  qc = a.x * a.x + w * w - outer * outer;
-    if (qa == 0) return qc <= 0 ? std::max(high - low, 0.0) * length : 0;
+    if (qa == 0) return qc <= 0 ? ImageInterval{low, high} : ImageInterval{};
     const double root = qb * qb - qa * qc;
-    if (!(root > 0)) return 0;
+    if (!(root > 0)) return {};
     low = std::max(low, (-qb - std::sqrt(root)) / qa);
     high = std::min(high, (-qb + std::sqrt(root)) / qa);
-    return std::max(high - low, 0.0) * length;
+    return {low, high};
+}
+
+double length_in_image(const Probe& probe, Point3 a, Point3 b, double half_slab_mm) {
+    return interval_in_image(probe, a, b, half_slab_mm).share() * norm(b - a);
 }
 
 }  // namespace sonocase

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "formats/scoring/image_region.h"
+#include "formats/scoring/sight.h"
 
 namespace sonocase {
 namespace {
@@ -31,12 +32,25 @@ struct LookUp {
             const Point3 t = probe_from_mannequin * tip;
             r.plane_mm = t.y;
             r.tip_in_view = std::abs(t.y) <= half_slab_mm && in_image(exercise.probe, t.x, t.z);
-            if (r.depth_mm > 0) {
-                const Point3 skin = probe_from_mannequin * (tip - r.depth_mm * direction);
-                r.in_beam_mm = length_in_image(exercise.probe, t, skin, half_slab_mm);
-            }
+            if (anatomy) look_along_beams(sample, point.time_s, t, direction, &r);
         }
         return r;
+    }
+
+    // What of the needle sound reaches.
+    void look_along_beams(const SessionSample& sample,
+                          double time_s,
+                          Point3 tip_probe,
+                          Vector3 direction,
+                          NeedleReading* r) const {
+        const Rigid& pose = sample.mannequin_from_probe;
+        r->tip_in_view =
+            r->tip_in_view && sound_reaches(*anatomy, exercise.probe, pose, tip_probe, time_s);
+        if (!(r->depth_mm > 0)) return;
+        const Vector3 back = transpose(pose.rotation) * direction;
+        const Point3 skin = tip_probe - r->depth_mm * back;
+        r->in_beam_mm =
+            visible_length(*anatomy, exercise.probe, pose, tip_probe, skin, half_slab_mm, time_s);
     }
 
     void look_in_body(const TrackPoint& point,

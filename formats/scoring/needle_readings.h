@@ -19,8 +19,8 @@ struct NeedleReading {
     Point3 skin;           // where the shaft passes it
     bool seen = false;     // the probe is tracked in the same sample
     double plane_mm = std::numeric_limits<double>::quiet_NaN();  // signed, of the tip
-    bool tip_in_view = false;
-    double in_beam_mm = 0;
+    bool tip_in_view = false;  // in the image and reached by sound
+    double in_beam_mm = 0;     // inserted length in the image that sound reaches
 };
 
 // # needle.points. anatomy may be null: then nothing is inside. Readings are independent and are

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "formats/scoring/image_region.h"
+#include "formats/scoring/sight.h"
 #include "formats/text/number_text.h"
 
 namespace sonocase {
@@ -215,7 +216,9 @@ std::span<const LiveEvent> SessionMonitor::update(double time_s,
     if (probe_ok && needle_ok) {
         const Point3 p = inverse(mannequin_from_probe) * tip;
         tip_in_view_ =
-            std::abs(p.y) <= half_slab_mm(*exercise_) && in_image(exercise_->probe, p.x, p.z);
+            std::abs(p.y) <= half_slab_mm(*exercise_) && in_image(exercise_->probe, p.x, p.z) &&
+            (!anatomy_ ||
+             sound_reaches(*anatomy_, exercise_->probe, mannequin_from_probe, p, time_s));
     }
     if (anatomy_ && needle_ok) watch_needle(time_s, mannequin_from_drawn);
     watch_targets(time_s, probe_ok, mannequin_from_probe, needle_ok, tip);

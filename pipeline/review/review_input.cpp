@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "formats/attempt/draw_attempt.h"
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
 #include "formats/files/bundle_file.h"
@@ -78,7 +79,10 @@ Result<ReviewInput> load_review(const std::string& session_path,
     auto exercise =
         find_review_exercise(input.bundle, options.exercise, header.exercise, input.warnings);
     if (!exercise) return exercise.error();
-    input.exercise = std::move(*exercise);
+    const CaseAnatomy at_rest(input.bundle);
+    AttemptDraw drawn = draw_attempt(*exercise, at_rest, input.bundle.labels, attempt_seed(header));
+    input.exercise = std::move(drawn.exercise);
+    input.warnings.insert(input.warnings.end(), drawn.warnings.begin(), drawn.warnings.end());
     if (options.exercise.empty() && !header.exercise_digest.empty()) {
         for (const EmbeddedExercise& embedded : input.bundle.exercises) {
             if (embedded.name == header.exercise &&

@@ -99,7 +99,14 @@ std::string comparison(const ReviewInput& input, const MetricInfo& info, double 
                                  {"progress", progress_svg(input, info.name)}});
 }
 
-std::string score_table(const ReviewInput& input) {
+std::string meaning(const MetricInfo& info) {
+    const std::string evidence = info.evidence;
+    return std::string(info.name) + ": " + metric_range(info.name) +
+           (evidence.empty() ? "" : "; evidence: " + evidence);
+}
+
+// The groups of those metrics that have evidence, or of the others.
+std::string score_groups(const ReviewInput& input, bool evidence) {
     static constexpr struct {
         const char* group;
         const char* title;
@@ -114,19 +121,26 @@ std::string score_table(const ReviewInput& input) {
         std::string rows;
         for (const MetricInfo& info : metric_table()) {
             if (std::string(info.group) != group.group) continue;
+            if ((info.evidence[0] != 0) != evidence) continue;
             const double value = input.score.value(info.name);
             rows +=
-                filled("score", {{"name", info.name},
+                filled("score", {{"name", escaped_html(meaning(info))},
                                  {"title", escaped_html(info.title)},
                                  {"value", shown(value, info.name)},
                                  {"comparison", compare ? comparison(input, info, value) : ""}});
         }
+        if (rows.empty()) continue;
         groups +=
             filled("score_group", {{"title", group.title},
                                    {"comparison", compare ? filled("comparison_head", {}) : ""},
                                    {"rows", rows}});
     }
-    return filled("scores", {{"groups", groups}});
+    return groups;
+}
+
+std::string score_table(const ReviewInput& input) {
+    return filled("scores",
+                  {{"groups", score_groups(input, true)}, {"others", score_groups(input, false)}});
 }
 
 std::string insertions(const ReviewInput& input) {

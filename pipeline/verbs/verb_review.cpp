@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "formats/attempt/draw_attempt.h"
 #include "formats/files/atomic_file.h"
 #include "formats/files/bundle_file.h"
 #include "formats/files/recording_file.h"
@@ -120,9 +121,12 @@ int verb_score(int argc, char** argv) {
         if (!loaded) return fail("score", loaded.error());
         bundle = std::move(*loaded);
     }
-    const auto exercise =
-        find_review_exercise(bundle, a.exercise, session->header.exercise, warnings);
+    auto exercise = find_review_exercise(bundle, a.exercise, session->header.exercise, warnings);
     if (!exercise) return fail("score", exercise.error());
+    if (const std::uint64_t seed = attempt_seed(session->header); seed != 0 && !a.bundle.empty()) {
+        const CaseAnatomy at_rest(bundle);
+        *exercise = draw_attempt(*exercise, at_rest, bundle.labels, seed).exercise;
+    }
     std::unique_ptr<Anatomy> anatomy;
     if (!a.body.empty()) {
         auto mesh = import_surface(a.body, {.torso = false});

@@ -56,8 +56,8 @@ const Fonts& fonts() {
 void apply_theme(float scale) {
     ImGuiIO& io = ImGui::GetIO();
     io.Fonts->Clear();
-    static const ImWchar kRanges[] = {0x20,   0xFF,   0x2013, 0x2014, 0x2018,
-                                      0x2026, 0x2190, 0x2193, 0};
+    static const ImWchar kRanges[] = {0x20,   0x17F,  0x370,  0x3FF,  0x400,  0x45F, 0x2013,
+                                      0x2014, 0x2018, 0x2026, 0x2190, 0x2193, 0};
     const std::string body = first_file(candidates(false)), bold = first_file(candidates(true));
     const auto load = [&](const std::string& file, float size) {
         if (file.empty()) {

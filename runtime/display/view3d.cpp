@@ -159,7 +159,7 @@ void* View3d::draw(int width_px, int height_px, const View3dInput& input) {
     d.program.use(perspective(kTanHalf, aspect, kNear, kFar), d.view_from_mannequin,
                   input.image_texture);
     d.draw_tools(input, from_needle);
-    d.draw_targets(input);
+    if (input.show_targets) d.draw_targets(input);
     d.draw_skin();
     d.picture.end();
     return d.picture.texture();

@@ -23,7 +23,8 @@ struct View3dInput {
     double depth_mm = 0;  // of the picture; may differ from the exercise's
     bool flipped = false;
     int image_width_px = 0, image_height_px = 0;
-    unsigned image_texture = 0;         // OpenGL name; 0: a plain plane
+    unsigned image_texture = 0;  // OpenGL name; 0: a plain plane
+    bool show_targets = true;
     std::vector<bool> targets_reached;  // # targets
     std::vector<Point3>
         target_centres;  // # targets, `mannequin` frame; empty: as the exercise has them

@@ -10,11 +10,14 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <map>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "runtime/display/theme.h"
 
@@ -25,6 +28,16 @@ std::string g_glfw_error;  // GLFW reports to a function without context
 
 void on_glfw_error(int, const char* text) {
     g_glfw_error = text ? text : "";
+}
+
+// Keys that went down since the last picture. A tap that is over before the next picture would
+// otherwise be lost: its key is held down for that one picture. GLFW calls back without context.
+std::array<bool, GLFW_KEY_LAST + 1> g_tapped{};
+
+void on_key(GLFWwindow* window, int key, int scancode, int action, int modifiers) {
+    if (action == GLFW_PRESS && key >= 0 && key <= GLFW_KEY_LAST)
+        g_tapped[static_cast<std::size_t>(key)] = true;
+    ImGui_ImplGlfw_KeyCallback(window, key, scancode, action, modifiers);
 }
 
 // Without a graphics card Mesa paints on threads of this process, one per core. One fewer leaves a
@@ -43,6 +56,7 @@ struct Window::Impl {
     bool imgui = false, imgui_glfw = false, imgui_gl = false;
     float wanted_scale = 1;
     bool rebuild = false;
+    std::vector<int> release;  // keys held down for this picture alone
     int windowed[4] = {0, 0, 0, 0};
 };
 
@@ -93,6 +107,7 @@ Result<std::unique_ptr<Window>> Window::open(const WindowOptions& options) {
     ImGui::GetIO().ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
     ImGui::GetIO().ConfigWindowsMoveFromTitleBarOnly = true;
     impl.imgui_glfw = ImGui_ImplGlfw_InitForOpenGL(impl.window, true);
+    glfwSetKeyCallback(impl.window, on_key);  // calls ImGui's
     impl.imgui_gl = ImGui_ImplOpenGL3_Init("#version 330 core");
     if (!impl.imgui_glfw || !impl.imgui_gl) {
         return Error{"the OpenGL functions of the window cannot be loaded", "window",
@@ -159,11 +174,24 @@ void Window::begin_frame(const InjectedInput& injected) {
         io.KeyCtrl = injected.control;
         io.KeyAlt = injected.alt;
     }
+    std::vector<int> over;  // taps that ended before this picture
+    ImGuiIO& io = ImGui::GetIO();
+    for (int key = 0; key <= GLFW_KEY_LAST; ++key) {
+        bool& tapped = g_tapped[static_cast<std::size_t>(key)];
+        if (tapped && !io.KeysDown[key]) {
+            io.KeysDown[key] = true;
+            over.push_back(key);
+        }
+        tapped = false;
+    }
     ImGui::NewFrame();
+    impl_->release = std::move(over);
 }
 
 void Window::end_frame(bool capture) {
     ImGui::Render();
+    for (const int key : impl_->release) ImGui::GetIO().KeysDown[key] = false;
+    impl_->release.clear();
     int width = 0, height = 0;
     glfwGetFramebufferSize(impl_->window, &width, &height);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);

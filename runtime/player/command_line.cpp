@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <limits>
 #include <sstream>
 
 #include "formats/base/build_facts.h"
@@ -34,7 +35,12 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     std::string size, effects;
     app.add_option("bundle", arguments.bundle,
                    "Case bundle (*.sonocase); without one: choose from a list");
-    app.add_option("--exercise", arguments.exercise, "Exercise of the bundle; default: its first");
+    app.add_option("--exercise", arguments.exercise,
+                   "Exercise of the bundle, or a TOML file; default: its first");
+    app.add_option("--attempt-seed", arguments.attempt_seed,
+                   "Where the attempt's targets lie; 0: as written. Default: new for each attempt "
+                   "in a window, a recording's own where it is replayed, else 0")
+        ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()));
     app.add_option("--tracker", arguments.tracker, tracker_help());
     app.add_option("--calibration", arguments.calibrations,
                    "File of a calibration or a lag; may be repeated")

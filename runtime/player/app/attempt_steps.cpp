@@ -4,13 +4,51 @@
 
 #include <algorithm>
 #include <cassert>
+#include <random>
 
+#include "formats/attempt/draw_attempt.h"
 #include "runtime/player/app/case_steps.h"
+#include "runtime/player/app/tracker_steps.h"
 #include "runtime/player/session/clock.h"
 #include "runtime/player/session/frame_server.h"
+#include "runtime/player/session/session_replay.h"
 
 namespace sonocase::runtime {
 namespace {
+
+// Draws a new attempt, unless the targets are given: a script aims at those that are written, a
+// replayed recording at its own.
+std::uint64_t new_attempt_seed(const App& app) {
+    if (app.player.arguments.attempt_seed >= 0)
+        return static_cast<std::uint64_t>(app.player.arguments.attempt_seed);
+    const std::string& spec = app.scan.tracker.spec;
+    if (spec.rfind("replay:", 0) == 0) {
+        const auto replay = session_replay(spec.substr(7));
+        return replay ? attempt_seed(replay->header) : 0;
+    }
+    if (spec.rfind("sweep", 0) == 0) return 0;
+    std::random_device random;
+    return 1 + (std::uint64_t{random()} << 16 ^ random()) % 1000000000;
+}
+
+// Targets and start of a new attempt; the mouse begins there without a needle.
+void draw_new_attempt(App& app) {
+    CaseState& loaded = app.loaded;
+    loaded.attempt_seed = new_attempt_seed(app);
+    loaded.drawn.reset();
+    if (loaded.attempt_seed != 0) {
+        const CaseAnatomy at_rest(loaded.open->bundle);
+        AttemptDraw draw = draw_attempt(loaded.exercise(), at_rest, loaded.open->bundle->labels,
+                                        loaded.attempt_seed);
+        for (const std::string& warning : draw.warnings) app.view.notices.warning(warning);
+        loaded.drawn = std::move(draw.exercise);
+    }
+    app.scan.hints_shown = 0;
+    if (app.view.small_view.view) app.view.small_view.view->set_exercise(loaded.exercise());
+    put_mouse_at_start(app);
+    loaded.exact = true;
+    rebuild_engine(app, false);
+}
 
 // An exact picture where the frame budget would reduce its accuracy.
 void set_exact(App& app, bool exact) {
@@ -56,20 +94,26 @@ void observe_frames(const ScanState& scan, ScanThread& thread) {
 void start_attempt(App& app, const std::string& path) {
     CaseState& loaded = app.loaded;
     if (app.scan.attempt || !loaded.open) return;
-    const Exercise& exercise = loaded.exercise();
+    const FrameRecord& shown = loaded.frame().record;
+    if (!app.scan.tracker.mouse && !app.scan.tracker.paced && shown.tools.has_needle &&
+        shown.needle.depth_mm > 0) {
+        app.view.notices.warning("Take the needle out of the body, then start the attempt.");
+        return;
+    }
+    const std::string name = loaded.exercise().name;
     std::string file = path;
-    if (file.empty())
-        file = new_session_path(loaded.open->bundle->manifest.case_name, exercise.name);
+    if (file.empty()) file = new_session_path(loaded.open->bundle->manifest.case_name, name);
     if (file.empty()) {
         app.view.notices.error("There is no folder to record to: set HOME or XDG_DATA_HOME.");
         return;
     }
-    set_exact(app, true);
+    draw_new_attempt(app);
+    const Exercise& exercise = loaded.exercise();
     Result<std::unique_ptr<SessionRun>> run = Error{"there is no picture to record", file, ""};
     const double now_s = steady_seconds() - app.player.clock_start_s;
     loaded.scan->with_engine([&](ScanEngine& engine) {
         run = SessionRun::start(file, *loaded.open, engine, app.player.arguments.trainee, utc_now(),
-                                now_s);
+                                now_s, loaded.attempt_seed);
     });
     if (!run) {
         app.view.notices.error(run.error().message());
@@ -104,6 +148,32 @@ void toggle_attempt(App& app) {
     } else {
         start_attempt(app, "");
     }
+}
+
+bool may_leave_attempt(App& app, const std::string& key) {
+    constexpr double kAskedForS = 4;
+    if (!app.scan.attempt || app.player.now_s - app.scan.leave_asked_s < kAskedForS) return true;
+    app.scan.leave_asked_s = app.player.now_s;
+    app.view.notices.warning("An attempt is running. " + key +
+                             " again ends it as it is; B finishes it and shows the result.");
+    return false;
+}
+
+void show_next_hint(App& app) {
+    if (!app.scan.attempt || !app.loaded.open) return;
+    const Exercise& exercise = app.loaded.exercise();
+    if (exercise.mode == ExerciseMode::exam) {
+        app.view.notices.news("An exam gives no hints.");
+        return;
+    }
+    const int most = static_cast<int>(exercise.hints.size()) + 1;
+    app.scan.hints_shown = std::min(app.scan.hints_shown + 1, most);
+}
+
+bool shows_targets(const ScanState& scan, const Exercise& exercise) {
+    if (!scan.attempt) return true;
+    return exercise.mode == ExerciseMode::practice &&
+           scan.hints_shown > static_cast<int>(exercise.hints.size());
 }
 
 void mark_targets_reached(const Exercise& exercise,

@@ -23,6 +23,14 @@ void start_attempt(App& app, const std::string& path);
 // Ends the recording and shows the scores. Does nothing unless an attempt runs.
 void finish_attempt(App& app);
 void toggle_attempt(App& app);
+// True if nothing would be lost by leaving: no attempt runs, or the user was asked in the last 4 s
+// and insists. Else asks, in a notice. key: that was pressed, as in "F5".
+bool may_leave_attempt(App& app, const std::string& key);
+// Practice: the exercise's next hint; after the last of them the targets are shown.
+void show_next_hint(App& app);
+// False while an attempt runs that does not show where the targets are: an exam, or practice
+// before all hints were asked for.
+bool shows_targets(const ScanState& scan, const Exercise& exercise);
 // Sends each live frame to the attempt and to the server, as far as they exist. When it returns,
 // the scan thread no longer uses an attempt that ended.
 void observe_frames(const ScanState& scan, ScanThread& thread);

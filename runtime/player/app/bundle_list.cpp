@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <set>
 #include <sstream>
 
@@ -14,6 +16,22 @@ namespace sonocase::runtime {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+// The first bytes of every bundle (docs/format.md): a file that was cut off or is something else is
+// not offered.
+bool looks_like_a_bundle(const fs::path& path) {
+    constexpr unsigned char kMagic[] = {0x89, 'S', 'O', 'N', 'O'};
+    constexpr std::uintmax_t kLeastBytes = 64;
+    std::error_code failed;
+    if (fs::file_size(path, failed) < kLeastBytes || failed) return false;
+    char first[sizeof kMagic] = {};
+    std::ifstream in(path, std::ios::binary);
+    return in.read(first, sizeof first) && std::memcmp(first, kMagic, sizeof kMagic) == 0;
+}
+
+}  // namespace
+
 std::vector<BundleEntry> find_bundles(const std::vector<std::string>& recent) {
     std::vector<BundleEntry> entries;
     std::set<std::string> seen;
@@ -21,6 +39,7 @@ std::vector<BundleEntry> find_bundles(const std::vector<std::string>& recent) {
         std::error_code failed;
         const fs::path whole = fs::weakly_canonical(path, failed);
         if (failed || !fs::is_regular_file(whole, failed)) return;
+        if (!looks_like_a_bundle(whole)) return;
         if (!seen.insert(whole.string()).second) return;
         BundleEntry entry;
         entry.path = whole.string();

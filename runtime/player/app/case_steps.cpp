@@ -58,18 +58,20 @@ void close_bundle(App& app) {
     loaded.guide.reset();
     forget_tracker(app.scan.tracker);
     loaded.anatomy.reset();
+    loaded.drawn.reset();
     loaded.skin.reset();
     loaded.open.reset();
 }
 
-bool open_bundle(App& app, const std::string& path, const std::string& exercise) {
+bool open_bundle(App& app, const std::string& given_path, const std::string& exercise) {
     Notices& notices = app.view.notices;
+    const std::string path = expand_home(given_path);
     Result<std::unique_ptr<OpenCase>> opened = open_case_to_render(path);
     if (!opened) {
         notices.error(opened.error().message());
         return false;
     }
-    Result<int> index = find_exercise(**opened, exercise);
+    Result<int> index = choose_or_load_exercise(**opened, exercise);
     if (!index) {
         notices.error(index.error().message());
         index = 0;
@@ -99,6 +101,7 @@ void choose_exercise(App& app, int index) {
     CaseState& loaded = app.loaded;
     const int count = static_cast<int>(loaded.open->exercises.size());
     loaded.exercise_index = (index % count + count) % count;
+    loaded.drawn.reset();
     const Exercise& exercise = loaded.exercise();
     const int side_px = loaded.image.width_px;
     loaded.image = initial_image(app.player.arguments, exercise);
@@ -183,6 +186,10 @@ void follow_setup(CaseState& loaded, const SensorAssignment& assignment, double 
 }
 
 bool save_calibrations(const Calibrations& calibrations, Settings& settings, Notices& notices) {
+    if (!calibrations.probe && !calibrations.needle && !calibrations.mannequin) {
+        notices.warning("There is nothing to save yet: no tool has been calibrated.");
+        return false;
+    }
     std::string folder = data_folder();
     if (folder.empty()) {
         notices.error("There is no folder to save to: set HOME or XDG_DATA_HOME.");

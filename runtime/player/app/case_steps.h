@@ -10,7 +10,8 @@
 
 namespace sonocase::runtime {
 
-// Opens a bundle in place of the open one and shows it. exercise: a name; empty: the first.
+// Opens a bundle in place of the open one and shows it. A path may begin with "~/". exercise: a
+// name or a TOML file; empty: the first.
 // False, and the open case stays, if the bundle cannot be opened.
 bool open_bundle(App& app, const std::string& path, const std::string& exercise);
 // Ends an attempt and lets go of tracker and engine.
@@ -40,7 +41,8 @@ Status load_initial_calibrations(const PlayerState& player, CaseState& loaded, N
 // While set-up is shown, once per picture: hands a reading to the guide and uses what it has found
 // at once, so that the picture shows it.
 void follow_setup(CaseState& loaded, const SensorAssignment& assignment, double now_s);
-// Saves the calibrations in use for later runs; false, with a notice, if that fails.
+// Saves the calibrations in use for later runs; false, with a notice, if that fails or
+// none is in use; what was saved before then stays.
 bool save_calibrations(const Calibrations& calibrations, Settings& settings, Notices& notices);
 
 }  // namespace sonocase::runtime

@@ -39,6 +39,7 @@ struct ScanFrame {
     SensorVerdict probe_verdict = SensorVerdict::absent, needle_verdict = SensorVerdict::absent;
     double rendered_s = 0;  // when finished, session clock
     double frame_ms = 0;
+    bool waiting = false;  // for the first reading of the tracker: the picture is black
     bool frozen = false;
     int cine_frames = 0;    // that are kept
     double cine_age_s = 0;  // time from the frame shown to the newest one

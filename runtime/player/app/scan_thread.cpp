@@ -64,6 +64,10 @@ void ScanThread::set_tracker(std::shared_ptr<Tracker> tracker) {
         const std::lock_guard lock(mutex_);
         if (tracker_) tracker_->set_wake({});
         tracker_ = std::move(tracker);
+        // What the tracker before it reported is not this one's.
+        reading_ = {};
+        waiting_ = tracker_ != nullptr;
+        redraw_ = true;
         if (tracker_) tracker_->set_wake([this] { wake(); });
     }
     wake();
@@ -136,6 +140,7 @@ bool ScanThread::poll_tracker(double now_s) {
     const bool arrived = tracker_->poll(now_s, reading);
     next_reading_s_ = tracker_->next_s();
     if (arrived) {
+        waiting_ = false;
         reading_ = reading;
         engine_->observe(reading_, tracker_->is_device());
     }
@@ -157,6 +162,7 @@ void ScanThread::render_kept(ScanFrame& out) {
 
 void ScanThread::describe(ScanFrame& out, double now_s) const {
     out.frozen = controls_.frozen;
+    out.waiting = waiting_ && !controls_.frozen;
     out.reading = reading_;
     out.layout = engine_->renderer().layout();
     out.depth_mm = engine_->exercise().probe.depth_mm;
@@ -165,8 +171,8 @@ void ScanThread::describe(ScanFrame& out, double now_s) const {
     const auto costs = engine_->renderer().costs();
     out.cost_count = static_cast<int>(std::min<std::size_t>(costs.size(), kMaxEffects));
     std::copy_n(costs.begin(), out.cost_count, out.costs.begin());
-    out.probe_verdict = engine_->probe_verdict(now_s);
-    out.needle_verdict = engine_->needle_verdict(now_s);
+    out.probe_verdict = waiting_ ? SensorVerdict::absent : engine_->probe_verdict(now_s);
+    out.needle_verdict = waiting_ ? SensorVerdict::absent : engine_->needle_verdict(now_s);
 }
 
 // Statistics and cine loop of a live frame. arrived: with a new reading.
@@ -211,6 +217,11 @@ bool ScanThread::step() {
     if (live) {
         out.status = engine_->frame(now_s, controls_.settings, out.pixels);
         out.record = engine_->last();
+        if (waiting_) {
+            std::fill(out.pixels.begin(), out.pixels.end(), std::uint8_t{0});
+            out.record.tools = {};
+            out.record.needle = {};
+        }
     } else {
         render_kept(out);
     }

@@ -78,6 +78,7 @@ class ScanThread {
     Mailbox<ScanControls> controls_box_;
     ScanControls controls_;
     bool redraw_ = false;
+    bool waiting_ = false;  // for the tracker's first reading
 
     std::vector<FrameRecord> cine_;  // ring
     std::size_t cine_next_ = 0, cine_count_ = 0;

@@ -12,6 +12,7 @@
 //   ViewState    the screen: window, page, what is shown on it. Changed by panels and keys.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <set>
@@ -61,8 +62,13 @@ struct CaseState {
     // Its engine points into `open`. Last, so that it is destroyed, and its thread ended, first.
     std::unique_ptr<ScanThread> scan;
 
+    // The exercise with the targets and the start of the attempt that runs or ran last; null: as
+    // written.
+    std::optional<Exercise> drawn;
+    std::uint64_t attempt_seed = 0;  // that it was drawn with
+
     const Exercise& exercise() const {
-        return open->exercises[static_cast<std::size_t>(exercise_index)];
+        return drawn ? *drawn : open->exercises[static_cast<std::size_t>(exercise_index)];
     }
     const ScanFrame& frame() const { return scan->frame(); }
     // Centres of the exercise's targets in the frame shown, where breathing has moved them;
@@ -94,6 +100,8 @@ struct ScanState {
     std::shared_ptr<IgtlServer> server;  // --serve
     std::optional<SessionScore> score;   // of the last attempt
     std::string score_file;              // the recording of that attempt
+    int hints_shown = 0;                 // of the exercise's in this attempt; one more: the targets
+    double leave_asked_s = -1e9;         // when the user was asked whether to end the attempt
     std::vector<bool> targets_reached;   // # targets; in free scanning or in the attempt
 };
 

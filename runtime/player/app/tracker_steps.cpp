@@ -48,6 +48,13 @@ void choose_tracker(App& app, const std::string& spec) {
     loaded.scan->set_tracker(std::shared_ptr<Tracker>(std::move(*made)));
 }
 
+void put_mouse_at_start(App& app) {
+    TrackerInUse& tracker = app.scan.tracker;
+    if (!tracker.mouse) return;
+    tracker.mouse = std::make_unique<MouseTracker>(*app.loaded.skin, app.loaded.exercise());
+    feed_mouse(tracker, steady_seconds() - app.player.clock_start_s);
+}
+
 void step_tracker(App& app, bool back) {
     std::vector<const TrackerKind*> kinds;
     int at = 0;

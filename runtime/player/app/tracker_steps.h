@@ -11,6 +11,8 @@ namespace sonocase::runtime {
 
 // spec: as --tracker takes it. One that cannot be made becomes a notice, and the mouse is used.
 void choose_tracker(App& app, const std::string& spec);
+// The mouse at the start of the exercise, without a needle. Does nothing unless it is in use.
+void put_mouse_at_start(App& app);
 // The next tracker of those that F7 steps through, or the one before.
 void step_tracker(App& app, bool back);
 // Lets go of what the window's thread holds of the tracker.

@@ -17,6 +17,12 @@ std::string folder_of(const char* variable, const char* below_home) {
 
 }  // namespace
 
+std::string expand_home(const std::string& path) {
+    const char* home = std::getenv("HOME");
+    const bool begins = !path.empty() && path[0] == '~' && (path.size() == 1 || path[1] == '/');
+    return begins && home && *home ? home + path.substr(1) : path;
+}
+
 std::string config_folder() {
     return folder_of("XDG_CONFIG_HOME", "/.config/sonocase");
 }

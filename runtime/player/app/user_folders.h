@@ -13,4 +13,8 @@ std::string config_folder();
 // without a home folder.
 std::string data_folder();
 
+// "~" or "~/x" with the user's home folder in place of "~", as a shell does it; anything else
+// unchanged.
+std::string expand_home(const std::string& path);
+
 }  // namespace sonocase::runtime

@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "formats/attempt/draw_attempt.h"
 #include "formats/base/event.h"
 #include "runtime/player/headless/frame_files.h"
 #include "runtime/player/headless/truth_files.h"
@@ -83,6 +84,7 @@ class HeadlessRun {
 
     std::unique_ptr<OpenCase> open_;
     const Exercise* exercise_ = nullptr;
+    std::uint64_t seed_ = 0;  // of the attempt
     Calibrations calibrations_;
     std::optional<ScanEngine> engine_;
     std::unique_ptr<Skin> skin_;
@@ -116,9 +118,20 @@ Status HeadlessRun::set_up_case() {
     if (!opened) return opened.error();
     open_ = std::move(*opened);
     for (const std::string& warning : open_->warnings) warn(warning);
-    const Result<int> index = find_exercise(*open_, arguments_.exercise);
+    const Result<int> index = choose_or_load_exercise(*open_, arguments_.exercise);
     if (!index) return index.error();
-    exercise_ = &open_->exercises[static_cast<std::size_t>(*index)];
+    Exercise& exercise = open_->exercises[static_cast<std::size_t>(*index)];
+    exercise_ = &exercise;
+    // A replayed session brings its targets and the console's settings along.
+    if (arguments_.tracker.compare(0, 7, "replay:") == 0)
+        replay_ = session_replay(arguments_.tracker.substr(7));
+    seed_ = arguments_.attempt_seed >= 0 ? static_cast<std::uint64_t>(arguments_.attempt_seed)
+            : replay_ && replay_->header.exercise == exercise.name ? attempt_seed(replay_->header)
+                                                                   : 0;
+    AttemptDraw drawn =
+        draw_attempt(exercise, CaseAnatomy(open_->bundle), open_->bundle->labels, seed_);
+    exercise = std::move(drawn.exercise);
+    for (const std::string& warning : drawn.warnings) warn(warning);
     const Result<Calibrations> calibrations = load_calibrations(arguments_.calibrations);
     if (!calibrations) return calibrations.error();
     calibrations_ = *calibrations;
@@ -150,8 +163,6 @@ Status HeadlessRun::set_up_tracker() {
     tracker_ = std::move(*made);
     tracker_->set_wake([this] { reading_arrived_.notify(); });
     frames_ = frame_count(arguments_, *tracker_);
-    // A replayed session brings the console's settings along.
-    if (spec_.compare(0, 7, "replay:") == 0) replay_ = session_replay(spec_.substr(7));
     return Done{};
 }
 
@@ -169,7 +180,7 @@ Status HeadlessRun::set_up_outputs() {
     }
     if (!arguments_.record.empty()) {
         auto session = SessionRun::start(arguments_.record, *open_, *engine_, arguments_.trainee,
-                                         utc_now(), 0);
+                                         utc_now(), 0, seed_);
         if (!session) return session.error();
         session_ = std::move(*session);
     }

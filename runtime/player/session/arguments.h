@@ -4,6 +4,7 @@
 // fills it in.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,11 @@ namespace sonocase::runtime {
 
 struct PlayerArguments {
     std::string bundle;    // empty: the list of bundles
-    std::string exercise;  // empty: the first of the bundle
-    std::string tracker;   // empty: mouse in a window, the first sweep when headless
+    std::string exercise;  // name, or a TOML file; empty: the first of the bundle
+    // Of the attempt's target positions; 0: as written. Negative: new for each attempt in a window,
+    // the recording's own where one is replayed, else 0.
+    std::int64_t attempt_seed = -1;
+    std::string tracker;  // empty: mouse in a window, the first sweep when headless
     bool headless = false;
     int frames = 0;                   // 0: all of the sweep or recording
     int width_px = 0, height_px = 0;  // 0: 512 x 512 when headless, the window's default otherwise

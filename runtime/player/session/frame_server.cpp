@@ -11,7 +11,6 @@ void serve_frame(IgtlServer& server,
                  int height_px,
                  double unix_time_s,
                  std::span<const std::uint8_t> pixels) {
-    if (server.clients() == 0) return;
     ServedFrame& out = server.slot();
     out.unix_time_s = unix_time_s;
     out.width_px = width_px;

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "formats/base/digest.h"
+#include "formats/files/atomic_file.h"
 #include "formats/files/bundle_file.h"
+#include "formats/scoring/anatomy.h"
 
 namespace sonocase::runtime {
 
@@ -43,6 +46,7 @@ Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
         }
         if (exercise->name.empty()) exercise->name = embedded.name;
         open->exercises.push_back(std::move(*exercise));
+        open->exercise_digests.push_back(digest_of(embedded.toml));
     }
     if (open->exercises.empty()) open->exercises.push_back(free_scan(*open->bundle));
     return open;
@@ -62,6 +66,35 @@ Result<int> find_exercise(const OpenCase& open, const std::string& name) {
         names += (i ? ", " : "") + open.exercises[i].name;
     }
     return Error{"no exercise named " + name, open.path, "this bundle holds: " + names};
+}
+
+Result<int> choose_or_load_exercise(OpenCase& open, const std::string& name_or_file) {
+    const std::string& file = name_or_file;
+    if (file.size() < 5 || file.compare(file.size() - 5, 5, ".toml") != 0)
+        return find_exercise(open, name_or_file);
+    const Result<std::string> text = read_text_file(file);
+    if (!text) return text.error();
+    Result<Exercise> exercise = parse_exercise(*text, file);
+    if (!exercise) return exercise.error();
+    const CaseAnatomy anatomy(open.bundle);
+    for (const Target& target : exercise->targets) {
+        const auto label = static_cast<std::size_t>(anatomy.label(target.centre));
+        const std::string found =
+            label == 0 ? "outside the body" : "in '" + open.bundle->labels[label].name + "'";
+        if (label == 0 ||
+            (!target.inside.empty() && target.inside != open.bundle->labels[label].name))
+            return Error{"target '" + target.name + "' lies " + found, file,
+                         label == 0 ? "a place inside, in the frame mannequin"
+                                    : "it is to lie in '" + target.inside + "'"};
+    }
+    open.exercise_digests.resize(open.exercises.size());
+    std::size_t at = 0;
+    while (at < open.exercises.size() && open.exercises[at].name != exercise->name) ++at;
+    open.exercises.resize(std::max(open.exercises.size(), at + 1));
+    open.exercise_digests.resize(open.exercises.size());
+    open.exercises[at] = std::move(*exercise);
+    open.exercise_digests[at] = digest_of(*text);
+    return static_cast<int>(at);
 }
 
 }  // namespace sonocase::runtime

@@ -17,6 +17,7 @@ struct OpenCase {
     std::string path;
     StreamedBundle bundle;
     std::vector<Exercise> exercises;                   // at least one: without any, a free scan
+    std::vector<std::string> exercise_digests;         // of their TOML; may be shorter
     std::shared_ptr<const PhysicalTextures> textures;  // null: each renderer makes its own
     std::vector<std::string> warnings;                 // whole sentences
 };
@@ -31,6 +32,11 @@ Status bundle_health(const OpenCase& open);
 
 // Index of the exercise of that name, or an Error that lists the names; "" means the first.
 Result<int> find_exercise(const OpenCase& open, const std::string& name);
+
+// The same; but a name that ends in .toml is a file whose exercise is added to those of the case,
+// in place of one of the same name. Its places are in the frame `mannequin`. Errors: also a file
+// that cannot be read or parsed, or that is written for a CT, and targets outside the body.
+Result<int> choose_or_load_exercise(OpenCase& open, const std::string& name_or_file);
 
 // A free scan of any bundle: the probe starts above the middle of its volume.
 Exercise free_scan(const CaseBundle& bundle);

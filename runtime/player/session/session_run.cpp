@@ -16,6 +16,8 @@
 namespace sonocase::runtime {
 namespace {
 
+constexpr double kLeastAttemptS = 3;  // shorter ones are slips of the hand
+
 // Why a frame with these events is kept as a picture; null: it is not.
 const char* picture_reason(std::span<const LiveEvent> events) {
     for (const LiveEvent& event : events) {
@@ -63,14 +65,18 @@ Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
                                                       ScanEngine& engine,
                                                       const std::string& trainee,
                                                       const std::string& started,
-                                                      double now_s) {
+                                                      double now_s,
+                                                      std::uint64_t attempt_seed) {
     std::unique_ptr<SessionRun> run(new SessionRun(open, engine, path));
     SessionHeader header;
     header.case_name = open.bundle->manifest.case_name;
     header.exercise = run->exercise_.name;
-    for (const EmbeddedExercise& embedded : open.bundle->exercises) {
-        if (embedded.name == header.exercise) header.exercise_digest = digest_of(embedded.toml);
+    for (std::size_t i = 0; i < std::min(open.exercises.size(), open.exercise_digests.size());
+         ++i) {
+        if (open.exercises[i].name == header.exercise)
+            header.exercise_digest = open.exercise_digests[i];
     }
+    if (attempt_seed != 0) header.attempt = "seed=" + std::to_string(attempt_seed);
     header.trainee = trainee;
     header.started = started;
     header.program = "sonoplay";
@@ -140,7 +146,11 @@ Result<SessionScore> SessionRun::finish() {
     options.jobs = &jobs;
     SessionScore score =
         score_session(*session, exercise_, anatomy_.get(), open_.bundle->labels, options);
-    if (!session->header.trainee.empty()) {
+    const auto& samples = session->samples;
+    const double seconds = samples.empty() ? 0 : samples.back().time_s - samples.front().time_s;
+    if (!session->header.trainee.empty() && seconds < kLeastAttemptS) {
+        score.warnings.push_back("An attempt this short is not put into the progress book.");
+    } else if (!session->header.trainee.empty()) {
         // A session that cannot be added to the book still has scores: the trainee sees them, and
         // why.
         std::error_code failed;

@@ -19,14 +19,15 @@ namespace sonocase::runtime {
 class SessionRun {
   public:
     // Begins the engine's session clock at now_s. `open` must outlive the run; the engine may be
-    // replaced meanwhile (ScanEngine::take_over). `started`: ISO 8601, UTC. Errors: a recording
-    // that cannot be created.
+    // replaced meanwhile (ScanEngine::take_over). `started`: ISO 8601, UTC. attempt_seed: that the
+    // engine's exercise was drawn with. Errors: a recording that cannot be created.
     static Result<std::unique_ptr<SessionRun>> start(const std::string& path,
                                                      const OpenCase& open,
                                                      ScanEngine& engine,
                                                      const std::string& trainee,
                                                      const std::string& started,
-                                                     double now_s);
+                                                     double now_s,
+                                                     std::uint64_t attempt_seed = 0);
 
     // Takes the frame that the engine just rendered. Allocates nothing and waits for nothing,
     // unless `may_wait` (for runs faster than real time). Returns what happened, valid until the

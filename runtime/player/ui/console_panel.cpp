@@ -41,7 +41,7 @@ void draw_tgc(ImageSettings& image, double depth_mm, float s) {
         double& gain_db = image.tgc_db[static_cast<std::size_t>(i)];
         float value = static_cast<float>(gain_db);
         ImGui::AlignTextToFramePadding();
-        ImGui::TextDisabled("%.0f cm", depth_mm / 80 * (i + 0.5));
+        ImGui::TextDisabled("%.1f cm", depth_mm / 80 * (i + 0.5));
         ImGui::SameLine(58 * s);
         ImGui::SetNextItemWidth(-30 * s);
         if (ImGui::SliderFloat("##tgc", &value, -20, 20, "")) gain_db = value;

@@ -11,7 +11,7 @@
 
 namespace sonocase::runtime {
 
-void draw_effects_panel(const ScanFrame& frame) {
+void draw_effects_panel(const ScanFrame& frame, float s) {
     heading("Effects");
     char total[48];
     std::snprintf(total, sizeof total, "%.2f ms per frame", frame.frame_ms);
@@ -42,7 +42,7 @@ void draw_effects_panel(const ScanFrame& frame) {
         } else {
             std::snprintf(value, sizeof value, "%s", cost.skipped_because);
         }
-        ImGui::SameLine(std::max(right - ImGui::CalcTextSize(value).x, 90.0f));
+        ImGui::SameLine(std::max(right - ImGui::CalcTextSize(value).x, 90 * s));
         ImGui::TextUnformatted(value);
         ImGui::PopStyleColor();
     }

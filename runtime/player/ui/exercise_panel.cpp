@@ -3,6 +3,7 @@
 // The exercise: what to do, where the needle is, how the attempt goes.
 #include <imgui.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -37,7 +38,26 @@ void draw_targets(const ExercisePanelInput& input) {
                 reached ? colour::kGood : colour::kDim);
         }
     }
-    if (record.tools.has_needle) row("Needle depth", "%.0f mm", record.needle.depth_mm);
+    if (record.tools.has_needle && record.needle.depth_mm > 0) {
+        row("Needle depth", "%.0f mm", record.needle.depth_mm);
+    } else {
+        row("Needle", "not inserted", colour::kDim);
+    }
+}
+
+// Those asked for so far, and a button for the next.
+void draw_hints(const ExercisePanelInput& input, ExercisePanelRequest& request) {
+    if (input.exercise.mode == ExerciseMode::exam) {
+        small_dim("Exam: no hints, no targets shown.");
+        return;
+    }
+    const int count = static_cast<int>(input.exercise.hints.size());
+    for (int i = 0; i < std::min(input.hints_shown, count); ++i)
+        ImGui::TextWrapped("%s", input.exercise.hints[static_cast<std::size_t>(i)].c_str());
+    if (input.hints_shown <= count) {
+        request.next_hint = ImGui::Button(
+            input.hints_shown < count ? "Next hint (H)" : "Show the target (H)", {-1, 0});
+    }
 }
 
 void draw_attempt(const AttemptView& view) {
@@ -48,7 +68,7 @@ void draw_attempt(const AttemptView& view) {
     row("Recording", clock, colour::kBad);
     row("Insertions", "%.0f", static_cast<double>(view.insertions));
     if (view.depth_mm > 0) {
-        row("Tip", view.tip_in_view ? "in the picture" : "out of the plane",
+        row("Tip", view.tip_in_view ? "visible" : "not visible",
             view.tip_in_view ? colour::kGood : colour::kWarn);
     }
     if (view.in_no_go) coloured(colour::kBad, "The needle is in a structure to be spared.");
@@ -65,8 +85,9 @@ ExercisePanelRequest draw_exercise_panel(const ExercisePanelInput& input) {
     request.toggle_attempt =
         coloured_button(input.attempt ? colour::rgba(150, 58, 54) : colour::rgba(32, 112, 92),
                         input.attempt ? "Finish (B)" : "Start attempt (B)", wide);
-    draw_targets(input);
+    if (input.shows_targets) draw_targets(input);
     if (input.attempt) {
+        draw_hints(input, request);
         draw_attempt(input.attempt->view());
     } else if (input.score) {
         ImGui::Separator();

@@ -93,16 +93,18 @@ void draw_grey_bar(const ImagePlace& place, float s) {
 }
 
 // A sentence on the picture where the frame is not one of tissue.
-void draw_status(const ImagePlace& place, FrameStatus status, bool skin_not_fitted) {
-    const bool no_contact = status == FrameStatus::no_contact;
-    const bool held = status == FrameStatus::held_bad_pose;
-    if (!no_contact && !held && !skin_not_fitted) return;
-    const char* words = no_contact ? "No contact: press the probe onto the skin"
-                        : held     ? "Pose is not usable: picture held"
-                                   : "Not fitted here: the mannequin was not swept";
+void draw_status(const ImagePlace& place, const ScanFrame& frame) {
+    const bool no_contact = frame.status == FrameStatus::no_contact;
+    const bool held = frame.status == FrameStatus::held_bad_pose;
+    const bool nothing = frame.waiting || no_contact || held;
+    if (!nothing && !frame.record.skin_not_fitted) return;
+    const char* words = frame.waiting ? "No reading from the tracker yet"
+                        : no_contact  ? "No contact: press the probe onto the skin"
+                        : held        ? "Pose is not usable: picture held"
+                                      : "Not fitted here: the mannequin was not swept";
     const ImVec2 wide = ImGui::CalcTextSize(words);
     // Over a picture of tissue the words stand at its foot.
-    const float height = no_contact || held ? 0.55f : 0.93f;
+    const float height = nothing ? 0.55f : 0.93f;
     text_at(ImGui::GetWindowDrawList(), place.x + 0.5f * (place.side_x - wide.x),
             place.y + height * place.side_y, no_contact ? colour::kDim : colour::kWarn, words);
 }
@@ -225,7 +227,7 @@ ImagePlace draw_image_view(float width, float height, const ImageViewInput& inpu
         draw_depth_scale(place, input);
         draw_orientation_mark(place, input);
         draw_grey_bar(place, input.scale);
-        draw_status(place, frame.status, frame.record.skin_not_fitted);
+        draw_status(place, frame);
         ImGui::PopFont();
         draw_measurements(place, input);
         draw->PopClipRect();

@@ -42,7 +42,8 @@ void move_probe(MouseTracker& mouse, double seconds) {
         mouse.press(12 * slow * push * seconds);
 }
 
-void move_needle(MouseTracker& mouse, double seconds) {
+// A and D move the tip to the left and to the right on the screen.
+void move_needle(MouseTracker& mouse, bool flipped, double seconds) {
     if (!mouse.has_needle()) return;
     const ImGuiIO& io = ImGui::GetIO();
     const double slow = io.KeyAlt ? 0.25 : 1;
@@ -50,17 +51,18 @@ void move_needle(MouseTracker& mouse, double seconds) {
         mouse.advance_needle(25 * slow * in * seconds);
     const double aim = axis(GLFW_KEY_A, GLFW_KEY_D), out = axis(GLFW_KEY_Z, GLFW_KEY_X);
     if (aim != 0 || out != 0)
-        mouse.aim_needle(-0.35 * slow * aim * seconds, 0.35 * slow * out * seconds);
+        mouse.aim_needle(0.35 * slow * (flipped ? -aim : aim) * seconds,
+                         0.35 * slow * out * seconds);
     if (io.KeyShift && mouse.needle_depth_mm() <= 0) {
         const double side = axis(GLFW_KEY_J, GLFW_KEY_L), up = axis(GLFW_KEY_K, GLFW_KEY_I);
         if (side != 0 || up != 0) mouse.slide_needle(30 * side * seconds, 30 * up * seconds);
     }
 }
 
-void move_tools(MouseTracker* mouse, double seconds) {
+void move_tools(MouseTracker* mouse, bool flipped, double seconds) {
     if (!mouse || ImGui::GetIO().KeyCtrl) return;
     move_probe(*mouse, seconds);
-    move_needle(*mouse, seconds);
+    move_needle(*mouse, flipped, seconds);
     if (pressed(GLFW_KEY_HOME)) mouse->reset();
 }
 
@@ -100,8 +102,9 @@ void change_time(ScanState& scan, int kept) {
 
 void change_console(App& app, double seconds) {
     ImageSettings& image = app.scan.controls.settings;
-    if (const double gain = axis(GLFW_KEY_MINUS, GLFW_KEY_EQUAL))
-        image.gain_db = std::clamp(image.gain_db + 12 * gain * seconds, -30.0, 30.0);
+    // With Ctrl they change the size of the text.
+    const double gain = ImGui::GetIO().KeyCtrl ? 0 : axis(GLFW_KEY_MINUS, GLFW_KEY_EQUAL);
+    if (gain != 0) image.gain_db = std::clamp(image.gain_db + 12 * gain * seconds, -30.0, 30.0);
     if (change_tgc(image, seconds)) return;
     change_time(app.scan, app.loaded.frame().cine_frames);
     if (pressed(GLFW_KEY_LEFT_BRACKET, true)) change_depth(app, -10);
@@ -129,7 +132,8 @@ void handle_window_keys(App& app) {
     };
     if (pressed(GLFW_KEY_F1)) app.view.show_help = !app.view.show_help;
     if (pressed(GLFW_KEY_F11)) window.toggle_full_screen();
-    if (io.KeyCtrl && pressed(GLFW_KEY_Q)) window.request_close();
+    if (io.KeyCtrl && pressed(GLFW_KEY_Q) && may_leave_attempt(app, "Ctrl + Q"))
+        window.request_close();
     if (io.KeyCtrl && (pressed(GLFW_KEY_EQUAL) || pressed(GLFW_KEY_KP_ADD)))
         resize(window.scale() * 1.1);
     if (io.KeyCtrl && (pressed(GLFW_KEY_MINUS) || pressed(GLFW_KEY_KP_SUBTRACT)))
@@ -153,7 +157,8 @@ void handle_function_keys(App& app) {
     Settings& settings = app.player.settings;
     if (pressed(GLFW_KEY_F2)) show_bundles(app.player, app.view);
     if (pressed(GLFW_KEY_F3)) app.view.show_setup = !app.view.show_setup;
-    if (pressed(GLFW_KEY_F5)) choose_exercise(app, app.loaded.exercise_index + (shift ? -1 : 1));
+    if (pressed(GLFW_KEY_F5) && may_leave_attempt(app, "F5"))
+        choose_exercise(app, app.loaded.exercise_index + (shift ? -1 : 1));
     if (pressed(GLFW_KEY_F6))
         choose_model(app, app.loaded.image.model == "paper" ? "physical" : "paper");
     if (pressed(GLFW_KEY_F7)) step_tracker(app, shift);
@@ -178,6 +183,7 @@ void handle_scan_keys(App& app) {
     if (pressed(GLFW_KEY_C)) view.measurements.clear();
     if (pressed(GLFW_KEY_F)) flipped = !flipped;
     if (pressed(GLFW_KEY_B)) toggle_attempt(app);
+    if (pressed(GLFW_KEY_H)) show_next_hint(app);
     if (pressed(GLFW_KEY_N)) {
         toggle_needle(scan.tracker, app.loaded.exercise().probe, !ImGui::GetIO().KeyShift,
                       view.notices);
@@ -199,7 +205,7 @@ void handle_keys(App& app, double seconds) {
     handle_function_keys(app);
     if (app.view.show_setup) return;
     handle_scan_keys(app);
-    move_tools(app.scan.tracker.mouse.get(), seconds);
+    move_tools(app.scan.tracker.mouse.get(), app.scan.controls.settings.flip_left_right, seconds);
     press_probe(app.scan.controls.settings, app.scan.tracker.mouse != nullptr, seconds);
     change_console(app, seconds);
 }

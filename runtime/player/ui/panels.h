@@ -42,9 +42,11 @@ struct ExercisePanelInput {
     const Attempt* attempt;                    // null: none runs
     const SessionScore* score;                 // of the last attempt; null: none
     const MouseTracker* mouse;                 // null: not in use
+    bool shows_targets;                        // false: neither distances nor places
+    int hints_shown;
 };
 struct ExercisePanelRequest {
-    bool toggle_attempt = false, show_score = false, toggle_needle = false;
+    bool toggle_attempt = false, show_score = false, toggle_needle = false, next_hint = false;
 };
 ExercisePanelRequest draw_exercise_panel(const ExercisePanelInput& input);
 
@@ -71,13 +73,14 @@ ConsoleRequest draw_console_panel(ScanControls& controls,
                                   float scale);
 
 // Times of the effects, from the frame shown.
-void draw_effects_panel(const ScanFrame& frame);
+void draw_effects_panel(const ScanFrame& frame, float scale);
 
 struct View3dPanelInput {
     const ScanFrame& frame;
     const ImageTexture& texture;
     std::span<const Point3> target_centres;
     const std::vector<bool>& targets_reached;
+    bool shows_targets;
     bool flipped;
     double now_s;
     const Skin& skin;

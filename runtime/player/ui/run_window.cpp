@@ -3,6 +3,7 @@
 #include "runtime/player/ui/run_window.h"
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 
 #include "runtime/display/input_script.h"
@@ -19,6 +20,14 @@ namespace sonocase::runtime {
 namespace {
 
 constexpr double kPictureTime = 1 / 60.0;  // seconds from one picture to the next
+constexpr double kStillTime = 0.25;        // where nothing moves
+
+// Set by SIGTERM, SIGINT and SIGHUP: a session that ends, or a system that shuts down, ends the
+// program as the user does, with settings and recordings kept.
+volatile std::sig_atomic_t g_asked_to_end = 0;
+void ask_to_end(int) {
+    g_asked_to_end = 1;
+}
 
 void apply_settings(const Settings& settings, ScanControls& controls) {
     controls.settings.gain_db = settings.gain_db;
@@ -42,8 +51,13 @@ class PictureClock {
   public:
     // Waits until the next picture is due, or input comes and it is nearly due. 60 pictures per
     // second; a display that paces itself through the swap is not slowed further.
-    void wait(Window& window) {
+    // longest_s: from one picture to the next without input.
+    void wait(Window& window, double longest_s) {
         due_s_ = last_s_ + kPictureTime;
+        // Input ends the longer wait; an end of the program asked for by a signal is seen within
+        // it.
+        if (longest_s > kPictureTime)
+            window.wait_events(std::max(0.0, last_s_ + longest_s - steady_seconds()));
         do {
             window.wait_events(std::max(0.0, due_s_ - steady_seconds()));
         } while (steady_seconds() < due_s_ - 5e-4 && !window.should_close());
@@ -86,6 +100,7 @@ class WindowRun {
     InputScript script_;
     WindowStats stats_;
     int shown_ = 0;  // pictures
+    bool was_frozen_ = false;
 };
 
 Status WindowRun::set_up() {
@@ -149,7 +164,11 @@ void WindowRun::start_scanning() {
 void WindowRun::show_pictures() {
     PictureClock clock;
     while (!app_.view.window->should_close()) {
-        clock.wait(*app_.view.window);
+        // The start page stands still: it is drawn for input, and four times per second.
+        const bool still = app_.view.page == Page::bundles && !script_.active() &&
+                           app_.player.arguments.frames == 0;
+        clock.wait(*app_.view.window, still ? kStillTime : kPictureTime);
+        if (g_asked_to_end) app_.view.window->request_close();
         app_.player.now_s = clock.now_s() - app_.player.clock_start_s;
         app_.view.pictures_per_s = clock.rate();
         show_picture(clock);
@@ -175,6 +194,9 @@ void WindowRun::show_picture(const PictureClock& clock) {
         view.texture->upload(frame.pixels, frame.width_px, frame.height_px);
     }
     handle_keys(app_, clock.seconds());
+    // Calipers belong to the picture that they were set on.
+    if (was_frozen_ && !app_.scan.controls.frozen) view.measurements.clear();
+    was_frozen_ = app_.scan.controls.frozen;
     advance_cine(app_.scan, loaded.frame().cine_frames, now_s);
     const TrackerHealth tracker = loaded.scan->tracker_health();
     check_device(app_.scan.tracker, tracker, loaded, view.notices);
@@ -232,6 +254,7 @@ void WindowRun::finish() {
 Status run_window(const PlayerArguments& arguments, double start_s) {
     WindowRun run(arguments, start_s);
     if (Status done = run.set_up(); !done) return done;
+    for (const int signal : {SIGTERM, SIGINT, SIGHUP}) std::signal(signal, ask_to_end);
     run.show_pictures();
     run.finish();
     return Done{};

@@ -43,7 +43,8 @@ void show_top_bar(App& app, const TrackerHealth& tracker, float height, float s)
     if (request.show_bundles) show_bundles(app.player, app.view);
     if (request.toggle_setup) app.view.show_setup = !app.view.show_setup;
     if (request.toggle_help) app.view.show_help = !app.view.show_help;
-    if (request.exercise) choose_exercise(app, *request.exercise);
+    if (request.exercise && may_leave_attempt(app, "Choosing it"))
+        choose_exercise(app, *request.exercise);
     if (request.machine) app.loaded.image.machine = *request.machine;
     if (request.model) choose_model(app, *request.model);
 }
@@ -54,7 +55,9 @@ void show_exercise_panel(App& app) {
     const ExercisePanelRequest request = draw_exercise_panel(
         {loaded.exercise(), loaded.frame().record, centres, app.scan.targets_reached,
          app.scan.attempt.get(), app.scan.score ? &*app.scan.score : nullptr,
-         app.scan.tracker.mouse.get()});
+         app.scan.tracker.mouse.get(), shows_targets(app.scan, loaded.exercise()),
+         app.scan.hints_shown});
+    if (request.next_hint) show_next_hint(app);
     if (request.toggle_attempt) toggle_attempt(app);
     if (request.show_score) app.view.show_score = true;
     if (request.toggle_needle)
@@ -142,17 +145,18 @@ void show_right_column(App& app, float width, float height, float s) {
     ImGui::BeginChild("right", {width, 0}, false, ImGuiWindowFlags_NoBackground);
     if (settings.show_3d) {
         const std::vector<Point3> centres = loaded.target_centres();
-        draw_view3d_panel(app.view.small_view,
-                          {loaded.frame(), *app.view.texture, centres, app.scan.targets_reached,
-                           app.scan.controls.settings.flip_left_right, app.player.now_s,
-                           *loaded.skin, app.scan.tracker.mouse.get()},
-                          std::min(0.34f * height, 0.8f * width), s);
+        draw_view3d_panel(
+            app.view.small_view,
+            {loaded.frame(), *app.view.texture, centres, app.scan.targets_reached,
+             shows_targets(app.scan, loaded.exercise()), app.scan.controls.settings.flip_left_right,
+             app.player.now_s, *loaded.skin, app.scan.tracker.mouse.get()},
+            std::min(0.34f * height, 0.8f * width), s);
     }
     const float rest = ImGui::GetContentRegionAvail().y;
     const float console = settings.show_effects ? std::min(0.66f * rest, 318 * s) : rest;
     panel("console", console, 5, s, [&] { show_console_panel(app, s); });
     if (settings.show_effects)
-        panel("effects", 0, 4, s, [&] { draw_effects_panel(loaded.frame()); });
+        panel("effects", 0, 4, s, [&] { draw_effects_panel(loaded.frame(), s); });
     ImGui::EndChild();
 }
 

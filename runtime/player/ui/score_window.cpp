@@ -54,6 +54,10 @@ void draw_pass_marks(const SessionScore& score, float s) {
         ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch);
         ImGui::TableSetupColumn("limit", ImGuiTableColumnFlags_WidthFixed, 150 * s);
         ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthFixed, 90 * s);
+        ImGui::TableNextRow();
+        ImGui::TableNextColumn();
+        right_cell(colour::kDim, "Required");
+        right_cell(colour::kDim, "Result");
         for (const PassResult& mark : score.pass_marks) {
             ImGui::TableNextRow();
             ImGui::TableNextColumn();
@@ -71,16 +75,17 @@ void draw_pass_marks(const SessionScore& score, float s) {
     ImGui::Dummy({0, 4 * s});
 }
 
-// Every metric that has a value, in groups.
-void draw_metrics(const SessionScore& score, float s) {
+// Every metric that has a value, in groups. evidence: those with some, or those without.
+void draw_metrics(const SessionScore& score, bool evidence, float s) {
     std::string group;
-    if (!ImGui::BeginTable("metrics", 2, ImGuiTableFlags_RowBg)) return;
+    if (!ImGui::BeginTable(evidence ? "metrics" : "more", 2, ImGuiTableFlags_RowBg)) return;
     ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch);
     ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthFixed, 110 * s);
     for (const Metric& metric : score.metrics) {
         if (!std::isfinite(metric.value)) continue;
         const MetricInfo* info = find_metric(metric.name);
-        if (info && group != info->group) {
+        if (!info || (info->evidence[0] != 0) != evidence) continue;
+        if (group != info->group) {
             group = info->group;
             std::string capitalised = group;
             capitalised[0] = static_cast<char>(capitalised[0] - 'a' + 'A');
@@ -91,7 +96,11 @@ void draw_metrics(const SessionScore& score, float s) {
         }
         ImGui::TableNextRow();
         ImGui::TableNextColumn();
-        ImGui::TextUnformatted(title(metric.name).c_str());
+        ImGui::TextUnformatted(info->title);
+        if (ImGui::IsItemHovered()) {
+            ImGui::SetTooltip("%s: %s%s%s", info->name, metric_range(info->name),
+                              evidence ? "; evidence: " : "", info->evidence);
+        }
         right_cell(colour::kText, with_unit(metric.name, metric.value));
     }
     ImGui::EndTable();
@@ -106,7 +115,9 @@ void draw_score_window(const SessionScore& score, const std::string& file, bool&
         ImGui::BeginChild("all", {0, -2.2f * ImGui::GetTextLineHeightWithSpacing()}, false,
                           ImGuiWindowFlags_NoBackground);
         ImGui::PushFont(fonts().small);
-        draw_metrics(score, s);
+        draw_metrics(score, true, s);
+        if (ImGui::CollapsingHeader("More measures, without published evidence"))
+            draw_metrics(score, false, s);
         ImGui::PopFont();
         ImGui::EndChild();
         small_dim(("Recorded in " + file).c_str());

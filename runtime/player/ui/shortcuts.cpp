@@ -28,7 +28,7 @@ std::span<const Shortcut> shortcuts() {
         {"1 ... 8 held with , .", "TGC; 0 levels it"},
         {"M  C  F", "measure, clear, flip"},
         {nullptr, "Program"},
-        {"B", "start and finish an attempt"},
+        {"B  H", "start and finish an attempt; next hint in practice"},
         {"F1  Escape", "this help; close what is on top"},
         {"F2  F3", "cases (Up, Down, Enter), set-up"},
         {"F5  F6  F7", "next exercise, image model, tracker; Shift goes back"},

@@ -75,11 +75,10 @@ void draw_choices(const TopBarInput& input, TopBarRequest& request, float s) {
 void draw_health(const TopBarInput& input, float s) {
     const std::string& device = input.tracker.device;
     const ScanFrame& frame = input.frame;
-    const std::string latency =
-        frame.pose_to_pixel_median_ms > 0
-            ? text("pose to pixels %.1f ms", frame.pose_to_pixel_median_ms) +
-                  text(" (99%%: %.1f)", frame.pose_to_pixel_p99_ms)
-            : "no pose yet";
+    const std::string latency = frame.pose_to_pixel_median_ms > 0
+                                    ? text("Latency %.1f ms", frame.pose_to_pixel_median_ms) +
+                                          text(" (99%%: %.1f)", frame.pose_to_pixel_p99_ms)
+                                    : "no pose yet";
     const std::string rate = text("%.0f fps", input.pictures_per_s);
     const float wide = ImGui::CalcTextSize(device.c_str()).x +
                        ImGui::CalcTextSize(latency.c_str()).x +

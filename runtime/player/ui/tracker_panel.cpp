@@ -72,8 +72,7 @@ void draw_pace(PacedTracker& paced) {
     }
     float speed = static_cast<float>(paced.speed());
     ImGui::SetNextItemWidth(-1);
-    if (ImGui::SliderFloat("##speed", &speed, 0, 8, "%.2f times as fast",
-                           ImGuiSliderFlags_Logarithmic)) {
+    if (ImGui::SliderFloat("##speed", &speed, 0, 8, "%.2fx speed", ImGuiSliderFlags_Logarithmic)) {
         paced.set_speed(speed);
     }
     if (ImGui::IsItemClicked(1)) paced.set_speed(1);

@@ -27,6 +27,7 @@ View3dInput view_input(const View3dPanelInput& panel) {
     input.image_height_px = frame.height_px;
     input.flipped = panel.flipped;
     input.image_texture = panel.texture.name();
+    input.show_targets = panel.shows_targets;
     input.targets_reached = panel.targets_reached;
     input.target_centres.assign(panel.target_centres.begin(), panel.target_centres.end());
     return input;

@@ -77,12 +77,18 @@ IgtlServer::~IgtlServer() {
 void IgtlServer::run() {
     std::vector<Client> clients;
     std::array<std::uint8_t, 4096> ignored;
+    bool published = false;
     while (!stop_) {
         for (Socket newcomer = listener_.accept(clients.empty() ? 0.05 : 0.002); newcomer.open();
              newcomer = listener_.accept(0)) {
-            if (clients.size() < kMostClients) clients.push_back({std::move(newcomer), {}, 0});
+            if (clients.size() >= kMostClients) continue;
+            clients.push_back({std::move(newcomer), {}, 0});
+            // The frame that is shown: the next may be long in coming.
+            if (published) clients.back().unsent = messages_of(box_.value());
         }
-        if (box_.refresh() && !clients.empty()) {
+        const bool fresh = box_.refresh();
+        published = published || fresh;
+        if (fresh && !clients.empty()) {
             const std::vector<std::uint8_t> messages = messages_of(box_.value());
             for (Client& client : clients) {
                 // Whole messages only: one that has begun is finished before a newer one is taken.

@@ -79,6 +79,20 @@ TEST_F(MouseOnCylinder, HandsOverOnlyChanges) {
     EXPECT_EQ(reading.sensors[kNeedleSensor].state, SensorState::absent);
 }
 
+// So that D, which aims by a positive angle, moves the tip to the right of the picture.
+TEST_F(MouseOnCylinder, APositiveAngleInThePlaneMovesTheTipTowardsX) {
+    ASSERT_TRUE(mouse_.place_needle_beside_probe(30, true));
+    mouse_.advance_needle(40);
+    const auto tip_x = [&] {
+        return (inverse(mouse_.mannequin_from_probe()) * mouse_.mannequin_from_needle() *
+                Point3{0, 0, 0})
+            .x;
+    };
+    const double before = tip_x();
+    mouse_.aim_needle(0.05, 0);
+    EXPECT_GT(tip_x(), before + 1);
+}
+
 TEST_F(MouseOnCylinder, NeedleKeepsItsEntryWhileAimedAndAdvanced) {
     ASSERT_TRUE(mouse_.place_needle_beside_probe(30, true));
     const Point3 entry = mouse_.needle_entry();

@@ -4,6 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <thread>
+
+#include "runtime/player/app/case_steps.h"
+#include "runtime/player/session/clock.h"
+#include "support/small_case.h"
+#include "support/temporary_folder.h"
+
 namespace sonocase::runtime {
 namespace {
 
@@ -25,6 +33,116 @@ TEST(TargetsReached, TheTipMarksATargetWithinItsRadiusAndTheMarkStays) {
     record.needle.mannequin_from_drawn.translation = {0, 0, 0};
     mark_targets_reached(exercise, record, centres, reached);
     EXPECT_TRUE(reached[0]);
+}
+
+std::unique_ptr<OpenCase> small_open_case() {
+    auto open = std::make_unique<OpenCase>();
+    open->bundle = StreamedBundle(testing::small_case());
+    Exercise exercise = testing::small_exercise();
+    exercise.hints = {"Look.", "Look again."};
+    open->exercises = {exercise};
+    return open;
+}
+
+// An attempt that runs, without a window.
+struct Running {
+    testing::TemporaryFolder folder;
+    App app;
+    Running() {
+        app.loaded.open = small_open_case();
+        EngineOptions options;
+        options.render.width_px = options.render.height_px = 64;
+        options.render.model = ImageModel::paper;
+        auto engine = ScanEngine::create(app.loaded.open->bundle, app.loaded.exercise(), options);
+        auto run = SessionRun::start(folder / "s.igs.mha", *app.loaded.open, *engine, "", "", 0);
+        app.scan.attempt =
+            std::make_shared<Attempt>(*app.loaded.open, app.loaded.exercise(), std::move(*run));
+    }
+};
+
+TEST(LeavingAnAttempt, IsAskedAboutOnceAndTheAnswerHoldsForFourSeconds) {
+    Running running;
+    App& app = running.app;
+    app.player.now_s = 10;
+    EXPECT_FALSE(may_leave_attempt(app, "F5"));
+    ASSERT_EQ(app.view.notices.standing().size(), 1u);
+    EXPECT_NE(app.view.notices.standing()[0].text.find("F5"), std::string::npos);
+    app.player.now_s = 12;
+    EXPECT_TRUE(may_leave_attempt(app, "F5"));
+    app.player.now_s = 30;
+    EXPECT_FALSE(may_leave_attempt(app, "F5"));
+    app.scan.attempt.reset();
+    EXPECT_TRUE(may_leave_attempt(app, "F5"));  // nothing to lose
+}
+
+TEST(Hints, ComeOneByOneThenTheTargetsAndNeverInAnExam) {
+    Running running;
+    App& app = running.app;
+    const Exercise& exercise = app.loaded.exercise();
+    for (int shown = 0; shown <= 3; ++shown) {
+        EXPECT_EQ(app.scan.hints_shown, shown);
+        EXPECT_EQ(shows_targets(app.scan, exercise), shown == 3);
+        show_next_hint(app);
+    }
+    EXPECT_EQ(app.scan.hints_shown, 3);
+    app.scan.hints_shown = 0;
+    app.loaded.open->exercises[0].mode = ExerciseMode::exam;
+    for (int i = 0; i < 5; ++i) show_next_hint(app);
+    EXPECT_FALSE(shows_targets(app.scan, exercise));
+    app.scan.attempt.reset();
+    EXPECT_TRUE(shows_targets(app.scan, exercise));  // free scanning
+}
+
+TEST(SavingCalibrations, WithNothingCalibratedKeepsWhatWasSaved) {
+    Settings settings;
+    settings.calibrations = {"/a/probe.json"};
+    Notices notices;
+    EXPECT_FALSE(save_calibrations({}, settings, notices));
+    EXPECT_EQ(settings.calibrations.size(), 1u);
+    ASSERT_EQ(notices.standing().size(), 1u);
+    EXPECT_EQ(notices.standing()[0].text.find("Saved"), std::string::npos);
+}
+
+// After another tracker was chosen, nothing of the one before is shown as if it were live.
+TEST(ChangingTheTracker, ForgetsWhatTheOneBeforeReported) {
+    const auto open = small_open_case();
+    EngineOptions options;
+    options.render.width_px = options.render.height_px = 64;
+    options.render.model = ImageModel::paper;
+    auto engine = ScanEngine::create(open->bundle, open->exercises[0], options);
+    ScanThread scan(session_clock(steady_seconds()));
+    scan.set_engine(std::make_unique<ScanEngine>(std::move(*engine)));
+    const auto mouse = std::make_shared<PushTracker>("Mouse");
+    scan.set_tracker(mouse);
+    TrackerReading reading;
+    reading.sequence = 1;
+    reading.in_mannequin = true;
+    reading.sensor_count = 1;
+    reading.sensors[0] = {SensorState::ok,
+                          {Matrix3::from_columns({1, 0, 0}, {0, -1, 0}, {0, 0, -1}), {0, 0, 59}},
+                          1,
+                          0};
+    mouse->push(reading);
+    const auto wait_for = [&](const auto& condition) {
+        const double give_up_s = steady_seconds() + 30;
+        while (steady_seconds() < give_up_s) {
+            if (scan.refresh() && condition(scan.frame())) return true;
+            std::this_thread::yield();
+        }
+        return false;
+    };
+    ASSERT_TRUE(wait_for([](const ScanFrame& f) { return f.record.tools.has_probe; }));
+    EXPECT_TRUE(scan.frame().reading.in_mannequin);
+    EXPECT_FALSE(scan.frame().waiting);
+    scan.set_tracker(std::make_shared<PushTracker>("Absent", true));
+    ASSERT_TRUE(wait_for([](const ScanFrame& f) { return f.waiting; }));
+    const ScanFrame& frame = scan.frame();
+    EXPECT_FALSE(frame.reading.in_mannequin);
+    EXPECT_EQ(frame.reading.sensor_count, 0);
+    EXPECT_FALSE(frame.record.tools.has_probe);
+    EXPECT_EQ(frame.probe_verdict, SensorVerdict::absent);
+    EXPECT_EQ(std::count(frame.pixels.begin(), frame.pixels.end(), 0),
+              static_cast<long>(frame.pixels.size()));
 }
 
 TEST(Cine, StepsThroughTheKeptFramesAndPlaysInARing) {

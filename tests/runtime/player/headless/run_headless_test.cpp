@@ -3,6 +3,7 @@
 // The program sonoplay without a window, as a user starts it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -170,6 +171,37 @@ TEST_F(Headless, RecordsASessionAndScoresIt) {
     ASSERT_EQ(again.status, 0) << again.error;
     EXPECT_EQ(read_text(folder_ / "first/frame_00030.png"),
               read_text(folder_ / "again/frame_00030.png"));
+}
+
+TEST_F(Headless, AnExerciseFromAFileIsPlayedDrawnAndReplayedFromItsSeed) {
+    std::string toml = sonocase::testing::small_exercise_toml();
+    toml.replace(toml.find("hit_radius_mm = 6"), 17, "hit_radius_mm = 6\nspread_mm = 20");
+    toml.replace(toml.find("name = \"scan\""), 13, "name = \"mine\"");
+    folder_.write("mine.toml", toml);
+    const std::string file = folder_ / "mine.toml";
+    const auto run = [&](const std::string& tracker, const std::string& more) {
+        const CommandResult done = play(bundle_ + " --headless --exercise " + file + " --tracker " +
+                                        tracker + " --size 64x64 --model paper " + more);
+        EXPECT_EQ(done.status, 0) << done.error;
+        return done;
+    };
+    run("sweep:along", "--frames 20 --attempt-seed 7 --record " + (folder_ / "a.igs.mha") +
+                           " --stats " + (folder_ / "a.json"));
+    EXPECT_NE(read_text(folder_ / "a.igs.mha").find("SonocaseAttempt = seed=7"), std::string::npos);
+    run("replay:" + (folder_ / "a.igs.mha"), "--record " + (folder_ / "b.igs.mha"));
+    EXPECT_NE(read_text(folder_ / "b.igs.mha").find("SonocaseAttempt = seed=7"), std::string::npos);
+    run("sweep:along", "--frames 2 --record " + (folder_ / "c.igs.mha"));
+    EXPECT_EQ(read_text(folder_ / "c.igs.mha").find("SonocaseAttempt"), std::string::npos);
+
+    toml.replace(toml.find("centre = [0, 0, 25]"), 19, "centre = [0, 0, 99]");
+    folder_.write("outside.toml", toml);
+    folder_.write("wrong.toml", "name = 3\n");
+    for (const char* name : {"outside.toml", "wrong.toml", "absent.toml"}) {
+        const CommandResult wrong = play(bundle_ + " --headless --exercise " + (folder_ / name));
+        EXPECT_EQ(wrong.status, 1);
+        EXPECT_NE(wrong.error.find(name), std::string::npos) << wrong.error;
+        EXPECT_EQ(std::count(wrong.error.begin(), wrong.error.end(), '\n'), 1) << wrong.error;
+    }
 }
 
 TEST_F(Headless, SaysInOneLineWhatIsWrong) {

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats/attempt/draw_attempt.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+namespace sonocase {
+namespace {
+
+constexpr int kPlaces = 400;                          // tried for a target
+constexpr int kStarts = 200;                          // tried for the probe
+constexpr int kDirections = 96;                       // tried for lines to a target
+constexpr double kSpareLengthMm = 10;                 // of the needle, for the hand
+constexpr double kOffPlaneMm = 20;                    // of the targets at the start
+constexpr double kLeastCosine = 0.17364817766693041;  // of 80 degrees
+constexpr double kMostCosine = 0.93969262078590843;   // of 20 degrees
+
+// SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
+class Draws {
+  public:
+    explicit Draws(std::uint64_t seed) : state_(seed) {}
+    double uniform(double low, double high) {
+        state_ += 0x9E3779B97F4A7C15ull;
+        std::uint64_t z = state_;
+        z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
+        z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
+        z ^= z >> 31;
+        return low + (high - low) * (static_cast<double>(z >> 11) * 0x1p-53);
+    }
+    // Uniform in the unit ball. By rejection: trigonometry would differ between machines.
+    Vector3 in_ball() {
+        for (;;) {
+            const Vector3 v{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+            if (dot(v, v) <= 1) return v;
+        }
+    }
+    Vector3 direction() {
+        for (;;) {
+            const Vector3 v = in_ball();
+            if (dot(v, v) > 0.01) return v / std::sqrt(dot(v, v));
+        }
+    }
+
+  private:
+    std::uint64_t state_;
+};
+
+struct Body {
+    const Anatomy& anatomy;
+    std::array<bool, 256> no_go{};
+
+    Body(const Exercise& exercise, const Anatomy& body, const std::vector<Label>& labels)
+        : anatomy(body) {
+        for (std::size_t i = 0; i < labels.size() && i < no_go.size(); ++i) {
+            no_go[i] = std::find(exercise.no_go.begin(), exercise.no_go.end(), labels[i].name) !=
+                       exercise.no_go.end();
+        }
+    }
+
+    // How far it is from p to the skin along a direction; nothing if that is more than reach_mm, or
+    // the body is cut off there.
+    std::optional<double> to_skin(Point3 p, Vector3 direction, double reach_mm) const {
+        const double depth = anatomy.exit_distance(p, direction, reach_mm);
+        if (!(depth < reach_mm) || anatomy.at_edge(p + depth * direction)) return {};
+        return depth;
+    }
+    // True if sound passes along the line, and, for a needle, nothing on it is to be spared.
+    bool free(Point3 p, Vector3 direction, double length_mm, bool needle) const {
+        for (double s = 0; s < length_mm; s += 1) {
+            const int label = anatomy.label(p + s * direction);
+            if (anatomy.blocks_sound(label)) return false;
+            if (needle && no_go[static_cast<std::size_t>(label)]) return false;
+        }
+        return true;
+    }
+};
+
+// The 26 directions to the neighbours of a cube's middle, scaled to unit length.
+bool clear_of_others(const Anatomy& anatomy, Point3 p, int label, double clearance_mm) {
+    if (anatomy.label(p) != label) return false;
+    for (const double part : {0.5, 1.0}) {
+        for (int i = 0; i < 27; ++i) {
+            const Vector3 v{i % 3 - 1.0, i / 3 % 3 - 1.0, i / 9 - 1.0};
+            if (i == 13) continue;
+            const double length = std::sqrt(dot(v, v));
+            if (anatomy.label(p + (part * clearance_mm / length) * v) != label) return false;
+        }
+    }
+    return true;
+}
+
+// True if a needle reaches p while a probe shows it.
+bool reachable(const Exercise& exercise, const Body& body, Point3 p, Draws draws) {
+    const double reach = exercise.needle.length_mm - kSpareLengthMm;
+    const double depth = exercise.probe.depth_mm - exercise.targets.front().radius_mm;
+    std::vector<Vector3> shown;
+    std::vector<Vector3> needles;
+    for (int i = 0; i < kDirections; ++i) {
+        const Vector3 out = draws.direction();
+        const auto way = body.to_skin(p, out, std::max(reach, depth));
+        if (!way || !body.free(p, out, *way, false)) continue;
+        if (*way <= depth) shown.push_back(out);
+        if (*way <= reach && body.free(p, out, *way, true)) needles.push_back(out);
+    }
+    for (const Vector3 needle : needles) {
+        for (const Vector3 beam : shown) {
+            const double cosine = dot(needle, beam);
+            if (cosine >= kLeastCosine && cosine <= kMostCosine) return true;
+        }
+    }
+    return false;
+}
+
+int label_of(const std::vector<Label>& labels, const std::string& name) {
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+        if (labels[i].name == name) return static_cast<int>(i);
+    }
+    return -1;
+}
+
+std::optional<Point3> draw_target(const Exercise& exercise,
+                                  std::size_t t,
+                                  const Body& body,
+                                  const std::vector<Label>& labels,
+                                  Draws& draws) {
+    const Target& target = exercise.targets[t];
+    const int label =
+        target.inside.empty() ? body.anatomy.label(target.centre) : label_of(labels, target.inside);
+    if (label < 0) return {};
+    const double clearance = target.clearance_mm < 0 ? target.radius_mm : target.clearance_mm;
+    for (int i = 0; i < kPlaces; ++i) {
+        const Point3 p = target.centre + target.spread_mm * draws.in_ball();
+        if (!clear_of_others(body.anatomy, p, label, clearance)) continue;
+        bool overlaps = false;
+        for (std::size_t other = 0; other < exercise.targets.size(); ++other) {
+            const Target& o = exercise.targets[other];
+            overlaps =
+                overlaps || (other != t && distance(o.centre, p) < o.radius_mm + target.radius_mm);
+        }
+        if (!overlaps && reachable(exercise, body, p, draws)) return p;
+    }
+    return {};
+}
+
+// Outward normal of the skin near p, as the mouse finds it: the mean way out over a ball.
+Vector3 skin_normal(const Anatomy& anatomy, Point3 p) {
+    constexpr int kSteps = 4;
+    constexpr double kRadiusMm = 12;
+    Vector3 sum;
+    for (int k = -kSteps; k <= kSteps; ++k) {
+        for (int j = -kSteps; j <= kSteps; ++j) {
+            for (int i = -kSteps; i <= kSteps; ++i) {
+                const Vector3 v{double(i) / kSteps, double(j) / kSteps, double(k) / kSteps};
+                if (dot(v, v) > 1) continue;
+                if (anatomy.inside(p + kRadiusMm * v)) sum = sum - (1 - dot(v, v)) * v;
+            }
+        }
+    }
+    return normalized(sum);
+}
+
+// Where the line from in front of p along the beam meets the skin.
+std::optional<Point3> skin_on_line(const Anatomy& anatomy, Point3 p, Vector3 beam) {
+    constexpr double kReachMm = 80;
+    bool outside = false;
+    for (double s = -kReachMm; s <= kReachMm; s += 0.5) {
+        const Point3 q = p + s * beam;
+        if (!anatomy.inside(q)) {
+            outside = true;
+        } else if (outside) {
+            return q;
+        }
+    }
+    return {};
+}
+
+bool draw_start(Exercise& exercise, const Anatomy& anatomy, Draws& draws) {
+    Vector3 beam = normalized(exercise.start_beam);
+    if (norm(beam) == 0) beam = {0, 0, -1};
+    const Vector3 u = any_perpendicular(beam), v = cross(beam, u);
+    const Vector3 x{1, 0, 0};
+    const Vector3 across = x - dot(x, beam) * beam;
+    const Vector3 lateral = norm(across) > 1e-6 ? normalized(across) : u;
+    double best_mm = -1;
+    Point3 best;
+    for (int i = 0; i < kStarts; ++i) {
+        const double a = draws.uniform(-1, 1), b = draws.uniform(-1, 1);
+        const double r2 = a * a + b * b;
+        if (r2 > 1 || r2 < 0.25) continue;
+        const Point3 near = exercise.start_probe + exercise.start_spread_mm * (a * u + b * v);
+        const auto skin = skin_on_line(anatomy, near, beam);
+        if (!skin || anatomy.at_edge(*skin)) continue;
+        const Vector3 normal = skin_normal(anatomy, *skin);
+        // A flank that is seen from the side would turn the probe away.
+        if (!(dot(normal, beam) < -0.5)) continue;
+        const Vector3 elevation =
+            normalized(cross(-normal, lateral - dot(lateral, normal) * normal));
+        double off_plane_mm = kOffPlaneMm;
+        for (const Target& target : exercise.targets) {
+            off_plane_mm = std::min(off_plane_mm, std::abs(dot(target.centre - *skin, elevation)));
+        }
+        if (off_plane_mm <= best_mm) continue;
+        best_mm = off_plane_mm;
+        best = *skin;
+        if (off_plane_mm >= kOffPlaneMm) break;
+    }
+    if (best_mm < 0) return false;
+    exercise.start_probe = best;
+    exercise.start_beam = beam;
+    return true;
+}
+
+}  // namespace
+
+AttemptDraw draw_attempt(const Exercise& exercise,
+                         const Anatomy& anatomy,
+                         const std::vector<Label>& labels,
+                         std::uint64_t seed) {
+    AttemptDraw out{exercise, {}};
+    if (seed == 0) return out;
+    Draws draws(seed);
+    const Body body(exercise, anatomy, labels);
+    for (std::size_t t = 0; t < exercise.targets.size(); ++t) {
+        if (!(exercise.targets[t].spread_mm > 0)) continue;
+        if (const auto place = draw_target(out.exercise, t, body, labels, draws)) {
+            out.exercise.targets[t].centre = *place;
+        } else {
+            out.warnings.push_back("No place was found for the target '" +
+                                   exercise.targets[t].name +
+                                   "', so it stays where the exercise has it: check its "
+                                   "inside, spread_mm and clearance_mm.");
+        }
+    }
+    if (exercise.start_spread_mm > 0 && !draw_start(out.exercise, anatomy, draws)) {
+        out.warnings.push_back(
+            "No place away from the target was found for the probe, so it "
+            "begins at start_probe: raise start_spread_mm.");
+    }
+    return out;
+}
+
+}  // namespace sonocase

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The exercises of the scenarios cannot be passed without looking, and can be passed by looking.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+
+#include "end_to_end/scripted_trainees.h"
+#include "formats/files/bundle_file.h"
+#include "support/paths.h"
+#include "support/run_command.h"
+
+namespace sonocase {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Attempt;
+
+struct Passed {
+    int attempts = 0, passed = 0;
+};
+
+struct Case {
+    CaseBundle bundle;
+    std::vector<Exercise> exercises;
+    explicit Case(const std::string& path) {
+        auto loaded = load_bundle(path);
+        EXPECT_TRUE(loaded) << loaded.error().message();
+        bundle = std::move(*loaded);
+        for (const EmbeddedExercise& embedded : bundle.exercises) {
+            auto exercise = parse_exercise(embedded.toml, embedded.name);
+            EXPECT_TRUE(exercise) << exercise.error().message();
+            exercises.push_back(std::move(*exercise));
+        }
+    }
+};
+
+Passed bluff(const Case& of, const Exercise& exercise, int attempts) {
+    const CaseAnatomy at_rest(of.bundle), breathing(of.bundle, exercise.breathing);
+    testing::Random random(7);
+    Passed out;
+    for (int i = 0; i < attempts; ++i) {
+        Attempt attempt(of.bundle, at_rest, breathing, exercise, 1000u + static_cast<unsigned>(i));
+        if (i % 3 == 0) testing::bluff_with_fixed_keys(attempt, i / 3 % 20);
+        if (i % 3 == 1) testing::bluff_with_a_random_walk(attempt, random);
+        if (i % 3 == 2) testing::bluff_with_a_straight_push(attempt, random);
+        ++out.attempts;
+        if (attempt.score().passed) ++out.passed;
+    }
+    return out;
+}
+
+Passed expert(const Case& of, const Exercise& exercise, int attempts) {
+    const CaseAnatomy at_rest(of.bundle), breathing(of.bundle, exercise.breathing);
+    Passed out;
+    for (int i = 0; i < attempts; ++i) {
+        Attempt attempt(of.bundle, at_rest, breathing, exercise, 1u + static_cast<unsigned>(i));
+        ++out.attempts;
+        const bool tried = testing::play_as_an_expert(attempt);
+        const SessionScore score = attempt.score();
+        if (tried && score.passed) {
+            ++out.passed;
+            continue;
+        }
+        std::printf("%s, seed %d: %s", exercise.name.c_str(), i + 1,
+                    tried ? "failed at" : "no way to the target was seen");
+        for (const PassResult& mark : score.pass_marks) {
+            if (tried && !mark.passed) std::printf(" %s = %.3g", mark.metric.c_str(), mark.value);
+        }
+        std::printf("\n");
+    }
+    return out;
+}
+
+// bluffs: spread over the exercises. expert_attempts: at each of them.
+void expect_honest(const Case& of, int bluffs, int expert_attempts) {
+    const int each = bluffs / static_cast<int>(of.exercises.size());
+    Passed all_bluffs, all_experts;
+    for (const Exercise& exercise : of.exercises) {
+        const Passed b = bluff(of, exercise, each);
+        const Passed e = expert(of, exercise, expert_attempts);
+        std::printf("%-18s bluffed %d of %d, expert %d of %d\n", exercise.name.c_str(), b.passed,
+                    b.attempts, e.passed, e.attempts);
+        all_bluffs.attempts += b.attempts;
+        all_bluffs.passed += b.passed;
+        all_experts.attempts += e.attempts;
+        all_experts.passed += e.passed;
+    }
+    // The bars: at most 1 % by bluffing, at least 95 % by looking.
+    EXPECT_LE(all_bluffs.passed, 0.01 * all_bluffs.attempts);
+    EXPECT_GE(all_experts.passed, 0.95 * all_experts.attempts);
+}
+
+std::string cooked(const testing::TemporaryFolder& folder, const std::string& arguments) {
+    const std::string path = folder / "case.sonocase";
+    const auto build = testing::run_command(std::string(SONOCASE_BIN) + "/sonocase build " +
+                                            arguments + " --quiet -o " + path);
+    EXPECT_EQ(build.status, 0) << build.error;
+    return path;
+}
+
+TEST(HonestExercises, OfTheDemoTorso) {
+    const testing::TemporaryFolder folder;
+    expect_honest(Case(cooked(folder, "--preset draft")), 1000, 20);
+}
+
+TEST(HonestExercises, OfTheRealTorso) {
+    const std::string data = SONOCASE_DATA;
+    if (!fs::exists(data + "/ct/labels.nii.gz")) GTEST_SKIP() << "no " << data;
+    const testing::TemporaryFolder folder;
+    expect_honest(Case(cooked(folder, std::string(SONOCASE_SOURCE) +
+                                          "/scenarios/real-torso/case.toml --data " + data +
+                                          " --set resample.voxel_mm=2")),
+                  1000, 20);
+}
+
+}  // namespace
+}  // namespace sonocase
