@@ -81,8 +81,15 @@ HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) 
                                    term(c.z.row(row), 2));
             return hn::And(rounded_bits(d, u), hn::Set(di, physical::kFineEdge - 1));
         };
-        const auto at = hn::Or(coordinate(0), hn::Or(hn::ShiftLeft<6>(coordinate(1)),
-                                                     hn::ShiftLeft<12>(coordinate(2))));
+        // physical::fine_index()
+        const auto low = hn::Set(di, 3);
+        const auto u0 = coordinate(0), u1 = coordinate(1), u2 = coordinate(2);
+        const auto in_block = hn::Or(hn::And(u0, low), hn::Or(hn::ShiftLeft<2>(hn::And(u1, low)),
+                                                              hn::ShiftLeft<4>(hn::And(u2, low))));
+        const auto block = hn::Or(
+            hn::ShiftLeft<4>(hn::AndNot(low, u0)),
+            hn::Or(hn::ShiftLeft<8>(hn::AndNot(low, u1)), hn::ShiftLeft<12>(hn::AndNot(low, u2))));
+        const auto at = hn::Or(in_block, block);
         const auto word =
             hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(b.fine),
                              hn::Add(at, hn::Set(di, static_cast<std::int32_t>(m[9]))));

@@ -48,6 +48,13 @@ struct TargetBall {
     bool fluid = false;
 };
 
+// Cells of kStreakCellMm from the volume's corner on, x fastest: 1 where the middle of one lies in
+// parenchyma. Empty: none does, or the machine shows no plates.
+struct PlateCells {
+    Int3 size{0, 0, 0};
+    std::vector<std::uint8_t> holds;
+};
+
 struct PhysicalScene {
     const CaseBundle* bundle = nullptr;
     Grid grid;
@@ -64,6 +71,7 @@ struct PhysicalScene {
     std::shared_ptr<const PhysicalTextures> textures;
     FineStructure fine;
     bool has_parenchyma = false;  // some label has its cube
+    PlateCells plate_cells;       // of effect streaks
     TissueLayers layers;
 
     std::vector<TargetBall> targets;

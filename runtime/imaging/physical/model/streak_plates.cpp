@@ -24,6 +24,32 @@ double bump(double x) {
     return y * y * y * y;
 }
 
+bool is_parenchyma(const PhysicalScene& scene, Point3 x) {
+    const Point3 v = scene.grid.voxel_from_point(x);
+    const int label =
+        label_at(scene, static_cast<int>(std::floor(v.x + 0.5)),
+                 static_cast<int>(std::floor(v.y + 0.5)), static_cast<int>(std::floor(v.z + 0.5)));
+    return scene.fine.frames[static_cast<std::size_t>(label)].cube == kParenchymaCube;
+}
+
+Point3 corner_of(const PhysicalScene& scene, int i, int j, int k) {
+    return scene.grid.origin_mm + kStreakCellMm * Vector3{double(i), double(j), double(k)};
+}
+Point3 middle_of(const PhysicalScene& scene, int i, int j, int k) {
+    return corner_of(scene, i, j, k) + 0.5 * kStreakCellMm * Vector3{1, 1, 1};
+}
+
+// What a hash says of a plate: its normal, not unit, at most 127 long in each direction.
+struct Draw {
+    float nx, ny, nz;
+};
+Draw normal_of(std::uint32_t h) {
+    const auto byte = [h](int shift) {
+        return static_cast<float>(static_cast<std::int32_t>(h << shift) >> 24);
+    };
+    return {byte(24), byte(16), byte(8)};
+}
+
 struct Search {
     const PhysicalScene& scene;
     const ScanGeometry& g;
@@ -35,14 +61,6 @@ struct Search {
     Rigid probe_from_volume;
     double thickest_mm = 0;  // of the slab: deviation at the face or at the far end
     int found = 0;
-
-    bool is_parenchyma(Point3 x) const {
-        const Point3 v = scene.grid.voxel_from_point(x);
-        const int label = label_at(scene, static_cast<int>(std::floor(v.x + 0.5)),
-                                   static_cast<int>(std::floor(v.y + 0.5)),
-                                   static_cast<int>(std::floor(v.z + 0.5)));
-        return scene.fine.frames[static_cast<std::size_t>(label)].cube == kParenchymaCube;
-    }
 
     // Where a point of the tissue shows, in the probe's frame.
     Point3 seen(Point3 x) const {
@@ -66,16 +84,13 @@ struct Search {
     void add_plate(Point3 centre, Vector3 normal, std::uint32_t draw);
 };
 
-// normal: not unit, at most 127 long, in steps of 1, frame of the volume.
 void Search::add_cell(int i, int j, int k) {
-    const Point3 corner =
-        scene.grid.origin_mm + kStreakCellMm * Vector3{double(i), double(j), double(k)};
-    const Point3 middle = corner + 0.5 * kStreakCellMm * Vector3{1, 1, 1};
-    const Point3 p = seen(middle);
+    const PlateCells& cells = scene.plate_cells;
+    if (!cells.holds[static_cast<std::size_t>((k * cells.size.y + j) * cells.size.x + i)]) return;
+    const Point3 p = seen(middle_of(scene, i, j, k));
     double r = 0;
     const PlanePoint beam = beam_at({p.x, p.z}, r);
     if (r < kStreakFirstMm - kStreakCellMm || r > g.depth_mm + kStreakCellMm) return;
-    if (!is_parenchyma(middle)) return;
     const Vector3 along = frame.volume_from_probe.rotation * Vector3{beam.x, 0, beam.z};
     const auto bx = static_cast<float>(along.x), by = static_cast<float>(along.y),
                bz = static_cast<float>(along.z);
@@ -86,16 +101,23 @@ void Search::add_cell(int i, int j, int k) {
     const std::uint32_t cell =
         hash32(static_cast<std::uint32_t>(i) * kHashX ^ static_cast<std::uint32_t>(j) * kHashY ^
                static_cast<std::uint32_t>(k) * kHashZ);
+    // All draws at once, without a branch, so that compilers use vectors.
+    std::array<std::uint32_t, kStreakTries> draws, faces;
     for (std::uint32_t t = 0; t < kStreakTries; ++t) {
         const std::uint32_t h = hash32(cell + t);
-        const auto nx = static_cast<float>(static_cast<std::int8_t>(h)),
-                   ny = static_cast<float>(static_cast<std::int8_t>(h >> 8)),
-                   nz = static_cast<float>(static_cast<std::int8_t>(h >> 16));
+        const auto [nx, ny, nz] = normal_of(h);
         const float square = nx * nx + ny * ny + nz * nz, cosine = nx * bx + ny * by + nz * bz;
         // Uniform directions: those within the ball.
-        if (!(square < 127.0f * 127.0f && cosine * cosine > least * square)) continue;
-        const std::uint32_t place = hash32(h ^ (cell + t) * kHashY);
+        faces[t] = static_cast<std::uint32_t>(square < 127.0f * 127.0f) &
+                   static_cast<std::uint32_t>(cosine * cosine > least * square);
+        draws[t] = h;
+    }
+    const Point3 corner = corner_of(scene, i, j, k);
+    for (std::uint32_t t = 0; t < kStreakTries; ++t) {
+        if (faces[t] == 0) continue;
+        const std::uint32_t h = draws[t], place = hash32(h ^ (cell + t) * kHashY);
         const auto part = [&](int shift) { return (place >> shift & 0x3FF) / 1024.0; };
+        const auto [nx, ny, nz] = normal_of(h);
         add_plate(corner + kStreakCellMm * Vector3{part(0), part(10), part(20)},
                   {static_cast<double>(nx), static_cast<double>(ny), static_cast<double>(nz)},
                   h >> 24);
@@ -133,7 +155,8 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     if (shown < kStreakFirstMm || shown > g.depth_mm) return;
     const Row& row = row_at(shown);
     const double level = level_in(row.elevation_mm);
-    if (level < 0.1 || found >= static_cast<int>(out.size()) || !is_parenchyma(centre)) return;
+    if (level < 0.1 || found >= static_cast<int>(out.size()) || !is_parenchyma(scene, centre))
+        return;
     Streak& s = out[static_cast<std::size_t>(found)];
     s.centre = {p.x + (shown - r) * beam.x, p.z + (shown - r) * beam.z};
     const double in_plane = 1 / std::sqrt(n.x * n.x + n.z * n.z);
@@ -153,7 +176,26 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     if (s.line_begin < s.line_end && s.sample_begin < s.sample_end) ++found;
 }
 
+Vector3 box_of(const PhysicalScene& s) {
+    return s.voxel_mm *
+           Vector3{double(s.grid.size.x), double(s.grid.size.y), double(s.grid.size.z)};
+}
+
 }  // namespace
+
+PlateCells find_plate_cells(const PhysicalScene& scene) {
+    PlateCells cells;
+    const Vector3 box = box_of(scene);
+    const auto count = [](double mm) { return static_cast<int>(mm / kStreakCellMm) + 1; };
+    cells.size = {count(box.x), count(box.y), count(box.z)};
+    for (int k = 0; k < cells.size.z; ++k) {
+        for (int j = 0; j < cells.size.y; ++j) {
+            for (int i = 0; i < cells.size.x; ++i)
+                cells.holds.push_back(is_parenchyma(scene, middle_of(scene, i, j, k)));
+        }
+    }
+    return cells;
+}
 
 int find_streaks(const PhysicalScene& scene,
                  const ScanGeometry& g,
@@ -162,7 +204,7 @@ int find_streaks(const PhysicalScene& scene,
                  const BreathingField* breathing,
                  std::span<const float> gaps,
                  std::span<Streak> out) {
-    if (!scene.has_parenchyma || tables.frequency_mhz > kStreakFrequencyMhz) return 0;
+    if (scene.plate_cells.holds.empty() || tables.frequency_mhz > kStreakFrequencyMhz) return 0;
     Search search{scene,
                   g,
                   tables,
@@ -196,9 +238,7 @@ int find_streaks(const PhysicalScene& scene,
             upper[axis] = std::max(upper[axis], at[axis]);
         }
     }
-    const Vector3 box =
-        scene.voxel_mm *
-        Vector3{double(scene.grid.size.x), double(scene.grid.size.y), double(scene.grid.size.z)};
+    const Vector3 box = box_of(scene);
     const auto cell = [&](double mm, int axis) {
         return static_cast<int>(std::floor(std::clamp(mm, 0.0, box[axis]) / kStreakCellMm));
     };
