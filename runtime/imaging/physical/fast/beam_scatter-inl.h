@@ -66,8 +66,9 @@ template <class D>
 HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) {
     static_assert(physical::kFineEdge == 64);
     const hn::RebindToSigned<D> di;
-    auto sum = hn::Zero(di);
-    auto left = hn::TestBit(hn::Load(di, c.look.row(row)), hn::Set(di, kLookFine));
+    const auto fine = hn::TestBit(hn::Load(di, c.look.row(row)), hn::Set(di, kLookFine));
+    auto left = fine;
+    auto at = hn::Zero(di);
     const std::int32_t* labels = c.label.row(row);
     while (!hn::AllFalse(di, left)) {
         const std::int32_t label = labels[hn::FindFirstTrue(di, left)];
@@ -81,24 +82,15 @@ HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) 
                                    term(c.z.row(row), 2));
             return hn::And(rounded_bits(d, u), hn::Set(di, physical::kFineEdge - 1));
         };
-        // physical::fine_index()
-        const auto low = hn::Set(di, 3);
-        const auto u0 = coordinate(0), u1 = coordinate(1), u2 = coordinate(2);
-        const auto in_block = hn::Or(hn::And(u0, low), hn::Or(hn::ShiftLeft<2>(hn::And(u1, low)),
-                                                              hn::ShiftLeft<4>(hn::And(u2, low))));
-        const auto block = hn::Or(
-            hn::ShiftLeft<4>(hn::AndNot(low, u0)),
-            hn::Or(hn::ShiftLeft<8>(hn::AndNot(low, u1)), hn::ShiftLeft<12>(hn::AndNot(low, u2))));
-        const auto at = hn::Or(in_block, block);
-        const auto word =
-            hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(b.fine),
-                             hn::Add(at, hn::Set(di, static_cast<std::int32_t>(m[9]))));
-        sum = hn::IfThenElse(mine, hn::ShiftLeft<2>(hn::ShiftRight<24>(hn::ShiftLeft<24>(word))),
-                             sum);
+        const auto place = hn::Or(coordinate(0), hn::Or(hn::ShiftLeft<6>(coordinate(1)),
+                                                        hn::ShiftLeft<12>(coordinate(2))));
+        const auto cube = hn::Set(di, static_cast<std::int32_t>(m[9]));
+        at = hn::IfThenElse(mine, hn::Add(place, cube), at);
         left = hn::AndNot(mine, left);
         (m[9] == kParenchymaOffset ? b.parenchyma_met : b.fine_met) = true;
     }
-    return sum;
+    const auto word = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(b.fine), at);
+    return hn::IfThenElseZero(fine, hn::ShiftLeft<2>(hn::ShiftRight<24>(hn::ShiftLeft<24>(word))));
 }
 
 // Added to the stretch's offsets. A loop of its own: the cubes together are as large as the
