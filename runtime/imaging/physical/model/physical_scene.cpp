@@ -9,6 +9,7 @@
 #include "runtime/imaging/physical/model/physical_model.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
 #include "runtime/imaging/physical/model/wall_sheets.h"
+#include "runtime/imaging/press/closed_label.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -190,8 +191,13 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
                                    [](const FineFrame& f) { return f.cube == kParenchymaCube; });
     if (s.has_parenchyma && options.structures.streaks) s.plate_cells = find_plate_cells(s);
-    if (options.structures.wall || options.structures.diaphragm)
+    s.has_septa = std::any_of(s.fine.frames.begin(), s.fine.frames.end(), [](const FineFrame& f) {
+        return f.cube == kFibreCube || f.cube == kSeptaCube;
+    });
+    if (options.structures.wall || options.structures.diaphragm ||
+        (options.structures.streaks && s.has_septa))
         s.layers = make_tissue_layers(bundle, jobs);
+    s.closed_label = press::closed_labels(bundle);
     return s;
 }
 

@@ -48,8 +48,8 @@ struct TargetBall {
     bool fluid = false;
 };
 
-// Cells of kStreakCellMm from the volume's corner on, x fastest: 1 where the middle of one lies in
-// parenchyma. Empty: none does, or the machine shows no plates.
+// Cells of the plates of organs (plate_kind()) from the volume's corner on, x fastest: 1 where the
+// middle of one lies in parenchyma. Empty: none does, or the machine shows no plates.
 struct PlateCells {
     Int3 size{0, 0, 0};
     std::vector<std::uint8_t> holds;
@@ -62,16 +62,18 @@ struct PhysicalScene {
 
     // Complete where the bundle is; otherwise a frame asks for what it reads.
     BrickTable words;
-    std::vector<AcousticProperties> looks;  // # labels, then one per target
-    std::vector<PairEcho> pairs;            // # labels^2, [own * # labels + second]
-    std::vector<bool> is_lung;              // # labels
-    bool has_gas = false;                   // some label is gas or lung
+    std::vector<AcousticProperties> looks;   // # labels, then one per target
+    std::vector<std::int32_t> closed_label;  // 256: what is shown of a lumen that is shut
+    std::vector<PairEcho> pairs;             // # labels^2, [own * # labels + second]
+    std::vector<bool> is_lung;               // # labels
+    bool has_gas = false;                    // some label is gas or lung
     bool has_hard = true;  // some label is bone or gas; if none, their kernels are left out
 
     std::shared_ptr<const PhysicalTextures> textures;
     FineStructure fine;
     bool has_parenchyma = false;  // some label has its cube
     PlateCells plate_cells;       // of effect streaks
+    bool has_septa = false;       // some label is fat or muscle
     TissueLayers layers;
 
     std::vector<TargetBall> targets;
