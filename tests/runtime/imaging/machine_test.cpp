@@ -26,15 +26,15 @@ RenderOptions options_of(const Machine& machine) {
 void expect_agreement(const Exercise& exercise,
                       RenderOptions options,
                       const std::string& what,
-                      const CaseBundle& bundle = phantom()) {
+                      const CaseBundle& bundle = phantom(),
+                      double most_bias = 0.1) {
     const FrameInput input = needle_input();
     const auto fast = draw(exercise, options, input, bundle);
     options.kind = RendererKind::reference;
     const Difference d = compare(fast, draw(exercise, options, input, bundle));
     std::printf("%-24s mean %.3f bias %+.3f worst %d\n", what.c_str(), d.mean, d.bias, d.worst);
     EXPECT_LT(d.mean, 0.35) << what;
-    // Strong reverberation sums many echoes of eight bits.
-    EXPECT_LT(std::abs(d.bias), 0.2) << what;
+    EXPECT_LT(std::abs(d.bias), most_bias) << what;
     options.kind = RendererKind::fast;
     for (const std::string& simd : simd_targets()) {
         options.simd = simd;
@@ -95,7 +95,10 @@ TEST(MachineInTheRenderer, BothRenderersAgreeAtTheLimits) {
     for (const auto& c : cases) {
         Machine machine;
         c.change(machine);
-        expect_agreement(phantom_exercise(), options_of(machine), c.what);
+        // Strong reverberation sums some hundred echoes of eight bits each, rounded: 0.17 darker.
+        const bool sums_many = machine.haze.fraction > 1;
+        expect_agreement(phantom_exercise(), options_of(machine), c.what, phantom(),
+                         sums_many ? 0.2 : 0.1);
     }
 }
 
@@ -116,6 +119,25 @@ double mean_of(const std::vector<std::uint8_t>& pixels) {
     double sum = 0;
     for (const std::uint8_t p : pixels) sum += p;
     return sum / static_cast<double>(pixels.size());
+}
+
+TEST(MachineInTheRenderer, StructuresThatAMachineDoesNotShowAreLeftOut) {
+    Machine bare;
+    bare.structures = {false, false, false, false, true};
+    RenderOptions off = options_of(Machine{});
+    off.effects = {"-parenchyma", "-streaks", "-diaphragm", "-wall"};
+    EXPECT_TRUE(draw(phantom_exercise(), options_of(bare), {}) ==
+                draw(phantom_exercise(), off, {}));
+    // classic shows none of them, and the table of effects says so.
+    auto renderer =
+        Renderer::create(phantom(), phantom_exercise(), options_of(*built_in_machine("classic")));
+    ASSERT_TRUE(renderer.has_value());
+    std::vector<std::uint8_t> pixels(128 * 128);
+    renderer->render({}, pixels);
+    int none = 0;
+    for (const EffectCost& cost : renderer->costs())
+        none += !cost.ran && std::string(cost.skipped_because) == "the machine shows none";
+    EXPECT_EQ(none, 4);
 }
 
 TEST(MachineInTheRenderer, TheConsoleActsOnEveryMap) {

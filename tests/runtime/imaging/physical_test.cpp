@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "formats/machine/machine_toml.h"
 #include "imaging_support.h"
 
 namespace sonocase::runtime {
@@ -122,16 +123,19 @@ TEST(PhysicalModel, PixelsAreTheSameOnEveryInstructionSetAndThreadCount) {
     }
 }
 
+// Levels of the machine of before: liver is above 60 grey, a cyst below 35.
 TEST(PhysicalModel, TargetsShowWhereTheyAreAndNowhereElse) {
+    RenderOptions options = physical_options();
+    options.machine = *built_in_machine("classic");
     Exercise exercise = phantom_exercise();
     FrameInput input;
-    const auto without = draw(exercise, physical_options(), input);
+    const auto without = draw(exercise, options, input);
     Target cyst;
     cyst.centre = {20, 0, 50};
     cyst.radius_mm = 9;
     cyst.look = TargetLook::cyst;
     exercise.targets = {cyst};
-    auto renderer = Renderer::create(phantom(), exercise, physical_options());
+    auto renderer = Renderer::create(phantom(), exercise, options);
     ASSERT_TRUE(renderer.has_value());
     std::vector<std::uint8_t> with(256 * 256);
     renderer->render(input, with);
@@ -154,11 +158,11 @@ TEST(PhysicalModel, TargetsShowWhereTheyAreAndNowhereElse) {
             }
         }
     }
-    EXPECT_LT(inside / n, 18);
-    EXPECT_GT(before / n, 20);
+    EXPECT_LT(inside / n, 35);
+    EXPECT_GT(before / n, 60);
     // Far from the slab it is pruned, and the picture is the plain one.
     exercise.targets[0].centre.y = 25;
-    EXPECT_TRUE(draw(exercise, physical_options(), input) == without);
+    EXPECT_TRUE(draw(exercise, options, input) == without);
 }
 
 TEST(PhysicalModel, PicturesForTheEye) {
@@ -169,8 +173,13 @@ TEST(PhysicalModel, PicturesForTheEye) {
               512);
     FrameInput input;
     write_pgm(::testing::TempDir() + "physical_linear.pgm", draw(linear, o, input), 512, 512);
+    o.machine = *built_in_machine("classic");
     const auto pixels = draw(curved, o, input);
-    EXPECT_GT(*std::max_element(pixels.begin(), pixels.end()), 150);
+    EXPECT_GT(*std::max_element(pixels.begin(), pixels.end()), 200);
+    // The map of `modern` is less steep above its knee.
+    o.machine = Machine{};
+    const auto modern = draw(curved, o, input);
+    EXPECT_GT(*std::max_element(modern.begin(), modern.end()), 150);
 }
 
 }  // namespace

@@ -49,6 +49,7 @@ struct BeamChunk {
     bool refracts = false;     // some edge_loss is not zero
     bool one_label = false;
     bool hard = false;  // bone or gas
+    bool fine = false;  // some label has fine structure
 };
 
 }  // namespace sonocase::runtime

@@ -26,13 +26,15 @@ HWY_NOINLINE void look_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
         other = hn::Or(other, hn::Xor(hn::Load(di, c.label.row(row)), hn::Set(di, first)));
     c.one_label = hn::AllTrue(di, hn::Eq(other, hn::Zero(di)));
     const auto kind_bits = hn::Set(di, 7 << 16);
-    auto hardest = hn::Zero(di);
+    auto hardest = hn::Zero(di), any = hn::Zero(di);
     for (int row = 0; row < c.rows; ++row) {
         auto look = hn::Set(di, b.looks[first]);
         if (!c.one_label) look = hn::GatherIndex(di, b.looks, hn::Load(di, c.label.row(row)));
         hardest = hn::Max(hardest, hn::And(look, kind_bits));
+        any = hn::Or(any, look);
         hn::Store(look, di, c.look.row(row));
     }
+    c.fine = !hn::AllFalse(di, hn::TestBit(any, hn::Set(di, kLookFine)));
     c.hard =
         !hn::AllTrue(di, hn::Lt(hardest, hn::Set(di, static_cast<std::int32_t>(kPackedGas) << 16)));
 }
@@ -64,8 +66,9 @@ template <class D>
 HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) {
     static_assert(physical::kFineEdge == 64);
     const hn::RebindToSigned<D> di;
-    auto sum = hn::Zero(di);
-    auto left = hn::TestBit(hn::Load(di, c.look.row(row)), hn::Set(di, kLookFine));
+    const auto fine = hn::TestBit(hn::Load(di, c.look.row(row)), hn::Set(di, kLookFine));
+    auto left = fine;
+    auto at = hn::Zero(di);
     const std::int32_t* labels = c.label.row(row);
     while (!hn::AllFalse(di, left)) {
         const std::int32_t label = labels[hn::FindFirstTrue(di, left)];
@@ -79,17 +82,29 @@ HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) 
                                    term(c.z.row(row), 2));
             return hn::And(rounded_bits(d, u), hn::Set(di, physical::kFineEdge - 1));
         };
-        const auto at = hn::Or(coordinate(0), hn::Or(hn::ShiftLeft<6>(coordinate(1)),
-                                                     hn::ShiftLeft<12>(coordinate(2))));
-        const auto word =
-            hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(b.fine),
-                             hn::Add(at, hn::Set(di, static_cast<std::int32_t>(m[9]))));
-        sum = hn::IfThenElse(mine, hn::ShiftLeft<2>(hn::ShiftRight<24>(hn::ShiftLeft<24>(word))),
-                             sum);
+        const auto place = hn::Or(coordinate(0), hn::Or(hn::ShiftLeft<6>(coordinate(1)),
+                                                        hn::ShiftLeft<12>(coordinate(2))));
+        const auto cube = hn::Set(di, static_cast<std::int32_t>(m[9]));
+        at = hn::IfThenElse(mine, hn::Add(place, cube), at);
         left = hn::AndNot(mine, left);
         (m[9] == kParenchymaOffset ? b.parenchyma_met : b.fine_met) = true;
     }
-    return sum;
+    const auto word = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(b.fine), at);
+    return hn::IfThenElseZero(fine, hn::ShiftLeft<2>(hn::ShiftRight<24>(hn::ShiftLeft<24>(word))));
+}
+
+// Added to the stretch's offsets. A loop of its own: the cubes together are as large as the
+// second-level cache, and the look-ups of several rows must wait at the same time.
+template <class D>
+HWY_NOINLINE void fine_chunk(D d, PhysicalBlock& b, BeamChunk& c) {
+    const hn::RebindToSigned<D> di;
+    for (int row = 0; row < c.rows; ++row) {
+        std::int32_t* offset = c.structure.row(row);
+        auto sum = fine_offset(d, b, c, row);
+        if (c.offsets) sum = hn::Add(sum, hn::Load(di, offset));
+        hn::Store(sum, di, offset);
+    }
+    c.offsets = true;
 }
 
 template <class D>
@@ -100,7 +115,6 @@ HWY_NOINLINE void scatter_chunk(D d, PhysicalBlock& b, const BeamChunk& c) {
         const auto look = hn::Load(di, c.look.row(row));
         auto echo = hn::ShiftRight<20>(look);  // 1/16 dB
         if (c.offsets) echo = hn::Add(echo, hn::Load(di, c.structure.row(row)));
-        if (b.fine != nullptr) echo = hn::Add(echo, fine_offset(d, b, c, row));
         const auto solid = hn::Ne(hn::And(look, hn::Set(di, 7 << 16)), hn::Zero(di));
         const auto amplitude = hn::IfThenElseZero(
             hn::RebindMask(d, solid), exp2_near(d, hn::Mul(hn::ConvertTo(d, echo), per_log2)));
@@ -121,7 +135,7 @@ HWY_NOINLINE void scatter_chunk(D d, PhysicalBlock& b, const BeamChunk& c) {
         const auto level = hn::Mul(amplitude, hn::Set(d, b.speckle_level[c.first + row]));
         for (int field = 0; field < looks; ++field) {
             hn::Vec<D> re, im;
-            field_of_look(d, scatterers, re, im);
+            field_of_look(d, scatterers, field + 1 < looks, re, im);
             write(hn::Mul(re, level), hn::Mul(im, level), field);
         }
     }

@@ -139,7 +139,7 @@ HWY_INLINE Scatterers<D> scatterers_of_row(D d, const PhysicalBlock& b, int beam
                                        hn::Mul(foot.per_normal, hn::Set(d, b.per_spacing[k]))),
                                one);  // as the beginnings below, which lie in [1, 2)
     Scatterers<D> out;
-    for (int i = 0; i < 3; ++i) {
+    const auto scatterer = [&](int i) HWY_ATTR {
         const auto node = mix_bits(du, sums[i], 0x2C1B3C6Du, hn::ShiftRight<16>(sums[i]));
         const auto begin =
             hn::BitCast(d, hn::Or(hn::ShiftRight<9>(node), hn::Set(du, 0x3F800000u)));
@@ -152,25 +152,27 @@ HWY_INLINE Scatterers<D> scatterers_of_row(D d, const PhysicalBlock& b, int beam
         const auto square = hn::Mul(off, off),
                    most = hn::Sub(one, hn::Mul(square, hn::Set(d, 3.0f)));
         out.weight[i] = hn::Mul(hn::Mul(blend[i], most), hn::Sub(most, square));
-    }
+    };
+    scatterer(0);
+    scatterer(1);
+    scatterer(2);
     return out;
 }
 
-// The field of one look, from bits moved so that its signs are on top.
+// The field of one look: the signs of its parts are the top bits of the scatterers, which move on
+// for the next look if there is one.
 template <class D>
-HWY_INLINE void field_of_look(D d, Scatterers<D>& s, hn::Vec<D>& re, hn::Vec<D>& im) {
+HWY_INLINE void field_of_look(D d, Scatterers<D>& s, bool more, hn::Vec<D>& re, hn::Vec<D>& im) {
     const hn::RebindToUnsigned<D> du;
-    const auto sign = hn::Set(du, 0x80000000u);
-    re = im = hn::Zero(d);
-    for (int i = 0; i < 3; ++i) {
-        const auto signed_by = [&](auto bits) HWY_ATTR {
-            return hn::BitCast(d, hn::Xor(hn::BitCast(du, s.weight[i]), hn::And(bits, sign)));
-        };
-        const auto second = hn::ShiftLeft<1>(s.bits[i]);
-        re = hn::Add(re, signed_by(s.bits[i]));
-        im = hn::Add(im, signed_by(second));
-        s.bits[i] = hn::ShiftLeft<1>(second);
-    }
+    const auto part = [&](int i, auto bits) HWY_ATTR {
+        return hn::CopySignToAbs(s.weight[i], hn::BitCast(d, bits));  // weights are not negative
+    };
+    const hn::Vec<decltype(du)> second[3] = {
+        hn::ShiftLeft<1>(s.bits[0]), hn::ShiftLeft<1>(s.bits[1]), hn::ShiftLeft<1>(s.bits[2])};
+    re = hn::Add(hn::Add(part(0, s.bits[0]), part(1, s.bits[1])), part(2, s.bits[2]));
+    im = hn::Add(hn::Add(part(0, second[0]), part(1, second[1])), part(2, second[2]));
+    if (!more) return;
+    for (int i = 0; i < 3; ++i) s.bits[i] = hn::ShiftLeft<1>(second[i]);
 }
 
 }  // namespace sonocase::runtime::HWY_NAMESPACE

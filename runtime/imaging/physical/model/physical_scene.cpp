@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "runtime/imaging/physical/model/physical_model.h"
+#include "runtime/imaging/physical/model/streak_plates.h"
 #include "runtime/imaging/physical/model/wall_sheets.h"
 #include "runtime/imaging/press/closed_label.h"
 
@@ -189,6 +190,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.fine = make_fine_structure(bundle, jobs);
     s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
                                    [](const FineFrame& f) { return f.cube == kParenchymaCube; });
+    if (s.has_parenchyma && options.structures.streaks) s.plate_cells = find_plate_cells(s);
     s.has_septa = std::any_of(s.fine.frames.begin(), s.fine.frames.end(), [](const FineFrame& f) {
         return f.cube == kFibreCube || f.cube == kSeptaCube;
     });

@@ -48,6 +48,13 @@ struct TargetBall {
     bool fluid = false;
 };
 
+// Cells of the plates of organs (plate_kind()) from the volume's corner on, x fastest: 1 where the
+// middle of one lies in parenchyma. Empty: none does, or the machine shows no plates.
+struct PlateCells {
+    Int3 size{0, 0, 0};
+    std::vector<std::uint8_t> holds;
+};
+
 struct PhysicalScene {
     const CaseBundle* bundle = nullptr;
     Grid grid;
@@ -65,6 +72,7 @@ struct PhysicalScene {
     std::shared_ptr<const PhysicalTextures> textures;
     FineStructure fine;
     bool has_parenchyma = false;  // some label has its cube
+    PlateCells plate_cells;       // of effect streaks
     bool has_septa = false;       // some label is fat or muscle
     TissueLayers layers;
 

@@ -99,11 +99,14 @@ void Search::add_cell(int i, int j, int k) {
     const Point3 corner =
         scene.grid.origin_mm + kind.cell_mm * Vector3{double(i), double(j), double(k)};
     const Point3 middle = corner + 0.5 * kind.cell_mm * Vector3{1, 1, 1};
+    const PlateCells& cells = scene.plate_cells;
+    if (!septa && !cells.holds[static_cast<std::size_t>((k * cells.size.y + j) * cells.size.x + i)])
+        return;
     const Point3 p = seen_at_rest(middle);
     double r = 0;
     const PlanePoint beam = beam_at({p.x, p.z}, r);
     if (r < kind.first_mm - kind.cell_mm || r > g.depth_mm + kind.cell_mm + pressed_mm) return;
-    const int label = plates_at(middle);
+    const int label = septa ? plates_at(middle) : 0;
     if (label < 0) return;
     const Vector3 along = frame.volume_from_probe.rotation * Vector3{beam.x, 0, beam.z};
     const auto bx = static_cast<float>(along.x), by = static_cast<float>(along.y),
@@ -219,6 +222,31 @@ const PlateKind& plate_kind(double frequency_mhz) {
     return frequency_mhz > kSeptaFrequencyMhz ? kSepta : kOrgans;
 }
 
+PlateCells find_plate_cells(const PhysicalScene& scene) {
+    PlateCells cells;
+    const double edge_mm = plate_kind(0).cell_mm;
+    const auto count = [&](int voxels) {
+        return static_cast<int>(voxels * scene.voxel_mm / edge_mm) + 1;
+    };
+    cells.size = {count(scene.grid.size.x), count(scene.grid.size.y), count(scene.grid.size.z)};
+    for (int k = 0; k < cells.size.z; ++k) {
+        for (int j = 0; j < cells.size.y; ++j) {
+            for (int i = 0; i < cells.size.x; ++i) {
+                const Point3 corner =
+                    scene.grid.origin_mm + edge_mm * Vector3{double(i), double(j), double(k)};
+                const Point3 v =
+                    scene.grid.voxel_from_point(corner + 0.5 * edge_mm * Vector3{1, 1, 1});
+                const int label = label_at(scene, static_cast<int>(std::floor(v.x + 0.5)),
+                                           static_cast<int>(std::floor(v.y + 0.5)),
+                                           static_cast<int>(std::floor(v.z + 0.5)));
+                cells.holds.push_back(scene.fine.frames[static_cast<std::size_t>(label)].cube ==
+                                      kParenchymaCube);
+            }
+        }
+    }
+    return cells;
+}
+
 int find_streaks(const PhysicalScene& scene,
                  const ScanGeometry& g,
                  const Tables& tables,
@@ -227,7 +255,7 @@ int find_streaks(const PhysicalScene& scene,
                  std::span<const float> gaps,
                  std::span<Streak> out) {
     const bool septa = tables.frequency_mhz > kSeptaFrequencyMhz;
-    if (!(septa ? scene.has_septa : scene.has_parenchyma)) return 0;
+    if (septa ? !scene.has_septa : scene.plate_cells.holds.empty()) return 0;
     const PlateKind& kind = plate_kind(tables.frequency_mhz);
     Search search{kind,
                   septa,
