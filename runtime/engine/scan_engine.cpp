@@ -127,13 +127,17 @@ FrameStatus ScanEngine::frame(double now_s,
         force_watch_.taken();
         input.settings.press_mm = sensed_press_mm_;
     }
-    const FrameStatus status = renderer_.render(input, pixels);
+    const FrameStatus drawn = renderer_.render(input, pixels);
     record.press = renderer_.press();
     if (tools_.has_needle)
         record.puncture = puncture_.update(time_s, input.needle.tip, input.needle.direction,
                                            record.needle.depth_mm, *anatomy_, renderer_);
+    const FrameStatus status = finish(input, drawn, pixels);
+    record.skin_not_fitted =
+        status == FrameStatus::rendered &&
+        skin_fit_.not_fitted(Point3{} + input.mannequin_from_probe.translation);
     last_ = record;
-    return finish(input, status, pixels);
+    return status;
 }
 
 void ScanEngine::begin_session(double now_s) {

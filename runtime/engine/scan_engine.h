@@ -22,6 +22,7 @@
 #include "runtime/engine/puncture_state.h"
 #include "runtime/engine/sensor_watch.h"
 #include "runtime/engine/skin.h"
+#include "runtime/engine/skin_fit.h"
 #include "runtime/engine/tracker_reading.h"
 #include "runtime/imaging/renderer.h"
 
@@ -61,6 +62,7 @@ struct FrameRecord {
     PressReport press;  // what the probe does to the tissue
     PunctureReport puncture;
     double reading_time_s = 0;
+    bool skin_not_fitted = false;  // the probe touches skin that no reading lies near
 };
 
 struct EngineOptions {
@@ -109,6 +111,7 @@ class ScanEngine {
   private:
     ScanEngine(CaseView bundle, Exercise exercise, EngineOptions options, Renderer renderer)
         : skin_(*bundle),
+          skin_fit_(*bundle),
           anatomy_(std::make_shared<CaseAnatomy>(
               bundle,
               breathing_shown(
@@ -122,6 +125,7 @@ class ScanEngine {
     FrameStatus finish(const FrameInput& input, FrameStatus status, std::span<std::uint8_t> pixels);
 
     Skin skin_;
+    SkinFit skin_fit_;
     std::shared_ptr<CaseAnatomy> anatomy_;  // stays in place when the engine moves
     NeedleState needle_;
     PunctureState puncture_;

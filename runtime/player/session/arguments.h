@@ -17,6 +17,7 @@ struct PlayerArguments {
     int frames = 0;                   // 0: all of the sweep or recording
     int width_px = 0, height_px = 0;  // 0: 512 x 512 when headless, the window's default otherwise
     std::string out;                  // folder for frames; empty: none are written
+    std::string truth;                // folder for what the frames show; empty: none
     std::string stats;                // JSON file, "-" for standard output; empty: none
     std::string record;               // recording to write; empty: none
     std::string trainee;  // a chosen name for the progress book; empty: no progress is kept

@@ -102,6 +102,7 @@ std::string FrameStats::json(const std::string& score_json,
         a["dropped_samples"] = accuracy_.full_samples - accuracy_.samples;
         a["reduced_frames"] = reduced_frames_;
     }
+    if (unfitted_frames_ > 0) out["frames_not_fitted"] = unfitted_frames_;
     out["force_n"]["mean"] = rounded(force_sum_n_ / std::max<double>(1, double(frame_ms_.count())));
     out["force_n"]["max"] = rounded(force_max_n_);
     out["effects"] = nlohmann::ordered_json::array();

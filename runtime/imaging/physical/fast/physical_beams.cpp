@@ -125,6 +125,7 @@ int PhysicalFast::choose_streaks(int first, std::span<PhysicalStreak> out) const
                                                   static_cast<float>(s.normal.z),
                                                   static_cast<float>(1 / s.width_mm),
                                                   static_cast<float>(2 / s.length_mm),
+                                                  static_cast<float>(s.bend),
                                                   static_cast<float>(s.amplitude),
                                                   s.sample_begin,
                                                   s.sample_end};
@@ -356,7 +357,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         }
         tail_from_[static_cast<std::size_t>(block)] = b.tail_from;
     });
-    mirror_rows(light_, 3);  // for the boxes of the aperture
+    mirror_rows(light_, 6);  // for the boxes of the aperture
     if (clutter) mirror_rows(clutter_, kMaxHazeReach);
     met_.pressed = f.press != nullptr;
     met_.breathes = f.motion.breathes();

@@ -46,7 +46,7 @@ enum BeamNumber {
 };
 
 inline constexpr int kRowSlack = 64;   // behind rows and buffers: lanes of the widest vector
-inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 3
+inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 6
 
 inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
 
@@ -64,6 +64,7 @@ struct PhysicalWall {
 struct PhysicalStreak {
     float x = 0, z = 0, normal_x = 0, normal_z = 1;  // mm, in the plane
     float per_width = 1, per_length = 1;             // 1 / deviation; 2 / length
+    float bend = 0;                                  // deviations, at half its length
     float amplitude = 0;
     int sample_begin = 0, sample_end = 0;
 };

@@ -65,6 +65,7 @@ struct PhysicalScene {
     std::shared_ptr<const PhysicalTextures> textures;
     FineStructure fine;
     bool has_parenchyma = false;  // some label has its cube
+    bool has_septa = false;       // some label is fat or muscle
     TissueLayers layers;
 
     std::vector<TargetBall> targets;

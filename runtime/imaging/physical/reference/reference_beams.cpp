@@ -323,8 +323,9 @@ class Beams {
             const Streak& s = streaks_[static_cast<std::size_t>(n)];
             const double x = o.x + p.row.r_mm * d.x - s.centre.x,
                          z = o.z + p.row.r_mm * d.z - s.centre.z;
-            const double off = (x * s.normal.x + z * s.normal.z) / s.width_mm;
             const double along = 2 * (x * s.normal.z - z * s.normal.x) / s.length_mm;
+            const double off =
+                (x * s.normal.x + z * s.normal.z) / s.width_mm - s.bend * along * along;
             p.re += s.amplitude * std::exp(-0.5 * (off * off + std::pow(along, 4))) *
                     p.row.interface_scale;
         }
