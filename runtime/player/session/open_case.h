@@ -32,7 +32,4 @@ Status bundle_health(const OpenCase& open);
 // Index of the exercise of that name, or an Error that lists the names; "" means the first.
 Result<int> find_exercise(const OpenCase& open, const std::string& name);
 
-// A free scan of any bundle: the probe starts above the middle of its volume.
-Exercise free_scan(const CaseBundle& bundle);
-
 }  // namespace sonocase::runtime

@@ -6,10 +6,10 @@
 #include <cstring>
 #include <filesystem>
 
-#include "formats/base/digest.h"
 #include "formats/files/recording_file.h"
 #include "formats/progress_book/progress_book.h"
 #include "formats/threads/thread_jobs.h"
+#include "runtime/recording/session_header.h"
 #include "runtime/recording/settings_text.h"
 
 namespace sonocase::runtime {
@@ -36,12 +36,6 @@ const char* picture_reason(std::span<const LiveEvent> events) {
     return nullptr;
 }
 
-std::string joined(const std::vector<std::string>& words) {
-    std::string out;
-    for (const std::string& word : words) out += (out.empty() ? "" : ",") + word;
-    return out;
-}
-
 }  // namespace
 
 SessionRun::SessionRun(const OpenCase& open, const ScanEngine& engine, std::string path)
@@ -60,21 +54,8 @@ Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
                                                       const std::string& started,
                                                       double now_s) {
     std::unique_ptr<SessionRun> run(new SessionRun(open, engine, path));
-    SessionHeader header;
-    header.case_name = open.bundle->manifest.case_name;
-    header.exercise = run->exercise_.name;
-    for (const EmbeddedExercise& embedded : open.bundle->exercises) {
-        if (embedded.name == header.exercise) header.exercise_digest = digest_of(embedded.toml);
-    }
-    header.trainee = trainee;
-    header.started = started;
-    header.program = "sonoplay";
-    const RenderOptions& render = engine.render_options();
-    header.render =
-        std::string("model=") + (render.model == ImageModel::paper ? "paper" : "physical") +
-        (render.machine ? " machine=" + render.machine->name : "") +
-        " effects=" + joined(render.effects) + " size=" + std::to_string(render.width_px) + "x" +
-        std::to_string(render.height_px) + " seed=" + std::to_string(render.seed);
+    const SessionHeader header =
+        session_header(*open.bundle, run->exercise_, engine.render_options(), trainee, started);
     auto recorder = SessionRecorder::start(path, header, run->exercise_, open.bundle->labels);
     if (!recorder) return recorder.error();
     run->recorder_ = std::move(*recorder);
