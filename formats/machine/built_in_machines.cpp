@@ -20,6 +20,7 @@ Machine classic() {
     m.near_field = {1.6, 2.2, 0.3, 9, 0, 0.5, 1.9, 0, 0, 0.8, 1, 3};
     m.haze = {0, 4.5, 2, -24};
     m.contact = {0, 0};
+    m.structures = {false, false, false, false, false};
     m.post_filter = true;
     return m;
 }

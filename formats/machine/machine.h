@@ -100,6 +100,14 @@ struct MachineContact {
     bool operator==(const MachineContact&) const = default;
 };
 
+// Structures that a case does not hold and the renderer adds to its tissue, each an effect
+// (docs/effects.md); linings are the walls of vessels and the double line of capsules. A machine of
+// the nineties shows none of them, and its frames do not pay for them.
+struct MachineStructures {
+    bool parenchyma = true, streaks = true, diaphragm = true, wall = true, linings = true;
+    bool operator==(const MachineStructures&) const = default;
+};
+
 struct Machine {
     std::string name = "modern";
     std::string title = "Modern scanner, abdominal fan";  // shown to people
@@ -111,6 +119,7 @@ struct Machine {
     MachineNearField near_field;
     MachineHaze haze;
     MachineContact contact;
+    MachineStructures structures;
     // Weights of the frames that persistence blends, newest first; scaled to sum to 1. One: none.
     std::vector<double> persistence{0.4, 0.3, 0.2, 0.1};  // 1 to 8 weights, [0, 1], the first > 0
     double edge_enhancement = 0;  // amount of the unsharp mask; 0: none; [0, 4]

@@ -68,6 +68,12 @@ void visit_machine(M& m, V& v) {
     v.table("contact");
     v.number("edge_db", m.contact.edge_db, 0, 120);
     v.number("edge_fraction", m.contact.edge_fraction, 0, 0.5);
+    v.table("structures");
+    v.flag("parenchyma", m.structures.parenchyma);
+    v.flag("streaks", m.structures.streaks);
+    v.flag("diaphragm", m.structures.diaphragm);
+    v.flag("wall", m.structures.wall);
+    v.flag("linings", m.structures.linings);
 }
 
 class Reader {

@@ -57,8 +57,7 @@ SessionEvent session_event(const LiveEvent& event,
         case LiveEventKind::no_go_left:
             if (index < labels.size()) out.detail = "label=" + word(labels[index].name);
             break;
-        default:
-            break;
+        default: break;
     }
     return out;
 }

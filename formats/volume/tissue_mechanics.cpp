@@ -57,13 +57,10 @@ constexpr Row kRows[] = {
 
 TissueMechanics of_vessel(Vessel vessel) {
     switch (vessel) {
-        case Vessel::vein:
-            return kVein;
-        case Vessel::thrombus:
-            return kThrombus;
+        case Vessel::vein: return kVein;
+        case Vessel::thrombus: return kThrombus;
         case Vessel::artery:
-        case Vessel::unknown:
-            break;
+        case Vessel::unknown: break;
     }
     return kArtery;
 }
@@ -71,14 +68,10 @@ TissueMechanics of_vessel(Vessel vessel) {
 TissueMechanics by_kind(TissueKind kind) {
     switch (kind) {
         case TissueKind::outside:
-        case TissueKind::gas:
-            return {2, false, 0.05, false};
-        case TissueKind::fluid:
-            return kFluid;
-        case TissueKind::bone:
-            return kRigid;
-        case TissueKind::soft:
-            break;
+        case TissueKind::gas: return {2, false, 0.05, false};
+        case TissueKind::fluid: return kFluid;
+        case TissueKind::bone: return kRigid;
+        case TissueKind::soft: break;
     }
     return {8, false, 0.1, false};
 }

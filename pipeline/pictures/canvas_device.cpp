@@ -76,14 +76,9 @@ class CanvasDevice : public vtkContextDevice2D {
                     stroke(-r, 0, r, 0);
                     stroke(0, -r, 0, r);
                     break;
-                case vtkPlotPoints::SQUARE:
-                    canvas_->fill(box, colour);
-                    break;
-                case vtkPlotPoints::DIAMOND:
-                    canvas_->fill(rhomb, colour);
-                    break;
-                default:
-                    canvas_->disc(c, r, colour);
+                case vtkPlotPoints::SQUARE: canvas_->fill(box, colour); break;
+                case vtkPlotPoints::DIAMOND: canvas_->fill(rhomb, colour); break;
+                default: canvas_->disc(c, r, colour);
             }
         }
     }

@@ -146,9 +146,7 @@ void add_plots(const Series& s, vtkTable* table, CanvasColour colour, vtkChartXY
         points->SetMarkerSize(static_cast<float>(size));
     };
     switch (s.look) {
-        case SeriesLook::bars:
-            add(vtkChart::BAR, s.width_px);
-            break;
+        case SeriesLook::bars: add(vtkChart::BAR, s.width_px); break;
         case SeriesLook::line:
         case SeriesLook::dashed:
         case SeriesLook::line_and_points:
@@ -160,9 +158,7 @@ void add_plots(const Series& s, vtkTable* table, CanvasColour colour, vtkChartXY
             break;
         case SeriesLook::points:
         case SeriesLook::crosses:
-        case SeriesLook::diamonds:
-            add_marks(3 * s.width_px);
-            break;
+        case SeriesLook::diamonds: add_marks(3 * s.width_px); break;
     }
 }
 

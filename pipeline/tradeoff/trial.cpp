@@ -10,18 +10,12 @@ namespace sonocase::pipeline {
 
 const char* role_name(TrialRole role) {
     switch (role) {
-        case TrialRole::standard:
-            return "standard";
-        case TrialRole::knob:
-            return "knob";
-        case TrialRole::pair:
-            return "pair";
-        case TrialRole::preset:
-            return "preset";
-        case TrialRole::paper:
-            return "paper";
-        case TrialRole::peer:
-            return "peer";
+        case TrialRole::standard: return "standard";
+        case TrialRole::knob: return "knob";
+        case TrialRole::pair: return "pair";
+        case TrialRole::preset: return "preset";
+        case TrialRole::paper: return "paper";
+        case TrialRole::peer: return "peer";
     }
     return "";
 }

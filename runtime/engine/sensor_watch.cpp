@@ -9,18 +9,15 @@ namespace sonocase::runtime {
 const char* verdict_sentence(SensorVerdict verdict) {
     switch (verdict) {
         case SensorVerdict::fine:
-        case SensorVerdict::absent:
-            return "";
+        case SensorVerdict::absent: return "";
         case SensorVerdict::lost:
             return "Out of range: bring the sensor nearer to the transmitter.";
-        case SensorVerdict::stale:
-            return "No new reading: check the cable of the tracker.";
+        case SensorVerdict::stale: return "No new reading: check the cable of the tracker.";
         case SensorVerdict::frozen:
             return "Frozen: readings arrive but never change; replug the sensor.";
         case SensorVerdict::jumped:
             return "Jumped faster than a hand can: check for loose mounts and metal nearby.";
-        case SensorVerdict::poor:
-            return "Distorted field: move metal away from the sensor.";
+        case SensorVerdict::poor: return "Distorted field: move metal away from the sensor.";
     }
     return "";
 }

@@ -6,16 +6,11 @@ namespace sonocase::runtime {
 
 const char* phase_name(TrackerPhase phase) {
     switch (phase) {
-        case TrackerPhase::searching:
-            return "searching";
-        case TrackerPhase::starting:
-            return "starting";
-        case TrackerPhase::streaming:
-            return "streaming";
-        case TrackerPhase::ended:
-            return "ended";
-        case TrackerPhase::failed:
-            return "failed";
+        case TrackerPhase::searching: return "searching";
+        case TrackerPhase::starting: return "starting";
+        case TrackerPhase::streaming: return "streaming";
+        case TrackerPhase::ended: return "ended";
+        case TrackerPhase::failed: return "failed";
     }
     return "";
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/volume/surface.h"
+#include "support/area_sampler.h"
 #include "support/random.h"
 
 namespace sonocase::testing {
@@ -18,18 +19,12 @@ enum class Build { belly, wide, slim, pear, gaunt, huge };
 
 inline std::string build_name(Build build) {
     switch (build) {
-        case Build::belly:
-            return "belly";
-        case Build::wide:
-            return "wide";
-        case Build::slim:
-            return "slim";
-        case Build::pear:
-            return "pear";
-        case Build::gaunt:
-            return "gaunt";
-        default:
-            return "huge";
+        case Build::belly: return "belly";
+        case Build::wide: return "wide";
+        case Build::slim: return "slim";
+        case Build::pear: return "pear";
+        case Build::gaunt: return "gaunt";
+        default: return "huge";
     }
 }
 
@@ -49,18 +44,12 @@ inline double build_offset_mm(
         return std::exp(-0.5 * t * t);
     };
     switch (build) {
-        case Build::belly:
-            return 45 * bump(-20, 80) * front * front;
-        case Build::wide:
-            return 15 + 15 * side2 * bump(-20, 150);
-        case Build::slim:
-            return -25 * (0.55 + 0.45 * bump(0, 110)) * (0.75 + 0.25 * side2);
-        case Build::pear:
-            return 40 * bump(-130, 75) * (0.55 + 0.45 * side2) - 8 * bump(90, 80);
-        case Build::gaunt:
-            return -50 * bump(-10, 75) * front * front - 14 * side2 - 4;
-        default:
-            return 45 + 45 * bump(-20, 110) * (0.4 + 0.6 * front);
+        case Build::belly: return 45 * bump(-20, 80) * front * front;
+        case Build::wide: return 15 + 15 * side2 * bump(-20, 150);
+        case Build::slim: return -25 * (0.55 + 0.45 * bump(0, 110)) * (0.75 + 0.25 * side2);
+        case Build::pear: return 40 * bump(-130, 75) * (0.55 + 0.45 * side2) - 8 * bump(90, 80);
+        case Build::gaunt: return -50 * bump(-10, 75) * front * front - 14 * side2 - 4;
+        default: return 45 + 45 * bump(-20, 110) * (0.4 + 0.6 * front);
     }
 }
 
@@ -103,32 +92,17 @@ inline Surface sweep_of_build(const Surface& surface,
                               const BodyAxes& axes,
                               const BuildSweep& plan,
                               Random& random) {
-    std::vector<double> area{0};
-    for (const auto& t : surface.triangles) {
-        const Vector3 n = cross(surface.points[t[1]] - surface.points[t[0]],
-                                surface.points[t[2]] - surface.points[t[0]]);
-        area.push_back(area.back() + 0.5 * norm(n));
-    }
+    const AreaSampler sampler(surface);
     Surface readings;
     while (static_cast<int>(readings.points.size()) < plan.points) {
-        const double at = random.uniform(0, area.back());
-        const auto above = std::upper_bound(area.begin() + 1, area.end() - 1, at);
-        const auto& t = surface.triangles[static_cast<std::size_t>(above - area.begin() - 1)];
-        double u = random.uniform(0, 1), v = random.uniform(0, 1);
-        if (u + v > 1) {
-            u = 1 - u;
-            v = 1 - v;
-        }
-        const Point3 a = surface.points[t[0]];
-        const Vector3 ab = surface.points[t[1]] - a, ac = surface.points[t[2]] - a;
-        const Point3 p = a + (u * ab + v * ac);
+        const auto [p, normal, corner] = sampler.draw(random);
         const Vector3 d = p - axes.centre;
         const double side = dot(d, axes.left), front = dot(d, axes.front);
         if (front < plan.least_front * std::hypot(side, front)) continue;
         Point3 y =
             p + plan.noise_mm * Vector3{random.gaussian(), random.gaussian(), random.gaussian()};
         if (random.uniform(0, 1) < plan.outliers)
-            y = y + random.uniform(10, 60) * normalized(cross(ab, ac));
+            y = y + random.uniform(10, 60) * normalized(normal);
         readings.points.push_back(y);
     }
     return readings;

@@ -53,14 +53,10 @@ class Phantom {
         const double none = 1e3;
         const double wave = 1.5 * std::sin(p.x / 11) * std::cos(p.y / 17);
         switch (shape) {
-            case skin:
-                return -depth;
-            case fat:
-                return options_.layers ? 2 - depth : none;
-            case muscle:
-                return options_.layers ? 11 + wave - depth : none;
-            case liver:
-                return (options_.layers ? 22 - 0.5 * wave : 2) - depth;
+            case skin: return -depth;
+            case fat: return options_.layers ? 2 - depth : none;
+            case muscle: return options_.layers ? 11 + wave - depth : none;
+            case liver: return (options_.layers ? 22 - 0.5 * wave : 2) - depth;
             case blood:
                 if (!options_.vessels) return none;
                 return std::min(std::hypot(p.x - 5, p.z - 75) - 8,
@@ -68,14 +64,10 @@ class Phantom {
             case kidney:
                 if (!options_.kidney) return none;
                 return (std::hypot((p.x - 45) / 22, p.y / 40, (p.z - 95) / 16) - 1) * 16;
-            case cyst:
-                return options_.vessels ? std::hypot(p.x + 40, p.y, p.z - 100) - 12 : none;
-            case bone:
-                return options_.ribs ? std::hypot((p.x + 22) / 1.6, p.z - 24) - 3.5 : none;
-            case gas:
-                return options_.gas ? std::hypot(p.x - 48, p.y, p.z - 45) - 9 : none;
-            default:
-                return none;
+            case cyst: return options_.vessels ? std::hypot(p.x + 40, p.y, p.z - 100) - 12 : none;
+            case bone: return options_.ribs ? std::hypot((p.x + 22) / 1.6, p.z - 24) - 3.5 : none;
+            case gas: return options_.gas ? std::hypot(p.x - 48, p.y, p.z - 45) - 9 : none;
+            default: return none;
         }
     }
 

@@ -8,6 +8,7 @@
 
 #include "formats/registration/registration.h"
 #include "formats/volume/surface.h"
+#include "support/area_sampler.h"
 #include "support/random.h"
 
 namespace sonocase::testing {
@@ -65,12 +66,8 @@ inline Surface sweep_of(const Surface& skin,
                         const Registration& map,
                         Random& random,
                         const SweepPlan& plan = {}) {
-    std::vector<double> area{0}, depth, side;
-    for (const auto& t : skin.triangles) {
-        const Vector3 n =
-            cross(skin.points[t[1]] - skin.points[t[0]], skin.points[t[2]] - skin.points[t[0]]);
-        area.push_back(area.back() + 0.5 * norm(n));
-    }
+    const AreaSampler sampler(skin);
+    std::vector<double> depth, side;
     for (Point3 p : skin.points) {
         depth.push_back(p.y);
         side.push_back(p.x);
@@ -82,22 +79,13 @@ inline Surface sweep_of(const Surface& skin,
     const double middle_depth = median(depth), middle_side = median(side);
     Surface readings;
     while (static_cast<int>(readings.points.size()) < plan.points) {
-        const double at = random.uniform(0, area.back());
-        const auto above = std::upper_bound(area.begin() + 1, area.end() - 1, at);
-        const auto& t = skin.triangles[static_cast<std::size_t>(above - area.begin() - 1)];
-        double u = random.uniform(0, 1), v = random.uniform(0, 1);
-        if (u + v > 1) {
-            u = 1 - u;
-            v = 1 - v;
-        }
-        const Point3 a = skin.points[t[0]];
-        const Point3 p = a + u * (skin.points[t[1]] - a) + v * (skin.points[t[2]] - a);
+        const auto [p, facing, corner] = sampler.draw(random);
         if (plan.part == SweptPart::front && p.y < middle_depth) continue;
         if (plan.part == SweptPart::one_side && p.x < middle_side) continue;
         const Vector3 noise{random.gaussian(), random.gaussian(), random.gaussian()};
         Point3 y = mannequin_from_ct(map, p) + plan.noise_mm * noise;
         if (random.uniform(0, 1) < plan.lift_off_share) {
-            const Vector3 n = transpose(inverse(jacobian(map, p))) * skin.normals[t[0]];
+            const Vector3 n = transpose(inverse(jacobian(map, p))) * skin.normals[corner];
             y = y + random.uniform(10, 60) * normalized(n);
         }
         readings.points.push_back(y);

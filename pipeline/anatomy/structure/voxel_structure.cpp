@@ -103,8 +103,7 @@ float VoxelStructure::offset_db(std::uint8_t label, int i, int j, int k) const {
                 z = static_cast<float>(k) * voxel_mm_;
     const auto sd = static_cast<float>(f.tissue->structure_db);
     switch (f.role) {
-        case StructureRole::none:
-            return 0;
+        case StructureRole::none: return 0;
         case StructureRole::muscle:
             // What segmentations label as muscle in the hilum is vessels and fat.
             if (in_hilum(i, j, k)) return 9 + 3 * grain3_.at(x, y, z);
@@ -132,8 +131,7 @@ float VoxelStructure::offset_db(std::uint8_t label, int i, int j, int k) const {
             if (!options_.parenchyma) return 0;
             return sd * (0.75f * grain5_.at(x, y, z) + 0.66f * grain14_.at(x, y, z));
         case StructureRole::liver:
-        case StructureRole::plain:
-            break;
+        case StructureRole::plain: break;
     }
     if (!options_.parenchyma || sd <= 0) return 0;
     return sd * (0.7f * grain3_.at(x, y, z) + 0.71f * grain5_.at(x, y, z));

@@ -92,22 +92,14 @@ class Body {
         at_ += size;
         if (form_ == Form::big) std::reverse(raw, raw + size);  // this machine is little-endian
         switch (type) {
-            case Type::i8:
-                return as_double<std::int8_t>(raw);
-            case Type::u8:
-                return as_double<std::uint8_t>(raw);
-            case Type::i16:
-                return as_double<std::int16_t>(raw);
-            case Type::u16:
-                return as_double<std::uint16_t>(raw);
-            case Type::i32:
-                return as_double<std::int32_t>(raw);
-            case Type::u32:
-                return as_double<std::uint32_t>(raw);
-            case Type::f32:
-                return as_double<float>(raw);
-            case Type::f64:
-                break;
+            case Type::i8: return as_double<std::int8_t>(raw);
+            case Type::u8: return as_double<std::uint8_t>(raw);
+            case Type::i16: return as_double<std::int16_t>(raw);
+            case Type::u16: return as_double<std::uint16_t>(raw);
+            case Type::i32: return as_double<std::int32_t>(raw);
+            case Type::u32: return as_double<std::uint32_t>(raw);
+            case Type::f32: return as_double<float>(raw);
+            case Type::f64: break;
         }
         return as_double<double>(raw);
     }

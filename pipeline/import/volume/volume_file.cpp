@@ -38,26 +38,16 @@ template <class Use>
 auto with_voxels(const NativeVolume& volume, Use use) {
     const std::byte* data = volume.bytes.data();
     switch (volume.component) {
-        case Component::u8:
-            return use(reinterpret_cast<const std::uint8_t*>(data));
-        case Component::i8:
-            return use(reinterpret_cast<const std::int8_t*>(data));
-        case Component::u16:
-            return use(reinterpret_cast<const std::uint16_t*>(data));
-        case Component::i16:
-            return use(reinterpret_cast<const std::int16_t*>(data));
-        case Component::u32:
-            return use(reinterpret_cast<const std::uint32_t*>(data));
-        case Component::i32:
-            return use(reinterpret_cast<const std::int32_t*>(data));
-        case Component::u64:
-            return use(reinterpret_cast<const std::uint64_t*>(data));
-        case Component::i64:
-            return use(reinterpret_cast<const std::int64_t*>(data));
-        case Component::f32:
-            return use(reinterpret_cast<const float*>(data));
-        case Component::f64:
-            break;
+        case Component::u8: return use(reinterpret_cast<const std::uint8_t*>(data));
+        case Component::i8: return use(reinterpret_cast<const std::int8_t*>(data));
+        case Component::u16: return use(reinterpret_cast<const std::uint16_t*>(data));
+        case Component::i16: return use(reinterpret_cast<const std::int16_t*>(data));
+        case Component::u32: return use(reinterpret_cast<const std::uint32_t*>(data));
+        case Component::i32: return use(reinterpret_cast<const std::int32_t*>(data));
+        case Component::u64: return use(reinterpret_cast<const std::uint64_t*>(data));
+        case Component::i64: return use(reinterpret_cast<const std::int64_t*>(data));
+        case Component::f32: return use(reinterpret_cast<const float*>(data));
+        case Component::f64: break;
     }
     return use(reinterpret_cast<const double*>(data));
 }

@@ -17,10 +17,8 @@ std::array<double, 4> spline_values(double t, int derivative) {
         case 0:
             return {s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6,
                     (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6};
-        case 1:
-            return {-s * s / 2, (3 * t * t - 4 * t) / 2, -(3 * s * s - 4 * s) / 2, t * t / 2};
-        default:
-            return {s, 3 * t - 2, 1 - 3 * t, t};
+        case 1: return {-s * s / 2, (3 * t * t - 4 * t) / 2, -(3 * s * s - 4 * s) / 2, t * t / 2};
+        default: return {s, 3 * t - 2, 1 - 3 * t, t};
     }
 }
 

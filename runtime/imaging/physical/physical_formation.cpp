@@ -24,6 +24,14 @@ Machine machine_of(const FormationInput& input) {
     return machine;
 }
 
+PhysicalEffects shown_by(PhysicalEffects on, const MachineStructures& machine) {
+    on.parenchyma = on.parenchyma && machine.parenchyma;
+    on.streaks = on.streaks && machine.streaks;
+    on.diaphragm = on.diaphragm && machine.diaphragm;
+    on.wall = on.wall && machine.wall;
+    return on;
+}
+
 class PhysicalFormation final : public ImageFormation {
   public:
     PhysicalFormation(PhysicalScene scene, PhysicalNoise noise, const FormationInput& input)
@@ -35,6 +43,7 @@ class PhysicalFormation final : public ImageFormation {
           reference_(input.options.kind == RendererKind::reference),
           keep_all_(input.effects.keep_all),
           switches_(switches_of<PhysicalEffects>(kPhysicalEffects, input.effects.on)),
+          shown_(shown_by(switches_, machine_of(input).structures)),
           context_(input.context),
           machine_(machine_of(input)) {
         if (exercise_.breathing.amplitude_mm != 0) breathing_ = BreathingField(*input.bundle);
@@ -114,7 +123,7 @@ class PhysicalFormation final : public ImageFormation {
                                      : 60.0;
         frame.motion = motion_at(exercise_.breathing, exercise_.pulsation,
                                  std::isfinite(input.time_s) ? input.time_s : 0);
-        frame.effects = switches_;
+        frame.effects = shown_;
         return frame;
     }
 
@@ -125,7 +134,7 @@ class PhysicalFormation final : public ImageFormation {
     VoxelBlocks* const blocks_;
     const std::uint32_t seed_;
     const bool reference_, keep_all_;
-    const PhysicalEffects switches_;
+    const PhysicalEffects switches_, shown_;  // what is asked for; what the machine shows of it
     const RenderContext context_;
     const Machine machine_;
     std::vector<std::unique_ptr<Level>> levels_;
@@ -141,8 +150,9 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
     std::optional<Result<PhysicalScene>> scene;
     jobs.run(2, [&](std::size_t job) {
         if (job == 0) {  // the longer one, on the caller's thread, whose memory it keeps
+            const Machine machine = machine_of(input);
             scene = make_physical_scene(input.bundle, input.exercise.targets,
-                                        {&jobs, textures, machine_of(input).tissue_db});
+                                        {&jobs, textures, machine.tissue_db, machine.structures});
         } else {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,
                                         input.scanlines + kNoiseSlack);

@@ -12,12 +12,9 @@ constexpr std::size_t kMostStanding = 4;
 
 double life_s(Notice::Kind kind) {
     switch (kind) {
-        case Notice::Kind::error:
-            return 20;
-        case Notice::Kind::warning:
-            return 12;
-        case Notice::Kind::news:
-            break;
+        case Notice::Kind::error: return 20;
+        case Notice::Kind::warning: return 12;
+        case Notice::Kind::news: break;
     }
     return 5;
 }

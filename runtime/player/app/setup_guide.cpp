@@ -68,20 +68,13 @@ void show_direction(const DirectionFit& fit, SetupView& view) {
 
 const char* setup_title(SetupStep step) {
     switch (step) {
-        case SetupStep::trackers:
-            return "Trackers";
-        case SetupStep::probe_tip:
-            return "Probe: middle of the face";
-        case SetupStep::probe_depth:
-            return "Probe: depth direction";
-        case SetupStep::probe_lateral:
-            return "Probe: lateral direction";
-        case SetupStep::needle:
-            return "Needle";
-        case SetupStep::mannequin:
-            return "Mannequin";
-        case SetupStep::done:
-            return "Try it and save";
+        case SetupStep::trackers: return "Trackers";
+        case SetupStep::probe_tip: return "Probe: middle of the face";
+        case SetupStep::probe_depth: return "Probe: depth direction";
+        case SetupStep::probe_lateral: return "Probe: lateral direction";
+        case SetupStep::needle: return "Needle";
+        case SetupStep::mannequin: return "Mannequin";
+        case SetupStep::done: return "Try it and save";
     }
     return "";
 }
@@ -178,15 +171,12 @@ void SetupGuide::fit() {
         case SetupStep::probe_lateral:
             if (poses.size() >= kFewestReadings) fit_probe_direction(poses);
             return;
-        case SetupStep::needle:
-            fit_needle_depths(poses);
-            return;
+        case SetupStep::needle: fit_needle_depths(poses); return;
         case SetupStep::mannequin:
             if (poses.size() >= kFewestSweepReadings) fit_mannequin(poses);
             return;
         case SetupStep::trackers:
-        case SetupStep::done:
-            return;
+        case SetupStep::done: return;
     }
 }
 

@@ -19,18 +19,12 @@ namespace {
 const char* picture_reason(std::span<const LiveEvent> events) {
     for (const LiveEvent& event : events) {
         switch (event.kind) {
-            case LiveEventKind::target_hit:
-                return "target_hit";
-            case LiveEventKind::no_go_contact:
-                return "no_go_contact";
-            case LiveEventKind::needle_entry:
-                return "needle_entry";
-            case LiveEventKind::target_scanned:
-                return "target_scanned";
-            case LiveEventKind::needle_exit:
-                return "needle_exit";
-            default:
-                break;
+            case LiveEventKind::target_hit: return "target_hit";
+            case LiveEventKind::no_go_contact: return "no_go_contact";
+            case LiveEventKind::needle_entry: return "needle_entry";
+            case LiveEventKind::target_scanned: return "target_scanned";
+            case LiveEventKind::needle_exit: return "needle_exit";
+            default: break;
         }
     }
     return nullptr;

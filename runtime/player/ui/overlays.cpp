@@ -57,12 +57,9 @@ namespace {
 
 unsigned notice_colour(Notice::Kind kind) {
     switch (kind) {
-        case Notice::Kind::error:
-            return colour::kBad;
-        case Notice::Kind::warning:
-            return colour::kWarn;
-        case Notice::Kind::news:
-            break;
+        case Notice::Kind::error: return colour::kBad;
+        case Notice::Kind::warning: return colour::kWarn;
+        case Notice::Kind::news: break;
     }
     return colour::kAccent;
 }

@@ -17,12 +17,9 @@ namespace {
 
 const char* shape_name(ProbeShape shape) {
     switch (shape) {
-        case ProbeShape::linear:
-            return "Linear";
-        case ProbeShape::curvilinear:
-            return "Curved";
-        case ProbeShape::phased:
-            return "Phased";
+        case ProbeShape::linear: return "Linear";
+        case ProbeShape::curvilinear: return "Curved";
+        case ProbeShape::phased: return "Phased";
     }
     return "";
 }

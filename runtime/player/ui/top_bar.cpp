@@ -13,14 +13,10 @@ namespace {
 
 unsigned phase_colour(TrackerPhase phase) {
     switch (phase) {
-        case TrackerPhase::streaming:
-            return colour::kGood;
-        case TrackerPhase::failed:
-            return colour::kBad;
-        case TrackerPhase::ended:
-            return colour::kDim;
-        default:
-            return colour::kWarn;
+        case TrackerPhase::streaming: return colour::kGood;
+        case TrackerPhase::failed: return colour::kBad;
+        case TrackerPhase::ended: return colour::kDim;
+        default: return colour::kWarn;
     }
 }
 

@@ -16,26 +16,13 @@ void sensor_row(const char* tool, const SensorReading* reading, SensorVerdict ve
     unsigned packed = colour::kGood;
     const char* word = "ok";
     switch (verdict) {
-        case SensorVerdict::fine:
-            break;
-        case SensorVerdict::absent:
-            packed = colour::kFaint, word = "none";
-            break;
-        case SensorVerdict::lost:
-            packed = colour::kBad, word = "out of range";
-            break;
-        case SensorVerdict::stale:
-            packed = colour::kBad, word = "silent";
-            break;
-        case SensorVerdict::frozen:
-            packed = colour::kBad, word = "frozen";
-            break;
-        case SensorVerdict::jumped:
-            packed = colour::kWarn, word = "jumped";
-            break;
-        case SensorVerdict::poor:
-            packed = colour::kWarn, word = "distorted";
-            break;
+        case SensorVerdict::fine: break;
+        case SensorVerdict::absent: packed = colour::kFaint, word = "none"; break;
+        case SensorVerdict::lost: packed = colour::kBad, word = "out of range"; break;
+        case SensorVerdict::stale: packed = colour::kBad, word = "silent"; break;
+        case SensorVerdict::frozen: packed = colour::kBad, word = "frozen"; break;
+        case SensorVerdict::jumped: packed = colour::kWarn, word = "jumped"; break;
+        case SensorVerdict::poor: packed = colour::kWarn, word = "distorted"; break;
     }
     row(tool, word, packed);
     if (reading && verdict != SensorVerdict::absent) {

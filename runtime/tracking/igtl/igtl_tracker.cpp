@@ -133,9 +133,7 @@ void IgtlTracker::converse(Socket socket) {
         reader.add({buffer.data(), static_cast<std::size_t>(n)});
         for (bool more = true; more;) {
             switch (reader.next()) {
-                case igtl::MessageReader::Event::need_more:
-                    more = false;
-                    break;
+                case igtl::MessageReader::Event::need_more: more = false; break;
                 case igtl::MessageReader::Event::message: {
                     const auto poses = igtl::parse_poses(reader.header(), reader.body());
                     if (!poses.empty()) {

@@ -33,28 +33,17 @@ std::string error_text(std::uint8_t code, bool& fatal) {
                "): switch it off and on, and have it serviced if that does not help.";
     }
     switch (code) {
-        case 0:
-            return "";
-        case 4:
-            return "The transmitter's calibration cannot be read: check its plug.";
-        case 5:
-            return "A sensor's calibration cannot be read: check its plug.";
-        case 6:
-            return "The tracker did not understand a command.";
-        case 9:
-            return "The tracker is not initialised yet.";
-        case 13:
-            return "A sensor does not respond: check its plug.";
-        case 29:
-            return "The transmitter cannot be reached: check its plug.";
-        case 32:
-            return "A sensor is saturated: move it away from the transmitter.";
-        case 34:
-            return "The tracker restarted itself.";
-        case 35:
-            return "The tracker is too hot: let it cool and free its vents.";
-        default:
-            return "The tracker reports error " + std::to_string(code) + ".";
+        case 0: return "";
+        case 4: return "The transmitter's calibration cannot be read: check its plug.";
+        case 5: return "A sensor's calibration cannot be read: check its plug.";
+        case 6: return "The tracker did not understand a command.";
+        case 9: return "The tracker is not initialised yet.";
+        case 13: return "A sensor does not respond: check its plug.";
+        case 29: return "The transmitter cannot be reached: check its plug.";
+        case 32: return "A sensor is saturated: move it away from the transmitter.";
+        case 34: return "The tracker restarted itself.";
+        case 35: return "The tracker is too hot: let it cool and free its vents.";
+        default: return "The tracker reports error " + std::to_string(code) + ".";
     }
 }
 

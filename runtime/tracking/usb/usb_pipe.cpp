@@ -18,16 +18,11 @@ std::string place_of(libusb_device* device) {
 
 UsbOutcome outcome_of(int code) {
     switch (code) {
-        case 0:
-            return UsbOutcome::ok;
-        case LIBUSB_ERROR_TIMEOUT:
-            return UsbOutcome::timeout;
-        case LIBUSB_ERROR_PIPE:
-            return UsbOutcome::stalled;
-        case LIBUSB_ERROR_NO_DEVICE:
-            return UsbOutcome::gone;
-        default:
-            return UsbOutcome::failed;
+        case 0: return UsbOutcome::ok;
+        case LIBUSB_ERROR_TIMEOUT: return UsbOutcome::timeout;
+        case LIBUSB_ERROR_PIPE: return UsbOutcome::stalled;
+        case LIBUSB_ERROR_NO_DEVICE: return UsbOutcome::gone;
+        default: return UsbOutcome::failed;
     }
 }
 

@@ -315,63 +315,6 @@ TEST(CaseBundle, ContentsThatWouldBreakTheRendererAreRefused) {
     expect_refused(b, "1 to 255");
 }
 
-std::string manifest_with(const std::string& mechanics) {
-    return R"({"grid":{"size":[1,1,1],"spacing_mm":[1,1,1],"origin_mm":[0,0,0],)"
-           R"("direction":[1,0,0,0,1,0,0,0,1]},"labels":[{"name":"o","tissue":"t"}],)"
-           R"("tissues":[{"name":"t","kind":"soft","mechanics":)" +
-           mechanics + R"(}],"textures":[],"speckle_edge":0})";
-}
-
-TEST(CaseBundle, ATissuesMechanicsComeBackAndImpossibleOnesAreRefusedByName) {
-    CaseBundle bundle = tiny_case();
-    const Bytes without = write_bundle(bundle);
-    bundle.tissues[1].mechanics = TissueMechanics{0.6, true, 0.4, false};
-    const auto back = read_bundle(write_bundle(bundle), "a");
-    ASSERT_TRUE(back) << back.error().message();
-    expect_same(bundle, *back);
-    // Where no recipe gave figures nothing is written: older bundles keep their bytes.
-    const std::string text(without.begin(), without.end());
-    EXPECT_EQ(text.find("stiffness"), std::string::npos);
-    for (const char* bad :
-         {R"({"stiffness_kpa":0})", R"({"stiffness_kpa":null})", R"({"stiffness_kpa":-3})",
-          R"({"stiffness_kpa":1e5})", R"({"drains":true})", R"({"stiffness_kpa":"soft"})",
-          R"({"stiffness_kpa":8,"puncture_n":-1})", R"({"stiffness_kpa":8,"puncture_n":101})",
-          "[]"}) {
-        const std::string manifest = manifest_with(bad);
-        ChunkWriter writer("CASE");
-        writer.add("manifest", true, Bytes(manifest.begin(), manifest.end()));
-        const auto refused = read_bundle(writer.write(), "bad");
-        ASSERT_FALSE(refused) << bad;
-        EXPECT_NE(refused.error().message().find("mechanics"), std::string::npos)
-            << refused.error().message();
-    }
-}
-
-TEST(CaseBundle, RandomBytesInAManifestNeverCrash) {
-    testing::Random random(5);
-    const std::string text =
-        R"({"grid":{"size":[1,1,1],"spacing_mm":[1,1,1],"origin_mm":[0,0,0],)"
-        R"("direction":[1,0,0,0,1,0,0,0,1]},"labels":[{"name":"o","tissue":"t"}],)"
-        R"("tissues":[{"name":"t","kind":"soft"}],"textures":[],"speckle_edge":0})";
-    for (int i = 0; i < 3000; ++i) {
-        std::string changed = text;
-        for (int k = 0; k < 1 + i % 3; ++k) {
-            changed[static_cast<std::size_t>(random.uniform(0, static_cast<double>(text.size())))] =
-                static_cast<char>(random.uniform(0, 256));
-        }
-        ChunkWriter writer("CASE");
-        writer.add("manifest", true, Bytes(changed.begin(), changed.end()));
-        (void)read_bundle(writer.write(), "fuzz");
-    }
-}
-
-TEST(CaseBundle, DeeplyNestedManifestIsAnErrorNotAnOverflow) {
-    const std::string text = "{\"a\":" + std::string(200000, '[');
-    ChunkWriter writer("CASE");
-    writer.add("manifest", true, Bytes(text.begin(), text.end()));
-    EXPECT_FALSE(read_bundle(writer.write(), "deep"));
-}
-
 TEST(CaseBundle, TissueOfLabelFollowsTheNames) {
     EXPECT_EQ(tissue_of_label(tiny_case()), (std::vector<int>{0, 1, 2}));
 }

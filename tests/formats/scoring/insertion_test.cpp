@@ -45,14 +45,9 @@ TEST(InsertionDetector, JitterAtAnyDepthOrRateGivesOneInsertion) {
                 const double t = i / rate;
                 const double way = t < 7 ? 5 * t - 5 : t < 12 ? 30 : 30 - 5 * (t - 12);
                 switch (d.update(t, way + jitter * random.gaussian(), kDown, {})) {
-                    case InsertionChange::entered:
-                        ++entered;
-                        break;
-                    case InsertionChange::left:
-                        ++left;
-                        break;
-                    default:
-                        break;
+                    case InsertionChange::entered: ++entered; break;
+                    case InsertionChange::left: ++left; break;
+                    default: break;
                 }
             }
             EXPECT_EQ(entered, 1) << rate << " Hz " << jitter;

@@ -2,6 +2,7 @@
 
 // Effects elevation and slice: where in the slab each sample of a stretch lies, and the label of
 // the voxel there.
+#include "runtime/imaging/physical/fast/beam_voxel-inl.h"
 #include "runtime/imaging/physical/fast/beam_walk-inl.h"
 //
 #include "runtime/imaging/physical/fast/beam_chunk.h"
@@ -26,7 +27,6 @@ HWY_INLINE void fetch_lanes(const T* pool, const std::int32_t* at, int lanes) {
 template <class D>
 HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     const hn::RebindToSigned<D> di;
-    const hn::RebindToUnsigned<D> du;
     const int v = c.beam;
     const auto beam = [&](int number)
                           HWY_ATTR { return hn::LoadU(d, b.beams + number * b.lines + v); };
@@ -35,13 +35,7 @@ HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     const auto jx = hn::Mul(beam(kBeam), jitter), jy = hn::Mul(beam(kBeam + 1), jitter),
                jz = hn::Mul(beam(kBeam + 2), jitter);
     const auto shift = hn::Set(d, kRoundingShift);
-    const auto bits = hn::Set(di, kRoundingBits), three = hn::Set(di, 3);
-    const auto bx = hn::Set(di, b.blocks_x), bxy = hn::Set(di, b.blocks_xy);
-    const int edge_log2 = b.block_log2;  // of a block of bricks
-    const auto in_block = hn::Set(di, (1 << edge_log2) - 1);
-    const auto sx = hn::Set(du, static_cast<std::uint32_t>(b.size.x)),
-               sy = hn::Set(du, static_cast<std::uint32_t>(b.size.y)),
-               sz = hn::Set(du, static_cast<std::uint32_t>(b.size.z));
+    const auto bits = hn::Set(di, kRoundingBits);
     for (int row = 0; row < c.rows; ++row) {
         const int k = c.first + row;
         auto [px, py, pz] = walk.at(d, b, v, k);
@@ -61,31 +55,15 @@ HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
         const auto hx = centre(px, 0, jx), hy = centre(py, 1, jy), hz = centre(pz, 2, jz);
         const auto i = hn::Sub(hn::BitCast(di, hx), bits), j = hn::Sub(hn::BitCast(di, hy), bits),
                    l = hn::Sub(hn::BitCast(di, hz), bits);
-        const auto inside = hn::RebindMask(
-            di, hn::And(hn::Lt(hn::BitCast(du, i), sx),
-                        hn::And(hn::Lt(hn::BitCast(du, j), sy), hn::Lt(hn::BitCast(du, l), sz))));
-        const auto bi = hn::ShiftRight<2>(i), bj = hn::ShiftRight<2>(j), bl = hn::ShiftRight<2>(l);
-        const auto along = [&](auto p) HWY_ATTR { return hn::ShiftRightSame(p, edge_log2); };
-        const auto block =
-            hn::Add(along(bi), hn::Add(hn::Mul(along(bj), bx), hn::Mul(along(bl), bxy)));
-        // Base of the block, then the layer's, the row's and the brick's place in it.
-        const auto shifted = [&](auto base, auto place) HWY_ATTR {
-            return hn::Or(hn::ShiftLeftSame(base, edge_log2), place);
-        };
-        const auto number =
-            shifted(shifted(shifted(block, hn::And(bl, in_block)), hn::And(bj, in_block)),
-                    hn::And(bi, in_block));
-        const auto brick = hn::ShiftLeft<2>(hn::IfThenElseZero(inside, number));
+        const auto at = voxel_address(di, b, i, j, l);
         hn::Store(px, d, c.x.row(row));
         hn::Store(py, d, c.y.row(row));
         hn::Store(pz, d, c.z.row(row));
         hn::Store(hn::Sub(px, hn::Sub(hx, shift)), d, c.off_x.row(row));
         hn::Store(hn::Sub(py, hn::Sub(hy, shift)), d, c.off_y.row(row));
         hn::Store(hn::Sub(pz, hn::Sub(hz, shift)), d, c.off_z.row(row));
-        const auto cell = hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
-                                                           hn::ShiftLeft<4>(hn::And(l, three))));
-        hn::Store(hn::IfThenElse(inside, cell, hn::Set(di, -1)), di, c.cell.row(row));
-        hn::Store(brick, di, c.brick.row(row));
+        hn::Store(hn::IfThenElse(at.inside, at.cell, hn::Set(di, -1)), di, c.cell.row(row));
+        hn::Store(at.brick, di, c.brick.row(row));
         fetch_lanes(b.table, c.brick.row(row), static_cast<int>(hn::Lanes(d)));
     }
 }

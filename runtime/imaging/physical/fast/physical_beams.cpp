@@ -280,6 +280,10 @@ void PhysicalFast::meet_machine(const PhysicalFrame& f) {
     met_.binomial = m.post_filter;
     met_.sharpening = m.edge_enhancement > 0;
     met_.logarithm = has_logarithm(tables_);
+    met_.shows_parenchyma = m.structures.parenchyma;
+    met_.shows_streaks = m.structures.streaks;
+    met_.shows_diaphragm = m.structures.diaphragm;
+    met_.shows_wall = m.structures.wall;
 }
 
 double PhysicalFast::sample_beams(const PhysicalFrame& f,
@@ -302,15 +306,17 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         f.effects.streaks
             ? find_streaks(scene_, g, tables_, f, breathes ? &breathing : nullptr, gaps_, streaks_)
             : 0;
-    find_faces(f, breathes ? &breathing : nullptr);
+    context_.workers.for_each(lines_ / kBeamBlock, [&](int, int block) {
+        place_beams(f, block * kBeamBlock);
+        if (breathes) weigh_breathing(f, breathing, block * kBeamBlock);
+    });
+    search_nodes(f, base, breathes);
     const bool clutter = f.effects.clutter && has_clutter(tables_);
     MetByAny met;
     std::atomic<double> needle_ms{0};
     context_.workers.for_each(lines_ / kBeamBlock, [&](int, int block) {
         PhysicalBlock b = base;
         const int line = block * kBeamBlock;
-        place_beams(f, line);
-        if (breathes) weigh_breathing(f, breathing, line);
         b.beams = beams_.data() + line;
         b.white = noise_.white.data() + line;
         b.breathing = breathes ? breathing_.data() + line : nullptr;
@@ -323,8 +329,8 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         b.streak_count = choose_streaks(line, streaks);
         show_faces(line, b);
         PhysicalWall wall;
-        if (f.effects.wall && !scene_.layers.empty()) {
-            place_wall(f, breathes ? &breathing : nullptr, keep_all, line, wall);
+        if (wall_shows_) {
+            place_wall(keep_all, line, wall);
             b.wall = &wall;
         }
         b.clutter = clutter ? clutter_ + kRowMargin + line : nullptr;

@@ -117,9 +117,8 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     gaps_.assign(lines + kSlack, 0.0f);
     beams_.assign(kBeamNumbers * lines + kSlack, 0.0f);
     breathing_.assign((samples / kBreathingNode + 2) * lines + kSlack, 0.0f);
-    prepare_wall(tables);
+    prepare_nodes(tables);
     streaks_.resize(kMostStreaks);
-    face_nodes_.resize(face_node_count(geometry));
     for (auto* per_beam : {&faces_.depth_mm, &faces_.dome_mm, &faces_.peak, &faces_.cosine})
         per_beam->assign(lines + kSlack, 0.0f);
     plane_beams_.assign(4 * lines + kSlack, 0.0f);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "runtime/imaging/formation/render_context.h"
+#include "runtime/imaging/physical/fast/node_lattice.h"
 #include "runtime/imaging/physical/fast/physical_kernels.h"
 #include "runtime/imaging/physical/model/gas_faces.h"
 #include "runtime/imaging/physical/model/physical_frame.h"
@@ -58,14 +59,13 @@ class PhysicalFast {
     void set_tables(const PhysicalFrame& frame, PhysicalBlock& block) const;
     PhysicalBlock block_of_frame(const PhysicalFrame& frame, bool keep_all) const;
     int choose_streaks(int first, std::span<PhysicalStreak> out) const;  // of a block of beams
-    void find_faces(const PhysicalFrame& frame, const BreathingField* breathing);
+    void prepare_nodes(const physical::Tables& tables);
+    void place_nodes(const PhysicalFrame& frame, bool breathes, int first);
+    void find_faces(const PhysicalFrame& frame, const PhysicalBlock& base, int first);
+    void search_nodes(const PhysicalFrame& frame, const PhysicalBlock& base, bool breathes);
     void show_faces(int line, PhysicalBlock& block) const;
-    void prepare_wall(const physical::Tables& tables);
-    void place_wall(const PhysicalFrame& frame,
-                    const BreathingField* breathing,
-                    bool keep_all,
-                    int first,
-                    PhysicalWall& wall);
+    int wall_node_rows() const { return wall_.rows / wall_.every + 2; }
+    void place_wall(bool keep_all, int first, PhysicalWall& wall);
     // Returns the time of the needle, ms.
     double sample_beams(const PhysicalFrame& frame, const BreathingField& breathing, bool keep_all);
     void mirror_rows(float* plane, int reach) const;
@@ -96,12 +96,17 @@ class PhysicalFast {
 
     std::vector<physical::Streak> streaks_;
     int streak_count_ = 0;
-    std::vector<float> plane_beams_;              // origin x, z, direction x, z; # lines each
-    std::vector<physical::FaceNode> face_nodes_;  // every kFaceEvery beams
+    std::vector<float> plane_beams_;  // origin x, z, direction x, z; # lines each
+    NodeLattice nodes_;
+    std::vector<physical::FaceNode> faces_of_nodes_;
+    std::vector<std::int32_t> node_kinds_;  // per label: see node_lattice.h
+    std::vector<int> node_of_;              // per beam: the node before it, and its part
+    std::vector<float> node_part_;
     physical::GasFaces faces_;
-    bool faces_found_ = false;
-    PhysicalWall wall_;  // what all blocks share
-    std::vector<float> wall_nodes_;
+    bool faces_found_ = false, wall_shows_ = false;
+    PhysicalWall wall_;                      // what all blocks share
+    std::vector<float> layer_nodes_;         // depth, above, strength at nodes of beams
+    std::vector<float> wall_nodes_;          // the same at every beam
     std::vector<std::uint8_t> wall_active_;  // per block and row of nodes
     std::vector<float> raw_gaps_, gaps_, beams_, breathing_;
     physical::SpeckleSlice slice_;  // of the frame

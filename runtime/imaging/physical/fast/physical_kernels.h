@@ -46,7 +46,6 @@ inline constexpr int kRowSlack = 64;   // behind rows and buffers: lanes of the 
 inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 3
 
 inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
-inline constexpr int kWallMostRows = 32;   // samples between nodes of the wall, at most
 
 // Effect wall: distances at nodes, `lines` of the block apart, and the tables of sheets.
 struct PhysicalWall {

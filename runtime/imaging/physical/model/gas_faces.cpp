@@ -26,15 +26,21 @@ void smooth(std::span<FaceNode> nodes) {
 
 }  // namespace
 
+float dome_peak(const PhysicalScene& s, Point3 voxel) {
+    const double strength =
+        s.layers.empty() ? 0 : std::clamp(s.layers.at(voxel).strength, -2.0, 2.0);
+    return static_cast<float>(kDomeAmplitude * std::exp2(kDomeStrengthDb / kDbPerLog2 * strength));
+}
+
 FaceNode find_face(const PhysicalScene& s,
                    const ScanGeometry& g,
+                   const NodeSpacing& nodes,
                    const PhysicalFrame& f,
                    const BreathingField* breathing,
                    double gap_mm,
-                   int line) {
+                   int node) {
     if (gap_mm < 0) return {};
-    const ScanGeometry::Beam& beam =
-        g.beams[static_cast<std::size_t>(std::min(line, g.scanlines - 1))];
+    const ScanGeometry::Beam& beam = g.beams[static_cast<std::size_t>(nodes.line(node))];
     const PlanePoint o = beam.origin, d = beam.direction;
     const auto voxel_at = [&](double r) {
         const double along = r + gap_mm * std::exp(-r / kGapReachMm);
@@ -44,42 +50,42 @@ FaceNode find_face(const PhysicalScene& s,
     };
     const auto label_of = [&](double r) {
         const Point3 v = voxel_at(r);
-        return static_cast<std::size_t>(label_at(s, static_cast<int>(std::floor(v.x + 0.5)),
-                                                 static_cast<int>(std::floor(v.y + 0.5)),
-                                                 static_cast<int>(std::floor(v.z + 0.5))));
+        return static_cast<std::size_t>(label_at(s, static_cast<int>(std::nearbyint(v.x)),
+                                                 static_cast<int>(std::nearbyint(v.y)),
+                                                 static_cast<int>(std::nearbyint(v.z))));
     };
     const auto is_gas = [&](std::size_t label) { return s.looks[label].kind == TissueKind::gas; };
     bool organ = false;  // met on the way
-    for (double r = kFaceStepMm; r < g.depth_mm; r += kFaceStepMm) {
-        const std::size_t label = label_of(r);
+    for (int row = 1; nodes.r_mm(row + 1) < g.depth_mm; ++row) {
+        const std::size_t label = label_of(nodes.r_mm(row));
         if (s.looks[label].kind == TissueKind::bone) return {};
         organ = organ || s.fine.frames[label].cube == kParenchymaCube;
-        if (!is_gas(label) || !is_gas(label_of(r + kFaceStepMm))) continue;
-        double before = r - kFaceStepMm, behind = r;
-        for (int halving = 0; halving < 4; ++halving) {
+        if (!is_gas(label) || !is_gas(label_of(nodes.r_mm(row + 1)))) continue;
+        double before = nodes.r_mm(row - 1), behind = nodes.r_mm(row);
+        for (int halving = 0; halving < kFaceHalvings; ++halving) {
             const double middle = 0.5 * (before + behind);
             (is_gas(label_of(middle)) ? behind : before) = middle;
         }
         FaceNode face{static_cast<float>(0.5 * (before + behind)), 0};
-        if (s.is_lung[label] && organ && r > kDomeFromMm) {
-            const double strength =
-                s.layers.empty() ? 0 : std::clamp(s.layers.at(voxel_at(r)).strength, -2.0, 2.0);
-            face.peak = static_cast<float>(kDomeAmplitude *
-                                           std::exp2(kDomeStrengthDb / kDbPerLog2 * strength));
-        }
+        if (s.is_lung[label] && organ && nodes.r_mm(row) > kDomeFromMm)
+            face.peak = dome_peak(s, voxel_at(nodes.r_mm(row)));
         return face;
     }
     return {};
 }
 
-void join_faces(const ScanGeometry& g, std::span<FaceNode> nodes, GasFaces& faces) {
+void join_faces(const ScanGeometry& g,
+                const NodeSpacing& spacing,
+                std::span<FaceNode> nodes,
+                GasFaces& faces) {
     for (int pass = 0; pass < 3; ++pass) smooth(nodes);
     faces.any_dome = false;
     for (std::size_t l = 0; l < faces.depth_mm.size(); ++l) {
-        const std::size_t n = std::min(l / kFaceEvery, nodes.size() - 1),
-                          next = std::min(n + 1, nodes.size() - 1);
-        const float part = static_cast<float>(l % kFaceEvery) / kFaceEvery;
-        const FaceNode &a = nodes[n], &b = nodes[next];
+        const auto line = static_cast<int>(std::min(l, static_cast<std::size_t>(g.scanlines - 1)));
+        const int n = spacing.node_of(line);
+        const float part = spacing.part(line);
+        const FaceNode &a = nodes[static_cast<std::size_t>(n)],
+                       &b = nodes[static_cast<std::size_t>(n) + 1];
         const bool between = joined(a, b);
         const FaceNode& nearest = part < 0.5f ? a : b;
         const float depth =
@@ -90,7 +96,7 @@ void join_faces(const ScanGeometry& g, std::span<FaceNode> nodes, GasFaces& face
         faces.dome_mm[l] = faces.peak[l] > 0 ? depth : kNoFace;
         faces.any_dome = faces.any_dome || faces.peak[l] > 0;
         const double pitch =
-            kFaceEvery *
+            std::max(spacing.line(n + 1) - spacing.line(n), 1) *
             (g.fan ? (g.radius_mm + static_cast<double>(std::min(depth, 1e3f))) * g.line_step
                    : g.line_step);
         const double slope =

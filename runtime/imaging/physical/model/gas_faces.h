@@ -17,13 +17,13 @@
 #include <span>
 #include <vector>
 
+#include "runtime/imaging/physical/model/node_spacing.h"
 #include "runtime/imaging/physical/model/physical_frame.h"
 
 namespace sonocase::runtime::physical {
 
 inline constexpr float kNoFace = 1e9f;
-inline constexpr int kFaceEvery = 4;       // beams between those that are looked at
-inline constexpr double kFaceStepMm = 2;   // gas thinner than this may be missed
+inline constexpr int kFaceHalvings = 4;    // of the stretch between two nodes
 inline constexpr double kFaceJoinMm = 12;  // neighbours further apart are two faces
 inline constexpr double kDomeFromMm = 25;  // nearer to the face lung lies under the wall
 inline constexpr double kFaceLightMm = 2;  // the light that a face gets: so far before it
@@ -39,10 +39,6 @@ struct FaceNode {
     float peak = 0;  // of the diaphragm, before the cosine; 0: another face of gas
 };
 
-inline std::size_t face_node_count(const ScanGeometry& geometry) {
-    return static_cast<std::size_t>((geometry.scanlines - 1) / kFaceEvery + 2);
-}
-
 // Per beam, # lines.
 struct GasFaces {
     std::vector<float> depth_mm;       // kNoFace: none
@@ -51,16 +47,24 @@ struct GasFaces {
     bool any_dome = false;
 };
 
-// gap_mm: of the beam; negative: air. Cost: 1 us.
+// The face of beam nodes.line(node). Two neighbouring nodes of gas along the beam make a face, so
+// that gas thinner than their distance, at most 2.5 mm, may be missed; bone before it hides it.
+// gap_mm: of the beam; negative: air. Plain and exact; physical/fast/node_lattice.h searches
+// sixteen at once.
 FaceNode find_face(const PhysicalScene& scene,
                    const ScanGeometry& geometry,
+                   const NodeSpacing& nodes,
                    const PhysicalFrame& frame,
                    const BreathingField* breathing,
                    double gap_mm,
-                   int line);
+                   int node);
+// Peak of the diaphragm at a place of it, before the cosine.
+float dome_peak(const PhysicalScene& scene, Point3 voxel);
 
-// nodes: of beams 0, kFaceEvery, 2 kFaceEvery and so on, changed; the last at or beyond the last
-// beam. Fills every beam that `faces` has room for.
-void join_faces(const ScanGeometry& geometry, std::span<FaceNode> nodes, GasFaces& faces);
+// faces: # spacing.nodes(), changed. Fills every beam that `out` has room for.
+void join_faces(const ScanGeometry& geometry,
+                const NodeSpacing& spacing,
+                std::span<FaceNode> faces,
+                GasFaces& out);
 
 }  // namespace sonocase::runtime::physical

@@ -61,6 +61,9 @@ struct PhysicalMet {
     bool edge_contact = false, compounding = false, receiver_noise = false, blending = false,
          reverberation = false, side_lobes = false, binomial = false, sharpening = false,
          logarithm = false;
+    // Structures that it shows.
+    bool shows_parenchyma = false, shows_streaks = false, shows_diaphragm = false,
+         shows_wall = false;
 };
 
 namespace physical {
@@ -74,6 +77,10 @@ inline const char* nothing_hard(const PhysicalMet& m) {
 
 inline const char* only_if(bool machine_has_it) {
     return machine_has_it ? "" : "the machine has none";
+}
+// A structure: what the machine does not show at all, and why there is none in a frame.
+inline const char* structure_if(bool machine_shows_it, bool met, const char* none) {
+    return !machine_shows_it ? "the machine shows none" : met ? "" : none;
 }
 
 }  // namespace physical
@@ -97,15 +104,23 @@ inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 32> kPhys
     {"fine_structure", Pass::beams, 1, 1, 1, &PhysicalEffects::fine_structure,
      [](const PhysicalMet& m) { return m.fine ? "" : "no muscle or fat crossed"; }},
     {"parenchyma", Pass::beams, 1, 1, 1, &PhysicalEffects::parenchyma,
-     [](const PhysicalMet& m) { return m.parenchyma ? "" : "no parenchyma crossed"; }},
+     [](const PhysicalMet& m) {
+         return physical::structure_if(m.shows_parenchyma, m.parenchyma, "no parenchyma crossed");
+     }},
     {"targets", Pass::beams, 0.5, 1, 4, &PhysicalEffects::targets,
      [](const PhysicalMet& m) { return m.target ? "" : "no target near the slab"; }},
     {"streaks", Pass::beams, 0.3, 0, 0, &PhysicalEffects::streaks,
-     [](const PhysicalMet& m) { return m.streaks ? "" : "no plate faces the beams"; }},
+     [](const PhysicalMet& m) {
+         return physical::structure_if(m.shows_streaks, m.streaks, "no plate faces the beams");
+     }},
     {"diaphragm", Pass::beams, 0.1, 0, 0, &PhysicalEffects::diaphragm,
-     [](const PhysicalMet& m) { return m.dome ? "" : "no organ before a lung"; }},
+     [](const PhysicalMet& m) {
+         return physical::structure_if(m.shows_diaphragm, m.dome, "no organ before a lung");
+     }},
     {"wall", Pass::beams, 0.3, 2, 0.5, &PhysicalEffects::wall,
-     [](const PhysicalMet& m) { return m.wall ? "" : "no body wall near the face"; }},
+     [](const PhysicalMet& m) {
+         return physical::structure_if(m.shows_wall, m.wall, "no body wall near the face");
+     }},
     {"speckle", Pass::beams, 2, 1, 2, &PhysicalEffects::speckle},
     {"interfaces", Pass::beams, 1, 1, 4, &PhysicalEffects::interfaces, physical::no_interface},
     {"edge_shadow", Pass::beams, 0.3, 0, 0, &PhysicalEffects::edge_shadow,

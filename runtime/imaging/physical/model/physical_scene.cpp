@@ -73,12 +73,17 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
         e.amplitude =
             kInterfaceGain * std::pow(std::min(reflection, kMaxReflection), kInterfacePower);
     }
+    return e;
+}
+
+// What lines an organ against its surroundings and its vessels.
+void add_lining(const Label& la, const Tissue& a, const Label& lb, const Tissue& b, PairEcho& e) {
+    if (a.kind == TissueKind::outside || b.kind == TissueKind::outside) return;
+    const bool fluid = a.kind == TissueKind::fluid || b.kind == TissueKind::fluid;
     if (is_parenchyma(a) && b.name == "blood") line_vessel(lb.name, e);
     if (is_parenchyma(b) && a.name == "blood") line_vessel(la.name, e);
     // An organ's capsule, and the peritoneum on it.
-    if (is_parenchyma(a) != is_parenchyma(b) && !e.hard && !fluid(a) && !fluid(b))
-        e.split_mm = kCapsuleMm;
-    return e;
+    if (is_parenchyma(a) != is_parenchyma(b) && !e.hard && !fluid) e.split_mm = kCapsuleMm;
 }
 
 // What a target that shows is made of.
@@ -90,15 +95,11 @@ struct TargetTissue {
 TargetTissue tissue_of_target(TargetLook look) {
     switch (look) {
         case TargetLook::none:
-        case TargetLook::lesion:
-            break;
-        case TargetLook::marker:
-            return {{12, 0.5, TissueKind::soft}, 12};
-        case TargetLook::abscess:
-            return {{-17, 0.2, TissueKind::fluid}, 4};
+        case TargetLook::lesion: break;
+        case TargetLook::marker: return {{12, 0.5, TissueKind::soft}, 12};
+        case TargetLook::abscess: return {{-17, 0.2, TissueKind::fluid}, 4};
         case TargetLook::cyst:
-        case TargetLook::calyx:
-            return {{-58, 0.02, TissueKind::fluid}, 3};
+        case TargetLook::calyx: return {{-58, 0.02, TissueKind::fluid}, 3};
     }
     return {};
 }
@@ -123,7 +124,7 @@ void add_targets(const std::vector<Target>& targets, PhysicalScene& s) {
 // Acoustic properties of labels and targets, and the echoes between labels.
 void add_tissues(const CaseBundle& bundle,
                  const std::vector<Target>& targets,
-                 const std::map<std::string, double>& measured_db,
+                 const PhysicalSceneOptions& options,
                  PhysicalScene& s) {
     const std::vector<int> tissue_of = tissue_of_label(bundle);
     const Tissue nothing{};
@@ -133,8 +134,8 @@ void add_tissues(const CaseBundle& bundle,
     const std::size_t count = bundle.labels.size();
     for (std::size_t l = 0; l < count; ++l) {
         const Tissue& t = tissue(l);
-        const auto measured = measured_db.find(bundle.labels[l].name);
-        s.looks.push_back({measured != measured_db.end() ? measured->second : t.echo_db,
+        const auto measured = options.tissue_db.find(bundle.labels[l].name);
+        s.looks.push_back({measured != options.tissue_db.end() ? measured->second : t.echo_db,
                            t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind,
                            t.name == "skin"  ? kWallSkinDb
                            : t.name == "fat" ? kWallFatDb
@@ -154,9 +155,11 @@ void add_tissues(const CaseBundle& bundle,
     s.pairs.resize(count * count);
     for (std::size_t a = 0; a < count; ++a) {
         for (std::size_t b = 0; b < count; ++b) {
-            if (a != b)
-                s.pairs[a * count + b] =
-                    pair_echo(bundle.labels[a], tissue(a), bundle.labels[b], tissue(b));
+            if (a == b) continue;
+            PairEcho& pair = s.pairs[a * count + b];
+            pair = pair_echo(bundle.labels[a], tissue(a), bundle.labels[b], tissue(b));
+            if (options.structures.linings)
+                add_lining(bundle.labels[a], tissue(a), bundle.labels[b], tissue(b), pair);
         }
     }
 }
@@ -175,7 +178,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     if (bundle.labels.empty() || bundle.label_bricks.table.empty()) {
         return Error{"the bundle holds no label volume", "", "build the case again"};
     }
-    add_tissues(bundle, targets, options.tissue_db, s);
+    add_tissues(bundle, targets, options, s);
     Result<BrickTable> words = BrickTable::create(bundle);
     if (!words) return words.error();
     s.words = std::move(*words);
@@ -185,7 +188,8 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.fine = make_fine_structure(bundle, jobs);
     s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
                                    [](const FineFrame& f) { return f.cube == kParenchymaCube; });
-    s.layers = make_tissue_layers(bundle, jobs);
+    if (options.structures.wall || options.structures.diaphragm)
+        s.layers = make_tissue_layers(bundle, jobs);
     return s;
 }
 

@@ -14,6 +14,7 @@
 #include "formats/base/result.h"
 #include "formats/bundle/streamed_bundle.h"
 #include "formats/exercise/exercise.h"
+#include "formats/machine/machine.h"
 #include "runtime/imaging/physical/model/brick_table.h"
 #include "runtime/imaging/physical/model/fine_structure.h"
 #include "runtime/imaging/physical/model/physical_textures.h"
@@ -74,6 +75,7 @@ struct PhysicalSceneOptions {
     JobRunner* jobs = nullptr;                         // null: one job after the other
     std::shared_ptr<const PhysicalTextures> textures;  // null: made here
     std::map<std::string, double> tissue_db;           // of labels, instead of the bundle's own
+    MachineStructures structures;                      // that the machine shows
 };
 
 // targets: of the exercise; those that only mark a place do not show in the tissue.

@@ -33,6 +33,7 @@ struct Search {
     std::span<const float> gaps;
     std::span<Streak> out;
     Rigid probe_from_volume;
+    double thickest_mm = 0;  // of the slab: deviation at the face or at the far end
     int found = 0;
 
     bool is_parenchyma(Point3 x) const {
@@ -105,6 +106,18 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     Point3 p = seen(centre);
     double r = 0;
     PlanePoint beam = beam_at({p.x, p.z}, r);
+    const double length = kLengthsMm[draw & 15], own = 0.25 * length;
+    const double inverse = 1 / norm(normal);
+    const Vector3 n = probe_from_volume.rotation * (inverse * normal);
+    const double cosine = n.x * beam.x + n.z * beam.z;
+    const double facing =
+        bump(std::max(1 - cosine * cosine, 0.0) / (kStreakFaceSin * kStreakFaceSin));
+    // Most plates are too far from the plane or turned away: their most comes before their place.
+    const auto level_in = [&](double slab) {
+        const double off = p.y / (2.9 * std::sqrt(slab * slab + own * own));
+        return bump(off * off) * facing;
+    };
+    if (level_in(thickest_mm) < 0.1) return;
     double line = 0, sample = 0;
     g.locate({p.x, p.z}, line, sample);
     const int nearest = static_cast<int>(std::clamp(line + 0.5, 0.0, g.scanlines - 1.0));
@@ -119,14 +132,7 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     for (int step = 0; step < 3; ++step) shown = r - gap * row_at(shown).contact;
     if (shown < kStreakFirstMm || shown > g.depth_mm) return;
     const Row& row = row_at(shown);
-    const double length = kLengthsMm[draw & 15];
-    const double own = 0.25 * length, slab = row.elevation_mm;
-    const double off = p.y / (2.9 * std::sqrt(slab * slab + own * own));
-    const double inverse = 1 / norm(normal);
-    const Vector3 n = probe_from_volume.rotation * (inverse * normal);
-    const double cosine = n.x * beam.x + n.z * beam.z;
-    const double level = bump(off * off) * bump(std::max(1 - cosine * cosine, 0.0) /
-                                                (kStreakFaceSin * kStreakFaceSin));
+    const double level = level_in(row.elevation_mm);
     if (level < 0.1 || found >= static_cast<int>(out.size()) || !is_parenchyma(centre)) return;
     Streak& s = out[static_cast<std::size_t>(found)];
     s.centre = {p.x + (shown - r) * beam.x, p.z + (shown - r) * beam.z};
@@ -157,7 +163,15 @@ int find_streaks(const PhysicalScene& scene,
                  std::span<const float> gaps,
                  std::span<Streak> out) {
     if (!scene.has_parenchyma || tables.frequency_mhz > kStreakFrequencyMhz) return 0;
-    Search search{scene, g, tables, f, breathing, gaps, out, inverse(f.volume_from_probe)};
+    Search search{scene,
+                  g,
+                  tables,
+                  f,
+                  breathing,
+                  gaps,
+                  out,
+                  inverse(f.volume_from_probe),
+                  std::max(tables.rows.front().elevation_mm, tables.rows.back().elevation_mm)};
     const double shift_mm = norm(f.motion.breathing_mm);
     // Columns of cells along the axis that the plane's normal follows most.
     const Vector3 normal = f.volume_from_probe.rotation * Vector3{0, 1, 0};

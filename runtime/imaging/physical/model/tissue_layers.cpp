@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kCellMm = 6;
 constexpr int kNoiseEdge = 64;
-constexpr double kDistanceUnit = 256, kNoiseUnit = 4096;
+constexpr double kDistanceUnit = TissueLayers::kDistanceUnit, kNoiseUnit = TissueLayers::kNoiseUnit;
 
 using Field = std::vector<float>;
 

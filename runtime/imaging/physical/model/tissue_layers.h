@@ -31,12 +31,18 @@ class TissueLayers {
     // Neither allocates nor throws. Cost: 15 ns.
     LayerPoint at(Point3 voxel) const noexcept;
 
+    // What at() reads, for vectorised look-ups: per cell depth and above_organs in 1 /
+    // kDistanceUnit mm, wave and strength in 1 / kNoiseUnit, side by side; x fastest.
+    static constexpr double kDistanceUnit = 256, kNoiseUnit = 4096;
+    const std::int16_t* cells() const { return cells_.front().data(); }
+    Int3 size() const { return size_; }
+    double cells_per_voxel() const { return cells_per_voxel_; }
+
   private:
     friend TissueLayers make_tissue_layers(const CaseBundle& bundle, JobRunner& jobs);
 
     Int3 size_{0, 0, 0};
     double cells_per_voxel_ = 1;
-    // Distances in 1/256 mm, noises in 1/4096.
     std::vector<std::array<std::int16_t, 4>> cells_;
 };
 

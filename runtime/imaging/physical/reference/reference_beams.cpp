@@ -217,18 +217,18 @@ class Beams {
         if (f.effects.breathing && f.motion.breathes())
             breathing_ = BreathingField(*in_.scene.bundle);
         if (in_.scene.has_gas && (f.effects.diaphragm || f.effects.gas_ring_down)) {
-            std::vector<FaceNode> nodes(face_node_count(in_.geometry));
-            for (std::size_t n = 0; n < nodes.size(); ++n) {
-                const int line =
-                    std::min(static_cast<int>(n) * kFaceEvery, in_.geometry.scanlines - 1);
-                nodes[n] = find_face(
-                    in_.scene, in_.geometry, f, breathing_.empty() ? nullptr : &breathing_,
-                    static_cast<double>(gaps_[static_cast<std::size_t>(line)]), line);
-                if (!f.effects.diaphragm) nodes[n].peak = 0;
+            const NodeSpacing spacing = node_spacing(in_.geometry, in_.tables);
+            std::vector<FaceNode> nodes(static_cast<std::size_t>(spacing.nodes()));
+            for (int n = 0; n < spacing.nodes(); ++n) {
+                FaceNode& node = nodes[static_cast<std::size_t>(n)];
+                node = find_face(
+                    in_.scene, in_.geometry, spacing, f, breathing_.empty() ? nullptr : &breathing_,
+                    static_cast<double>(gaps_[static_cast<std::size_t>(spacing.line(n))]), n);
+                if (!f.effects.diaphragm) node.peak = 0;
             }
             for (auto* per_beam : {&faces_.depth_mm, &faces_.dome_mm, &faces_.peak, &faces_.cosine})
                 per_beam->resize(gaps_.size());
-            join_faces(in_.geometry, nodes, faces_);
+            join_faces(in_.geometry, spacing, nodes, faces_);
         }
         if (f.effects.streaks)
             streak_count_ =

@@ -239,15 +239,13 @@ class EmulatedDevice final : public DevicePort {
                 umockdev_ioctl_data_unref(data);
                 return complete(0, 0);
             }
-            case USBDEVFS_GETDRIVER:
-                return complete(-1, ENODATA);
+            case USBDEVFS_GETDRIVER: return complete(-1, ENODATA);
             case USBDEVFS_CLAIMINTERFACE:
             case USBDEVFS_RELEASEINTERFACE:
             case USBDEVFS_SETCONFIGURATION:
             case USBDEVFS_SETINTERFACE:
             case USBDEVFS_CLEAR_HALT:
-            case USBDEVFS_RESET:
-                return gone_ ? complete(-1, ENODEV) : complete(0, 0);
+            case USBDEVFS_RESET: return gone_ ? complete(-1, ENODEV) : complete(0, 0);
             case USBDEVFS_SUBMITURB:
                 if (gone_) return complete(-1, ENODEV);
                 submit(client, argument);
@@ -275,8 +273,7 @@ class EmulatedDevice final : public DevicePort {
                 reap_ = static_cast<UMockdevIoctlClient*>(g_object_ref(client));
                 reap_since_ = Clock::now();
                 return TRUE;
-            default:
-                return complete(-1, ENOTTY);
+            default: return complete(-1, ENOTTY);
         }
     }
 

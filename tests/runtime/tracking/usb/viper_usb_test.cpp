@@ -78,11 +78,8 @@ class ViperFirmware final : public Firmware {
                 case viper::kFrameRate:
                     rate_ok_ = command.payload.size() == 4 && u32_le(command.payload, 0) == 3;
                     break;
-                case viper::kContinuousPno:
-                    streaming_ = command.action == viper::kSet;
-                    break;
-                default:
-                    break;
+                case viper::kContinuousPno: streaming_ = command.action == viper::kSet; break;
+                default: break;
             }
         }
         Bytes answer = viper::encode(command.command, action, 0, 0, payload);
