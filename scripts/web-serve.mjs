@@ -9,9 +9,11 @@ import {extname, join, normalize} from 'node:path';
 const kTypes = {'.html': 'text/html; charset=utf-8', '.css': 'text/css', '.js': 'text/javascript', '.json': 'application/json',
     '.wasm': 'application/wasm', '.png': 'image/png'};
 
-// site: a folder. Returns the server; listen() it.
-export function site_server(site) {
+// site: a folder. before(request, response): for tests; true where it has answered itself. Returns the server; listen()
+// it.
+export function site_server(site, before = () => false) {
     return createServer((request, response) => {
+        if (before(request, response)) return;
         const path = decodeURIComponent(new URL(request.url, 'http://x').pathname);
         const file = join(site, normalize(path.endsWith('/') ? `${path}index.html` : path));
         let size;

@@ -231,6 +231,7 @@ class App {
             kept ? '' : 'This browser keeps nothing: save recording and scores now.',
             sent ? '' : 'The learning record store did not take the result: save the scores and hand them in.',
             ...finished.score.warnings].filter((words) => words).join(' ');
+        this.settled = this.started;  // kept and sent, or said that it was not
     }
     send(which) {
         const endpoint = this.list?.xapi ?? '';

@@ -25,6 +25,9 @@ export class Picture {
         if (this.canvas.width !== side) this.canvas.width = this.canvas.height = side;
         this.image = this.context.createImageData(side, side);
         this.words = new Uint32Array(this.image.data.buffer);
+        // In the middle, but for the room that the depth scale takes.
+        this.left = Math.max(0, Math.min((width - this.css_side) / 2, width - this.css_side - 44));
+        this.canvas.style.left = `${this.left}px`;
         this.canvas.style.width = this.canvas.style.height = `${this.css_side}px`;
         this.overlay.width = Math.round(width * devicePixelRatio);
         this.overlay.height = Math.round(height * devicePixelRatio);
@@ -49,10 +52,10 @@ export class Picture {
     draw_over(values, flip, measures, first) {
         const to = this.overlay.getContext('2d'), ratio = devicePixelRatio;
         to.setTransform(ratio, 0, 0, ratio, 0, 0);
-        const width = this.overlay.width / ratio, height = this.overlay.height / ratio;
-        to.clearRect(0, 0, width, height);
+        const height = this.overlay.height / ratio;
+        to.clearRect(0, 0, this.overlay.width / ratio, height);
         const per_mm = this.css_side / values.side / values.mm_per_px;
-        const left = (width - this.css_side) / 2, top = (height - this.css_side) / 2;
+        const left = this.left, top = (height - this.css_side) / 2;
         const x_of = (mm) => left + values.origin_x * this.css_side / values.side + mm * per_mm;
         const y_of = (mm) => top + values.origin_y * this.css_side / values.side + mm * per_mm;
         to.font = '13px "Noto Sans", "DejaVu Sans", sans-serif';

@@ -137,7 +137,7 @@ export class ScanPage {
         this.frame_ms = performance.now() - before;
         this.picture.draw_over(this.values, this.flip_sign(), this.measures, this.first_point);
         this.say();
-        ++this.frames;
+        if (++this.frames === 1) performance.mark('first-picture');
         this.page.frame_shown();
     }
 
