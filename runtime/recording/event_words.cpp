@@ -25,24 +25,15 @@ std::string event_words(const LiveEvent& event,
     char number[32];
     std::snprintf(number, sizeof number, "%.0f mm", event.value);
     switch (event.kind) {
-        case LiveEventKind::needle_entry:
-            return "Insertion " + std::to_string(event.index);
-        case LiveEventKind::needle_exit:
-            return std::string("Needle out, was ") + number + " deep";
-        case LiveEventKind::target_hit:
-            return "Reached: " + target();
-        case LiveEventKind::target_scanned:
-            return "Seen: " + target();
-        case LiveEventKind::no_go_contact:
-            return "Touched: " + label();
-        case LiveEventKind::no_go_left:
-            return "Left: " + label();
-        case LiveEventKind::needle_lost:
-            return "Needle lost";
-        case LiveEventKind::probe_lost:
-            return "Probe lost";
-        default:
-            return {};
+        case LiveEventKind::needle_entry: return "Insertion " + std::to_string(event.index);
+        case LiveEventKind::needle_exit: return std::string("Needle out, was ") + number + " deep";
+        case LiveEventKind::target_hit: return "Reached: " + target();
+        case LiveEventKind::target_scanned: return "Seen: " + target();
+        case LiveEventKind::no_go_contact: return "Touched: " + label();
+        case LiveEventKind::no_go_left: return "Left: " + label();
+        case LiveEventKind::needle_lost: return "Needle lost";
+        case LiveEventKind::probe_lost: return "Probe lost";
+        default: return {};
     }
 }
 
