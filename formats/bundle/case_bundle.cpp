@@ -67,6 +67,7 @@ std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle, JobRunner& jobs
     if (bundle.speckle.edge != 0) writer.add_array("speckle", false, bundle.speckle.voxels);
     if (!bundle.patient_skin.points.empty())
         detail::add_surface(writer, "skin.pat", bundle.patient_skin);
+    if (!bundle.skin_unfitted.empty()) writer.add_array("skin.fit", false, bundle.skin_unfitted);
     if (!bundle.mannequin_skin.points.empty())
         detail::add_surface(writer, "skin.man", bundle.mannequin_skin);
     if (!bundle.preview_png.empty()) writer.add_array("preview", false, bundle.preview_png);

@@ -51,7 +51,10 @@ struct CaseBundle {
     std::vector<SolidTexture> textures;
     SpeckleVolume speckle;
 
-    Surface patient_skin;                   // `mannequin` frame, after the warp
+    Surface patient_skin;  // `mannequin` frame, after the warp
+    // # patient_skin.points, 1 where the skin lies farther than 20 mm from any reading of the
+    // mannequin, so that it was not fitted; empty: fitted everywhere, or not known.
+    std::vector<std::uint8_t> skin_unfitted;
     Surface mannequin_skin;                 // `mannequin` frame, as digitised
     std::vector<std::uint8_t> preview_png;  // may be empty
 };

@@ -18,7 +18,8 @@ using detail::JsonFault;
 using detail::JsonObject;
 
 constexpr std::string_view kKnownChunks[] = {
-    "manifest", SONOCASE_VOLUME_CHUNKS, "textures", "speckle", "skin.pat", "skin.man", "preview"};
+    "manifest", SONOCASE_VOLUME_CHUNKS, "textures", "speckle", "skin.pat", "skin.fit", "skin.man",
+    "preview"};
 constexpr std::size_t kMaxPreviewBytes = std::size_t{64} << 20;
 
 void read_manifest_into(CaseBundle& bundle, JsonObject& manifest) {
@@ -74,6 +75,12 @@ Status read_small_parts(CaseBundle& bundle,
     auto patient = detail::read_surface(reader, "skin.pat");
     if (!patient) return patient.error();
     bundle.patient_skin = std::move(*patient);
+    if (reader.has("skin.fit")) {
+        auto unfitted =
+            reader.read_array<std::uint8_t>("skin.fit", bundle.patient_skin.points.size());
+        if (!unfitted) return unfitted.error();
+        bundle.skin_unfitted = std::move(*unfitted);
+    }
     auto mannequin = detail::read_surface(reader, "skin.man");
     if (!mannequin) return mannequin.error();
     bundle.mannequin_skin = std::move(*mannequin);

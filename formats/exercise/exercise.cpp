@@ -191,6 +191,14 @@ Exercise read_exercise(const TomlTable& root) {
         table->number("rate_per_min", e.pulsation.rate_per_min, 1, 400);
         table->finish();
     }
+    if (auto table = root.table("deformation")) {
+        Deformation& d = e.deformation;
+        table->number("venous_pressure_mmhg", d.venous_pressure_mmhg, 0.5, 60);
+        table->number("stiffness_scale", d.stiffness_scale, 0.05, 20);
+        table->number("press_offset_mm", d.press_offset_mm, 0, 40);
+        table->number("force_limit_n", d.force_limit_n, 0.1, 200);
+        table->finish();
+    }
     for (const TomlTable& table : root.tables("pass_marks")) read_pass_mark(table, e.pass_marks);
     root.finish();
     return e;

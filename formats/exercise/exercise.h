@@ -83,6 +83,14 @@ struct Pulsation {
     double rate_per_min = 70;
 };
 
+// How tissue yields to the probe (effect deformation; docs/deformation.md).
+struct Deformation {
+    double venous_pressure_mmhg = 8;  // veins are as stiff as this pressure makes them
+    double stiffness_scale = 1;       // of every tissue
+    double press_offset_mm = 0;       // by which the probe begins pressed in; the player changes it
+    double force_limit_n = 15;        // for the score of the time above it
+};
+
 struct Exercise {
     std::string name;
     std::string title;  // shown to the trainee
@@ -100,6 +108,7 @@ struct Exercise {
     std::vector<Sweep> sweeps;
     BreathingMotion breathing;
     Pulsation pulsation;
+    Deformation deformation;
     // Pass marks: metric name and limits, both inclusive; see docs/metrics.md.
     struct PassMark {
         std::string metric;

@@ -34,6 +34,11 @@ constexpr MetricInfo kTable[] = {
     {"tissue_damage_mm2", "needle", "Area swept by the inserted shaft", kLess},
     {"depth_perception_mm", "needle", "Motion of the tip along the needle, in both directions",
      kLess},
+    {"correct_vessel_punctured", "needle", "The first vessel that was punctured was the target's",
+     kMore},
+    {"vein_collapse_at_puncture_percent", "needle", "Loss of the vein's height at its puncture",
+     kLess},
+    {"posterior_wall_punctures", "needle", "Punctures of a vessel's far wall", kLess},
     {"no_go_contacts", "needle", "Contacts of the needle with structures to be spared", kLess},
     {"no_go_time_s", "needle", "Time inside structures to be spared", kLess},
     {"needle_elapsed_time_s", "needle", "Time from its first reading to its last", kLess},
@@ -57,6 +62,11 @@ constexpr MetricInfo kTable[] = {
     {"needle_plane_angle_mean_deg", "guidance",
      "Angle between needle and scan plane, mean in tissue", kNeutral},
 
+    {"probe_force_mean_n", "probe", "Force on the probe while it presses, mean", kLess},
+    {"probe_force_max_n", "probe", "Force on the probe, greatest", kLess},
+    {"probe_pressure_mean_kpa", "probe", "Pressure of the probe while it presses, mean", kLess},
+    {"press_time_over_limit_s", "probe", "Time above the exercise's limit of force", kLess},
+    {"compressions_done", "probe", "Veins pressed shut and opened again", kMore},
     {"probe_usage_time_s", "probe", "Time with the probe on the skin", kNeutral},
     {"probe_elapsed_time_s", "probe", "Time from its first reading to its last", kLess},
     {"probe_path_length_mm", "probe", "Path length of the probe", kLess},
@@ -88,9 +98,16 @@ std::string metric_unit(std::string_view name) {
     static constexpr struct {
         std::string_view ending;
         const char* unit;
-    } kUnits[] = {{"_mm_s3", "mm/s\u00b3"}, {"_mm_s", "mm/s"}, {"_mm3", "mm\u00b3"},
-                  {"_mm2", "mm\u00b2"},     {"_mm", "mm"},     {"_s", "s"},
-                  {"_deg", "\u00b0"},       {"_percent", "%"}};
+    } kUnits[] = {{"_mm_s3", "mm/s\u00b3"},
+                  {"_mm_s", "mm/s"},
+                  {"_mm3", "mm\u00b3"},
+                  {"_mm2", "mm\u00b2"},
+                  {"_mm", "mm"},
+                  {"_s", "s"},
+                  {"_n", "N"},
+                  {"_kpa", "kPa"},
+                  {"_deg", "\u00b0"},
+                  {"_percent", "%"}};
     for (const auto& [ending, unit] : kUnits) {
         if (name.size() > ending.size() && name.substr(name.size() - ending.size()) == ending)
             return unit;

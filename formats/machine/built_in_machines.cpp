@@ -13,6 +13,7 @@ Machine classic() {
     m.title = "Classic scanner, single look, logarithmic grey";
     m.beam.axial_mm = m.beam.lateral_mm = 0;
     m.beam.lateral_focus_mm = 0;
+    m.beam.skirt = 0;
     m.looks = {1, 1, 0};
     m.grey = {GreyMap::log, 0, 131.5, 1, 255, 1, 60};
     m.noise = {-70, false};
@@ -32,11 +33,15 @@ Machine modern_linear() {
     m.name = "modern-linear";
     m.title = "Modern scanner, linear probe";
     m.beam.reference_mhz = 9;
-    m.beam.axial_mm = 0.3;
-    m.beam.lateral_mm = 0.6;
+    m.beam.axial_mm = 0.23;
+    m.beam.lateral_mm = 0.36;
     m.beam.lateral_focus_mm = 20;
     m.beam.lateral_range_mm = 25;
+    m.beam.skirt = 0.65;
+    m.beam.skirt_width = 5.5;
     m.looks.near_mm = 8;
+    m.grey.level = 57;
+    m.grey.exponent = 0.9;
     m.gain = {0, 14, 3, 10};
     m.near_field = {1, 0.9, 0, 9, 3, 0.3, 0.8, 4, 2.2, 0.35, 0.5, 1.5};
     m.haze = {0.2, 1.6, 0.8, -120};

@@ -19,11 +19,15 @@ namespace sonocase {
 struct MachineBeam {
     double frequency_mhz = 0;      // 0: the exercise's; else [0.5, 50]
     double reference_mhz = 3.5;    // [0.5, 50]
-    double axial_mm = 0.74;        // along the beam; 0: from the frequency alone; [0, 10]
-    double lateral_mm = 1.25;      // along the face, at the focus; 0: from the frequency; [0, 20]
+    double axial_mm = 0.72;        // along the beam; 0: from the frequency alone; [0, 10]
+    double lateral_mm = 1.0;       // along the face, at the focus; 0: from the frequency; [0, 20]
     double lateral_focus_mm = 60;  // 0: the exercise's; [0, 500]
     double lateral_range_mm = 60;  // width = lateral_mm sqrt(1 + ((r - focus) / range)^2); [1, 1e4]
-    double elevation_mm = 0;       // slice thickness at the focus; 0: the exercise's; [0, 50]
+    // Skirt of the point spread along the face, as the body wall's aberration leaves it: a second
+    // Gaussian, skirt_width times as wide. skirt: root of its power over that of the first.
+    double skirt = 0.5;       // 0: none; [0, 4]
+    double skirt_width = 3;   // [1, 10]
+    double elevation_mm = 0;  // slice thickness at the focus; 0: the exercise's; [0, 50]
     bool operator==(const MachineBeam&) const = default;
 };
 
@@ -41,7 +45,7 @@ enum class GreyMap { power, log };
 struct MachineGrey {
     GreyMap map = GreyMap::power;
     double floor = 9;              // the machine's own black, [0, 255]
-    double level = 39;             // of e = 1; power: above the floor; [1, 255]
+    double level = 44;             // of e = 1; power: above the floor; [1, 255]
     double exponent = 0.75;        // power only, [0.05, 4]
     double knee = 160;             // power only; 255: none; [1, 255]
     double knee_slope = 0.5;       // [0, 1]
@@ -67,7 +71,7 @@ struct MachineGain {
 // decay, and lines fixed to the probe at first_mm + k spacing_mm, line_db - k line_step_db over it.
 // Everything else is multiplied by min(1, start + r / start_mm) below the face.
 struct MachineNearField {
-    double ring_level = 2;       // [0, 100]
+    double ring_level = 1.5;     // [0, 100]
     double ring_decay_mm = 2.5;  // [0.1, 100]
     double tail_level = 0;       // [0, 100]
     double tail_decay_mm = 9;    // [0.1, 100]

@@ -26,6 +26,8 @@ void visit_machine(M& m, V& v) {
     v.number("lateral_mm", m.beam.lateral_mm, 0.01, 20, true);
     v.number("lateral_focus_mm", m.beam.lateral_focus_mm, 1, 500, true);
     v.number("lateral_range_mm", m.beam.lateral_range_mm, 1, 1e4);
+    v.number("skirt", m.beam.skirt, 0, 4);
+    v.number("skirt_width", m.beam.skirt_width, 1, 10);
     v.number("elevation_mm", m.beam.elevation_mm, 0.01, 50, true);
     v.table("looks");
     v.whole("count", m.looks.count, 1, 16);

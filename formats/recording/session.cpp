@@ -12,6 +12,7 @@ namespace {
 
 constexpr const char* kEventField = "Event";
 constexpr const char* kSettingsField = "Settings";
+constexpr const char* kPressField = "Press";
 
 struct HeaderField {
     const char* name;
@@ -58,6 +59,25 @@ void read_events(const std::string& value,
         if (parse_number(detail_value(event.detail, "t"), time_s)) event.time_s = time_s;
         to.push_back(std::move(event));
     }
+}
+
+// "force_n=3.2 pressure_kpa=8 vein_open=0.4"; a word that is missing or no number leaves its value.
+bool read_press(const std::string& text, PressSample& to) {
+    const auto number = [&](const char* key, double& value) {
+        double read = 0;
+        if (parse_number(detail_value(text, key), read) && std::isfinite(read)) value = read;
+    };
+    number("force_n", to.force_n);
+    number("pressure_kpa", to.pressure_kpa);
+    number("vein_open", to.vein_open);
+    return true;
+}
+
+std::string press_text(const PressSample& press) {
+    std::string text = "force_n=" + number_text(press.force_n, 6);
+    if (press.force_n > 0) text += " pressure_kpa=" + number_text(press.pressure_kpa, 6);
+    if (press.vein_open >= 0) text += " vein_open=" + number_text(press.vein_open, 6);
+    return text;
 }
 
 // Turns the needle's own frame so that its axis is z.
@@ -147,6 +167,7 @@ Result<Session> session_from_sequence(const Sequence& sequence,
         }
         for (const SequenceField& field : frame.fields) {
             if (field.name == kSettingsField) sample.settings = field.value;
+            if (field.name == kPressField) sample.has_press = read_press(field.value, sample.press);
             if (field.name == kEventField) read_events(field.value, sample, session.events);
         }
         session.samples.push_back(std::move(sample));
@@ -164,6 +185,7 @@ SequenceFrame frame_from_sample(const SessionSample& sample,
                    {sample.needle_ok, matrix_from_rigid(sample.mannequin_from_needle)},
                    {sample.needle_ok, matrix_from_rigid(sample.mannequin_from_drawn)}};
     if (!sample.settings.empty()) frame.fields.push_back({kSettingsField, sample.settings});
+    if (sample.has_press) frame.fields.push_back({kPressField, press_text(sample.press)});
     std::string text;
     for (const SessionEvent& event : events) {
         if (!text.empty()) text += ";";

@@ -30,6 +30,15 @@ struct SessionHeader {
     std::string render;
 };
 
+// What the probe did to the tissue in a frame (effect deformation).
+struct PressSample {
+    double force_n = 0, pressure_kpa = 0;
+    // Height of the draining lumens under the face over their height at rest; negative: there is
+    // none, or nothing is pressed.
+    double vein_open = -1;
+    friend bool operator==(const PressSample&, const PressSample&) = default;
+};
+
 struct SessionSample {
     double time_s = 0;
     std::int64_t frame = 0;  // the renderer's frame number, which seeds its noise
@@ -40,6 +49,8 @@ struct SessionSample {
     Rigid mannequin_from_drawn;   // as shown, after the bend constraint
     // Console settings that changed at this frame, as "key=value" words; empty: unchanged.
     std::string settings;
+    bool has_press = false;  // false in recordings of before, and of other programs
+    PressSample press;
 };
 
 // Events have fixed names; `detail` holds "key=value" words. docs/metrics.md lists them.

@@ -12,9 +12,10 @@ namespace sonocase {
 namespace {
 
 constexpr const char* kNames[] = {
-    "needle_entry", "needle_exit",   "target_hit",   "target_scanned", "no_go_contact",
-    "no_go_left",   "probe_contact", "probe_lifted", "needle_lost",    "needle_found",
-    "probe_lost",   "probe_found",   "deepest",      "key_frame",      "session_end"};
+    "needle_entry",    "needle_exit",    "target_hit",    "target_scanned", "no_go_contact",
+    "no_go_left",      "probe_contact",  "probe_lifted",  "needle_lost",    "needle_found",
+    "probe_lost",      "probe_found",    "deepest",       "key_frame",      "session_end",
+    "tissue_puncture", "posterior_wall", "needle_stopped"};
 
 // Words are separated by blanks, so names must not contain any.
 std::string word(std::string text) {
@@ -57,6 +58,12 @@ SessionEvent session_event(const LiveEvent& event,
         case LiveEventKind::no_go_left:
             if (index < labels.size()) out.detail = "label=" + word(labels[index].name);
             break;
+        case LiveEventKind::tissue_puncture:
+        case LiveEventKind::posterior_wall:
+        case LiveEventKind::needle_stopped:
+            if (index < labels.size()) out.detail = "label=" + word(labels[index].name) + " ";
+            out.detail += "force_n=" + number_text(event.value, 5);
+            break;
         default: break;
     }
     return out;
@@ -94,7 +101,7 @@ SessionMonitor::SessionMonitor(const Exercise& exercise,
             if (labels[i].name == name) is_no_go_[i] = true;
         }
     }
-    events_.reserve(2 * exercise.targets.size() + 16);
+    events_.reserve(2 * exercise.targets.size() + 24);
 }
 
 void SessionMonitor::add(LiveEventKind kind, double time_s, int index, double value) {

@@ -33,6 +33,9 @@ enum class LiveEventKind : std::uint8_t {
     deepest,    // index: insertion; given with needle_exit, at the time of the deepest point
     key_frame,  // the player stored a picture
     session_end,
+    tissue_puncture,  // index: label that the tip went into; value: force, N
+    posterior_wall,   // through the far wall of a vessel, likewise
+    needle_stopped,   // by something rigid, likewise
 };
 
 struct LiveEvent {
@@ -65,6 +68,12 @@ class SessionMonitor {
                                       const Rigid& mannequin_from_probe,
                                       bool needle_ok,
                                       const Rigid& mannequin_from_drawn);
+
+    // What the needle did to the tissue in the sample just given; index: label.
+    void report(LiveEventKind kind, int label, double force_n) {
+        add(kind, last_time_s_, label, force_n);
+    }
+    std::span<const LiveEvent> events() const { return events_; }  // of the sample just given
 
     // For the screen.
     double depth_mm() const { return depth_mm_; }              // inserted length; 0 outside

@@ -110,8 +110,10 @@ Result<PackResult> pack_case(const PackInput& input) {
     bundle.boundary = input.boundary;
     bundle.textures = input.textures.textures;
     bundle.speckle = input.textures.speckle;
-    if (input.ct_skin != nullptr && input.registration != nullptr)
+    if (input.ct_skin != nullptr && input.registration != nullptr) {
         bundle.patient_skin = rounded(mapped_surface(*input.ct_skin, *input.registration));
+        bundle.skin_unfitted = input.skin_unfitted;
+    }
     bundle.mannequin_skin = input.mannequin;
     bundle.preview_png = png_of(preview_picture(volume));
 

@@ -26,6 +26,8 @@ struct PackInput {
     const BrickVolume<std::int8_t>& echo_offset;  // of cooked; may be empty
     const TextureFile& textures;
     const std::vector<Tissue>& tissues;  // every one that the palette names
+    // # points of ct_skin, 1 where it was not fitted; empty: fitted everywhere, or not known.
+    std::vector<std::uint8_t> skin_unfitted = {};
 };
 
 struct PackResult {

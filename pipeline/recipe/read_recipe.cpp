@@ -138,6 +138,12 @@ Status read_text(std::string_view text,
     }
     if (root->fault()) return *root->fault();
     if (auto status = apply_sets(overrides.sets, recipe.settings); !status) return status;
+    if (!overrides.surface.empty()) {
+        if (recipe.inputs.analytic)
+            return Error{"the analytic torso makes its own mannequin", "--surface",
+                         "take a recipe with [inputs]"};
+        recipe.inputs.surface = fs::absolute(overrides.surface).string();
+    }
     return check_inputs(recipe);
 }
 

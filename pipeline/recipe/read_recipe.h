@@ -33,6 +33,9 @@ struct RecipeOverrides {
     std::string data;               // --data
     std::string preset;             // --preset; empty: the recipe's own
     std::vector<std::string> sets;  // --set section.key=value
+    // --surface: another mannequin than inputs.surface, relative to the working folder. Empty:
+    // none.
+    std::string surface;
 };
 
 // path   the recipe, or its folder

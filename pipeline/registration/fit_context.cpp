@@ -56,6 +56,8 @@ double vote_of_landmarks(const FitContext& s) {
 
 void decide_open_side(const std::string& wanted, FitContext* s) {
     s->open_side = find_open_side(s->target, s->hints.up);
+    const bool table = s->target.table.found;
+    if (table) s->open_side = open_towards(-s->target.table.normal);
     s->open_side_is = "none";
     if (wanted == "none") {
         s->open_side_why = "the recipe wants no open side to be considered";
@@ -76,8 +78,9 @@ void decide_open_side(const std::string& wanted, FitContext* s) {
         s->open_side_why = "the landmarks say so";
     } else {
         s->open_side_is = "back";
-        s->open_side_why =
-            vote > 0 ? "the landmarks say so" : "a patient on a table lies on it (--open-side)";
+        s->open_side_why = vote > 0 ? "the landmarks say so"
+                           : table  ? "the patient lies on the table that was read (--open-side)"
+                                    : "a patient on a table lies on it (--open-side)";
     }
     s->hints.back = s->open_side_is == "back" ? s->open_side.direction : -s->open_side.direction;
     s->hints.back_weight_mm2 = std::max(s->open_side.weight_mm2(), wanted == "auto" ? 0.0 : 300.0);

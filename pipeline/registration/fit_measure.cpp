@@ -78,6 +78,18 @@ void closest_on_triangle(Point3 p, Point3 a, Point3 b, Point3 c, double* wb, dou
     *wc = vc / sum;
 }
 
+double depth_behind_table_mm(const Surface& mapped, const Table& table) {
+    if (!table.found) return 0;
+    std::vector<double> depth;
+    for (std::size_t i = 0; i < mapped.points.size(); ++i) {
+        if (dot(mapped.normals[i], table.normal) > -kLeastCosine) continue;
+        depth.push_back(std::max(0.0, dot(table.normal, table.place - mapped.points[i])));
+    }
+    if (depth.empty()) return 0;
+    std::sort(depth.begin(), depth.end());
+    return depth[std::min(depth.size() - 1, depth.size() * 95 / 100)];
+}
+
 }  // namespace
 
 Surface mapped_skin(const Surface& skin, const Registration& registration, Point3 target_origin) {
@@ -166,6 +178,7 @@ FitMeasure measure_fit(const SkinSurfaceResult& skin,
         }
         m.coverage = static_cast<double>(kept) / static_cast<double>(std::max(1L, m.readings));
     }
+    m.behind_table_mm = depth_behind_table_mm(mapped, target.table);
     long covered = 0;
     for (double g : signed_gaps(mapped, target)) covered += std::isfinite(g);
     m.skin_coverage = static_cast<double>(covered) / static_cast<double>(mapped.points.size());

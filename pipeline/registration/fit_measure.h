@@ -17,6 +17,8 @@ struct FitMeasure {
     double mean_signed_mm = 0;  // > 0: the readings lie outside the skin
     double coverage = 0;        // readings with a counterpart over usable readings
     double skin_coverage = 0;   // skin points near a reading over all skin points
+    // Depth of the skin that faces the table behind its plane, 95th percentile; 0 without a table.
+    double behind_table_mm = 0;
     long readings = 0, counterparts = 0;
     long unexplained =
         0;  // near the skin, but farther than the others allow: lift-offs, folds of skin

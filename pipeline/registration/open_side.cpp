@@ -65,6 +65,14 @@ double OpenSide::weight_mm2() const {
            std::clamp((size - kNoOpening) / (kFullOpening - kNoOpening), 0.0, 1.0);
 }
 
+OpenSide open_towards(Vector3 direction) {
+    OpenSide side;
+    side.size = 1;
+    side.direction = direction;
+    side.flatness = INFINITY;
+    return side;
+}
+
 OpenSide find_open_side(const TargetSurface& target, const std::optional<Vector3>& head) {
     // One reading per cube: strokes that were repeated count once.
     std::vector<std::uint32_t> readings = thin_target(target, 1.2 * target.spacing_mm);

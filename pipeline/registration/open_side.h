@@ -29,6 +29,9 @@ struct OpenSide {
     double weight_mm2() const;
 };
 
+// Towards a table that was read: as sure as a direction can be.
+OpenSide open_towards(Vector3 direction);
+
 // head  the patient's head direction on the mannequin, if it is known
 OpenSide find_open_side(const TargetSurface& target, const std::optional<Vector3>& head);
 

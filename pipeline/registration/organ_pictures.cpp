@@ -20,6 +20,7 @@
 #include "pipeline/registration/map/inverse_map.h"
 #include "pipeline/registration/matching/point_index.h"
 #include "pipeline/registration/path_choice.h"
+#include "pipeline/registration/unfitted_skin.h"
 
 VTK_MODULE_INIT(vtkRenderingFreeType)
 
@@ -28,7 +29,7 @@ namespace {
 
 constexpr int kPanelWidth = 440, kPanelHeight = 330, kTitle = 26, kTable = 470, kRow = 18;
 constexpr int kCuts = 3;
-constexpr double kNear_mm = 5, kNotFitted_mm = 20;
+constexpr double kNear_mm = 5;
 constexpr CanvasColour kInk{30, 30, 30, 255}, kAlarm{190, 20, 20, 255};
 constexpr std::array<std::uint8_t, 3> kReading{0, 190, 220}, kFitted{250, 250, 250},
     kUnfitted{255, 90, 40};

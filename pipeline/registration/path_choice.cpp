@@ -23,6 +23,8 @@ constexpr double kDistortedVolume = 0.25;
 constexpr double kPoorCoverage = 0.55;
 // 95th percentile of readings about a skin that they lie on: 1.4 mm with noise of 0.7 mm.
 constexpr double kNoise_mm = 1.8;
+// Skin of the back farther behind the table than this does not suffice.
+constexpr double kBehindTable_mm = 15;
 // Fewer readings do not determine a field: it would follow their noise.
 constexpr std::size_t kFewestReadings = 200;
 
@@ -55,6 +57,10 @@ std::string shortcoming(const WarpFit& w, const Proofs& proofs) {
             "the residual warp leaves readings %.1f mm from the skin (95th percentile; "
             "%.0f mm are wanted)",
             w.fit.p95_mm, kSufficientP95_mm);
+    }
+    if (w.fit.behind_table_mm > kBehindTable_mm) {
+        return text("the residual warp leaves skin %.0f mm behind the table",
+                    w.fit.behind_table_mm);
     }
     if (!(proofs.fold.least_bound > kLeastDetJacobian))
         return "the residual warp is not proven free of folds";

@@ -90,7 +90,7 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
 bool drop_open_side(const FitContext& s,
                     const RegisterOptions& options,
                     std::vector<JudgedPose>& judged) {
-    if (!s.hints.back || options.open_side != "auto") return false;
+    if (!s.hints.back || options.open_side != "auto" || s.target.table.found) return false;
     const auto bare = [](const JudgedPose& p) {
         return std::sqrt(std::max(0.0, p.score_mm * p.score_mm - p.back_cost_mm2));
     };

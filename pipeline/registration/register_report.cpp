@@ -22,6 +22,7 @@ void add_target(StageReport& report, const TargetSurface& t) {
     report.measures.push_back({"readings_not_finite", static_cast<double>(t.not_finite)});
     report.measures.push_back({"readings_repeated", static_cast<double>(t.repeated)});
     report.measures.push_back({"readings_lifted_off", static_cast<double>(t.lift_offs)});
+    report.measures.push_back({"table_readings", static_cast<double>(t.table.readings)});
     report.measures.push_back({"reading_spacing_mm", t.spacing_mm});
 }
 
@@ -132,6 +133,7 @@ StageReport warp_report(const FitContext& s,
     report.measures.push_back({"sampled_min_det_jacobian", w.sampled_det});
     report.measures.push_back({"skin_bias_mm", w.fit.mean_signed_mm});
     report.measures.push_back({"skin_coverage", w.fit.skin_coverage});
+    report.measures.push_back({"skin_behind_table_mm", w.fit.behind_table_mm});
     report.measures.push_back({"counterparts", static_cast<double>(w.fit.counterparts)});
     report.measures.push_back({"unexplained_readings", static_cast<double>(w.fit.unexplained)});
     add_fit(report, "quadratic", w.quadratic_fit);

@@ -34,7 +34,7 @@
 
 namespace sonocase::pipeline {
 
-inline constexpr int kRegisterVersion = 3;
+inline constexpr int kRegisterVersion = 4;
 
 // The same point of the body on both surfaces, e.g. navel or crotch.
 struct Landmark {

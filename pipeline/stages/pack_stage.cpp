@@ -7,6 +7,7 @@
 #include "pipeline/pack/error_budget.h"
 #include "pipeline/pack/pack_case.h"
 #include "pipeline/registration/skin/skin_surface.h"
+#include "pipeline/registration/unfitted_skin.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
 #include "pipeline/stages/mannequin_surface.h"
@@ -43,10 +44,12 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     if (!structure) return structure.error();
     report_progress(progress, 0, "packing");
     const Recipe& recipe = inputs.recipe();
-    PackInput input{recipe.name,          recipe.text,      recipe.exercises,
-                    &(*skin)->skin,       *registration,    (*mannequin)->surface,
-                    (*labels)->volume,    (*used)->palette, (*labels)->boundary,
-                    (*structure)->offset, **textures,       (*used)->tissues};
+    auto unfitted = unfitted_skin((*skin)->skin, (*mannequin)->surface, **registration);
+    if (!unfitted) return unfitted.error();
+    PackInput input{recipe.name,         recipe.text,           recipe.exercises,  &(*skin)->skin,
+                    *registration,       (*mannequin)->surface, (*labels)->volume, (*used)->palette,
+                    (*labels)->boundary, (*structure)->offset,  **textures,        (*used)->tissues,
+                    std::move(*unfitted)};
     auto packed = pack_case(input);
     if (!packed) return packed.error();
     add_error_budget(inputs.reported(), packed->report);

@@ -44,7 +44,10 @@ void add_align(OptionsOf<Fit>& options) {
             "standard deviation of a landmark along an axis")
         .choice(
             "open_side", [](auto& o) { return &o.open_side; }, {"auto", "back", "front", "none"},
-            "", "side of the patient that the open side of the sweep is; auto: the back");
+            "", "side of the patient that the open side of the sweep is; auto: the back")
+        .toggle(
+            "find_table", [](auto& o) { return &o.target.find_table; },
+            "recognise readings of the table: left out, its plane holds the back");
 }
 
 void add_quadratic(OptionsOf<Fit>& options) {

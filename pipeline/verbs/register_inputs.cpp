@@ -35,6 +35,17 @@ Result<Vector3> parse_direction(const std::string& text) {
     return v;
 }
 
+// What becomes of a dense scan, without its size.
+std::vector<Measure> reduction_of(const StageReport& report) {
+    std::vector<Measure> reduction;
+    for (const Measure& m : report.measures) {
+        if (m.name.starts_with("given_") || m.name.starts_with("reduction_") ||
+            m.name == "small_parts" || m.name == "sparse_points")
+            reduction.push_back(m);
+    }
+    return reduction;
+}
+
 }  // namespace
 
 RegisterArguments::RegisterArguments() {
@@ -91,6 +102,7 @@ Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Pr
     Result<Surface> surface = import_surface(mannequin, {in.surface_scale}, &surface_report);
     if (!surface) return surface.error();
     inputs.mannequin = std::move(*surface);
+    inputs.reduction = reduction_of(surface_report);
     ImportOptions import;
     import.table = in.label_table;
     Result<ImportedLabels> labels = import_label_map(in.labels, import, progress);
@@ -120,6 +132,7 @@ Status read_other_mannequin(const RegisterArguments& a,
     Result<Surface> surface = import_surface(path, {a.recipe.inputs.surface_scale}, &report);
     if (!surface) return surface.error();
     inputs.mannequin = std::move(*surface);
+    inputs.reduction = reduction_of(report);
     inputs.warnings.insert(inputs.warnings.end(), report.warnings.begin(), report.warnings.end());
     return Done{};
 }
@@ -127,6 +140,7 @@ Status read_other_mannequin(const RegisterArguments& a,
 void add_input_reports(const RegisterInputs& inputs, StageReport& report) {
     report.measures.insert(report.measures.end(), inputs.skin.report.measures.begin(),
                            inputs.skin.report.measures.end());
+    report.measures.insert(report.measures.end(), inputs.reduction.begin(), inputs.reduction.end());
     report.measures.push_back({"import_seconds", inputs.import_seconds});
     report.measures.push_back({"surface_seconds", inputs.skin.report.seconds});
     report.seconds += inputs.skin.report.seconds;

@@ -33,6 +33,7 @@ struct RegisterInputs {
     Surface mannequin;
     RegisterOptions options;
     double import_seconds = 0;
+    std::vector<Measure> reduction;  // of a dense mannequin, as import_surface reports it
     std::vector<std::string> warnings;
 };
 Result<RegisterInputs> read_register_inputs(const RegisterArguments& arguments,

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -36,6 +37,7 @@ struct BuildOptions {
     std::string plan_key;
     std::string preview;
     bool list_options = false;
+    std::vector<std::string> surfaces;
     AccuracyTarget target;
     RecipeOverrides overrides;
     CommonOptions common;
@@ -165,9 +167,8 @@ Status write_case(const BuildOptions& options,
     return Done{};
 }
 
-int build(const BuildOptions& options) {
+int build_one(const BuildOptions& options) {
     const Stopwatch watch;
-    const ThreadLimit limit(options.common.threads);
     auto recipe = options.recipe.empty() ? embedded_recipe(options.overrides)
                                          : load_recipe(options.recipe, options.overrides);
     if (!recipe) return fail("build", recipe.error());
@@ -202,6 +203,59 @@ int build(const BuildOptions& options) {
     return kDone;
 }
 
+// "OUT-STEM.sonocase": of several mannequins each has its own bundle.
+std::string with_stem(const std::string& path, const std::string& stem) {
+    const std::filesystem::path whole(path);
+    return (whole.parent_path() / (whole.stem().string() + "-" + stem)).string() +
+           whole.extension().string();
+}
+
+// One bundle for each mannequin. What does not depend on the mannequin (import, skin, textures) is
+// made once: results pass from one to the next through the cache, or through a folder of this run.
+int build_several(const BuildOptions& options) {
+    namespace fs = std::filesystem;
+    std::vector<std::string> stems;
+    for (const std::string& surface : options.surfaces) {
+        const std::string stem = fs::path(surface).stem().string();
+        if (std::find(stems.begin(), stems.end(), stem) != stems.end())
+            return fail("build", Error{"two mannequins are called '" + stem + "'", "--surface",
+                                       "their names become those of the bundles"});
+        stems.push_back(stem);
+    }
+    if (!options.until.empty() || !options.plan_key.empty())
+        return fail("build", Error{"several mannequins cannot stop half way", "--until",
+                                   "build one mannequin at a time"});
+    auto recipe = options.recipe.empty() ? embedded_recipe(options.overrides)
+                                         : load_recipe(options.recipe, options.overrides);
+    if (!recipe) return fail("build", recipe.error());
+    const std::string out = options.out.empty() ? recipe->name + ".sonocase" : options.out;
+    BuildOptions one = options;
+    std::error_code code;
+    if (one.cache.empty()) {
+        one.cache = out + ".cache-" + std::to_string(getpid());
+        fs::create_directories(one.cache, code);
+        if (code) return fail("build", Error{"folder cannot be made", one.cache, code.message()});
+    }
+    int worst = kDone;
+    for (std::size_t n = 0; n < stems.size(); ++n) {
+        one.overrides.surface = options.surfaces[n];
+        one.out = with_stem(out, stems[n]);
+        if (!options.preview.empty()) one.preview = with_stem(options.preview, stems[n]);
+        if (!options.common.report_path.empty())
+            one.common.report_path = with_stem(options.common.report_path, stems[n]);
+        worst = std::max(worst, build_one(one));
+    }
+    if (options.cache.empty()) fs::remove_all(one.cache, code);
+    return worst;
+}
+
+int build(BuildOptions& options) {
+    const ThreadLimit limit(options.common.threads);
+    if (options.surfaces.size() > 1) return build_several(options);
+    if (options.surfaces.size() == 1) options.overrides.surface = options.surfaces[0];
+    return build_one(options);
+}
+
 }  // namespace
 
 int verb_build(int argc, char** argv) {
@@ -215,6 +269,11 @@ int verb_build(int argc, char** argv) {
     app.add_option("--data", options.overrides.data,
                    "Folder that the recipe's input paths start from")
         ->type_name("DIR");
+    app.add_option("--surface", options.surfaces,
+                   "Mannequin in place of the recipe's; of several, one bundle OUT-NAME.sonocase "
+                   "for each, and what they have in common is cooked once")
+        ->type_name("FILE")
+        ->expected(1, 100);
     app.add_option("--set", options.overrides.sets, "Set an option of a stage; may be repeated")
         ->type_name("SECTION.KEY=VALUE")
         ->expected(1)

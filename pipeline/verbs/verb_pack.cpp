@@ -17,6 +17,7 @@
 #include "pipeline/command_line/verbs.h"
 #include "pipeline/import/surface/surface_file.h"
 #include "pipeline/pack/pack_case.h"
+#include "pipeline/registration/unfitted_skin.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -82,10 +83,16 @@ Result<PackResult> pack(const PackFiles& files, const Progress& progress) {
         labels->echo_offset = std::move(baked->echo_offset);
         labels->reports.push_back(baked->report);
     }
+    std::vector<std::uint8_t> unfitted;
+    if (has_skin && has_fit) {
+        auto found = unfitted_skin(skin, *mannequin, registration);
+        if (!found) return found.error();
+        unfitted = std::move(*found);
+    }
     auto packed = pack_case({files.name, "", exercises, has_skin ? &skin : nullptr,
                              has_fit ? &registration : nullptr, *mannequin, labels->volume,
                              labels->volume.labels, labels->boundary, labels->echo_offset,
-                             *textures, tissues});
+                             *textures, tissues, std::move(unfitted)});
     if (!packed) return packed;
     auto& stages = packed->bundle.manifest.stages;
     for (const auto* reports : {&labels->reports, &textures->reports})

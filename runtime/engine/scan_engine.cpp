@@ -83,6 +83,7 @@ void ScanEngine::observe(const TrackerReading& reading, bool is_device) {
     const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment_;
     watch(probe_watch_, places.probe);
     watch(needle_watch_, places.needle);
+    force_watch_.observe(reading.force_n, reading.time_s);
     reading_ = reading;
     ToolPoses tools = tool_poses(reading, calibrations_, assignment_);
     // A lost probe keeps its last place, so that the picture freezes rather than flickers.
@@ -119,19 +120,39 @@ FrameStatus ScanEngine::frame(double now_s,
     input.time_s = time_s;
     input.frame = frame_++;
     input.settings = settings;
+    if (force_watch_.present()) {
+        if (force_watch_.fresh())
+            sensed_press_mm_ = renderer_.press_mm_for(input.mannequin_from_probe,
+                                                      force_watch_.force_n(), sensed_press_mm_);
+        force_watch_.taken();
+        input.settings.press_mm = sensed_press_mm_;
+    }
+    const FrameStatus drawn = renderer_.render(input, pixels);
+    record.press = renderer_.press();
+    if (tools_.has_needle)
+        record.puncture = puncture_.update(time_s, input.needle.tip, input.needle.direction,
+                                           record.needle.depth_mm, *anatomy_, renderer_);
+    const FrameStatus status = finish(input, drawn, pixels);
+    record.skin_not_fitted =
+        status == FrameStatus::rendered &&
+        skin_fit_.not_fitted(Point3{} + input.mannequin_from_probe.translation);
     last_ = record;
-    return finish(input, renderer_.render(input, pixels), pixels);
+    return status;
 }
 
 void ScanEngine::begin_session(double now_s) {
     origin_s_ = now_s;
     frame_ = 0;
     needle_ = NeedleState(anatomy_.get(), exercise_.needle);
+    puncture_.reset();
 }
 
 void ScanEngine::take_over(const ScanEngine& before) {
     needle_ = before.needle_;
     needle_.set_anatomy(anatomy_.get());
+    puncture_ = before.puncture_;
+    force_watch_ = before.force_watch_;
+    sensed_press_mm_ = before.sensed_press_mm_;
     probe_watch_ = before.probe_watch_;
     needle_watch_ = before.needle_watch_;
     reading_ = before.reading_;

@@ -17,9 +17,12 @@
 #include "formats/exercise/exercise.h"
 #include "formats/scoring/anatomy.h"
 #include "formats/scoring/session_score.h"
+#include "runtime/engine/force_watch.h"
 #include "runtime/engine/needle_state.h"
+#include "runtime/engine/puncture_state.h"
 #include "runtime/engine/sensor_watch.h"
 #include "runtime/engine/skin.h"
+#include "runtime/engine/skin_fit.h"
 #include "runtime/engine/tracker_reading.h"
 #include "runtime/imaging/renderer.h"
 
@@ -56,7 +59,10 @@ struct FrameRecord {
     FrameInput input;
     ToolPoses tools;
     NeedleView needle;  // as drawn, after the bend constraint
+    PressReport press;  // what the probe does to the tissue
+    PunctureReport puncture;
     double reading_time_s = 0;
+    bool skin_not_fitted = false;  // the probe touches skin that no reading lies near
 };
 
 struct EngineOptions {
@@ -105,11 +111,13 @@ class ScanEngine {
   private:
     ScanEngine(CaseView bundle, Exercise exercise, EngineOptions options, Renderer renderer)
         : skin_(*bundle),
+          skin_fit_(*bundle),
           anatomy_(std::make_shared<CaseAnatomy>(
               bundle,
               breathing_shown(
                   exercise, options.render.model == ImageModel::physical, options.render.effects))),
           needle_(anatomy_.get(), exercise.needle),
+          puncture_(*bundle, exercise.needle),
           exercise_(std::move(exercise)),
           options_(std::move(options)),
           renderer_(std::move(renderer)) {}
@@ -117,8 +125,12 @@ class ScanEngine {
     FrameStatus finish(const FrameInput& input, FrameStatus status, std::span<std::uint8_t> pixels);
 
     Skin skin_;
+    SkinFit skin_fit_;
     std::shared_ptr<CaseAnatomy> anatomy_;  // stays in place when the engine moves
     NeedleState needle_;
+    PunctureState puncture_;
+    ForceWatch force_watch_;
+    double sensed_press_mm_ = 0;  // that the force sensor's last reading asks for
     Exercise exercise_;
     EngineOptions options_;
     Renderer renderer_;

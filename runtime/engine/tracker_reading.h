@@ -36,6 +36,8 @@ struct TrackerReading {
     double device_time_s = -1;   // on the device's own clock; negative: it has none
     // The sensors are the tools themselves and `world` is the mannequin: no calibration applies.
     bool in_mannequin = false;
+    // On the probe's face, newtons, of a force or pressure sensor; negative: there is none.
+    double force_n = -1;
     int sensor_count = 0;
     std::array<SensorReading, kMaxSensors> sensors{};
 };

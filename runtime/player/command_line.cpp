@@ -27,6 +27,9 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     CLI::App app{"Scan a case bundle with a tracked probe, the mouse or a script.", "sonoplay"};
     std::string facts = build_facts();
     facts.pop_back();  // the last end of line is printed by the library
+    app.footer(
+        "sonoplay dataset RECIPE.toml -o DIR --frames N renders whole data sets; see "
+        "sonoplay dataset --help.");
     app.set_version_flag("--version", facts);
     std::string size, effects;
     app.add_option("bundle", arguments.bundle,
@@ -44,6 +47,10 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         ->group("Headless");
     app.add_option("--size", size, "Size WxH of the picture or the window")->group("Headless");
     app.add_option("--out", arguments.out, "Folder for PNG frames")->group("Headless");
+    app.add_option("--truth", arguments.truth,
+                   "Folder for what each frame shows: labels, needle, shadow and depth as PNG, and "
+                   "truth.jsonl")
+        ->group("Headless");
     app.add_option("--stats", arguments.stats,
                    "Write times and costs as JSON; - for standard output");
     app.add_option("--record", arguments.record, "Record the session to FILE.igs.mha");
@@ -74,6 +81,11 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
                    "In a window: milliseconds per frame above which accuracy is reduced; "
                    "0: never reduced. Recordings are always at full accuracy")
         ->check(CLI::Range(0.0, 1000.0))
+        ->group("Picture");
+    app.add_option("--press", arguments.press_mm,
+                   "Millimetres by which the probe presses deeper than its pose; default: the "
+                   "exercise's")
+        ->check(CLI::Range(0.0, 40.0))
         ->group("Picture");
     app.add_option("--threads", arguments.threads, "Rendering threads")
         ->check(CLI::Range(1, 256))

@@ -2,8 +2,10 @@
 
 #include <cstdio>
 #include <exception>
+#include <string_view>
 
 #include "runtime/player/command_line.h"
+#include "runtime/player/dataset_command.h"
 #include "runtime/player/headless/run_headless.h"
 #include "runtime/player/session/clock.h"
 #include "runtime/player/ui/run_window.h"
@@ -14,6 +16,8 @@ using namespace sonocase::runtime;
 int main(int argc, char** argv) {
     const double start_s = steady_seconds();
     try {
+        if (argc > 1 && std::string_view(argv[1]) == "dataset")
+            return run_dataset_command(argc - 1, argv + 1);
         PlayerArguments arguments;
         bool exit_now = false;
         const int status = parse_arguments(argc, argv, arguments, exit_now);

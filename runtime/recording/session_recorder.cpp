@@ -102,6 +102,8 @@ struct SessionRecorder::Impl {
         sample.mannequin_from_probe = f.mannequin_from_probe;
         sample.mannequin_from_needle = f.mannequin_from_needle;
         sample.mannequin_from_drawn = f.mannequin_from_drawn;
+        sample.has_press = f.has_press;
+        sample.press = f.press;
         sample.settings.assign(f.settings.data(), ::strnlen(f.settings.data(), f.settings.size()));
         std::vector<SessionEvent> events;
         for (std::size_t i = 0; i < record.event_count; ++i) {

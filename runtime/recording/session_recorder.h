@@ -28,6 +28,8 @@ struct RecordedFrame {
     std::int64_t frame = 0;  // FrameInput::frame
     bool probe_ok = false, needle_ok = false;
     Rigid mannequin_from_probe, mannequin_from_needle, mannequin_from_drawn;
+    bool has_press = false;
+    PressSample press;
     // The console's settings as text (settings_text.h) where they changed; empty otherwise.
     std::array<char, 224> settings{};
 };

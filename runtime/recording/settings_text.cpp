@@ -16,10 +16,13 @@ std::string settings_text(const ImageSettings& settings) {
     for (std::size_t i = 0; i < settings.tgc_db.size(); ++i) {
         out += (i ? "," : "") + number_text(settings.tgc_db[i]);
     }
-    return out + " flip=" + (settings.flip_left_right ? "1" : "0");
+    out += std::string(" flip=") + (settings.flip_left_right ? "1" : "0");
+    // Not in recordings of before, and only where it is used.
+    return settings.press_mm > 0 ? out + " press_mm=" + number_text(settings.press_mm) : out;
 }
 
 void apply_settings_text(const std::string& text, ImageSettings& settings) {
+    if (text.empty()) return;  // unchanged
     const auto number = [](std::string_view word, double& to) {
         double value = 0;
         if (parse_number(word, value) && std::isfinite(value)) to = value;
@@ -34,6 +37,9 @@ void apply_settings_text(const std::string& text, ImageSettings& settings) {
     }
     const std::string flip = detail_value(text, "flip");
     if (!flip.empty()) settings.flip_left_right = flip == "1";
+    // A text of settings without it says that nobody presses.
+    settings.press_mm = 0;
+    number(detail_value(text, "press_mm"), settings.press_mm);
 }
 
 }  // namespace sonocase::runtime

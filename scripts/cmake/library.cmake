@@ -20,8 +20,8 @@ string(CONCAT core_rooms "^(formats/(base|text|volume|container|bundle|bundle/co
 set(formats_rooms "^formats/(threads|files|progress_book)$")
 # Rooms whose headers a program may include, and headers of theirs that are for the room's neighbours alone.
 string(CONCAT public_rooms "^(formats/(base|volume|bundle|registration|exercise|machine|recording|calibration|"
-  "calibration/solve|scoring|threads|files|progress_book)|runtime/(imaging|imaging/frame|imaging/host|engine))$")
-set(inner_headers "/(build_facts|event|whole_file|pass_timer|parallel_halves)\\.h$")
+  "calibration/solve|scoring|threads|files|progress_book)|runtime/(imaging|imaging/frame|imaging/host|imaging/truth|engine))$")
+set(inner_headers "/(build_facts|event|whole_file|pass_timer|parallel_halves|plane_look_up|truth_planes|truth_rows)\\.h$")
 
 set(version_headers "${CMAKE_BINARY_DIR}/include/version")
 configure_file(scripts/cmake/version.h.in "${version_headers}/sonocase/version.h" @ONLY)

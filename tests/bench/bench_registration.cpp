@@ -13,6 +13,7 @@
 #include "pipeline/registration/map/fold_proof.h"
 #include "pipeline/registration/map/inverse_map.h"
 #include "pipeline/registration/register_surfaces.h"
+#include "support/torso_builds.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -87,7 +88,35 @@ void run(benchmark::State& state, const RegisterOptions& options, const Surface&
 void BM_Whole(benchmark::State& state) {
     run(state, {}, readings());
 }
-BENCHMARK(BM_Whole)->Name("Registration/whole")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(BM_Whole)
+    ->Name("Registration/whole")
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
+
+// With the elastic path: mannequins of another build, and their patient's tissues.
+void BM_Elastic(benchmark::State& state) {
+    const auto build = static_cast<testing::Build>(state.range(0));
+    const testing::BuiltMannequin mannequin =
+        testing::built_mannequin(build, 1, testing::usual_sweep(build));
+    const testing::TorsoPatient& patient = testing::torso_patient();
+    RegisterOptions options;
+    options.up = mannequin.head;
+    options.landmarks = mannequin.landmarks;
+    RegisterResult last;
+    for (auto _ : state)
+        last = *register_surfaces({patient.skin, mannequin.sweep, &patient.labels}, options);
+    state.SetLabel(testing::build_name(build));
+    state.counters["skin_median_mm"] = last.fit.median_mm;
+    state.counters["skin_p95_mm"] = last.fit.p95_mm;
+    state.counters["min_det"] = last.registration.min_det_jacobian;
+}
+BENCHMARK(BM_Elastic)
+    ->Name("Registration/elastic")
+    ->DenseRange(0, 4)
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
 
 void BM_Starts(benchmark::State& state) {
     RegisterOptions options;

@@ -25,11 +25,11 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Bundles: since fits report volumes. Physical frames: since machines. Paper: commit aa0be5b.
-constexpr const char* kDraft = "815e6c7d170369bed23df5dca4fe3f95";
-constexpr const char* kBalanced = "e46af3964f7c4342a663f60bf968a1e7";
-constexpr const char* kSlender = "04744c53c83a77f9827edb9fb7719fa7";
-constexpr const char* kReal = "f7a4c9a5ace9b12a5d9c0432ebfeb718";
+// Bundles: since skin not fitted is marked. Physical frames: since machines. Paper: commit aa0be5b.
+constexpr const char* kDraft = "f69508b6aef4b073068e1e53256a6adc";
+constexpr const char* kBalanced = "4c5d9b7ec9afadcfc9d382757066800f";
+constexpr const char* kSlender = "3c3201254fbe664b33d2a8d1f54be463";
+constexpr const char* kReal = "583739f7d1591ffe5c6fc50825c76315";
 constexpr const char* kDraftPhysical = "9b0098324bc2cdc6cccec08969a2ccdf";
 constexpr const char* kDraftPaper = "1628db3a0fe630d2e2b3a86b0621208a";
 constexpr const char* kRealPhysical = "14787e6e050cc9b2e04ab33ab0b7c385";

@@ -15,7 +15,7 @@
 
 namespace sonocase::testing {
 
-enum class Build { belly, wide, slim, pear, gaunt, huge };
+enum class Build { belly, wide, slim, pear, gaunt, huge, pregnant };
 
 inline std::string build_name(Build build) {
     switch (build) {
@@ -24,6 +24,7 @@ inline std::string build_name(Build build) {
         case Build::slim: return "slim";
         case Build::pear: return "pear";
         case Build::gaunt: return "gaunt";
+        case Build::pregnant: return "pregnant";
         default: return "huge";
     }
 }
@@ -34,8 +35,9 @@ struct BodyAxes {
     Vector3 left, front, head;  // unit
 };
 
-// Outward displacement of the skin, mm: at most 45 (belly), 30 (wide), -25 (slim), 40 (pear),
-// -50 (gaunt), 90 (huge). sine, cosine: of the direction from the axis, 1 and 0 at the front.
+// Outward displacement of the skin, mm: at most 45 (belly), 30 (wide), -25 (slim), 40 (pear), -50
+// (gaunt), 90 (huge), 75 (pregnant). sine, cosine: of the direction from the axis, 1 and 0 at the
+// front.
 inline double build_offset_mm(
     Build build, double sine, double cosine, double height_mm, double shift_mm) {
     const double front = std::max(0.0, sine), side2 = cosine * cosine;
@@ -49,6 +51,7 @@ inline double build_offset_mm(
         case Build::slim: return -25 * (0.55 + 0.45 * bump(0, 110)) * (0.75 + 0.25 * side2);
         case Build::pear: return 40 * bump(-130, 75) * (0.55 + 0.45 * side2) - 8 * bump(90, 80);
         case Build::gaunt: return -50 * bump(-10, 75) * front * front - 14 * side2 - 4;
+        case Build::pregnant: return 75 * bump(-40, 65) * front * front * front;
         default: return 45 + 45 * bump(-20, 110) * (0.4 + 0.6 * front);
     }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Mesh files through VTK: the only file of the import that includes it.
+// Mesh files through VTK.
 #include <vtkCallbackCommand.h>
 #include <vtkCellArray.h>
 #include <vtkCleanPolyData.h>
@@ -11,16 +11,19 @@
 #include <vtkPolyData.h>
 #include <vtkSTLReader.h>
 #include <vtkTriangleFilter.h>
+#include <vtkTypeInt64Array.h>
 #include <vtkXMLPolyDataReader.h>
 
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <string_view>
 
 #include "pipeline/base/delimited_text.h"
 #include "pipeline/base/quiet_library.h"
+#include "pipeline/import/surface/dense_mesh.h"
 #include "pipeline/import/surface/ply_file.h"
 #include "pipeline/import/surface/surface_readers.h"
 
@@ -37,27 +40,43 @@ void keep_first_error(vtkObject*, unsigned long, void* client, void* data) {
 }
 
 template <class Reader>
-vtkSmartPointer<vtkPolyData> read_with(const std::string& path, std::string* error) {
+vtkSmartPointer<vtkPolyData> read_with(
+    const std::string& path,
+    std::string* error,
+    const std::function<void(Reader&)>& set_up = [](Reader&) {}) {
     vtkNew<vtkCallbackCommand> observer;
     observer->SetCallback(keep_first_error);
     observer->SetClientData(error);
     vtkNew<Reader> reader;
     reader->AddObserver("ErrorEvent", observer);
     reader->SetFileName(path.c_str());
+    set_up(*reader.Get());
     reader->Update();
     vtkSmartPointer<vtkPolyData> data = reader->GetOutput();
     return data;
 }
 
-vtkSmartPointer<vtkPolyData> polygons_of(const PolygonFile& file) {
+// Takes the file's arrays one by one: a dense scan is held once.
+vtkSmartPointer<vtkPolyData> polygons_of(PolygonFile file) {
     vtkNew<vtkPoints> points;
     points->SetDataTypeToDouble();
-    for (const Point3 p : file.points) points->InsertNextPoint(p.x, p.y, p.z);
-    vtkNew<vtkCellArray> polygons;
-    for (const auto& polygon : file.polygons) {
-        polygons->InsertNextCell(static_cast<int>(polygon.size()));
-        for (const std::uint32_t corner : polygon) polygons->InsertCellPoint(corner);
+    points->SetNumberOfPoints(static_cast<vtkIdType>(file.points.size()));
+    for (std::size_t i = 0; i < file.points.size(); ++i) {
+        const Point3 p = file.points[i];
+        points->SetPoint(static_cast<vtkIdType>(i), p.x, p.y, p.z);
     }
+    file.points = {};
+    vtkNew<vtkTypeInt64Array> offsets, corners;
+    offsets->SetNumberOfValues(static_cast<vtkIdType>(file.ends.size()) + 1);
+    offsets->SetValue(0, 0);
+    for (std::size_t i = 0; i < file.ends.size(); ++i)
+        offsets->SetValue(static_cast<vtkIdType>(i) + 1, static_cast<vtkIdType>(file.ends[i]));
+    file.ends = {};
+    corners->SetNumberOfValues(static_cast<vtkIdType>(file.corners.size()));
+    for (std::size_t i = 0; i < file.corners.size(); ++i)
+        corners->SetValue(static_cast<vtkIdType>(i), file.corners[i]);
+    vtkNew<vtkCellArray> polygons;
+    polygons->SetData(offsets, corners);
     auto data = vtkSmartPointer<vtkPolyData>::New();
     data->SetPoints(points);
     data->SetPolys(polygons);
@@ -79,6 +98,26 @@ bool binary_stl_is_cut_off(const std::string& path) {
     std::uint32_t triangles = 0;
     std::memcpy(&triangles, head + 80, sizeof triangles);
     return std::filesystem::file_size(path) < 84 + 50ull * triangles;
+}
+
+std::uint64_t stl_triangles(const std::string& path) {
+    std::error_code code;
+    const auto bytes = std::filesystem::file_size(path, code);
+    return code ? 0 : bytes / 50;  // of the binary form; the text form takes five times as many
+}
+
+// A dense mesh is reduced before anything is made of its single triangles.
+Surface reduced(vtkPolyData& data, double scale, StageReport* report) {
+    vtkPolyData* triangles = &data;
+    vtkNew<vtkTriangleFilter> cut;
+    if (data.GetNumberOfStrips() > 0 || data.GetPolys()->GetMaxCellSize() > 3) {
+        cut->SetInputData(&data);
+        cut->PassVertsOff();
+        cut->PassLinesOff();
+        cut->Update();
+        triangles = cut->GetOutput();
+    }
+    return reduce_mesh(*triangles, scale, report);
 }
 
 Surface surface_of(vtkPolyData& data) {
@@ -111,7 +150,7 @@ Surface surface_of(vtkPolyData& data) {
 
 }  // namespace
 
-Result<Surface> read_mesh_file(const std::string& path) {
+Result<Surface> read_mesh_file(const std::string& path, double scale, StageReport* report) {
     const char* todo = "check that the file is complete; export it again";
     const std::string ending = lower_case(std::filesystem::path(path).extension().string());
     const QuietLibrary quiet;
@@ -121,15 +160,18 @@ Result<Surface> read_mesh_file(const std::string& path) {
         if (ending == ".ply") {
             auto file = read_ply_file(path);
             if (!file) return file.error();
-            if (file->polygons.empty()) {
+            if (file->ends.empty()) {
                 Surface cloud{file->points, file->normals, {}};
                 for (Vector3& normal : cloud.normals) normal = normalized(normal);
                 return cloud;
             }
-            data = polygons_of(*file);
+            data = polygons_of(std::move(*file));
         } else if (ending == ".stl") {
             if (binary_stl_is_cut_off(path)) return Error{"STL file is cut off", path, todo};
-            data = read_with<vtkSTLReader>(path, &error);
+            // The merging of a dense scan's corners is left to its reduction.
+            const bool merge = stl_triangles(path) <= kDenseTriangles;
+            data = read_with<vtkSTLReader>(path, &error,
+                                           [&](vtkSTLReader& reader) { reader.SetMerging(merge); });
         } else if (ending == ".obj") {
             data = read_with<vtkOBJReader>(path, &error);
         } else {
@@ -140,6 +182,8 @@ Result<Surface> read_mesh_file(const std::string& path) {
         if (data->GetNumberOfPolys() == 0 && data->GetNumberOfStrips() == 0)
             return surface_of(*data);
 
+        if (data->GetNumberOfPolys() > static_cast<vtkIdType>(kDenseTriangles))
+            return reduced(*data, scale, report);
         vtkNew<vtkTriangleFilter> triangles;
         triangles->SetInputData(data);
         triangles->PassVertsOff();

@@ -173,7 +173,6 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
     auto header = parse_header(*bytes, path);
     if (!header) return header.error();
     PolygonFile file;
-    bool has_normals = false;
     Body body(*bytes, header->body, header->form);
     for (const Element& element : header->elements) {
         const auto cut_off = [&](std::uint64_t read) {
@@ -183,29 +182,34 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
         };
         // An entry takes at least one byte in either form; one without properties means damage.
         if (element.count > body.left()) return cut_off(0);
+        const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
+        const bool has_normals =
+            is_vertex && std::any_of(element.properties.begin(), element.properties.end(),
+                                     [](const Property& p) { return p.name == "nx"; });
+        if (is_vertex) file.points.reserve(file.points.size() + element.count);
+        if (is_face) file.ends.reserve(element.count);
+        if (is_face) file.corners.reserve(3 * element.count);
         for (std::uint64_t n = 0; n < element.count; ++n) {
             Point3 point{NAN, NAN, NAN};
             Vector3 normal;
             for (const Property& property : element.properties) {
                 if (!property.is_list) {
                     const double value = body.next(property.type);
-                    if (element.name != "vertex") continue;
+                    if (!is_vertex) continue;
                     if (property.name == "x") point.x = value;
                     if (property.name == "y") point.y = value;
                     if (property.name == "z") point.z = value;
                     if (property.name == "nx") normal.x = value;
                     if (property.name == "ny") normal.y = value;
                     if (property.name == "nz") normal.z = value;
-                    has_normals = has_normals || property.name == "nx";
                     continue;
                 }
                 const double count = body.next(property.count_type);
                 if (!body.good() || !(count >= 0) || count > static_cast<double>(body.left()))
                     return cut_off(n);
-                std::vector<std::uint32_t> corners;
-                const bool is_polygon =
-                    element.name == "face" &&
-                    (property.name == "vertex_indices" || property.name == "vertex_index");
+                const std::size_t first = file.corners.size();
+                const bool is_polygon = is_face && (property.name == "vertex_indices" ||
+                                                    property.name == "vertex_index");
                 for (int c = 0; c < static_cast<int>(count); ++c) {
                     const double corner = body.next(property.type);
                     if (!is_polygon) continue;
@@ -213,18 +217,20 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
                         return Error{
                             "face " + std::to_string(n) + " names a vertex that does not exist",
                             path, "check that the file is complete; export it again"};
-                    corners.push_back(static_cast<std::uint32_t>(corner));
+                    file.corners.push_back(static_cast<std::uint32_t>(corner));
                 }
-                if (is_polygon && corners.size() >= 3) file.polygons.push_back(std::move(corners));
+                if (is_polygon && file.corners.size() - first >= 3) {
+                    file.ends.push_back(file.corners.size());
+                } else {
+                    file.corners.resize(first);
+                }
             }
             if (!body.good()) return cut_off(n);
-            if (element.name == "vertex") {
-                file.points.push_back(point);
-                file.normals.push_back(normal);
-            }
+            if (is_vertex) file.points.push_back(point);
+            if (has_normals) file.normals.push_back(normal);
         }
     }
-    if (!has_normals) file.normals.clear();
+    if (file.normals.size() != file.points.size()) file.normals.clear();
     return file;
 }
 

@@ -14,8 +14,11 @@ namespace sonocase::pipeline {
 
 struct PolygonFile {
     std::vector<Point3> points;
-    std::vector<Vector3> normals;                      // # points, or empty
-    std::vector<std::vector<std::uint32_t>> polygons;  // >= 3 corners each, all within points
+    std::vector<Vector3> normals;  // # points, or empty
+    // Of all polygons one after another, each within points; polygon n ends before ends[n] and has
+    // 3 corners or more.
+    std::vector<std::uint32_t> corners;
+    std::vector<std::uint64_t> ends;
 };
 
 // ASCII and both binary forms; unknown properties are skipped.

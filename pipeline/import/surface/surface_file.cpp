@@ -12,6 +12,7 @@
 #include "pipeline/base/delimited_text.h"
 #include "pipeline/base/plausible_size.h"
 #include "pipeline/import/source/source_path.h"
+#include "pipeline/import/surface/dense_points.h"
 #include "pipeline/import/surface/surface_readers.h"
 
 namespace sonocase::pipeline {
@@ -106,7 +107,8 @@ Result<Surface> import_surface(const std::string& path,
     if (!mesh && !cloud)
         return Error{"not a known surface file name", path,
                      "expected .ply, .stl, .obj, .vtp, .csv, .tsv, .txt or .xyz"};
-    auto surface = mesh ? read_mesh_file(path) : read_point_file(path, &own.warnings);
+    auto surface =
+        mesh ? read_mesh_file(path, options.scale, &own) : read_point_file(path, &own.warnings);
     if (!surface) return surface.error();
     if (surface->points.empty())
         return Error{"surface holds no points", path,
@@ -120,6 +122,7 @@ Result<Surface> import_surface(const std::string& path,
             "expected at least 30 all round the torso, 500 or more are good; take more readings"};
     if (options.scale != 1)
         for (Point3& p : surface->points) p = Point3{} + options.scale * (p - Point3{});
+    if (!mesh && options.torso) reduce_points(*surface, &own);
     Box3 box;
     for (const Point3 p : surface->points) box.include(p);
     if (options.torso) {
@@ -128,16 +131,20 @@ Result<Surface> import_surface(const std::string& path,
     }
 
     if (!surface->triangles.empty()) {
-        if (const std::size_t turned = orient_outwards(*surface); turned > 0)
+        // Folds that the reduction of a dense scan leaves are no fault of the file.
+        const std::size_t turned = orient_outwards(*surface);
+        if (turned > 0 && own.measures.empty())
             own.warnings.push_back(std::to_string(turned) +
                                    " triangles faced inwards and were turned");
         add_vertex_normals(*surface);
     }
+    const std::vector<Measure> reduction = std::move(own.measures);
     own.measures = {{"points", static_cast<double>(surface->points.size())},
                     {"triangles", static_cast<double>(surface->triangles.size())},
                     {"width_mm", box.extent().x},
                     {"depth_mm", box.extent().y},
                     {"height_mm", box.extent().z}};
+    own.measures.insert(own.measures.end(), reduction.begin(), reduction.end());
     own.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (report != nullptr) *report = std::move(own);
     return surface;

@@ -26,6 +26,11 @@ struct SurfaceFileOptions {
 // blanks. Readings that are not finite are left out and counted in `report` (stage "surface_file",
 // may be null).
 //
+// A mesh of more than 400,000 triangles becomes one with a vertex per cube of 4 mm, without parts
+// of less than 2 % of the largest; the distance of the given vertices from it is reported. A
+// torso's cloud of more than 60,000 readings becomes one point per cube of 5 mm, without single
+// readings in the air beside a dense surface.
+//
 // Errors: no such file, a pipe or a device, unreadable or truncated, and for a torso fewer than 30
 // points or an extent that no torso has in mm.
 Result<Surface> import_surface(const std::string& path,

@@ -7,13 +7,13 @@
 
 #include "pipeline/base/parallel.h"
 #include "pipeline/registration/elastic/natural_log.h"
-#include "pipeline/registration/map/map_evaluator.h"
+#include "pipeline/registration/matching/map_skin.h"
 
 namespace sonocase::pipeline {
 namespace {
 
 constexpr double kEdge_mm = 8;
-constexpr double kLeastCosine = 0.3;
+constexpr double kLeastCosine = 0.3, kTableLoss_mm = 10;
 constexpr std::size_t kBlocks = 4;  // of rows, each summed by itself: fixed, whatever the threads
 constexpr Lanes kZero = {0, 0, 0, 0};
 
@@ -39,32 +39,6 @@ std::vector<std::uint8_t> points_near_edge(const SkinModel& skin) {
         if (d2 < kEdge_mm * kEdge_mm) near[i] = 1;
     }
     return near;
-}
-
-struct MappedPoints {
-    std::vector<Point3> points;  // relative to the target's origin
-    std::vector<Vector3> normals;
-};
-
-MappedPoints map_points(const SkinModel& skin, const TargetSurface& target, const Registration& r) {
-    const MapEvaluator evaluate(r);
-    const Vector3 shift_in = skin.origin - evaluate.ct_centre();
-    const Vector3 shift_out = evaluate.mannequin_centre() - target.origin;
-    MappedPoints mapped;
-    mapped.points.resize(skin.points.size());
-    mapped.normals.resize(skin.points.size());
-    parallel_for(skin.points.size(), 512, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const MapSample s = evaluate((skin.points[i] - Point3{}) + shift_in);
-            mapped.points[i] = Point3{} + (s.value + shift_out);
-            // The cofactor of J carries normals.
-            const Vector3 x = s.jacobian.column(0), y = s.jacobian.column(1),
-                          z = s.jacobian.column(2), n = skin.normals[i];
-            mapped.normals[i] =
-                normalized(n.x * cross(y, z) + n.y * cross(z, x) + n.z * cross(x, y));
-        }
-    });
-    return mapped;
 }
 
 // A pair of points that may be counterparts.
@@ -97,28 +71,29 @@ ElasticRows::ElasticRows(const SkinModel& skin,
     for (int n = 0; n < 64; ++n) offset_[static_cast<std::size_t>(n)] = footprint_offset(grid_, n);
 }
 
-void ElasticRows::add_row(std::uint32_t skin, Vector3 normal, double gap_mm, double weight) {
+void ElasticRows::add_row(
+    std::uint32_t skin, Vector3 normal, double gap_mm, double weight, double loss_mm) {
     Row row;
     row.at = spline_footprint(grid_, skin_.origin + (skin_.points[skin] - Point3{}));
     row.normal = normal;
     row.gap_mm = gap_mm;
     row.weight = weight;
-    const double root = std::sqrt(weight / (1 + gap_mm * gap_mm / (loss_mm_ * loss_mm_)));
+    row.loss_mm2 = loss_mm * loss_mm;
+    const double root = std::sqrt(weight / (1 + gap_mm * gap_mm / row.loss_mm2));
     row.scaled = lanes_of(root * normal);
     rows_.push_back(row);
 }
 
 void ElasticRows::match(const Registration& map, const GapOptions& options) {
-    const MappedPoints mapped = map_points(skin_, target_, map);
-    const PointIndex index(mapped.points);
+    const MappedSkin mapped = map_skin(skin_, target_.origin, map);
     const double farthest2 = options.farthest_mm * options.farthest_mm;
-    loss_mm_ = options.loss_mm;
+    const double loss_mm = options.loss_mm;
     std::vector<Pair> pairs(readings_.size());
     parallel_for(pairs.size(), 128, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n) {
             const std::uint32_t j = readings_[n];
             double d2 = 0;
-            const std::uint32_t i = index.nearest(target_.points[j], &d2);
+            const std::uint32_t i = mapped.index.nearest(target_.points[j], &d2);
             if (d2 > farthest2 || near_edge_[i]) continue;
             if (dot(mapped.normals[i], target_.normals[j]) < kLeastCosine) continue;
             const double gap = dot(mapped.normals[i], mapped.points[i] - target_.points[j]);
@@ -135,7 +110,7 @@ void ElasticRows::match(const Registration& map, const GapOptions& options) {
     };
     double weight = 1 / count();
     for (const Pair& p : pairs) {
-        if (p.found) add_row(p.skin, p.normal, p.gap_mm, weight);
+        if (p.found) add_row(p.skin, p.normal, p.gap_mm, weight, loss_mm);
     }
     from_readings_ = rows_.size();
     pairs.assign((skin_.points.size() + options.skin_stride - 1) / options.skin_stride, {});
@@ -161,13 +136,38 @@ void ElasticRows::match(const Registration& map, const GapOptions& options) {
     });
     weight = options.skin_weight / count();
     for (const Pair& p : pairs) {
-        if (p.found) add_row(p.skin, p.normal, p.gap_mm, weight * p.weight);
+        if (p.found) add_row(p.skin, p.normal, p.gap_mm, weight * p.weight, loss_mm);
+    }
+    if (target_.table.found) {
+        std::vector<std::uint8_t> matched(skin_.points.size(), 0);
+        for (const Pair& p : pairs) matched[p.skin] |= p.found;
+        add_table_rows(mapped, options, matched);
     }
     marks_.clear();
     for (const Correspondence& c : landmarks_) {
         const Point3 ct = skin_.origin + (c.skin - Point3{});
         const Point3 place = target_.origin + (c.place - Point3{});
         marks_.push_back({spline_footprint(grid_, ct), mannequin_from_ct(map, ct) - place, {}});
+    }
+}
+
+// One-sided: nothing pulls the skin down to the table. The weight is that of a mean over all skin
+// that faces it, so that the last few points behind it do not pull like a whole back.
+void ElasticRows::add_table_rows(const MappedSkin& mapped,
+                                 const GapOptions& options,
+                                 const std::vector<std::uint8_t>& matched) {
+    const Table& table = target_.table;
+    std::vector<std::uint32_t> behind;
+    std::size_t facing = 0;
+    for (std::size_t i = 0; i < mapped.points.size(); i += options.skin_stride) {
+        if (near_edge_[i] || dot(mapped.normals[i], table.normal) > -kLeastCosine) continue;
+        ++facing;
+        if (!matched[i] && dot(table.normal, mapped.points[i] - table.place) < 0)
+            behind.push_back(static_cast<std::uint32_t>(i));
+    }
+    for (const std::uint32_t i : behind) {
+        add_row(i, table.normal, dot(table.normal, mapped.points[i] - table.place),
+                options.table_weight / static_cast<double>(facing), kTableLoss_mm);
     }
 }
 
@@ -182,9 +182,9 @@ void ElasticRows::project(std::span<const Lanes> along) {
 }
 
 double ElasticRows::energy(double step) const {
-    const double scale2 = loss_mm_ * loss_mm_;
     double sum = 0;
     for (const Row& row : rows_) {
+        const double scale2 = row.loss_mm2;
         const double gap = row.gap_mm + step * row.along_mm;
         sum += row.weight * scale2 * natural_log(1 + gap * gap / scale2);
     }
@@ -196,9 +196,8 @@ double ElasticRows::energy(double step) const {
 }
 
 void ElasticRows::add_gradient(std::span<Lanes> gradient, std::span<Lanes> diagonal) const {
-    const double scale2 = loss_mm_ * loss_mm_;
     for (const Row& row : rows_) {
-        const double pull = row.weight * row.gap_mm / (1 + row.gap_mm * row.gap_mm / scale2);
+        const double pull = row.weight * row.gap_mm / (1 + row.gap_mm * row.gap_mm / row.loss_mm2);
         const Lanes g = lanes_of(pull * row.normal);
         for (std::size_t w = 0; w < 64; ++w) {
             const float f = row.at.weight[w];

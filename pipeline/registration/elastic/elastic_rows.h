@@ -9,6 +9,7 @@
 #include "formats/registration/registration.h"
 #include "pipeline/registration/elastic/rim_patch.h"
 #include "pipeline/registration/elastic/spline_lattice.h"
+#include "pipeline/registration/matching/map_skin.h"
 #include "pipeline/registration/matching/matching.h"
 #include "pipeline/registration/warp/quadratic_warp.h"
 
@@ -19,11 +20,13 @@ struct GapOptions {
     double loss_mm = 2.5;      // Cauchy scale
     double rim_weight = 0.3;   // of skin beyond the last readings to the surface extrapolated there
     double skin_weight = 0.1;  // of skin to reading; reading to skin has 1
+    double table_weight = 1;   // of skin behind the table, if the sweep has one
     std::size_t skin_stride = 1;  // every n-th skin point is matched
 };
 
 // Rows weight * loss^2 log(1 + gap^2 / loss^2) with gap = gap_mm + normal . (d - d_now), and
-// weight |offset + d - d_now|^2 for landmarks.
+// weight |offset + d - d_now|^2 for landmarks. Skin that lies behind the table has a row to its
+// plane, with a loss of 10 mm; skin before it has none.
 class ElasticRows {
   public:
     // skin      as the fit uses it; a point within 8 mm of an open edge has no counterpart
@@ -56,7 +59,7 @@ class ElasticRows {
     struct Row {
         SplineFootprint at;
         Vector3 normal;
-        double gap_mm, weight;
+        double gap_mm, weight, loss_mm2;
         double along_mm = 0;  // normal . of what project() was given
         Lanes scaled = {};    // normal times the root of the row's curvature
     };
@@ -65,7 +68,10 @@ class ElasticRows {
         Vector3 offset;  // from its place
         Vector3 along;
     };
-    void add_row(std::uint32_t skin, Vector3 normal, double gap_mm, double weight);
+    void add_row(std::uint32_t skin, Vector3 normal, double gap_mm, double weight, double loss_mm);
+    void add_table_rows(const MappedSkin& mapped,
+                        const GapOptions& options,
+                        const std::vector<std::uint8_t>& matched);
 
     const SkinModel& skin_;
     const TargetSurface& target_;
@@ -79,7 +85,6 @@ class ElasticRows {
     std::vector<Row> rows_;
     std::vector<Mark> marks_;
     std::size_t from_readings_ = 0;
-    double loss_mm_ = 1;
     mutable std::vector<std::vector<Lanes>> sums_;  // of each block of rows
 };
 

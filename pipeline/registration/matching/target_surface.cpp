@@ -9,6 +9,7 @@
 #include <queue>
 
 #include "pipeline/base/parallel.h"
+#include "pipeline/registration/matching/table_plane.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -256,6 +257,24 @@ void take_triangles(const Surface& surface,
     }
 }
 
+// Takes the readings of a table out of the points; `number` of those becomes UINT32_MAX.
+void take_table_out(TargetSurface& t, std::vector<std::uint32_t>& number) {
+    const TablePlane table = find_table(t.points);
+    if (!table.found) return;
+    t.table = {true, table.place, table.normal, table.readings};
+    std::vector<std::uint32_t> moved(t.points.size(), UINT32_MAX);
+    std::vector<Point3> kept;
+    for (std::size_t i = 0; i < t.points.size(); ++i) {
+        if (table.on_table[i]) continue;
+        moved[i] = static_cast<std::uint32_t>(kept.size());
+        kept.push_back(t.points[i]);
+    }
+    t.points = std::move(kept);
+    for (std::uint32_t& n : number) {
+        if (n != UINT32_MAX) n = moved[n];
+    }
+}
+
 // The nearest `count` neighbours of each point, itself first; sets spacing_mm.
 std::vector<std::vector<std::uint32_t>> neighbourhoods(TargetSurface& t, int count) {
     std::vector<double> sixth(t.points.size());
@@ -289,10 +308,14 @@ Result<TargetSurface> prepare_target(const Surface& surface, const TargetOptions
     const Box3 middle = middle_box(surface, order);
     if (auto ok = check_units(middle); !ok) return ok.error();
     t.origin = middle.centre();
-    const std::vector<std::uint32_t> number = take_distinct_points(surface, std::move(order), t);
+    std::vector<std::uint32_t> number = take_distinct_points(surface, std::move(order), t);
+    if (options.find_table) take_table_out(t, number);
     if (t.points.size() < kFewestPoints) {
-        return too_few(text("surface of %ld distinct points among %ld",
-                            static_cast<long>(t.points.size()), t.given));
+        return too_few(t.table.found
+                           ? text("surface of %ld points beside %ld readings of the table",
+                                  static_cast<long>(t.points.size()), t.table.readings)
+                           : text("surface of %ld distinct points among %ld",
+                                  static_cast<long>(t.points.size()), t.given));
     }
     const Spread whole = spread_of(t.points, all_of(t.points.size()));
     t.thickness_mm = whole.deviation.x;

@@ -17,6 +17,16 @@ struct TargetOptions {
     int neighbours = 12;  // that define the plane through a reading, >= 6
     // A reading farther than this from the plane of its neighbours: the sensor was in the air.
     double lift_off_mm = 8;
+    // Readings of the table that the mannequin lies on are recognised and left out.
+    bool find_table = true;
+};
+
+// What a sweep touched beside the mannequin.
+struct Table {
+    bool found = false;
+    Point3 place;    // on the plane, relative to the target's origin
+    Vector3 normal;  // unit, towards the mannequin
+    long readings = 0;
 };
 
 struct TargetSurface {
@@ -29,10 +39,12 @@ struct TargetSurface {
     PointIndex index;                                     // over all points
     double spacing_mm = 0;                                // median distance to the sixth neighbour
     double thickness_mm = 0;  // least standard deviation over directions
+    Table table;              // its readings are not among the points
     long given = 0, not_finite = 0, repeated = 0, lift_offs = 0;
 };
 
-// Errors: too few points, units that cannot be mm, points on a line or in a plane.
+// Errors: too few points (beside those of the table), units that cannot be mm, points on a line or
+// in a plane.
 Result<TargetSurface> prepare_target(const Surface& surface, const TargetOptions& options = {});
 
 }  // namespace sonocase::pipeline

@@ -20,6 +20,7 @@
 
 #include "formats/registration/registration.h"
 #include "pipeline/base/progress.h"
+#include "pipeline/registration/matching/map_skin.h"
 #include "pipeline/registration/matching/matching.h"
 
 namespace sonocase::pipeline {
@@ -76,12 +77,6 @@ RansacResult ransac_quadratic(const SkinModel& skin,
 // Every n-th point, about `count` of them.
 std::vector<Point3> subsample(const std::vector<Point3>& points, std::size_t count);
 
-// The mapped skin, ready for matching.
-struct MappedSkin {
-    std::vector<Point3> points;
-    std::vector<Vector3> normals;
-    PointIndex index;
-};
 MappedSkin map_skin(const SkinModel& skin, const RigidQuadratic& q);
 
 struct RefineOptions {

@@ -7,7 +7,7 @@
 
 #include "pipeline/base/parallel.h"
 #include "pipeline/registration/map/fold_proof.h"
-#include "pipeline/registration/map/map_evaluator.h"
+#include "pipeline/registration/matching/map_skin.h"
 #include "pipeline/registration/warp/spline_penalty.h"
 
 namespace sonocase::pipeline {
@@ -137,28 +137,6 @@ int solve(const SplinePenalty& penalty,
     return n;
 }
 
-struct MappedBySpline {
-    std::vector<Point3> points;
-    std::vector<Vector3> normals;
-};
-
-MappedBySpline map_all(const SkinModel& skin, const TargetSurface& target, const Registration& r) {
-    const MapEvaluator evaluate(r);
-    const Vector3 shift_in = skin.origin - evaluate.ct_centre();
-    const Vector3 shift_out = evaluate.mannequin_centre() - target.origin;
-    MappedBySpline mapped;
-    mapped.points.resize(skin.points.size());
-    mapped.normals.resize(skin.points.size());
-    parallel_for(skin.points.size(), 512, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const MapSample s = evaluate((skin.points[i] - Point3{}) + shift_in);
-            mapped.points[i] = Point3{} + (s.value + shift_out);
-            mapped.normals[i] = normalized(transpose(inverse(s.jacobian)) * skin.normals[i]);
-        }
-    });
-    return mapped;
-}
-
 // Root of the mean squared gap, gaps beyond 8 mm counted as 8.
 double robust_rms(const Matches& matches) {
     double sum[2] = {0, 0};
@@ -211,9 +189,9 @@ FieldFit fit_field(const SkinModel& skin,
         MatchOptions gates;
         gates.farthest_mm = 40 - 15 * t;
         gates.side_step_mm = 1.2 * target.spacing_mm;
-        const MappedBySpline mapped = map_all(skin, target, r);
-        fit.matches = find_matches(skin, mapped.points, mapped.normals, PointIndex(mapped.points),
-                                   target, readings, stride, gates);
+        const MappedSkin mapped = map_skin(skin, target.origin, r);
+        fit.matches = find_matches(skin, mapped.points, mapped.normals, mapped.index, target,
+                                   readings, stride, gates);
         const Matches& matches = fit.matches;
         if (matches.from_target.size() + matches.from_skin.size() < 30) break;
         fit.rms_after_mm = robust_rms(matches);

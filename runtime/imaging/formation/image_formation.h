@@ -23,6 +23,10 @@
 
 namespace sonocase::runtime {
 
+namespace press {
+class PressField;
+}
+
 // What a model is created from. Everything referred to outlives the model.
 struct FormationInput {
     CaseView bundle;
@@ -37,7 +41,9 @@ struct FormationInput {
 struct FrameRequest {
     const FrameInput& input;
     const NeedleShape* needle = nullptr;  // probe frame; null: none
-    std::span<const float> row_gain_db;   // # samples of the level: console gain and TGC sliders
+    // What the probe presses; the input's pose is where bone holds the face. Null: nothing.
+    const press::PressField* press = nullptr;
+    std::span<const float> row_gain_db;  // # samples of the level: console gain and TGC sliders
 };
 
 class ImageFormation {

@@ -17,6 +17,9 @@ struct ImageSettings {
     double dynamic_range_db = 60;    // clamped to [20, 120]
     std::array<double, 8> tgc_db{};  // sliders, near to far
     bool flip_left_right = false;
+    // By which the probe presses deeper than its pose says, [0, 40] mm: on a rigid mannequin
+    // nobody can press. Without effect deformation it does nothing.
+    double press_mm = 0;
 };
 
 // A straight needle as drawn: after calibration and bend constraint.
@@ -38,6 +41,20 @@ enum class FrameStatus : std::uint8_t {
     rendered,
     held_bad_pose,  // not finite, mirrored or not orthonormal: the pixels are left as they were
     no_contact,     // rendered, and the probe does not touch the skin
+};
+
+// What the probe does to the tissue under it (effect deformation).
+struct PressReport {
+    bool solved = false;  // the effect is on
+    // Height of the draining lumens under the face over that at rest; negative: there are none, or
+    // nothing is pressed.
+    double vein_open = -1;
+    bool pressed = false;       // else all is 0
+    double force_n = 0;         // on the whole face
+    double pressure_kpa = 0;    // over the part of it that touches
+    double deepest_mm = 0;      // greatest depth below the resting skin
+    double excess_mm = 0;       // by how much bone holds the face back from the pose
+    bool out_of_reach = false;  // more than 30 mm inside the body: drawn as if 30
 };
 
 // What one effect cost in the last frame.

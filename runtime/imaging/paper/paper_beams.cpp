@@ -13,6 +13,7 @@
 #include <hwy/highway.h>
 //
 #include "runtime/imaging/needle/needle_chord-inl.h"
+#include "runtime/imaging/press/press_view-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
@@ -115,7 +116,100 @@ std::uint32_t sample_block_as(const PaperBlock& b) {
     return bits;
 }
 
+// The same where tissue is pressed: each sample lies where its tissue is at rest.
+std::uint32_t sample_pressed(const PaperBlock& b) {
+    const hn::CappedTag<std::int32_t, kPaperBlock> d;
+    const hn::RebindToUnsigned<decltype(d)> du;
+    const hn::RebindToFloat<decltype(d)> df;
+    const hn::Rebind<std::uint16_t, decltype(d)> d16;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const auto three = hn::Set(d, 3), byte = hn::Set(d, 0xFF);
+    const auto bx = hn::Set(d, b.bricks_x), bxy = hn::Set(d, b.bricks_xy);
+    const auto sx = hn::Set(du, static_cast<std::uint32_t>(b.size.x));
+    const auto sy = hn::Set(du, static_cast<std::uint32_t>(b.size.y));
+    const auto sz = hn::Set(du, static_cast<std::uint32_t>(b.size.z));
+    const int e = b.edge_log2;
+    auto met = hn::Zero(d);
+    press::PressChunk chunk;
+    for (int v = 0; v < kPaperBlock; v += lanes) {
+        const auto load = [&](const std::int32_t* p, int axis)
+                              HWY_ATTR { return hn::LoadU(d, p + axis * b.lines + v); };
+        for (int k = 0; k < b.samples; ++k) {
+            const bool moves = k < b.press->active;
+            if (moves && k % press::kPressRows == 0)
+                press::HWY_NAMESPACE::press_chunk(df, *b.press, b.first_line, v, k,
+                                                  std::min(press::kPressRows, b.samples - k),
+                                                  chunk);
+            auto along = hn::Zero(df), side = hn::Zero(df);
+            auto shut = hn::Zero(d);
+            if (moves) {
+                const int at = k % press::kPressRows * press::kPressBeams + v;
+                along = hn::Load(df, chunk.along + at);
+                side = hn::Load(df, chunk.side + at);
+                shut = hn::Load(d, chunk.closed + at);
+            }
+            const auto count = hn::Set(d, k);
+            // Shift in 1/65536 of a voxel, or of a texture's period.
+            const auto shift = [&](int row) HWY_ATTR {
+                const float* along_row = b.directions + row * b.lines + v;
+                const auto sum = hn::Add(hn::Mul(along, hn::LoadU(df, along_row)),
+                                         hn::Mul(side, hn::LoadU(df, along_row + 3 * b.lines)));
+                return hn::NearestInt(hn::Mul(sum, hn::Set(df, 65536.0f)));
+            };
+            const auto voxel = [&](int axis) HWY_ATTR {
+                const auto walk = hn::Add(load(b.start, axis), hn::Mul(load(b.step, axis), count));
+                return hn::ShiftRight<16>(hn::Add(walk, shift(axis)));
+            };
+            const auto i = voxel(0), j = voxel(1), l = voxel(2);
+            const auto inside =
+                hn::And(hn::Lt(hn::BitCast(du, i), sx),
+                        hn::And(hn::Lt(hn::BitCast(du, j), sy), hn::Lt(hn::BitCast(du, l), sz)));
+            const auto valid = hn::RebindMask(d, inside);
+            const auto brick = hn::IfThenElseZero(
+                valid, hn::Add(hn::ShiftRight<2>(i), hn::Add(hn::Mul(hn::ShiftRight<2>(j), bx),
+                                                             hn::Mul(hn::ShiftRight<2>(l), bxy))));
+            const auto entry = hn::GatherIndex(d, b.table, brick);
+            const auto uniform = hn::Lt(entry, hn::Zero(d));
+            const auto cell = hn::Or(
+                hn::And(i, three),
+                hn::Or(hn::ShiftLeft<2>(hn::And(j, three)), hn::ShiftLeft<4>(hn::And(l, three))));
+            const auto address = hn::IfThenZeroElse(uniform, hn::Or(hn::ShiftLeft<6>(entry), cell));
+            auto material = hn::IfThenElse(uniform, entry, hn::GatherOffset(d, b.pool, address));
+            material = hn::IfThenElseZero(valid, hn::And(material, byte));
+            const auto is_shut = hn::Gt(shut, hn::Zero(d));
+            if (!hn::AllFalse(d, is_shut))
+                material = hn::IfThenElse(is_shut, hn::GatherIndex(d, b.closed_material, material),
+                                          material);
+            const auto look = hn::And(material, hn::Set(d, 0x7F));
+            auto grey = look;
+            if (b.texture) {
+                const auto phase = [&](int axis) HWY_ATTR {
+                    const auto walk =
+                        hn::Add(load(b.start, 3 + axis), hn::Mul(load(b.step, 3 + axis), count));
+                    return hn::ShiftRightSame(
+                        hn::BitCast(du, hn::Add(walk, hn::ShiftLeft<16>(shift(6 + axis)))), 32 - e);
+                };
+                const auto place = hn::Or(phase(0), hn::Or(hn::ShiftLeftSame(phase(1), e),
+                                                           hn::ShiftLeftSame(phase(2), 2 * e)));
+                const auto texel = hn::Or(hn::BitCast(d, place), hn::ShiftLeftSame(look, 3 * e));
+                grey = hn::And(hn::GatherOffset(d, b.atlas, texel), byte);
+            } else {
+                grey = hn::And(hn::GatherOffset(d, b.flat, look), byte);
+            }
+            const auto value = hn::Or(grey, hn::ShiftLeft<1>(hn::And(material, hn::Set(d, 0x80))));
+            met = hn::Or(met, value);
+            hn::StoreU(hn::DemoteTo(d16, value), d16, b.stage + k * kPaperBlock + v);
+        }
+    }
+    HWY_ALIGN std::int32_t all[HWY_MAX_BYTES / 4];
+    hn::StoreU(met, d, all);
+    std::uint32_t bits = 0;
+    for (int v = 0; v < lanes; ++v) bits |= static_cast<std::uint32_t>(all[v]);
+    return bits;
+}
+
 std::uint32_t sample_block(const PaperBlock& b) {
+    if (b.press != nullptr) return sample_pressed(b);
     if (b.texture)
         return b.inside ? sample_block_as<true, true>(b) : sample_block_as<true, false>(b);
     return b.inside ? sample_block_as<false, true>(b) : sample_block_as<false, false>(b);

@@ -9,18 +9,21 @@
 namespace sonocase::runtime {
 
 struct PaperEffects {
-    bool texture = true, needle = true, noise = true, shadow = true, attenuation = true,
-         blur = true;
+    bool deformation = true, texture = true, needle = true, noise = true, shadow = true,
+         attenuation = true, blur = true;
 };
 
 // What a frame met.
 struct PaperMet {
+    bool pressed = false;       // the face lies below the resting skin
     bool needle_given = false;  // there is a needle to draw
     bool needle = false;        // it shows in the slab
     bool shadow = false;        // something that casts a shadow was crossed
 };
 
-inline constexpr std::array<EffectEntry<PaperEffects, PaperMet>, 8> kPaperEffects{{
+inline constexpr std::array<EffectEntry<PaperEffects, PaperMet>, 9> kPaperEffects{{
+    {"deformation", Pass::beams, 1, 2, 9, &PaperEffects::deformation,
+     [](const PaperMet& m) { return m.pressed ? "" : "nothing is pressed"; }},
     {"slice", Pass::beams, 5, 2, 5},
     {"texture", Pass::beams, 3, 1, 1, &PaperEffects::texture},
     {"needle", Pass::needle, 1, 0, 2, &PaperEffects::needle,

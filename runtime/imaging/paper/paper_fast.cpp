@@ -59,8 +59,13 @@ std::vector<std::uint16_t> make_blur_taps(const ScanGeometry& g) {
 PaperFast::PaperFast(const PaperScene& scene,
                      const ScanGeometry& geometry,
                      std::span<const std::int8_t> noise,
+                     const press::PressFace& face,
                      const RenderContext& context)
-    : scene_(scene), geometry_(geometry), noise_(noise), context_(context) {
+    : scene_(scene),
+      geometry_(geometry),
+      noise_(noise),
+      context_(context),
+      press_(geometry_, face) {
     const auto samples = static_cast<std::size_t>(geometry.samples);
     lines_ = (geometry.scanlines + kPaperBlock - 1) / kPaperBlock * kPaperBlock;
     assert(noise_.size() >= kNoiseTile + static_cast<std::size_t>(lines_));
@@ -74,6 +79,7 @@ PaperFast::PaperFast(const PaperScene& scene,
     table_.weight.resize(table_.weight.size() + kSlack);
     start_.resize(6 * static_cast<std::size_t>(lines_) + kSlack);
     step_.resize(start_.size());
+    directions_.resize(12 * static_cast<std::size_t>(lines_) + kSlack);
     noise_start_.resize(samples);
     row_scale_.resize(samples);
     brightness_.resize(samples);
@@ -119,6 +125,30 @@ bool PaperFast::place_block(const Rigid& volume_from_probe, int first_line) {
     return inside;
 }
 
+// Directions along the beams of a block and beside them, for pressed tissue.
+void PaperFast::turn_block(const Rigid& volume_from_probe, int first_line) {
+    const ScanGeometry& g = geometry_;
+    const double per_voxel = 1 / scene_.grid.spacing_mm.x;
+    const double per_edge =
+        1 / (static_cast<double>(1 << scene_.edge_log2) * scene_.texture_voxel_mm);
+    for (int l = first_line; l < first_line + kPaperBlock; ++l) {
+        const PlanePoint d =
+            g.beams[static_cast<std::size_t>(std::min(l, g.scanlines - 1))].direction;
+        const PlanePoint n = press::beside(d);
+        const Vector3 along = volume_from_probe.rotation * Vector3{d.x, 0, d.z},
+                      beside = volume_from_probe.rotation * Vector3{n.x, 0, n.z};
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto put = [&](int row, double value) {
+                directions_[static_cast<std::size_t>(row * lines_ + l)] = static_cast<float>(value);
+            };
+            put(axis, per_voxel * along[axis]);
+            put(3 + axis, per_voxel * beside[axis]);
+            put(6 + axis, per_edge * along[axis]);
+            put(9 + axis, per_edge * beside[axis]);
+        }
+    }
+}
+
 // Noise and brightness of every row.
 void PaperFast::set_rows(const PaperFrame& frame) {
     for (int k = 0; k < geometry_.samples; ++k) {
@@ -145,6 +175,8 @@ PaperBlock PaperFast::block_of_scene(const PaperFrame& frame,
     b.bricks_x = scene_.bricks.x;
     b.bricks_xy = scene_.bricks.x * scene_.bricks.y;
     b.edge_log2 = scene_.edge_log2;
+    b.press = frame.press != nullptr ? &press_ : nullptr;
+    b.closed_material = scene_.closed_material.data();
     b.texture = frame.effects.texture;
     b.with_noise = frame.effects.noise;
     b.noise_start = noise_start_.data();
@@ -174,6 +206,11 @@ double PaperFast::sample_beams(const PaperFrame& frame, bool keep_all) {
         b.image = image_.data() + margin_ + line;
         b.noise = noise_.data() + line;
         b.inside = place_block(frame.volume_from_probe, line);
+        if (b.press != nullptr) {
+            turn_block(frame.volume_from_probe, line);
+            b.first_line = line;
+            b.directions = directions_.data() + line;
+        }
         const std::uint32_t met = sample_paper_block(context_.simd, b);
         NeedleRow row;
         int k0 = 0, k1 = 0;
@@ -188,7 +225,7 @@ double PaperFast::sample_beams(const PaperFrame& frame, bool keep_all) {
         finish_paper_block(context_.simd, b);
         finish_edges(block);
     });
-    met_ = {frame.needle != nullptr, needle_met.load(), shadow_met.load()};
+    met_ = {frame.press != nullptr, frame.needle != nullptr, needle_met.load(), shadow_met.load()};
     return needle_ms.load() / context_.workers.threads();
 }
 
@@ -245,6 +282,7 @@ void PaperFast::render(const PaperFrame& frame,
     };
     PassTimer timer(context_.clock);
     set_rows(frame);
+    if (frame.press != nullptr) press_.show(*frame.press);
     time_of(Pass::needle) = sample_beams(frame, keep_all);
     time_of(Pass::beams) = std::max(timer.lap_ms() - time_of(Pass::needle), 0.0);
     blur_rows(frame);

@@ -13,6 +13,7 @@
 #include "runtime/imaging/formation/render_context.h"
 #include "runtime/imaging/needle/needle_strip.h"
 #include "runtime/imaging/paper/paper_reference.h"
+#include "runtime/imaging/press/press_view.h"
 
 namespace sonocase::runtime {
 
@@ -24,6 +25,7 @@ class PaperFast {
     PaperFast(const PaperScene& scene,
               const ScanGeometry& geometry,
               std::span<const std::int8_t> noise,
+              const press::PressFace& face,
               const RenderContext& context);
 
     // keep_all: also works out what cannot show; the pixels are the same.
@@ -37,6 +39,7 @@ class PaperFast {
     void set_rows(const PaperFrame& frame);
     PaperBlock block_of_scene(const PaperFrame& frame, std::span<const std::int32_t> flat) const;
     bool place_block(const Rigid& volume_from_probe, int first_line);
+    void turn_block(const Rigid& volume_from_probe, int first_line);
     double sample_beams(const PaperFrame& frame, bool keep_all);  // returns the needle's time, ms
     void finish_edges(int block);
     void blur_rows(const PaperFrame& frame);
@@ -45,6 +48,8 @@ class PaperFast {
     const ScanGeometry geometry_;
     const std::span<const std::int8_t> noise_;
     const RenderContext context_;
+    press::PressView press_;
+    std::vector<float> directions_;  // see PaperBlock
     ScanConversionTable table_;
     std::vector<std::uint16_t> blur_taps_;  // # 2 * reach + 1, sum 256
     int lines_ = 0;                         // padded to whole blocks

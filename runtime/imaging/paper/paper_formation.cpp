@@ -15,7 +15,8 @@ namespace {
 class PaperFormation final : public ImageFormation {
   public:
     PaperFormation(PaperScene scene, const FormationInput& input)
-        : scene_(std::move(scene)),
+        : exercise_(input.exercise),
+          scene_(std::move(scene)),
           noise_(make_paper_noise(input.options.seed, input.scanlines)),
           seed_(input.options.seed),
           reference_(input.options.kind == RendererKind::reference),
@@ -29,7 +30,8 @@ class PaperFormation final : public ImageFormation {
         if (reference_) {
             geometry_ = geometry;
         } else {
-            level.fast = std::make_unique<PaperFast>(scene_, geometry, noise_, context_);
+            level.fast = std::make_unique<PaperFast>(scene_, geometry, noise_,
+                                                     press::press_face(exercise_.probe), context_);
         }
     }
 
@@ -74,9 +76,11 @@ class PaperFormation final : public ImageFormation {
         frame.frame = request.input.frame;
         frame.row_gain = row_gain;
         frame.effects = switches_;
+        frame.press = switches_.deformation ? request.press : nullptr;
         return frame;
     }
 
+    const Exercise& exercise_;
     const PaperScene scene_;
     const std::vector<std::int8_t> noise_;
     const std::uint32_t seed_;

@@ -7,6 +7,7 @@
 
 #include "formats/base/geometry.h"
 #include "runtime/imaging/needle/needle_strip.h"
+#include "runtime/imaging/press/press_view.h"
 #include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime {
@@ -19,6 +20,12 @@ struct PaperBlock {
     const std::int32_t *table = nullptr, *pool = nullptr, *atlas = nullptr, *flat = nullptr;
     Int3 size;
     int bricks_x = 0, bricks_xy = 0, edge_log2 = 0;
+    // Effect deformation; null: nothing is pressed.
+    const press::PressView* press = nullptr;
+    int first_line = 0;
+    const float* directions = nullptr;  // twelve rows of `lines`: voxels per mm along the beam (3)
+                                        // and beside it (3), texture periods likewise
+    const std::int32_t* closed_material = nullptr;
     bool texture = true;
     bool inside = false;  // every sample of the block lies in the volume
     bool with_noise = true, with_shadow = true;

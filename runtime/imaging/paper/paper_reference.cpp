@@ -15,9 +15,32 @@ int nearest(double x) {
     return static_cast<int>(std::floor(std::clamp(x, -1e6, 1e6) + 0.5));
 }
 
-std::uint32_t material_of_point(const PaperScene& scene, Point3 p) {
-    const Point3 v = scene.grid.voxel_from_point(p);
-    return material_at(scene, nearest(v.x), nearest(v.y), nearest(v.z));
+// Where the tissue that is shown at a point of the plane lies at rest, and its material.
+struct Shown {
+    Point3 at;
+    std::uint32_t material = 0;
+};
+
+Shown shown_at(const PaperScene& scene,
+               const ScanGeometry& g,
+               const PaperFrame& frame,
+               PlanePoint p,
+               double line,
+               double sample) {
+    bool shut = false;
+    if (frame.press != nullptr) {
+        const ScanGeometry::Beam beam{g.beam_origin(line), g.beam_direction(line)};
+        const double r = (sample + 0.5) * g.step_mm;
+        shut = frame.press->closed_in_plane(
+            press::follows_columns(g) ? press::BeamPoint{press::lateral_of_line(g, line), r}
+                                      : press::BeamPoint{p.x, p.z});
+        p = press::rest_point(*frame.press, g, beam, line, r);
+    }
+    Shown out{frame.volume_from_probe * Point3{p.x, 0, p.z}};
+    const Point3 v = scene.grid.voxel_from_point(out.at);
+    out.material = material_at(scene, nearest(v.x), nearest(v.y), nearest(v.z));
+    if (shut) out.material = static_cast<std::uint32_t>(scene.closed_material[out.material]);
+    return out;
 }
 
 double texture_grey(const PaperScene& scene, std::uint32_t material, Point3 p) {
@@ -76,16 +99,13 @@ double with_needle(double grey, const NeedleShape& needle, PlanePoint p) {
 // Length in bone and gas from the probe's face down to a sample, mm.
 double length_in_shadow_mm(const PaperScene& scene,
                            const ScanGeometry& g,
-                           const Rigid& volume_from_probe,
+                           const PaperFrame& frame,
                            double line,
                            double sample) {
     double in_shadow_mm = 0;
     for (int k = 0; k <= sample; ++k) {
-        const PlanePoint q = g.point(line, k);
-        if (material_of_point(scene, volume_from_probe * Point3{q.x, 0, q.z}) &
-            PaperScene::kShadowBit) {
+        if (shown_at(scene, g, frame, g.point(line, k), line, k).material & PaperScene::kShadowBit)
             in_shadow_mm += g.step_mm;
-        }
     }
     return in_shadow_mm;
 }
@@ -98,8 +118,7 @@ double grey_at(const PaperScene& scene,
                PlanePoint p,
                double line,
                double sample) {
-    const Point3 x = frame.volume_from_probe * Point3{p.x, 0, p.z};
-    const std::uint32_t material = material_of_point(scene, x);
+    const auto [x, material] = shown_at(scene, g, frame, p, line, sample);
     double grey =
         frame.effects.texture ? texture_grey(scene, material, x) : scene.flat_grey[material & 0x7F];
     if (frame.effects.needle && frame.needle != nullptr) grey = with_needle(grey, *frame.needle, p);
@@ -111,8 +130,8 @@ double grey_at(const PaperScene& scene,
         grey = std::clamp(grey, 0.0, 255.0);
     }
     if (frame.effects.shadow) {
-        grey *= std::exp(-length_in_shadow_mm(scene, g, frame.volume_from_probe, line, sample) /
-                         paper::kShadowLengthMm);
+        grey *=
+            std::exp(-length_in_shadow_mm(scene, g, frame, line, sample) / paper::kShadowLengthMm);
     }
     return grey;
 }

@@ -12,6 +12,7 @@
 #include "runtime/imaging/needle/needle_chord.h"
 #include "runtime/imaging/paper/paper_effects.h"
 #include "runtime/imaging/paper/paper_scene.h"
+#include "runtime/imaging/press/press_plane.h"
 #include "runtime/imaging/scan/scan_geometry.h"
 
 namespace sonocase::runtime {
@@ -22,6 +23,7 @@ struct PaperFrame {
     std::uint32_t seed = 1, frame = 0;
     std::span<const float> row_gain;  // # samples: console gain at each depth, 1 is neutral
     PaperEffects effects;
+    const press::PressField* press = nullptr;  // null: nothing is pressed
 };
 
 // pixels: # width * height of the geometry.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/imaging/press/closed_label.h"
 #include "runtime/imaging/simd/gather_slack.h"
 
 namespace sonocase::runtime {
@@ -48,6 +49,34 @@ void bake(const Tissue& tissue,
             const std::uint8_t* row = texture->voxels.data() + n * (j + n * k);
             for (const std::size_t i : source) *out++ = grey[row[i]];
         }
+    }
+}
+
+// Gives every draining lumen a material of its own, a copy of its tissue's, and says what is shown
+// of it when it is shut. A bundle with too many materials draws such lumens as the others of their
+// tissue, and they stay open.
+void add_closed_materials(const CaseBundle& bundle,
+                          std::size_t cube,
+                          std::array<std::uint8_t, 256>& material,
+                          PaperScene& scene) {
+    const std::vector<std::int32_t> shown = press::closed_labels(bundle);
+    std::array<std::uint8_t, 256> wall = material;
+    for (std::size_t l = 1; l < bundle.labels.size() && l < material.size(); ++l) {
+        if (shown[l] == static_cast<std::int32_t>(l) || scene.flat_grey.size() > 127) continue;
+        const std::size_t from = material[l] & ~PaperScene::kShadowBit;
+        wall[l] = material[static_cast<std::size_t>(shown[l])];
+        material[l] = static_cast<std::uint8_t>(scene.flat_grey.size() |
+                                                (material[l] & PaperScene::kShadowBit));
+        scene.atlas.resize(scene.atlas.size() + cube);
+        std::copy_n(scene.atlas.begin() + static_cast<std::ptrdiff_t>(cube * from), cube,
+                    scene.atlas.end() - static_cast<std::ptrdiff_t>(cube));
+        scene.flat_grey.push_back(scene.flat_grey[from]);
+    }
+    scene.materials = static_cast<int>(scene.flat_grey.size());
+    scene.atlas.resize(scene.atlas.size() + kGatherSlack);
+    for (std::int32_t m = 0; m < 256; ++m) scene.closed_material.push_back(m);
+    for (std::size_t l = 1; l < bundle.labels.size() && l < material.size(); ++l) {
+        if (wall[l] != material[l]) scene.closed_material[material[l]] = wall[l];
     }
 }
 
@@ -105,14 +134,12 @@ Result<PaperScene> make_paper_scene(const CaseBundle& bundle) {
             static_cast<std::uint8_t>(index | (tissue.casts_shadow ? PaperScene::kShadowBit : 0u));
         scene.has_shadow = scene.has_shadow || tissue.casts_shadow;
     }
-    scene.materials = static_cast<int>(scene.flat_grey.size());
-    scene.atlas.resize(scene.atlas.size() + kGatherSlack);
-
     std::array<std::uint8_t, 256> material{};
     for (std::size_t l = 1; l < tissue_of.size() && l < material.size(); ++l) {
         if (tissue_of[l] >= 0)
             material[l] = material_of_tissue[static_cast<std::size_t>(tissue_of[l])];
     }
+    add_closed_materials(bundle, cube, material, scene);
     const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
     scene.table.resize(labels.table.size());
     for (std::size_t b = 0; b < labels.table.size(); ++b) {

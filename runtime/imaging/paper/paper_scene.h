@@ -31,6 +31,9 @@ struct PaperScene {
     double texture_voxel_mm = 0.5;
     std::vector<std::uint8_t> atlas;
     std::vector<std::uint8_t> flat_grey;  // # materials: mean grey alone
+    // # 256: the material itself, or what is shown of a lumen that is pressed shut. A draining
+    // lumen is a material of its own.
+    std::vector<std::int32_t> closed_material;
 };
 
 // Errors: the bundle has no labels, or uses more than 127 tissues. The bundle is not needed

@@ -64,8 +64,8 @@ class PhysicalFormation final : public ImageFormation {
         machine.looks.near_count = share(machine.looks.near_count);
         level.tables = physical::make_tables(exercise_.probe, machine, geometry);
         if (reference_) return;
-        level.fast =
-            std::make_unique<PhysicalFast>(scene_, geometry, level.tables, noise_, context_);
+        level.fast = std::make_unique<PhysicalFast>(scene_, geometry, level.tables, noise_,
+                                                    press::press_face(exercise_.probe), context_);
         level.reach = ScanReach(geometry, level.tables, scene_.voxel_mm);
     }
 
@@ -76,7 +76,8 @@ class PhysicalFormation final : public ImageFormation {
         Level& at = *levels_[static_cast<std::size_t>(level)];
         const PhysicalFrame frame = frame_of(request);
         if (blocks_ != nullptr) {
-            const double shift_mm = norm(frame.motion.breathing_mm);
+            const double shift_mm = norm(frame.motion.breathing_mm) +
+                                    (frame.press != nullptr ? frame.press->state().farthest_mm : 0);
             if (ahead_) ahead_->frame(at.reach, frame.volume_from_probe, shift_mm);
             at.reach.ensure_loaded(*blocks_, scene_.grid, frame.volume_from_probe, shift_mm);
             at.reach.ensure_loaded(scene_.words, scene_.grid, frame.volume_from_probe, shift_mm);
@@ -124,6 +125,7 @@ class PhysicalFormation final : public ImageFormation {
         frame.motion = motion_at(exercise_.breathing, exercise_.pulsation,
                                  std::isfinite(input.time_s) ? input.time_s : 0);
         frame.effects = shown_;
+        frame.press = shown_.deformation ? request.press : nullptr;
         return frame;
     }
 

@@ -12,8 +12,6 @@
 namespace sonocase::runtime::press {
 namespace {
 
-constexpr double kSideFade_mm = 20;
-
 // A plane of numbers under the columns, between them; row may be a fraction.
 template <int kHeight>
 double between(const Plane<kHeight>& plane, double column, double row) {
@@ -35,6 +33,7 @@ double column_of(const PressFace& face, double lateral_mm) {
 // Of a pressed place in the plane, to where it lies at rest.
 struct Shift {
     double lateral_mm = 0, depth_mm = 0;
+    double tilt = 0;  // of depth_mm per mm along the face
 };
 
 Shift shift_at(const PressFace& face, const PressTable& table, BeamPoint p) {
@@ -44,12 +43,17 @@ Shift shift_at(const PressFace& face, const PressTable& table, BeamPoint p) {
     const double past =
         std::max(std::abs(column - (kColumns - 1) / 2.0) - (kColumns - 1) / 2.0, 0.0);
     const double beyond = std::max(0.0, row - (kTableRows - 1)) * kTableStep_mm;
-    const double share = std::max(0.0, 1 - past * column_width_mm(face) / kSideFade_mm) *
-                         std::max(0.0, 1 - beyond / kSideFade_mm);
+    const double share = std::max(0.0, 1 - past * column_width_mm(face) / kTableFade_mm) *
+                         std::max(0.0, 1 - beyond / kTableFade_mm);
     const double lateral = -share * between(table.bulge_mm, column, row / kBulgeEvery);
     const double there = column_of(face, p.lateral_mm + lateral);
     const double depth = std::clamp(row, 0.0, kTableRows - 1.0) * kTableStep_mm;
-    return {lateral, share * (between(table.rest_mm, there, row) - depth)};
+    const double left = std::floor(std::clamp(there, 0.0, kColumns - 2.0));
+    const double rest = between(table.rest_mm, there, row);
+    const double slope =
+        (between(table.rest_mm, left + 1, row) - between(table.rest_mm, left, row)) /
+        column_width_mm(face);
+    return {lateral, share * (rest - depth), share * slope};
 }
 
 // Depth of the resting skin from the face.
@@ -59,6 +63,23 @@ double skin_mm(const PressFace& face, const PressSamples& samples, double latera
     const auto i = static_cast<std::size_t>(std::min(static_cast<int>(x), kColumns - 2));
     const double left = samples.pressed_mm[i], right = samples.pressed_mm[i + 1];
     return -(left + (x - static_cast<double>(i)) * (right - left));
+}
+
+// Height of the draining lumens under the face over their height at rest; -1 where there are none
+// to speak of.
+double lumen_height(const PressSamples& samples, const PressColumns& columns, double width_mm) {
+    constexpr double kLeast_mm2 = 4;
+    double rest = 0, pressed = 0;
+    for (int j = 0; j < kFineRows; ++j) {
+        if (!samples.lumen[static_cast<std::size_t>(j)]) continue;
+        for (int i = kSideColumns; i < kSideColumns + kFaceColumns; ++i) {
+            const double share = double{samples.drains.row(j)[i]};
+            if (share < 0.5) continue;
+            rest += fine_height(j);
+            pressed += fine_height(j) * double{columns.stretch.row(j)[i]};
+        }
+    }
+    return rest * width_mm < kLeast_mm2 ? -1 : pressed / rest;
 }
 
 }  // namespace
@@ -82,6 +103,7 @@ bool PressField::press(SimdTarget simd, const PressScene& scene, const PressOpti
     solve_press(simd, samples, face_, options.solve, work_->elastic);
     stretch_columns(simd, samples, face_, work_->elastic, work_->columns);
     build_table(simd, samples, face_, work_->columns, work_->table);
+    mark_closed(samples, work_->columns, work_->closed);
     int touching = 0;
     for (std::size_t i = 0; i < kColumns; ++i) {
         if (!samples.touching[i]) continue;
@@ -93,7 +115,54 @@ bool PressField::press(SimdTarget simd, const PressScene& scene, const PressOpti
     const double area_mm2 = touching * column_width_mm(face_) * 2 * face_.half_height_mm;
     state_.pressure_kpa = 1e3 * state_.force_n / area_mm2;
     state_.least_determinant = work_->table.least_determinant;
+    state_.vein_open = lumen_height(samples, work_->columns, column_width_mm(face_));
+    float sideways = 0;
+    for (const float v : work_->table.bulge_mm.values) sideways = std::max(sideways, std::abs(v));
+    state_.farthest_mm = state_.deepest_mm + double{sideways};
     return true;
+}
+
+RestPlace PressField::rest_in_plane(BeamPoint shown) const {
+    const Shift shift = shift_at(face_, work_->table, shown);
+    return {shown.lateral_mm + shift.lateral_mm, shown.depth_mm + shift.depth_mm, shift.tilt};
+}
+
+BeamPoint PressField::shown_in_plane(BeamPoint rest) const {
+    // The rest depth rises down the column of `rest`: the row by halving, then the sideways shift
+    // of that row.
+    const PressTable& table = work_->table;
+    const double column = column_of(face_, rest.lateral_mm);
+    const auto depth_at = [&](double row) { return between(table.rest_mm, column, row); };
+    double shown = rest.depth_mm;
+    int low = 0, high = kTableRows - 1;
+    if (rest.depth_mm < depth_at(low)) {
+        shown = rest.depth_mm - depth_at(low);
+    } else if (rest.depth_mm < depth_at(high)) {
+        while (high - low > 1) {
+            const int middle = (low + high) / 2;
+            (depth_at(middle) <= rest.depth_mm ? low : high) = middle;
+        }
+        const double above = depth_at(low), below = depth_at(high);
+        shown = (low + (rest.depth_mm - above) / (below - above)) * kTableStep_mm;
+    }
+    double lateral = rest.lateral_mm;
+    for (int step = 0; step < 8; ++step)
+        lateral = rest.lateral_mm - shift_at(face_, table, {lateral, shown}).lateral_mm;
+    return {lateral, shown};
+}
+
+double PressField::skin_now_mm(double lateral_mm) const {
+    const double column = std::clamp(column_of(face_, lateral_mm), 0.0, kColumns - 1.0);
+    return std::max(0.0, between(work_->columns.pressed_mm, column, 0));
+}
+
+bool PressField::closed_in_plane(BeamPoint shown) const {
+    const PressClosed& nodes = work_->closed;
+    if (!nodes.any) return false;
+    const RestPlace rest = rest_in_plane(shown);
+    const double column = std::clamp(column_of(face_, rest.lateral_mm), 0.0, kColumns - 1.0);
+    const double row = std::clamp(shown.depth_mm / kTableStep_mm, 0.0, kTableRows - 1.0);
+    return nodes.at(static_cast<int>(row + 0.5), static_cast<int>(column + 0.5)) != 0;
 }
 
 Point3 PressField::pull_back(Point3 pressed) const {

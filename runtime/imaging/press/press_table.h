@@ -12,6 +12,7 @@ namespace sonocase::runtime::press {
 
 inline constexpr int kTableRows = 241;
 inline constexpr double kTableStep_mm = 0.3;  // 72 mm in all: below, nothing moves
+inline constexpr double kTableFade_mm = 20;   // what is left there, and beside it, fades
 // Rows of the sideways shift, which is smooth: one for every five of the other.
 inline constexpr int kBulgeEvery = 5, kBulgeRows = (kTableRows - 1) / kBulgeEvery + 1;
 

@@ -14,7 +14,7 @@ namespace sonocase::runtime {
 inline constexpr double kCineSeconds = 20;
 inline constexpr double kCineRate = 60;  // frames per second that are kept
 inline constexpr double kIdleRate = 40;  // frames per second while no pose arrives
-inline constexpr int kMaxEffects = 32;
+inline constexpr int kMaxEffects = 48;
 
 // What the window asks for; taken over between two frames.
 struct ScanControls {

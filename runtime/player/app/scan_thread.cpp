@@ -173,6 +173,8 @@ void ScanThread::describe(ScanFrame& out, double now_s) const {
 void ScanThread::count_live(const ScanFrame& out, double now_s, bool arrived) {
     stats_.add(out.frame_ms, engine_->renderer().costs());
     stats_.set_accuracy(out.accuracy);
+    stats_.count_unfitted(out.record.skin_not_fitted);
+    stats_.set_press(out.record.press);
     if (arrived) pose_to_pixel_.add((out.rendered_s - reading_.time_s) * 1e3);
     if (last_frame_s_ >= 0 && now_s > last_frame_s_) {
         rate_ += 0.1 * (1 / (now_s - last_frame_s_) - rate_);

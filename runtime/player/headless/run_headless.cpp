@@ -11,6 +11,7 @@
 
 #include "formats/base/event.h"
 #include "runtime/player/headless/frame_files.h"
+#include "runtime/player/headless/truth_files.h"
 #include "runtime/player/session/calibration_set.h"
 #include "runtime/player/session/case_set_up.h"
 #include "runtime/player/session/clock.h"
@@ -95,6 +96,7 @@ class HeadlessRun {
     TrackerReading reading_;
 
     std::unique_ptr<FrameFiles> files_;    // --out
+    std::unique_ptr<TruthFiles> truth_;    // --truth
     std::unique_ptr<SessionRun> session_;  // --record
     std::unique_ptr<IgtlServer> server_;   // --serve
     FrameStats stats_;
@@ -131,6 +133,8 @@ Status HeadlessRun::set_up_case() {
     if (!engine) return engine.error();
     engine_.emplace(std::move(*engine));
     engine_->set_calibrations(calibrations_);
+    settings_.press_mm =
+        arguments_.press_mm >= 0 ? arguments_.press_mm : exercise_->deformation.press_offset_mm;
     stats_.set_effects(engine_->renderer().costs());
     return Done{};
 }
@@ -157,6 +161,11 @@ Status HeadlessRun::set_up_outputs() {
         if (!files) return files.error();
         files_ = std::move(*files);
         files_->begin(frames_, width_px_, height_px_);
+    }
+    if (!arguments_.truth.empty()) {
+        auto truth = TruthFiles::in(arguments_.truth, open_->bundle, *engine_);
+        if (!truth) return truth.error();
+        truth_ = std::move(*truth);
     }
     if (!arguments_.record.empty()) {
         auto session = SessionRun::start(arguments_.record, *open_, *engine_, arguments_.trainee,
@@ -210,10 +219,12 @@ Status HeadlessRun::render(int i, double now_s) {
     if (replay_ && static_cast<std::size_t>(i) < replay_->settings.size())
         apply_settings_text(replay_->settings[static_cast<std::size_t>(i)], settings_);
     const double before_s = steady_seconds();
-    engine_->frame(now_s, settings_, pixels_);
+    const FrameStatus status = engine_->frame(now_s, settings_, pixels_);
     const double after_s = steady_seconds();
     if (Status read = bundle_health(*open_); !read) return read;
     stats_.add((after_s - before_s) * 1e3, engine_->renderer().costs());
+    stats_.count_unfitted(engine_->last().skin_not_fitted);
+    stats_.set_press(engine_->renderer().press());
     if (device) pose_to_pixel_.add((clock_() - reading_.time_s) * 1e3);
     if (session_) session_->observe(engine_->last(), pixels_, !device);
     if (server_) {
@@ -223,6 +234,9 @@ Status HeadlessRun::render(int i, double now_s) {
         if (!device) std::this_thread::sleep_for(std::chrono::duration<double>(1 / kFrameRate));
     }
     if (i == 0) stats_.set_first_frame_ms((after_s - start_s_) * 1e3);
+    if (truth_) {
+        if (Status added = truth_->add(i, engine_->last().input, status); !added) return added;
+    }
     return files_ ? files_->add(i, pixels_) : Status(Done{});
 }
 
@@ -238,6 +252,9 @@ Status HeadlessRun::render_frames() {
 Status HeadlessRun::finish() {
     if (files_) {
         if (Status written = files_->finish(); !written) return written;
+    }
+    if (truth_) {
+        if (Status written = truth_->finish(); !written) return written;
     }
     std::string metrics;
     if (session_) {

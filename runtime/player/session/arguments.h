@@ -17,6 +17,7 @@ struct PlayerArguments {
     int frames = 0;                   // 0: all of the sweep or recording
     int width_px = 0, height_px = 0;  // 0: 512 x 512 when headless, the window's default otherwise
     std::string out;                  // folder for frames; empty: none are written
+    std::string truth;                // folder for what the frames show; empty: none
     std::string stats;                // JSON file, "-" for standard output; empty: none
     std::string record;               // recording to write; empty: none
     std::string trainee;  // a chosen name for the progress book; empty: no progress is kept
@@ -24,6 +25,7 @@ struct PlayerArguments {
     std::vector<std::string> effects;  // empty: the exercise's
     std::string machine;               // name or file; empty: by the probe's shape
     std::string renderer = "fast";     // "fast", "reference"
+    double press_mm = -1;              // that the probe is pressed in; negative: the exercise's
     int threads = 1;
     int scanlines = 0, samples = 0;         // 0: the model's own
     int looks = 0;                          // 0: the machine's

@@ -21,6 +21,8 @@ void serve_frame(IgtlServer& server,
     out.origin_y_px = layout.origin_y_px;
     out.has_probe = record.tools.has_probe;
     out.has_needle = record.tools.has_needle;
+    out.force_n = record.press.force_n;
+    out.pressure_kpa = record.press.pressure_kpa;
     out.mannequin_from_probe = record.tools.mannequin_from_probe;
     out.mannequin_from_needle = record.needle.mannequin_from_drawn;
     out.pixels.assign(pixels.begin(), pixels.end());

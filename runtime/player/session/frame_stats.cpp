@@ -74,6 +74,11 @@ void FrameStats::add(double frame_ms, std::span<const EffectCost> costs) {
     }
 }
 
+void FrameStats::set_press(const PressReport& press) {
+    force_sum_n_ += press.force_n;
+    force_max_n_ = std::max(force_max_n_, press.force_n);
+}
+
 void FrameStats::set_accuracy(const Renderer::Accuracy& accuracy) {
     accuracy_ = accuracy;
     if (accuracy.level > 0) ++reduced_frames_;
@@ -97,6 +102,9 @@ std::string FrameStats::json(const std::string& score_json,
         a["dropped_samples"] = accuracy_.full_samples - accuracy_.samples;
         a["reduced_frames"] = reduced_frames_;
     }
+    if (unfitted_frames_ > 0) out["frames_not_fitted"] = unfitted_frames_;
+    out["force_n"]["mean"] = rounded(force_sum_n_ / std::max<double>(1, double(frame_ms_.count())));
+    out["force_n"]["max"] = rounded(force_max_n_);
     out["effects"] = nlohmann::ordered_json::array();
     for (const Effect& effect : effects_) {
         nlohmann::ordered_json entry;

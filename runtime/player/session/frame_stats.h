@@ -51,6 +51,10 @@ class FrameStats {
     void add(double frame_ms, std::span<const EffectCost> costs);
     // The accuracy of the frame just added, which the governor may have reduced.
     void set_accuracy(const Renderer::Accuracy& accuracy);
+    // Frames whose probe touched skin that was not fitted to the mannequin.
+    void count_unfitted(bool not_fitted) { unfitted_frames_ += not_fitted ? 1 : 0; }
+    // Of the frame just added, effect deformation.
+    void set_press(const PressReport& press);
     void set_first_frame_ms(double ms) { first_frame_ms_ = ms; }
 
     const TimeHistogram& frame_ms() const { return frame_ms_; }
@@ -71,8 +75,9 @@ class FrameStats {
     };
     TimeHistogram frame_ms_;
     double first_frame_ms_ = 0;
+    double force_sum_n_ = 0, force_max_n_ = 0;
     Renderer::Accuracy accuracy_;
-    std::uint64_t reduced_frames_ = 0;
+    std::uint64_t reduced_frames_ = 0, unfitted_frames_ = 0;
     std::vector<Effect> effects_;
 };
 

@@ -19,5 +19,10 @@ Status write_png(const std::string& path,
                  int height,
                  int channels,
                  std::span<const std::uint8_t> pixels);
+// Grey of 16 bits: # width * height.
+Status write_png16(const std::string& path,
+                   int width,
+                   int height,
+                   std::span<const std::uint16_t> pixels);
 
 }  // namespace sonocase::runtime

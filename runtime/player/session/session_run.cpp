@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
+#include <optional>
 
 #include "formats/files/recording_file.h"
 #include "formats/progress_book/progress_book.h"
@@ -28,6 +29,16 @@ const char* picture_reason(std::span<const LiveEvent> events) {
         }
     }
     return nullptr;
+}
+
+std::optional<LiveEventKind> tissue_event(NeedleEventKind kind) {
+    switch (kind) {
+        case NeedleEventKind::puncture: return LiveEventKind::tissue_puncture;
+        case NeedleEventKind::posterior_wall: return LiveEventKind::posterior_wall;
+        case NeedleEventKind::stopped: return LiveEventKind::needle_stopped;
+        case NeedleEventKind::withdrawn: break;  // needle_exit and the depth say it
+    }
+    return {};
 }
 
 }  // namespace
@@ -73,7 +84,7 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
     const ImageSettings& s = input.settings;
     const bool changed = first_ || s.gain_db != settings_.gain_db ||
                          s.dynamic_range_db != settings_.dynamic_range_db ||
-                         s.tgc_db != settings_.tgc_db ||
+                         s.tgc_db != settings_.tgc_db || s.press_mm != settings_.press_mm ||
                          s.flip_left_right != settings_.flip_left_right;
     if (changed) {
         const std::string text = settings_text(s);  // short, and only while a setting changes
@@ -81,9 +92,16 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
         settings_ = s;
     }
     first_ = false;
-    const auto events =
-        monitor_.update(frame.time_s, frame.frame, frame.probe_ok, frame.mannequin_from_probe,
-                        frame.needle_ok, frame.mannequin_from_drawn);
+    frame.has_press = record.press.solved;
+    frame.press = {record.press.force_n, record.press.pressure_kpa, record.press.vein_open};
+    monitor_.update(frame.time_s, frame.frame, frame.probe_ok, frame.mannequin_from_probe,
+                    frame.needle_ok, frame.mannequin_from_drawn);
+    for (int n = 0; n < record.puncture.event_count; ++n) {
+        const NeedleEvent& event = record.puncture.events[static_cast<std::size_t>(n)];
+        if (const auto kind = tissue_event(event.kind))
+            monitor_.report(*kind, event.layer, event.force_n);
+    }
+    const auto events = monitor_.events();
     recorder_->push(frame, events);
     if (const char* why = picture_reason(events)) {
         recorder_->push_picture(frame.frame, frame.time_s, why, width_px_, height_px_, pixels);

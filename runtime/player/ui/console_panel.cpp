@@ -71,6 +71,7 @@ ConsoleRequest draw_console_panel(ScanControls& controls,
     if (coloured_button(switch_colour(measuring), "Measure", half)) measuring = !measuring;
     slider("Gain", "##gain", image.gain_db, -30, 30, "%+.0f dB");
     slider("Range", "##range", image.dynamic_range_db, 40, 90, "%.0f dB");
+    slider("Press", "##press", image.press_mm, 0, 40, "%.0f mm");
     request.depth_by_mm = 10 * step_buttons("Depth", "-##depth", "+##depth", s);
     ImGui::Text("%.0f cm", choice.depth_mm / 10);
     request.focus_by_mm = 5 * step_buttons("Focus", "-##focus", "+##focus", s);

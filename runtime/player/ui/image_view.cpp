@@ -93,14 +93,18 @@ void draw_grey_bar(const ImagePlace& place, float s) {
 }
 
 // A sentence on the picture where the frame is not one of tissue.
-void draw_status(const ImagePlace& place, FrameStatus status) {
+void draw_status(const ImagePlace& place, FrameStatus status, bool skin_not_fitted) {
     const bool no_contact = status == FrameStatus::no_contact;
-    if (!no_contact && status != FrameStatus::held_bad_pose) return;
+    const bool held = status == FrameStatus::held_bad_pose;
+    if (!no_contact && !held && !skin_not_fitted) return;
     const char* words = no_contact ? "No contact: press the probe onto the skin"
-                                   : "Pose is not usable: picture held";
+                        : held     ? "Pose is not usable: picture held"
+                                   : "Not fitted here: the mannequin was not swept";
     const ImVec2 wide = ImGui::CalcTextSize(words);
+    // Over a picture of tissue the words stand at its foot.
+    const float height = no_contact || held ? 0.55f : 0.93f;
     text_at(ImGui::GetWindowDrawList(), place.x + 0.5f * (place.side_x - wide.x),
-            place.y + 0.55f * place.side_y, no_contact ? colour::kDim : colour::kWarn, words);
+            place.y + height * place.side_y, no_contact ? colour::kDim : colour::kWarn, words);
 }
 
 void draw_measurements(const ImagePlace& place, const ImageViewInput& input) {
@@ -221,7 +225,7 @@ ImagePlace draw_image_view(float width, float height, const ImageViewInput& inpu
         draw_depth_scale(place, input);
         draw_orientation_mark(place, input);
         draw_grey_bar(place, input.scale);
-        draw_status(place, frame.status);
+        draw_status(place, frame.status, frame.record.skin_not_fitted);
         ImGui::PopFont();
         draw_measurements(place, input);
         draw->PopClipRect();

@@ -64,6 +64,13 @@ void move_tools(MouseTracker* mouse, double seconds) {
     if (pressed(GLFW_KEY_HOME)) mouse->reset();
 }
 
+// Presses the probe of a tracker on a rigid mannequin; the mouse's own probe is moved instead.
+void press_probe(ImageSettings& image, bool mouse, double seconds) {
+    if (mouse || ImGui::GetIO().KeyCtrl) return;
+    const double push = axis(GLFW_KEY_PAGE_UP, GLFW_KEY_PAGE_DOWN);
+    if (push != 0) image.press_mm = std::clamp(image.press_mm + 12 * push * seconds, 0.0, 40.0);
+}
+
 // True while a digit is held: comma and full stop then move its TGC slider.
 bool change_tgc(ImageSettings& image, double seconds) {
     for (int k = 0; k < 8; ++k) {
@@ -193,6 +200,7 @@ void handle_keys(App& app, double seconds) {
     if (app.view.show_setup) return;
     handle_scan_keys(app);
     move_tools(app.scan.tracker.mouse.get(), seconds);
+    press_probe(app.scan.controls.settings, app.scan.tracker.mouse != nullptr, seconds);
     change_console(app, seconds);
 }
 

@@ -170,6 +170,17 @@ std::vector<std::uint8_t> encode_transform(std::string_view device, double time_
     return encode("TRANSFORM", device, time_s, body);
 }
 
+std::vector<std::uint8_t> encode_sensor(std::string_view device,
+                                        double time_s,
+                                        std::span<const double> values) {
+    std::vector<std::uint8_t> body;
+    put(body, values.size(), 1);
+    put(body, 0, 1);  // status, reserved
+    put(body, 0, 8);  // unit
+    for (const double value : values) put(body, std::bit_cast<std::uint64_t>(value), 8);
+    return encode("SENSOR", device, time_s, body);
+}
+
 std::vector<std::uint8_t> encode_image(std::string_view device,
                                        double time_s,
                                        int width_px,

@@ -50,6 +50,10 @@ std::vector<std::uint8_t> encode(std::string_view type,
                                  std::string_view device,
                                  double time_s,
                                  std::span<const std::uint8_t> body);
+// Numbers of a sensor, of unit 0 (not said).
+std::vector<std::uint8_t> encode_sensor(std::string_view device,
+                                        double time_s,
+                                        std::span<const double> values);
 std::vector<std::uint8_t> encode_transform(std::string_view device,
                                            double time_s,
                                            const Rigid& to_from);

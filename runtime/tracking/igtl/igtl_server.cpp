@@ -23,6 +23,10 @@ std::vector<std::uint8_t> messages_of(const ServedFrame& frame) {
         add(igtl::encode_transform("ProbeToMannequin", frame.unix_time_s,
                                    frame.mannequin_from_probe));
     }
+    if (frame.has_probe) {
+        const std::array<double, 2> force{frame.force_n, frame.pressure_kpa};
+        add(igtl::encode_sensor("ProbeForce", frame.unix_time_s, force));
+    }
     if (frame.has_needle) {
         add(igtl::encode_transform("NeedleToMannequin", frame.unix_time_s,
                                    frame.mannequin_from_needle));

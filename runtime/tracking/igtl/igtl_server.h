@@ -3,6 +3,7 @@
 // Sends the picture and the tools to programs that connect (3D Slicer, PLUS), over OpenIGTLink:
 //   IMAGE      Ultrasound            placed in `mannequin`
 //   TRANSFORM  ProbeToMannequin, NeedleToMannequin
+//   SENSOR     ProbeForce            newtons on the face, kPa over what touches
 // The frame loop hands a frame over and never waits; a slow or silent client misses frames and
 // delays nobody.
 #pragma once
@@ -27,6 +28,7 @@ struct ServedFrame {
     double origin_x_px = 0, origin_y_px = 0;  // pixel of the probe's origin
     Rigid mannequin_from_probe, mannequin_from_needle;
     bool has_probe = false, has_needle = false;
+    double force_n = 0, pressure_kpa = 0;
     std::vector<std::uint8_t> pixels;
 };
 

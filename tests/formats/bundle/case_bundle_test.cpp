@@ -86,6 +86,7 @@ void expect_same(const CaseBundle& a, const CaseBundle& b) {
     EXPECT_EQ(a.speckle.edge, b.speckle.edge);
     EXPECT_EQ(a.speckle.voxels, b.speckle.voxels);
     expect_same(a.patient_skin, b.patient_skin);
+    EXPECT_EQ(a.skin_unfitted, b.skin_unfitted);
     expect_same(a.mannequin_skin, b.mannequin_skin);
     EXPECT_EQ(a.preview_png, b.preview_png);
 }
@@ -109,6 +110,22 @@ TEST(CaseBundle, ComesBackAsItWas) {
     expect_same(*back, bundle);
     EXPECT_EQ(write_bundle(*back), bytes);
     EXPECT_EQ(container_kind(bytes), "CASE");
+}
+
+TEST(CaseBundle, TheMarkOfUnfittedSkinComesBackAndHasOneEntryPerPoint) {
+    CaseBundle bundle = tiny_case();
+    const Bytes without = write_bundle(bundle);
+    const std::size_t points = bundle.patient_skin.points.size();
+    ASSERT_GT(points, 1u);
+    bundle.skin_unfitted.assign(points, 0);
+    bundle.skin_unfitted[1] = 1;
+    const auto back = read_bundle(write_bundle(bundle), "marked");
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(*back, bundle);
+    bundle.skin_unfitted.pop_back();
+    EXPECT_FALSE(read_bundle(write_bundle(bundle), "short"));
+    bundle.skin_unfitted.clear();
+    EXPECT_EQ(write_bundle(bundle), without);  // nothing is stored where all is fitted
 }
 
 TEST(CaseBundle, AnEmptyOneComesBackToo) {
@@ -148,7 +165,7 @@ Bytes with_chunk(const Bytes& file, const std::string& type, Change change) {
         "manifest", "lab.t",    "lab.u",    "lab.p",    "echo.t",  "echo.u",  "echo.p",
         "bnd.t",    "bnd.u",    "bnd.p",    "vox.kind", "vox.one", "vox.mix", "vox.pair",
         "vox.low",  "vox.high", "vox.fix",  "ofs.kind", "ofs.one", "ofs.val", "textures",
-        "speckle",  "skin.pat", "skin.man", "preview"};
+        "speckle",  "skin.pat", "skin.fit", "skin.man", "preview"};
     const auto reader = ChunkReader::open(file, "CASE", known, "test");
     EXPECT_TRUE(reader);
     ChunkWriter writer("CASE");

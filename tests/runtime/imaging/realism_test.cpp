@@ -55,8 +55,9 @@ class View {
             place_.apex_y_px -= place_.radius_mm / place_.mm_per_px;
         }
     }
-    BeamImage at(Vector3 moved_mm = {}) {
+    BeamImage at(Vector3 moved_mm = {}, double gain_db = 0) {
         FrameInput input;
+        input.settings.gain_db = gain_db;
         input.mannequin_from_probe.translation = moved_mm;
         input.frame = frame_++;
         std::vector<std::uint8_t> pixels(kWidth * kHeight);
@@ -100,22 +101,18 @@ void expect_inside(const char* name, double value) {
 
 TEST(Realism, ModernLiverHasTheTextureOfALivingOne) {
     View view(liver(), sweep_exercise(), "modern");
-    const PatchScores t = liver_scores(view.at());
+    // No wall weakens this liver: an operator turns the gain down to where a living one lies.
+    const PatchScores t = liver_scores(view.at({}, -3));
     const double black = built_in_machine("modern")->grey.floor;
     expect_inside("liver_mean", t.mean);
     expect_inside("local_sd", t.local_sd);
     expect_inside("local_sd_over_mean", t.local_sd / (t.mean - black));
     expect_inside("local_skew", t.local_skew);
     expect_inside("grain_along_mm", t.grain_along_mm);
-    // The living liver's lowest are 1.9 mm and 1.8: streaks, haze and lobules of a whole case widen
-    // the grain across, and a phantom has none of them.
-    std::printf("grain across %.2f mm, across / along %.2f\n", t.grain_across_mm,
-                t.grain_across_mm / t.grain_along_mm);
-    EXPECT_GT(t.grain_across_mm, 1.55);
-    EXPECT_LT(t.grain_across_mm, limits_of("grain_across_mm").high);
-    EXPECT_GT(t.grain_across_mm / t.grain_along_mm, 1.5);
-    std::printf("without streaks: local kurtosis %.2f, of the gradient %.2f\n", t.local_kurtosis,
-                t.gradient_kurtosis);
+    expect_inside("grain_across_mm", t.grain_across_mm);
+    expect_inside("grain_ratio", t.grain_across_mm / t.grain_along_mm);
+    expect_inside("local_kurtosis", t.local_kurtosis);
+    expect_inside("gradient_kurtosis", t.gradient_kurtosis);
 }
 
 TEST(Realism, ClassicLiverIsOutsideTheLimitsThatTellItApart) {
@@ -166,7 +163,7 @@ TEST(Realism, NothingIsDarkerThanTheMachinesBlackAndBlackIsFreeOfNoise) {
     }
     const Moments m = moments_of(lumen);
     std::printf("vessel lumen %.1f grey, sd %.2f\n", m.mean, m.sd);
-    EXPECT_LT(m.mean, 27);  // of living vessels: portal 15 to 17, hepatic veins 8 to 14
+    EXPECT_LT(m.mean, 22);  // of living vessels: portal 15 to 17, hepatic veins 8 to 14
 }
 
 TEST(Realism, TheFaceStartsDarkerThanTheOldOneAndIsLined) {
@@ -201,7 +198,8 @@ TEST(Realism, TheFaceStartsDarkerThanTheOldOneAndIsLined) {
 
 TEST(Realism, SpeckleOfALinearScanIsFinerAndAsSkewed) {
     View view(liver(), phantom_linear_exercise(), "modern-linear");
-    const BeamImage image = view.at();
+    // Fat and muscle, which such probes look at, scatter 7 to 8 dB less than liver.
+    const BeamImage image = view.at({}, -8);
     std::vector<PatchScores> scores;
     for (const PatchPlace p :
          patch_places(image, image.sample_of(8), image.sample_of(30), 20, 236, 32))

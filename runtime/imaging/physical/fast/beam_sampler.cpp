@@ -16,6 +16,7 @@
 #include "runtime/imaging/physical/fast/beam_dome-inl.h"
 #include "runtime/imaging/physical/fast/beam_light-inl.h"
 #include "runtime/imaging/physical/fast/beam_place-inl.h"
+#include "runtime/imaging/physical/fast/beam_press-inl.h"
 #include "runtime/imaging/physical/fast/beam_scatter-inl.h"
 #include "runtime/imaging/physical/fast/beam_streak-inl.h"
 #include "runtime/imaging/physical/fast/beam_surface-inl.h"
@@ -34,6 +35,7 @@ void sample_beams_as(PhysicalBlock& b) {
     const int lanes = static_cast<int>(hn::Lanes(d));
     const auto zero = hn::Zero(d);
     BeamChunk c;
+    press::PressChunk pressed;
     int from[kBeamBlock];
     for (int v = 0; v < kBeamBlock; v += lanes) {
         c.beam = v;
@@ -60,6 +62,8 @@ void sample_beams_as(PhysicalBlock& b) {
             c.first = k;
             c.rows = std::min(kChunkRows, b.samples - k);
             c.surfaces = c.refracts = false;
+            b.press = b.press_view != nullptr && k < b.press_view->active ? &pressed : nullptr;
+            if (b.press != nullptr) press_stretch(d, b, c);
             place_chunk(d, b, c);
             entry_chunk(d, b, c);
             label_chunk(d, b, c);
@@ -67,6 +71,7 @@ void sample_beams_as(PhysicalBlock& b) {
                 record_chunk(d, b, c);
                 surface_chunk(d, b, c);
             }
+            if (b.press != nullptr && pressed.any_closed) close_chunk(d, b, c);
             b.boundary_met = b.boundary_met || c.surfaces;
             b.refraction_met = b.refraction_met || c.refracts;
             if (b.target_count > 0 && target_chunk(d, b, c)) b.target_met = true;

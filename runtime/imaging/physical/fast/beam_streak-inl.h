@@ -24,9 +24,11 @@ HWY_INLINE void streak_row(
     const auto x = hn::Sub(hn::Add(beam(0), hn::Mul(r, beam(2))), hn::Set(d, s.x)),
                z = hn::Sub(hn::Add(beam(1), hn::Mul(r, beam(3))), hn::Set(d, s.z));
     const auto nx = hn::Set(d, s.normal_x), nz = hn::Set(d, s.normal_z);
-    const auto off = hn::Mul(hn::Add(hn::Mul(x, nx), hn::Mul(z, nz)), hn::Set(d, s.per_width));
     const auto along = hn::Mul(hn::Sub(hn::Mul(x, nz), hn::Mul(z, nx)), hn::Set(d, s.per_length));
     const auto square = hn::Mul(along, along);
+    const auto off =
+        hn::Sub(hn::Mul(hn::Add(hn::Mul(x, nx), hn::Mul(z, nz)), hn::Set(d, s.per_width)),
+                hn::Mul(square, hn::Set(d, s.bend)));
     const auto exponent =
         hn::Mul(hn::Add(hn::Mul(off, off), hn::Mul(square, square)), hn::Set(d, -0.72134752f));
     const auto soft =

@@ -2,6 +2,7 @@
 
 // Effects boundaries, pulsation, interfaces and edge_shadow: on which side of the plane in its
 // voxel a sample lies, and what the surface itself reflects and takes away.
+#include "runtime/imaging/physical/fast/beam_press-inl.h"
 #include "runtime/imaging/simd/simd_math-inl.h"
 //
 #include "formats/volume/boundary_record.h"
@@ -129,8 +130,11 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
         const auto beyond = hn::And(near, hn::RebindMask(di, hn::Lt(distance, zero)));
         hn::Store(hn::IfThenElse(beyond, second, own), di, c.label.row(row));
 
-        const auto cosine = hn::Abs(
+        auto cosine = hn::Abs(
             hn::Mul(hn::Add(hn::Mul(nu, dx), hn::Add(hn::Mul(nv, dy), hn::Mul(nz, dz))), inverse));
+        if (b.press != nullptr)
+            press_surface(d, b, v, c.first + row, hn::Mul(nu, inverse), hn::Mul(nv, inverse),
+                          hn::Mul(nz, inverse), cosine, distance);
         const auto c2 = hn::Mul(cosine, cosine), c4 = hn::Mul(c2, c2), c6 = hn::Mul(c4, c2);
         const auto hard = hn::RebindMask(d, hn::TestBit(pair, hn::Set(di, kPairHard)));
         const auto mirror = hn::IfThenElse(

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effects contact and breathing: where the samples of a vector of beams lie, in voxels or in cells
-// of scatterers. Included once per instruction set.
+// Effects contact, deformation and breathing: where the samples of a vector of beams lie, in voxels
+// or in cells of scatterers. Included once per instruction set.
 #include "runtime/imaging/simd/simd_math-inl.h"
 //
 #include "runtime/imaging/physical/fast/physical_kernels.h"
@@ -31,16 +31,24 @@ HWY_INLINE hn::Vec<D> breathing_weight(D d, const PhysicalBlock& b, int beam, in
 }
 
 // A vector of beams: origin + s * per_mm, s from the probe's face, where the gap to the skin is
-// closed, less the breathing shift.
+// closed; from there to where pressed tissue lies at rest; less the breathing shift.
 template <class D>
 struct BeamWalk {
     hn::Vec<D> ox, oy, oz, vx, vy, vz, gap;
-    const float* shift;  // of breathing at weight 1
+    const float* shift;     // of breathing at weight 1
+    const float* sideways;  // row of numbers per mm beside the beam
 
     HWY_INLINE BeamPoint<D> at(D d, const PhysicalBlock& b, int beam, int k) const {
-        const auto s = hn::Add(hn::Set(d, b.r[k]), hn::Mul(gap, hn::Set(d, b.contact[k])));
+        auto s = hn::Add(hn::Set(d, b.r[k]), hn::Mul(gap, hn::Set(d, b.contact[k])));
+        if (b.press != nullptr) s = hn::Add(s, hn::Load(d, b.press->row(b.press->along, k) + beam));
         BeamPoint<D> p{hn::Add(ox, hn::Mul(vx, s)), hn::Add(oy, hn::Mul(vy, s)),
                        hn::Add(oz, hn::Mul(vz, s))};
+        if (b.press != nullptr) {
+            const auto side = hn::Load(d, b.press->row(b.press->side, k) + beam);
+            p.x = hn::Add(p.x, hn::Mul(side, hn::LoadU(d, sideways)));
+            p.y = hn::Add(p.y, hn::Mul(side, hn::LoadU(d, sideways + b.lines)));
+            p.z = hn::Add(p.z, hn::Mul(side, hn::LoadU(d, sideways + 2 * b.lines)));
+        }
         if (b.breathing != nullptr) {
             const auto w = breathing_weight(d, b, beam, k);
             p.x = hn::Sub(p.x, hn::Mul(w, hn::Set(d, shift[0])));
@@ -57,8 +65,15 @@ HWY_INLINE BeamWalk<D> beam_walk(
     D d, const PhysicalBlock& b, int beam, int origin, int per_mm, const float* shift) {
     const auto number = [&](int row)
                             HWY_ATTR { return hn::LoadU(d, b.beams + row * b.lines + beam); };
-    return {number(origin),     number(origin + 1), number(origin + 2), number(per_mm),
-            number(per_mm + 1), number(per_mm + 2), number(kGap),       shift};
+    return {number(origin),
+            number(origin + 1),
+            number(origin + 2),
+            number(per_mm),
+            number(per_mm + 1),
+            number(per_mm + 2),
+            number(kGap),
+            shift,
+            b.beams + (per_mm + kSideways) * b.lines + beam};
 }
 
 }  // namespace sonocase::runtime::HWY_NAMESPACE

@@ -22,6 +22,7 @@ void PhysicalFast::find_contact(const PhysicalFrame& f) {
         find_gaps(scene_, geometry_, f, first, std::min(first + kBeamBlock, lines), raw_gaps_);
     });
     met_.beams_in_contact = smooth_gaps(lines, raw_gaps_, gaps_);
+    if (f.press != nullptr) press_gaps(*f.press, geometry_, gaps_);
     if (!f.effects.contact) std::fill(gaps_.begin(), gaps_.end(), 0.0f);
     met_.gap =
         std::any_of(gaps_.begin(), gaps_.begin() + lines, [](float gap) { return gap != 0.0f; });
@@ -36,6 +37,8 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
         const auto& [o, d] = g.beams[static_cast<std::size_t>(line)];
         const Point3 origin = f.volume_from_probe * Point3{o.x, 0, o.z};
         const Vector3 beam = f.volume_from_probe.rotation * Vector3{d.x, 0, d.z};
+        const PlanePoint n = press::beside(d);
+        const Vector3 beside = f.volume_from_probe.rotation * Vector3{n.x, 0, n.z};
         const Vector3 from_origin = origin - scene_.grid.origin_mm;
         const auto put = [&](int number, double value) {
             beams_[static_cast<std::size_t>(number) * static_cast<std::size_t>(lines_) +
@@ -45,6 +48,8 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
             put(kVoxelOrigin + axis, inverse_voxel * from_origin[axis]);
             put(kVoxelPerMm + axis, inverse_voxel * beam[axis]);
             put(kBeam + axis, beam[axis]);
+            if (f.press != nullptr)
+                put(kSideways + kVoxelPerMm + axis, inverse_voxel * beside[axis]);
         }
         put(kEdge, f.effects.contact ? tables_.edge[static_cast<std::size_t>(line)] : 1);
         for (int side = 0; side < slice_.count; ++side) {
@@ -53,6 +58,8 @@ void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
             for (int i = 0; i < 3; ++i) {
                 put(kSpeckleOrigin + 6 * side + i, dot(*of[i], from_origin));
                 put(kSpecklePerMm + 6 * side + i, dot(*of[i], beam));
+                if (f.press != nullptr)
+                    put(kSideways + kSpecklePerMm + 6 * side + i, dot(*of[i], beside));
             }
         }
         put(kGap, static_cast<double>(gaps_[static_cast<std::size_t>(line)]));
@@ -73,12 +80,11 @@ void PhysicalFast::weigh_breathing(const PhysicalFrame& f,
         float left = 0;
         for (int l = 0; l <= kBeamBlock; l += kEvery) {
             const int line = std::min(first + l, g.scanlines - 1);
-            const auto& [o, d] = g.beams[static_cast<std::size_t>(line)];
-            const double s =
-                r + static_cast<double>(std::max(gaps_[static_cast<std::size_t>(line)], 0.0f)) *
-                        tables_.rows[static_cast<std::size_t>(k)].contact;
-            const auto right = static_cast<float>(
-                breathing.weight(f.volume_from_probe * Point3{o.x + s * d.x, 0, o.z + s * d.z}));
+            const double gap =
+                static_cast<double>(std::max(gaps_[static_cast<std::size_t>(line)], 0.0f));
+            const double contact = tables_.rows[static_cast<std::size_t>(k)].contact;
+            const auto right =
+                static_cast<float>(breathing.weight(point_on_beam(g, f, line, r, gap * contact)));
             if (l > 0) {
                 for (int j = 0; j < kEvery; ++j)
                     row[l - kEvery + j] = left + (right - left) * static_cast<float>(j) / kEvery;
@@ -119,6 +125,7 @@ int PhysicalFast::choose_streaks(int first, std::span<PhysicalStreak> out) const
                                                   static_cast<float>(s.normal.z),
                                                   static_cast<float>(1 / s.width_mm),
                                                   static_cast<float>(2 / s.length_mm),
+                                                  static_cast<float>(s.bend),
                                                   static_cast<float>(s.amplitude),
                                                   s.sample_begin,
                                                   s.sample_end};
@@ -213,6 +220,8 @@ PhysicalBlock PhysicalFast::block_of_frame(const PhysicalFrame& f, bool keep_all
     b.lookup_start = lookup_start_.data();
     set_poses(f, b);
     set_tables(f, b);
+    b.press_view = f.press != nullptr ? &press_ : nullptr;
+    b.closed_label = scene_.closed_label.data();
     b.step_mm = static_cast<float>(g.step_mm);
     b.dead_light = static_cast<float>(std::exp2(kDeadLog2));
     const auto decay = [&](double mm) { return static_cast<float>(std::exp(-g.step_mm / mm)); };
@@ -297,6 +306,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     }
     choose_targets(f, keep_all);
     choose_looks(f);
+    if (f.press != nullptr) press_.show(*f.press);
     slice_ = speckle_slice(f.volume_from_probe.rotation * Vector3{0, 1, 0}, tables_.cell_mm);
     const PhysicalBlock base = block_of_frame(f, keep_all);
     const bool breathes = f.effects.breathing && f.motion.breathes() && !breathing.empty();
@@ -318,6 +328,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         PhysicalBlock b = base;
         const int line = block * kBeamBlock;
         b.beams = beams_.data() + line;
+        b.first_beam = line;
         b.white = noise_.white.data() + line;
         b.breathing = breathes ? breathing_.data() + line : nullptr;
         b.echoes = echoes_ + kRowMargin + line;
@@ -346,8 +357,9 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         }
         tail_from_[static_cast<std::size_t>(block)] = b.tail_from;
     });
-    mirror_rows(light_, 3);  // for the boxes of the aperture
+    mirror_rows(light_, 6);  // for the boxes of the aperture
     if (clutter) mirror_rows(clutter_, kMaxHazeReach);
+    met_.pressed = f.press != nullptr;
     met_.breathes = f.motion.breathes();
     met_.pulses = f.motion.pulse_mm != 0;
     met_.has_echo = scene_.words.has_echo();

@@ -51,8 +51,14 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
                            const ScanGeometry& geometry,
                            const Tables& tables,
                            const PhysicalNoise& noise,
+                           const press::PressFace& face,
                            const RenderContext& context)
-    : scene_(scene), geometry_(geometry), tables_(tables), noise_(noise), context_(context) {
+    : scene_(scene),
+      geometry_(geometry),
+      tables_(tables),
+      noise_(noise),
+      context_(context),
+      press_(geometry_, face) {
     const auto samples = static_cast<std::size_t>(geometry.samples);
     lines_ = (geometry.scanlines + kBeamBlock - 1) / kBeamBlock * kBeamBlock;
     stride_ = kMargin + lines_ + kMargin + kSlack;

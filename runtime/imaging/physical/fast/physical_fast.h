@@ -28,6 +28,7 @@ class PhysicalFast {
                  const ScanGeometry& geometry,
                  const physical::Tables& tables,
                  const PhysicalNoise& noise,
+                 const press::PressFace& face,
                  const RenderContext& context);
 
     PhysicalFast(const PhysicalFast&) = delete;
@@ -61,6 +62,7 @@ class PhysicalFast {
     int choose_streaks(int first, std::span<PhysicalStreak> out) const;  // of a block of beams
     void prepare_nodes(const physical::Tables& tables);
     void place_nodes(const PhysicalFrame& frame, bool breathes, int first);
+    void press_nodes(int first, int end);
     void find_faces(const PhysicalFrame& frame, const PhysicalBlock& base, int first);
     void search_nodes(const PhysicalFrame& frame, const PhysicalBlock& base, bool breathes);
     void show_faces(int line, PhysicalBlock& block) const;
@@ -82,6 +84,7 @@ class PhysicalFast {
     const physical::Tables& tables_;
     const PhysicalNoise& noise_;
     const RenderContext context_;
+    press::PressView press_;
     ScanConversionTable conversion_;
     int lines_ = 0, stride_ = 0, pair_stride_ = 0, cells_k_ = 0, cells_l_ = 0;
 

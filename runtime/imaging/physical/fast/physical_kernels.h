@@ -9,6 +9,7 @@
 #include "runtime/imaging/needle/needle_strip.h"
 #include "runtime/imaging/physical/model/physical_model.h"
 #include "runtime/imaging/physical/model/speckle.h"
+#include "runtime/imaging/press/press_view.h"
 
 namespace sonocase::runtime {
 
@@ -39,11 +40,13 @@ enum BeamNumber {
     kEdge = 10,           // amplitude that the beam's contact leaves
     kSpeckleOrigin = 11,  // height, u, v; then the same per mm; kSpeckleSides times
     kSpecklePerMm = kSpeckleOrigin + 3,
-    kBeamNumbers = kSpeckleOrigin + 6 * physical::kSpeckleSides
+    // The rows per mm once more, per mm beside the beam: kSideways rows further. Where pressed.
+    kSideways = kSpeckleOrigin + 6 * physical::kSpeckleSides,
+    kBeamNumbers = 2 * kSideways
 };
 
 inline constexpr int kRowSlack = 64;   // behind rows and buffers: lanes of the widest vector
-inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 3
+inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 6
 
 inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
 
@@ -61,6 +64,7 @@ struct PhysicalWall {
 struct PhysicalStreak {
     float x = 0, z = 0, normal_x = 0, normal_z = 1;  // mm, in the plane
     float per_width = 1, per_length = 1;             // 1 / deviation; 2 / length
+    float bend = 0;                                  // deviations, at half its length
     float amplitude = 0;
     int sample_begin = 0, sample_end = 0;
 };
@@ -94,6 +98,12 @@ struct PhysicalBlock {
     const float* breathing = nullptr;  // weight at nodes, `lines` apart; null: nothing moves
     float shift_voxel[3] = {0, 0, 0};
     float pulse_mm = 0;
+
+    // Effect deformation; null: nothing is pressed.
+    const press::PressView* press_view = nullptr;
+    press::PressChunk* press = nullptr;          // of the stretch; null: nothing moves in it
+    const std::int32_t* closed_label = nullptr;  // per label: what a shut lumen shows
+    int first_beam = 0;                          // of the block
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
     const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr;

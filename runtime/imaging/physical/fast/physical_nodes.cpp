@@ -46,6 +46,28 @@ void PhysicalFast::prepare_nodes(const Tables& tables) {
     layer_nodes_.assign(3 * nodes_.at(nodes_.rows, 0), 0.0f);
 }
 
+// Moves nodes to where their tissue lies at rest: n.x, n.y, n.z already hold where the beams run.
+void PhysicalFast::press_nodes(int first, int end) {
+    NodeLattice& n = nodes_;
+    for (int row = 0; row < n.rows; ++row) {
+        const int k = row * n.spacing.samples;
+        if (k >= press_.active) break;
+        for (int node = first; node < end; ++node) {
+            const int line = n.spacing.line(node);
+            const press::PressView::Shift shift = press_.at(line, k);
+            const auto side = [&](int axis) {
+                return beams_[static_cast<std::size_t>(kSideways + kVoxelPerMm + axis) *
+                                  static_cast<std::size_t>(lines_) +
+                              static_cast<std::size_t>(line)];
+            };
+            const std::size_t at = n.at(row, node), beam = static_cast<std::size_t>(node);
+            n.x[at] += n.per_mm[0][beam] * shift.along_mm + side(0) * shift.side_mm;
+            n.y[at] += n.per_mm[1][beam] * shift.along_mm + side(1) * shift.side_mm;
+            n.z[at] += n.per_mm[2][beam] * shift.along_mm + side(2) * shift.side_mm;
+        }
+    }
+}
+
 // first: of a block of nodes. After place_beams and weigh_breathing of all beams.
 void PhysicalFast::place_nodes(const PhysicalFrame& f, bool breathes, int first) {
     NodeLattice& n = nodes_;
@@ -76,6 +98,7 @@ void PhysicalFast::place_nodes(const PhysicalFrame& f, bool breathes, int first)
     walk(0, n.x);
     walk(1, n.y);
     walk(2, n.z);
+    if (f.press != nullptr) press_nodes(first, end);
     if (!breathes) return;
     const Vector3 shift = (1 / scene_.voxel_mm) * f.motion.breathing_mm;
     const int last = geometry_.samples - 1;

@@ -17,13 +17,13 @@ HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 using namespace physical;
 
-// Light of the aperture: boxes of 5 and 3 beams.
+// Light of the aperture: every other beam of boxes of 10 and 6.
 template <class D>
 HWY_INLINE hn::Vec<D> smooth_light(D d, const float* light) {
     const auto at = [&](int j) HWY_ATTR { return hn::LoadU(d, light + j); };
-    auto sum = hn::Mul(hn::Add(at(-3), at(3)), hn::Set(d, 1 / 15.0f));
-    sum = hn::Add(sum, hn::Mul(hn::Add(at(-2), at(2)), hn::Set(d, 2 / 15.0f)));
-    return hn::Add(sum, hn::Mul(hn::Add(hn::Add(at(-1), at(1)), at(0)), hn::Set(d, 3 / 15.0f)));
+    auto sum = hn::Mul(hn::Add(at(-6), at(6)), hn::Set(d, 1 / 15.0f));
+    sum = hn::Add(sum, hn::Mul(hn::Add(at(-4), at(4)), hn::Set(d, 2 / 15.0f)));
+    return hn::Add(sum, hn::Mul(hn::Add(hn::Add(at(-2), at(2)), at(0)), hn::Set(d, 3 / 15.0f)));
 }
 
 // Mean of the clutter over neighbouring beams.

@@ -40,11 +40,8 @@ FaceNode find_face(const PhysicalScene& s,
                    double gap_mm,
                    int node) {
     if (gap_mm < 0) return {};
-    const ScanGeometry::Beam& beam = g.beams[static_cast<std::size_t>(nodes.line(node))];
-    const PlanePoint o = beam.origin, d = beam.direction;
     const auto voxel_at = [&](double r) {
-        const double along = r + gap_mm * std::exp(-r / kGapReachMm);
-        Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
+        Point3 x = point_on_beam(g, f, nodes.line(node), r, gap_mm * std::exp(-r / kGapReachMm));
         if (breathing != nullptr) x = x - breathing->weight(x) * f.motion.breathing_mm;
         return s.grid.voxel_from_point(x);
     };

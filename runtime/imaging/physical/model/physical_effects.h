@@ -9,7 +9,8 @@
 namespace sonocase::runtime {
 
 struct PhysicalEffects {
-    bool contact = true;  // gel gap closed, air gap dark
+    bool contact = true;      // gel gap closed, air gap dark
+    bool deformation = true;  // tissue yields to the probe
     bool breathing = true;
     bool pulsation = true;
     bool elevation = true;       // beam thickness across the plane
@@ -41,6 +42,7 @@ struct PhysicalEffects {
 
 // What a frame met.
 struct PhysicalMet {
+    bool pressed = false;       // the face lies below the resting skin
     bool gap = false;           // between the probe's face and the skin
     bool breathes = false;      // the anatomy is shifted
     bool pulses = false;        // arteries are wider or narrower than at rest
@@ -85,11 +87,13 @@ inline const char* structure_if(bool machine_shows_it, bool met, const char* non
 
 }  // namespace physical
 
-inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 32> kPhysicalEffects{{
+inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 33> kPhysicalEffects{{
     {"contact", Pass::contact, 1, 0, 0, &PhysicalEffects::contact,
      [](const PhysicalMet& m) {
          return m.gap || m.edge_contact ? "" : "the probe touches everywhere";
      }},
+    {"deformation", Pass::beams, 0.5, 2, 9, &PhysicalEffects::deformation,
+     [](const PhysicalMet& m) { return m.pressed ? "" : "nothing is pressed"; }},
     {"slice", Pass::beams, 4, 2, 7},
     {"breathing", Pass::beams, 1, 0, 8, &PhysicalEffects::breathing,
      [](const PhysicalMet& m) {

@@ -50,6 +50,34 @@ PhysicalNoise make_physical_noise(std::span<const double> levels,
             smoothed_tile(levels, 0, seed + 3, overhang)};
 }
 
+void press_gaps(const press::PressField& field, const ScanGeometry& g, std::span<float> gaps) {
+    for (int l = 0; l < g.scanlines; ++l) {
+        float& gap = gaps[static_cast<std::size_t>(l)];
+        if (gap < 0) continue;
+        const double lateral =
+            press::follows_columns(g) ? press::lateral_of_line(g, l) : g.beam_origin(l).x;
+        gap = static_cast<float>(field.skin_now_mm(lateral));
+    }
+}
+
+Point3 point_on_beam(
+    const ScanGeometry& g, const PhysicalFrame& f, int line, double r, double gap_mm) {
+    const bool beyond = line >= g.scanlines;
+    const ScanGeometry::Beam beam =
+        beyond ? ScanGeometry::Beam{g.beam_origin(line), g.beam_direction(line)}
+               : g.beams[static_cast<std::size_t>(line)];
+    const PlanePoint o = beam.origin, d = beam.direction;
+    double s = r + gap_mm, beside = 0;
+    if (f.press != nullptr) {
+        const press::PlaneShift shift = press::plane_shift(*f.press, g, beam, line, r);
+        s += shift.along_mm;
+        beside = shift.side_mm;
+    }
+    const PlanePoint n = press::beside(d);
+    return f.volume_from_probe *
+           Point3{o.x + s * d.x + beside * n.x, 0, o.z + s * d.z + beside * n.z};
+}
+
 int label_at(const PhysicalScene& s, int i, int j, int k) {
     if (!s.grid.contains(i, j, k)) return 0;
     return s.bundle->label_bricks.at(i, j, k);

@@ -14,6 +14,7 @@
 #include "runtime/imaging/physical/model/physical_effects.h"
 #include "runtime/imaging/physical/model/physical_scene.h"
 #include "runtime/imaging/physical/model/physical_tables.h"
+#include "runtime/imaging/press/press_plane.h"
 #include "runtime/imaging/scan/scan_geometry.h"
 
 namespace sonocase::runtime {
@@ -26,6 +27,7 @@ struct PhysicalFrame {
     double dynamic_range_db = 60;
     MotionState motion;
     PhysicalEffects effects;
+    const press::PressField* press = nullptr;  // null: nothing is pressed
 };
 
 // Noise in tiles of signed bytes (32 is one standard deviation), read row by row from random
@@ -67,6 +69,17 @@ void find_gaps(const PhysicalScene& scene,
                std::span<float> raw);
 // The mean over neighbouring beams that have skin. Returns the number of beams in contact.
 int smooth_gaps(int scanlines, std::span<const float> raw, std::span<float> gaps);
+
+// While something is pressed, a gap ends at the skin as it is now. Beams in air stay there.
+void press_gaps(const press::PressField& field,
+                const ScanGeometry& geometry,
+                std::span<float> gaps);
+
+// Where the tissue that beam `line` shows at depth r lies when nothing is pressed and nobody
+// breathes, in the middle of the slab. line: may lie beyond the last beam. gap_mm: by which a gap
+// to the skin moves the sample along the beam.
+Point3 point_on_beam(
+    const ScanGeometry& geometry, const PhysicalFrame& frame, int line, double r_mm, double gap_mm);
 
 // Label of a voxel; 0, the outside, beyond the volume.
 int label_at(const PhysicalScene& scene, int i, int j, int k);

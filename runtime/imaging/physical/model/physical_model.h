@@ -92,7 +92,7 @@ inline constexpr double kFibreAlongMm = 2.4, kFibreAcrossMm = 0.16;  // a cube's
 inline constexpr double kPennationRad = 0.2;
 inline constexpr double kSeptaAlongMm = 0.8, kSeptaAcrossMm = 0.4;
 // Parenchyma: a third cube, a voxel of it the same in all directions.
-inline constexpr int kParenchymaCube = 2;
+inline constexpr int kFibreCube = 0, kSeptaCube = 1, kParenchymaCube = 2;
 inline constexpr double kParenchymaMm = 1.3;
 // Nerves: a fourth cube, bundles of kNerveBundle voxels across, straight along the nerve.
 inline constexpr int kNerveCube = 3;

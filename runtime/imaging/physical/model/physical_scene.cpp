@@ -8,6 +8,7 @@
 
 #include "runtime/imaging/physical/model/physical_model.h"
 #include "runtime/imaging/physical/model/wall_sheets.h"
+#include "runtime/imaging/press/closed_label.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -188,8 +189,13 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.fine = make_fine_structure(bundle, jobs);
     s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
                                    [](const FineFrame& f) { return f.cube == kParenchymaCube; });
-    if (options.structures.wall || options.structures.diaphragm)
+    s.has_septa = std::any_of(s.fine.frames.begin(), s.fine.frames.end(), [](const FineFrame& f) {
+        return f.cube == kFibreCube || f.cube == kSeptaCube;
+    });
+    if (options.structures.wall || options.structures.diaphragm ||
+        (options.structures.streaks && s.has_septa))
         s.layers = make_tissue_layers(bundle, jobs);
+    s.closed_label = press::closed_labels(bundle);
     return s;
 }
 

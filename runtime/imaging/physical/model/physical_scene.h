@@ -55,15 +55,17 @@ struct PhysicalScene {
 
     // Complete where the bundle is; otherwise a frame asks for what it reads.
     BrickTable words;
-    std::vector<AcousticProperties> looks;  // # labels, then one per target
-    std::vector<PairEcho> pairs;            // # labels^2, [own * # labels + second]
-    std::vector<bool> is_lung;              // # labels
-    bool has_gas = false;                   // some label is gas or lung
+    std::vector<AcousticProperties> looks;   // # labels, then one per target
+    std::vector<std::int32_t> closed_label;  // 256: what is shown of a lumen that is shut
+    std::vector<PairEcho> pairs;             // # labels^2, [own * # labels + second]
+    std::vector<bool> is_lung;               // # labels
+    bool has_gas = false;                    // some label is gas or lung
     bool has_hard = true;  // some label is bone or gas; if none, their kernels are left out
 
     std::shared_ptr<const PhysicalTextures> textures;
     FineStructure fine;
     bool has_parenchyma = false;  // some label has its cube
+    bool has_septa = false;       // some label is fat or muscle
     TissueLayers layers;
 
     std::vector<TargetBall> targets;

@@ -15,6 +15,7 @@ constexpr double kLayerMm = 0.18;      // deviation of a reflecting layer, about
 constexpr double kPhaseLoss = 0.75;    // measured on the rough face of bone
 constexpr double kCellMm = 0.66;       // edge of the scatterers' lattice at 3.5 MHz,
 constexpr double kCellPerStep = 1.25;  // and at least of a sample
+constexpr int kSkirtReach = 6;         // beams: what lies further out shows nowhere
 
 // Deviation that is left to the taps: the blend of the scatterers is a part of the point spread.
 double rest_of(double fwhm_mm, double cell_mm) {
@@ -37,6 +38,27 @@ int gaussian(double sigma, int most, std::array<float, kSize>& taps) {
     for (std::size_t i = 0; i < kSize; ++i)
         taps[i] = static_cast<float>(exact[i] / std::sqrt(power));
     return reach;
+}
+
+// The point spread across the beams with its skirt, unit power; returns the reach.
+template <std::size_t kSize>
+int lateral_taps(const MachineBeam& beam,
+                 double fwhm_mm,
+                 double cell_mm,
+                 double pitch_mm,
+                 std::array<float, kSize>& taps) {
+    const int reach = gaussian(rest_of(fwhm_mm, cell_mm) / pitch_mm, kMaxLateral, taps);
+    if (!(beam.skirt > 0)) return reach;
+    std::array<float, kSize> skirt{};
+    const double sigma = rest_of(beam.skirt_width * fwhm_mm, cell_mm) / pitch_mm;
+    const int wide = gaussian(sigma, std::max(kSkirtReach, reach), skirt);
+    double power = 0;
+    for (std::size_t i = 0; i < kSize; ++i) {
+        taps[i] += static_cast<float>(beam.skirt) * skirt[i];
+        power += static_cast<double>(taps[i]) * static_cast<double>(taps[i]);
+    }
+    for (float& tap : taps) tap = static_cast<float>(static_cast<double>(tap) / std::sqrt(power));
+    return std::max(reach, wide);
 }
 
 double sum(const auto& taps) {
@@ -189,7 +211,7 @@ Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometr
     };
     t.wall =
         make_wall_tables(frequency, rest_of(axial_fwhm, t.cell_mm) / kSigmaPerFwhm, layer_scale);
-    t.streak_mm = std::max(kStreakMm, 0.6 * g.step_mm);
+    t.streak_mm = std::max(kStreakMm * std::min(3.5 / frequency, 1.0), 0.6 * g.step_mm);
     t.streak_scale = layer_scale(t.streak_mm);
     t.dome_scale = layer_scale(kDomeMm);
 
@@ -204,7 +226,7 @@ Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometr
         row.contact = std::exp(-r / kGapReachMm);
         const double pitch = g.fan ? (g.radius_mm + r) * g.line_step : g.line_step;
         const double lateral_fwhm = lateral_width(beam, probe, g.fan, frequency, r);
-        row.reach = gaussian(rest_of(lateral_fwhm, t.cell_mm) / pitch, kMaxLateral, row.lateral);
+        row.reach = lateral_taps(beam, lateral_fwhm, t.cell_mm, pitch, row.lateral);
         row.speckle = 1 / std::sqrt(kSpecklePower * axial_power *
                                     power_of_taps(row.lateral, pitch / t.cell_mm));
         row.interface_scale = peak / sum(row.lateral);

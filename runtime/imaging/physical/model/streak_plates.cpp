@@ -13,9 +13,6 @@ namespace {
 // Sixteen equally likely values of a gamma distribution of mean 4 and shape 2.5.
 constexpr std::array<double, 16> kLengthsMm{0.74, 1.25, 1.63, 1.97, 2.3,  2.63, 2.96, 3.3,
                                             3.67, 4.06, 4.51, 5.01, 5.62, 6.4,  7.53, 9.82};
-// Eight equally likely amplitudes of mean 0 dB, deviation 2 dB.
-constexpr std::array<double, 8> kLevels{0.70, 0.82, 0.89, 0.96, 1.04, 1.12, 1.22, 1.43};
-
 constexpr std::uint32_t kHashX = 0x9E3779B1u, kHashY = 0x85EBCA77u, kHashZ = 0xC2B2AE3Du;
 
 // (1 - x)^4, close to a Gaussian, 0 from x = 1 on.
@@ -24,7 +21,24 @@ double bump(double x) {
     return y * y * y * y;
 }
 
+// Where the skin's surface lies: the direction in which the depth below it grows most.
+Vector3 layer_normal(const PhysicalScene& scene, Point3 x) {
+    constexpr double kReachMm = 4;
+    if (scene.layers.empty()) return {};
+    const auto depth = [&](double i, double j, double k) {
+        return scene.layers.at(scene.grid.voxel_from_point(x + kReachMm * Vector3{i, j, k})).depth;
+    };
+    // Corners of a tetrahedron.
+    const double a = depth(1, 1, 1), b = depth(1, -1, -1), c = depth(-1, 1, -1),
+                 d = depth(-1, -1, 1);
+    const Vector3 n{a + b - c - d, a - b + c - d, a - b - c + d};
+    const double size = norm(n);  // 0: not known
+    return size > 1e-6 ? n / size : Vector3{};
+}
+
 struct Search {
+    const PlateKind& kind;
+    bool septa;
     const PhysicalScene& scene;
     const ScanGeometry& g;
     const Tables& tables;
@@ -34,20 +48,30 @@ struct Search {
     std::span<Streak> out;
     Rigid probe_from_volume;
     double thickest_mm = 0;  // of the slab: deviation at the face or at the far end
+    double pressed_mm = 0;   // tissue shows so much nearer to the face than it lies at rest
     int found = 0;
 
-    bool is_parenchyma(Point3 x) const {
+    // The label that holds plates there; negative: none.
+    int plates_at(Point3 x) const {
         const Point3 v = scene.grid.voxel_from_point(x);
         const int label = label_at(scene, static_cast<int>(std::floor(v.x + 0.5)),
                                    static_cast<int>(std::floor(v.y + 0.5)),
                                    static_cast<int>(std::floor(v.z + 0.5)));
-        return scene.fine.frames[static_cast<std::size_t>(label)].cube == kParenchymaCube;
+        const int cube = scene.fine.frames[static_cast<std::size_t>(label)].cube;
+        return (septa ? cube == kFibreCube || cube == kSeptaCube : cube == kParenchymaCube) ? label
+                                                                                            : -1;
     }
 
-    // Where a point of the tissue shows, in the probe's frame.
-    Point3 seen(Point3 x) const {
+    // Where a point of the tissue shows, in the probe's frame, before anything is pressed.
+    Point3 seen_at_rest(Point3 x) const {
         if (breathing != nullptr) x = x + breathing->weight(x) * frame.motion.breathing_mm;
         return probe_from_volume * x;
+    }
+    Point3 seen(Point3 x) const {
+        const Point3 p = seen_at_rest(x);
+        if (frame.press == nullptr) return p;
+        const PlanePoint q = press::shown_point(*frame.press, {p.x, p.z});
+        return {q.x, p.y, q.z};
     }
 
     // The beam at a place: its direction, and how far the place lies along it.
@@ -62,6 +86,12 @@ struct Search {
         return {x / from_centre, z / from_centre};
     }
 
+    // A normal of a septum: about the skin's in fat, across the fibres in muscle.
+    Vector3 lined_up(Vector3 any, Vector3 guide, bool fibres) const {
+        if (fibres) return any - dot(any, guide) * guide;
+        return guide + (kind.scatter / 64) * any;
+    }
+
     void add_cell(int i, int j, int k);
     void add_plate(Point3 centre, Vector3 normal, std::uint32_t draw);
 };
@@ -69,36 +99,55 @@ struct Search {
 // normal: not unit, at most 127 long, in steps of 1, frame of the volume.
 void Search::add_cell(int i, int j, int k) {
     const Point3 corner =
-        scene.grid.origin_mm + kStreakCellMm * Vector3{double(i), double(j), double(k)};
-    const Point3 middle = corner + 0.5 * kStreakCellMm * Vector3{1, 1, 1};
-    const Point3 p = seen(middle);
+        scene.grid.origin_mm + kind.cell_mm * Vector3{double(i), double(j), double(k)};
+    const Point3 middle = corner + 0.5 * kind.cell_mm * Vector3{1, 1, 1};
+    const Point3 p = seen_at_rest(middle);
     double r = 0;
     const PlanePoint beam = beam_at({p.x, p.z}, r);
-    if (r < kStreakFirstMm - kStreakCellMm || r > g.depth_mm + kStreakCellMm) return;
-    if (!is_parenchyma(middle)) return;
+    if (r < kind.first_mm - kind.cell_mm || r > g.depth_mm + kind.cell_mm + pressed_mm) return;
+    const int label = plates_at(middle);
+    if (label < 0) return;
     const Vector3 along = frame.volume_from_probe.rotation * Vector3{beam.x, 0, beam.z};
     const auto bx = static_cast<float>(along.x), by = static_cast<float>(along.y),
                bz = static_cast<float>(along.z);
     // Within a cell beams turn by as much as its size over their distance from the fan's centre.
-    const double turn = kStreakCellMm / (g.fan ? std::max(g.radius_mm + r, kStreakCellMm) : 1e9);
-    const double widest = std::min(kStreakFaceSin + turn, 1.0);
+    const double turn = kind.cell_mm / (g.fan ? std::max(g.radius_mm + r, kind.cell_mm) : 1e9);
+    const double widest = std::min(kind.face_sin + turn, 1.0);
     const auto least = static_cast<float>(1 - widest * widest);
+    // What septa line up with: the normal of the skin, or the direction of the fibres.
+    const FineFrame& fine = scene.fine.frames[static_cast<std::size_t>(label)];
+    const bool fibres = septa && fine.cube == kFibreCube;
+    Vector3 guide;
+    if (fibres) {
+        guide = normalized(Vector3{static_cast<double>(fine.cube_from_voxel[0]),
+                                   static_cast<double>(fine.cube_from_voxel[1]),
+                                   static_cast<double>(fine.cube_from_voxel[2])});
+    } else if (septa) {
+        guide = layer_normal(scene, middle);
+    }
     const std::uint32_t cell =
         hash32(static_cast<std::uint32_t>(i) * kHashX ^ static_cast<std::uint32_t>(j) * kHashY ^
                static_cast<std::uint32_t>(k) * kHashZ);
-    for (std::uint32_t t = 0; t < kStreakTries; ++t) {
+    for (std::uint32_t t = 0; t < static_cast<std::uint32_t>(kind.tries); ++t) {
         const std::uint32_t h = hash32(cell + t);
         const auto nx = static_cast<float>(static_cast<std::int8_t>(h)),
                    ny = static_cast<float>(static_cast<std::int8_t>(h >> 8)),
                    nz = static_cast<float>(static_cast<std::int8_t>(h >> 16));
         const float square = nx * nx + ny * ny + nz * nz, cosine = nx * bx + ny * by + nz * bz;
         // Uniform directions: those within the ball.
-        if (!(square < 127.0f * 127.0f && cosine * cosine > least * square)) continue;
+        if (!(square < 127.0f * 127.0f)) continue;
+        Vector3 normal{static_cast<double>(nx), static_cast<double>(ny), static_cast<double>(nz)};
+        if (septa) {
+            normal = lined_up(normal, guide, fibres);
+            const double facing = dot(normal, along);
+            if (!(facing * facing > static_cast<double>(least) * dot(normal, normal))) continue;
+        } else if (!(cosine * cosine > least * square)) {
+            continue;
+        }
         const std::uint32_t place = hash32(h ^ (cell + t) * kHashY);
         const auto part = [&](int shift) { return (place >> shift & 0x3FF) / 1024.0; };
-        add_plate(corner + kStreakCellMm * Vector3{part(0), part(10), part(20)},
-                  {static_cast<double>(nx), static_cast<double>(ny), static_cast<double>(nz)},
-                  h >> 24);
+        add_plate(corner + kind.cell_mm * Vector3{part(0), part(10), part(20)}, normal,
+                  h >> 24 | (place >> 30) << 8);
     }
 }
 
@@ -106,12 +155,12 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     Point3 p = seen(centre);
     double r = 0;
     PlanePoint beam = beam_at({p.x, p.z}, r);
-    const double length = kLengthsMm[draw & 15], own = 0.25 * length;
+    const double length = kind.length_scale * kLengthsMm[draw & 15], own = 0.25 * length;
     const double inverse = 1 / norm(normal);
     const Vector3 n = probe_from_volume.rotation * (inverse * normal);
     const double cosine = n.x * beam.x + n.z * beam.z;
     const double facing =
-        bump(std::max(1 - cosine * cosine, 0.0) / (kStreakFaceSin * kStreakFaceSin));
+        bump(std::max(1 - cosine * cosine, 0.0) / (kind.face_sin * kind.face_sin));
     // Most plates are too far from the plane or turned away: their most comes before their place.
     const auto level_in = [&](double slab) {
         const double off = p.y / (2.9 * std::sqrt(slab * slab + own * own));
@@ -130,21 +179,24 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     };
     double shown = r;
     for (int step = 0; step < 3; ++step) shown = r - gap * row_at(shown).contact;
-    if (shown < kStreakFirstMm || shown > g.depth_mm) return;
+    if (shown < kind.first_mm || shown > g.depth_mm) return;
     const Row& row = row_at(shown);
     const double level = level_in(row.elevation_mm);
-    if (level < 0.1 || found >= static_cast<int>(out.size()) || !is_parenchyma(centre)) return;
+    if (level < 0.1 || found >= static_cast<int>(out.size()) || plates_at(centre) < 0) return;
     Streak& s = out[static_cast<std::size_t>(found)];
     s.centre = {p.x + (shown - r) * beam.x, p.z + (shown - r) * beam.z};
     const double in_plane = 1 / std::sqrt(n.x * n.x + n.z * n.z);
     s.normal = {n.x * in_plane, n.z * in_plane};
     s.length_mm = length;
     s.width_mm = tables.streak_mm;
-    s.amplitude = kStreakAmplitude * tables.streak_scale * kLevels[draw >> 4 & 7] * level;
+    s.amplitude = kind.amplitude * tables.streak_scale * kind.levels[draw >> 4 & 7] * level;
+    constexpr std::array<double, 4> kBends{-1, -0.4, 0.4, 1};
+    const double sunk_mm = kind.most_bend * kBends[draw >> 8 & 3] * 0.125 * length * length;
+    s.bend = sunk_mm / s.width_mm;
     // Beyond 0.9 L from its middle a plate is 0.5 % of itself, beyond three widths 1 %.
     const double reach = 0.9 * length + 3 * s.width_mm;
     const double slope = std::sqrt(std::max(1 - cosine * cosine * in_plane * in_plane, 0.0));
-    const double deep = 0.9 * length * slope + 3 * s.width_mm + g.step_mm;
+    const double deep = 0.9 * length * slope + 3 * s.width_mm + g.step_mm + 3.3 * std::abs(sunk_mm);
     const double pitch = g.fan ? (g.radius_mm + shown) * g.line_step : g.line_step;
     s.line_begin = std::max(static_cast<int>(line - reach / pitch), 0);
     s.line_end = std::min(static_cast<int>(line + reach / pitch) + 2, g.scanlines);
@@ -155,6 +207,14 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
 
 }  // namespace
 
+const PlateKind& plate_kind(double frequency_mhz) {
+    static constexpr PlateKind kOrgans{
+        8, 44, 0.5, 12, 6, {0.41, 0.61, 0.75, 0.9, 1.1, 1.33, 1.64, 2.45}, 1, 0.01, 0};
+    static constexpr PlateKind kSepta{
+        4, 9, 0.45, 1.5, 4, {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5}, 1.4, 0.04, 0.3};
+    return frequency_mhz > kSeptaFrequencyMhz ? kSepta : kOrgans;
+}
+
 int find_streaks(const PhysicalScene& scene,
                  const ScanGeometry& g,
                  const Tables& tables,
@@ -162,8 +222,12 @@ int find_streaks(const PhysicalScene& scene,
                  const BreathingField* breathing,
                  std::span<const float> gaps,
                  std::span<Streak> out) {
-    if (!scene.has_parenchyma || tables.frequency_mhz > kStreakFrequencyMhz) return 0;
-    Search search{scene,
+    const bool septa = tables.frequency_mhz > kSeptaFrequencyMhz;
+    if (!(septa ? scene.has_septa : scene.has_parenchyma)) return 0;
+    const PlateKind& kind = plate_kind(tables.frequency_mhz);
+    Search search{kind,
+                  septa,
+                  scene,
                   g,
                   tables,
                   f,
@@ -172,6 +236,7 @@ int find_streaks(const PhysicalScene& scene,
                   out,
                   inverse(f.volume_from_probe),
                   std::max(tables.rows.front().elevation_mm, tables.rows.back().elevation_mm)};
+    if (f.press != nullptr) search.pressed_mm = f.press->state().farthest_mm;
     const double shift_mm = norm(f.motion.breathing_mm);
     // Columns of cells along the axis that the plane's normal follows most.
     const Vector3 normal = f.volume_from_probe.rotation * Vector3{0, 1, 0};
@@ -200,17 +265,17 @@ int find_streaks(const PhysicalScene& scene,
         scene.voxel_mm *
         Vector3{double(scene.grid.size.x), double(scene.grid.size.y), double(scene.grid.size.z)};
     const auto cell = [&](double mm, int axis) {
-        return static_cast<int>(std::floor(std::clamp(mm, 0.0, box[axis]) / kStreakCellMm));
+        return static_cast<int>(std::floor(std::clamp(mm, 0.0, box[axis]) / kind.cell_mm));
     };
     const Vector3 origin = f.volume_from_probe * Point3{0, 0, 0} - scene.grid.origin_mm;
     // Half the slab, half the longest plate, and the cell's own extent along the normal.
     const double thick =
         4 + shift_mm +
-        0.5 * kStreakCellMm * (std::abs(normal[u]) + std::abs(normal[v])) / std::abs(normal[a]);
+        0.5 * kind.cell_mm * (std::abs(normal[u]) + std::abs(normal[v])) / std::abs(normal[a]);
     for (int j = cell(lower[v], v); j <= cell(upper[v], v); ++j) {
         for (int i = cell(lower[u], u); i <= cell(upper[u], u); ++i) {
-            const double mu = (i + 0.5) * kStreakCellMm - origin[u],
-                         mv = (j + 0.5) * kStreakCellMm - origin[v];
+            const double mu = (i + 0.5) * kind.cell_mm - origin[u],
+                         mv = (j + 0.5) * kind.cell_mm - origin[v];
             const double plane = origin[a] - (normal[u] * mu + normal[v] * mv) / normal[a];
             if (plane < -thick || plane > box[a] + thick) continue;
             for (int k = cell(plane - thick, a); k <= cell(plane + thick, a); ++k) {

@@ -18,19 +18,30 @@
 
 namespace sonocase::runtime::physical {
 
-inline constexpr double kStreakCellMm = 8;
-inline constexpr int kStreakTries = 44;         // per cell; pi / 6 of them are plates
-inline constexpr double kStreakFaceSin = 0.35;  // sine of the angle at which a plate is gone
-inline constexpr double kStreakFirstMm = 12;    // none closer to the face
-inline constexpr double kStreakAmplitude = 6;
-inline constexpr double kStreakFrequencyMhz = 6;  // above it the pulse is finer than these plates
-inline constexpr int kMostStreaks = 512;          // in a frame
+// What plates a picture shows. At the frequencies of a fan: those of organs. Above
+// kSeptaFrequencyMhz, where the pulse is finer than they are: septa of fat, which follow the skin,
+// and the perimysium of muscle, which follows its fibres.
+struct PlateKind {
+    double cell_mm = 8;
+    int tries = 44;                  // per cell; pi / 6 of them are plates
+    double face_sin = 0.35;          // sine of the angle at which a plate is gone
+    double first_mm = 12;            // none closer to the face
+    double amplitude = 6;            // of the middle one
+    std::array<double, 8> levels{};  // equally likely factors of it
+    double length_scale = 1;         // of a mean length of 4 mm
+    double most_bend = 0;            // curvature in the picture, 1/mm
+    double scatter = 0;              // of the normals of septa about the skin's
+};
+inline constexpr double kSeptaFrequencyMhz = 6;
+const PlateKind& plate_kind(double frequency_mhz);
+inline constexpr int kMostStreaks = 512;  // in a frame
 
 struct Streak {
     PlanePoint centre;  // of the plate, as seen: contact and breathing have moved it
     PlanePoint normal;  // its direction in the plane, unit
     double length_mm = 4;
     double width_mm = 0.25;  // deviation along the normal
+    double bend = 0;         // deviations of the width that the plate has sunk at half its length
     double amplitude = 0;
     int line_begin = 0, line_end = 0, sample_begin = 0, sample_end = 0;  // that can show it
 };

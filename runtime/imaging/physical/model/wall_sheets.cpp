@@ -26,11 +26,15 @@ constexpr Sheet kInner[] = {
 };
 // What a pulse of a third of the length shows: septa of fat and fasciae, thin and many.
 constexpr Sheet kOuterFine[] = {
-    {0.5, 12, 0.9}, {4.3, 14, 0.9, 0.9}, {7.2, 12, 0.8}, {12.3, 16, 1, 1.1}, {15.1, 13, 0.9},
-    {20.6, 15, 1},  {23.1, 12, 0.9, 1},  {29.4, 12, 1},  {33.2, 13, 1},      {37, 12, 1},
+    {0.5, 12, 0.9},
+    {9.5, 14, 1, 1.1},
 };
+// The peritoneum and the sheets of three muscles.
 constexpr Sheet kInnerFine[] = {
-    {1.0, 18, 1.1}, {3.0, 12, 0.9}, {4.6, 15, 1, 1.0}, {8.6, 15, 1, 1.1}, {12.6, 14, 1, 1.2},
+    {1.0, 18, 1.1},
+    {4.6, 15, 1, 1.0},
+    {8.6, 15, 1, 1.1},
+    {12.6, 14, 1, 1.2},
 };
 constexpr double kFineMhz = 6;
 

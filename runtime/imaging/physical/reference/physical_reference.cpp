@@ -29,7 +29,8 @@ void for_samples(const ReferenceInput& in, const Work& work) {
     }
 }
 
-// The light is that of the whole aperture: boxes of 5 and 3 beams.
+// The light is that of the whole aperture, so that shadows have a penumbra: every other beam of
+// boxes of 10 and 6.
 ComplexPlane light_echoes(const ReferenceInput& in,
                           const Plane& light,
                           const ComplexPlane& echoes) {
@@ -40,7 +41,7 @@ ComplexPlane light_echoes(const ReferenceInput& in,
         double smooth = 0;
         for (int j = -3; j <= 3; ++j)
             smooth += kBoxes[static_cast<std::size_t>(j + 3)] *
-                      light[in.at(k, reflect(l + j, in.geometry.scanlines))];
+                      light[in.at(k, reflect(l + 2 * j, in.geometry.scanlines))];
         out.re[in.at(k, l)] = echoes.re[in.at(k, l)] * smooth;
         out.im[in.at(k, l)] = echoes.im[in.at(k, l)] * smooth;
     });

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "runtime/imaging/physical/model/gas_faces.h"
+#include "runtime/imaging/physical/model/pressed_surface.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
 #include "runtime/imaging/physical/reference/reference_place.h"
 #include "runtime/imaging/physical/reference/reference_speckle.h"
@@ -213,6 +214,7 @@ class Beams {
             std::vector<float> raw(gaps_.size());
             find_gaps(in_.scene, in_.geometry, f, 0, in_.geometry.scanlines, raw);
             smooth_gaps(in_.geometry.scanlines, raw, gaps_);
+            if (f.press != nullptr) press_gaps(*f.press, in_.geometry, gaps_);
         }
         if (f.effects.breathing && f.motion.breathes())
             breathing_ = BreathingField(*in_.scene.bundle);
@@ -251,14 +253,14 @@ class Beams {
                 out.light[at] = 0;
                 continue;
             }
-            Sample p = place_sample(k, l, o, d, beam);
+            Sample p = place_sample(k, l, d, beam);
             if (in_.frame.effects.targets) find_target(in_, beam, p);
             const AcousticProperties& look =
                 in_.scene.looks[static_cast<std::size_t>(p.look_index)];
             const double past = in_.row(k).r_mm - face.dome_mm;
             const bool dome = past > -1;
             const double line = dome_echo(face, past);
-            const WallEcho wall = meet_wall(k, l, o, d, look);
+            const WallEcho wall = meet_wall(k, l, look);
             echo_of_tissue(look, wall.in_wall, line, p);
             p.re += p.row.interface_scale * wall.amplitude;
             if (look.kind == TissueKind::soft) meet_streaks(o, d, p);
@@ -289,11 +291,11 @@ class Beams {
 
   private:
     // The point that beam l shows at depth r, in the middle of the slab.
-    Point3 point_at(int l, PlanePoint o, PlanePoint d, double r_mm) const {
+    Point3 point_at(int l, double r_mm) const {
         const PhysicalFrame& f = in_.frame;
         const double gap = static_cast<double>(gaps_[static_cast<std::size_t>(l)]);
-        const double along = r_mm + gap * std::exp(-r_mm / kGapReachMm);
-        const Point3 x = f.volume_from_probe * Point3{o.x + along * d.x, 0, o.z + along * d.z};
+        const Point3 x =
+            point_on_beam(in_.geometry, f, l, r_mm, gap * std::exp(-r_mm / kGapReachMm));
         return breathing_.empty() ? x : x - breathing_.weight(x) * f.motion.breathing_mm;
     }
 
@@ -321,16 +323,16 @@ class Beams {
             const Streak& s = streaks_[static_cast<std::size_t>(n)];
             const double x = o.x + p.row.r_mm * d.x - s.centre.x,
                          z = o.z + p.row.r_mm * d.z - s.centre.z;
-            const double off = (x * s.normal.x + z * s.normal.z) / s.width_mm;
             const double along = 2 * (x * s.normal.z - z * s.normal.x) / s.length_mm;
+            const double off =
+                (x * s.normal.x + z * s.normal.z) / s.width_mm - s.bend * along * along;
             p.re += s.amplitude * std::exp(-0.5 * (off * off + std::pow(along, 4))) *
                     p.row.interface_scale;
         }
     }
 
     // Sheets of the wall, in soft tissue.
-    WallEcho meet_wall(
-        int k, int l, PlanePoint o, PlanePoint d, const AcousticProperties& look) const {
+    WallEcho meet_wall(int k, int l, const AcousticProperties& look) const {
         const double step = in_.geometry.step_mm;
         const int every = std::clamp(static_cast<int>(in_.tables.wall.node_mm / step), 1, 32);
         const int rows = static_cast<int>(kWallDepthMm / step) / every * every;
@@ -339,20 +341,42 @@ class Beams {
             return {};
         const double half = 0.5 * every * step;
         const auto voxel = [&](double r) {
-            return in_.scene.grid.voxel_from_point(point_at(l, o, d, r));
+            return in_.scene.grid.voxel_from_point(point_at(l, r));
         };
         const double r = in_.row(k).r_mm;
         return wall_echo(in_, voxel(r - half), voxel(r), voxel(r + half), 2 * half);
     }
 
+    // The surface near a sample turns with pressed tissue, and a lumen that is shut shows what is
+    // around it.
+    void press_place(int k, int l, PlanePoint d, Vector3 beam, Place& place) const {
+        const ScanGeometry& g = in_.geometry;
+        const PhysicalFrame& f = in_.frame;
+        const ScanGeometry::Beam& of = g.beams[static_cast<std::size_t>(l)];
+        const double r = in_.row(k).r_mm;
+        const press::PlaneShift here = press::plane_shift(*f.press, g, of, l, r);
+        const press::PlaneShift above =
+            k > 0 ? press::plane_shift(*f.press, g, of, l, in_.row(k - 1).r_mm) : here;
+        const PlanePoint n = press::beside(d);
+        if (place.second >= 0)
+            press_surface(beam, f.volume_from_probe.rotation * Vector3{n.x, 0, n.z},
+                          1 + (here.along_mm - above.along_mm) / g.step_mm, here.tilt, place.normal,
+                          place.distance_mm);
+        const double lateral =
+            press::follows_columns(g) ? press::lateral_of_line(g, l) : of.origin.x + r * d.x;
+        const double depth = press::follows_columns(g) ? r : of.origin.z + r * d.z;
+        if (f.press->closed_in_plane({lateral, depth}))
+            place.label = in_.scene.closed_label[static_cast<std::size_t>(place.label)];
+    }
+
     // Where sample k of beam l lies, and what is there.
-    Sample place_sample(int k, int l, PlanePoint o, PlanePoint d, Vector3 beam) const {
+    Sample place_sample(int k, int l, PlanePoint d, Vector3 beam) const {
         const PhysicalScene& s = in_.scene;
         const PhysicalFrame& f = in_.frame;
         Sample p{in_.row(k)};
         const Vector3 across = f.volume_from_probe.rotation * Vector3{0, 1, 0};
         const Vector3 sideways = f.volume_from_probe.rotation * Vector3{1, 0, 0};
-        const Point3 x = point_at(l, o, d, p.row.r_mm);
+        const Point3 x = point_at(l, p.row.r_mm);
         p.from_origin = x - s.grid.origin_mm;
 
         const double jitter = in_.draw(in_.noise.white, NoiseUse::elevation, 0, k, l);
@@ -362,6 +386,7 @@ class Beams {
         p.looked_up = s.grid.voxel_from_point(slab + (kLookupJitter * s.voxel_mm) *
                                                          (jitter2 * sideways + jitter * beam));
         p.place = place_at(s, f, p.v, p.looked_up);
+        if (f.press != nullptr) press_place(k, l, d, beam, p.place);
         p.look_index = p.place.label;
         return p;
     }

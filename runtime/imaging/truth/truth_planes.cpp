@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/imaging/truth/truth_planes.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sonocase::runtime {
+namespace {
+
+constexpr std::size_t kVectorSlack = 64;
+
+// One ray per pixel where a row of pixels meets most beams: at the greatest depth.
+int ray_count(const ScanGeometry& g) {
+    const double across_mm = 2 * g.half_extent * (g.fan ? g.radius_mm + g.depth_mm : 1.0);
+    return std::clamp(static_cast<int>(std::ceil(across_mm / g.mm_per_px)), 64, 16384);
+}
+
+}  // namespace
+
+TruthPixels::TruthPixels(const ScanGeometry& g) : width_px_(g.width_px), rays_(ray_count(g)) {
+    const double ray_step = 2 * g.half_extent / rays_;  // rad or mm
+    rays_per_px_at_face_ = static_cast<float>(
+        g.mm_per_px / (g.fan ? std::max(g.radius_mm, 1e-3) * ray_step : ray_step));
+    for (int row = 0; row < g.height_px; ++row) {
+        bool open = false;
+        for (int column = 0; column < g.width_px; ++column) {
+            double line = 0, sample = 0;
+            if (!g.locate(g.pixel_centre(column, row), line, sample)) {
+                open = false;
+                continue;
+            }
+            if (!open)
+                runs_.push_back({row, column, column, static_cast<std::uint32_t>(ray_.size())});
+            open = true;
+            runs_.back().end = column + 1;
+            const double ray = (line + 0.5) / g.scanlines * rays_;
+            ray_.push_back(
+                static_cast<std::uint16_t>(std::clamp(static_cast<int>(ray), 0, rays_ - 1)));
+            r_mm_.push_back(static_cast<float>((sample + 0.5) * g.step_mm));
+        }
+    }
+    ray_.resize(ray_.size() + kVectorSlack, 0);
+    r_mm_.resize(r_mm_.size() + kVectorSlack, 0.0f);
+}
+
+bool TruthPixels::scanned(int column, int row) const {
+    const auto after = std::partition_point(runs_.begin(), runs_.end(), [&](const PixelRun& r) {
+        return r.row < row || (r.row == row && r.end <= column);
+    });
+    return after != runs_.end() && after->row == row && after->begin <= column;
+}
+
+void needle_plane(const ScanGeometry& g,
+                  const TruthPixels& pixels,
+                  const NeedleShape& n,
+                  double tip_mm,
+                  std::span<std::uint8_t> plane) {
+    // The part of the axis that the slab can hold, and how far from it the needle can show.
+    const double reach = 0.5 * n.slab_mm + n.radius_mm;
+    double near = -n.length_mm, far = 0;
+    if (std::abs(n.axis.y) > 1e-9) {
+        const double a = (-reach - n.tip.y) / n.axis.y, b = (reach - n.tip.y) / n.axis.y;
+        near = std::max(near, std::min(a, b));
+        far = std::min(far, std::max(a, b));
+    } else if (std::abs(n.tip.y) > reach) {
+        return;
+    }
+    if (near > far) return;
+    const double margin = n.radius_mm + n.slab_mm * std::abs(n.axis.y) + g.mm_per_px;
+    const PlanePoint a{n.tip.x + near * n.axis.x, n.tip.z + near * n.axis.z},
+        b{n.tip.x + far * n.axis.x, n.tip.z + far * n.axis.z};
+    pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
+        const double z = (run.row - g.origin_y_px) * g.mm_per_px;
+        if (z < std::min(a.z, b.z) - margin || z > std::max(a.z, b.z) + margin) return;
+        // The axis where it is within the margin of this row.
+        double x0 = std::min(a.x, b.x), x1 = std::max(a.x, b.x);
+        const double dz = b.z - a.z;
+        if (std::abs(dz) > 1e-6) {
+            const double u0 = std::clamp((z - margin - a.z) / dz, 0.0, 1.0),
+                         u1 = std::clamp((z + margin - a.z) / dz, 0.0, 1.0);
+            const double xa = a.x + u0 * (b.x - a.x), xb = a.x + u1 * (b.x - a.x);
+            x0 = std::min(xa, xb);
+            x1 = std::max(xa, xb);
+        }
+        const auto column = [&](double x) {
+            return static_cast<int>(std::clamp(x / g.mm_per_px + g.origin_x_px, -1.0, 1e5));
+        };
+        const int first = std::max(column(x0 - margin), run.begin),
+                  last = std::min(column(x1 + margin) + 1, run.begin + run.count - 1);
+        for (int c = first; c <= last; ++c) {
+            double along = 0;
+            if (needle_share(n, (c - g.origin_x_px) * g.mm_per_px, z, along) > 0)
+                plane[at + static_cast<std::size_t>(c - run.begin)] = along <= tip_mm ? 2 : 1;
+        }
+    });
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Labels, shadows and depths of runs of pixels, many at a time. The same bytes on every instruction
+// set.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "runtime/imaging/simd/simd_target.h"
+
+namespace sonocase::runtime {
+
+// What all rows of a frame share. Coordinates are voxels of the bundle's grid.
+struct TruthFrameRows {
+    // A pixel's voxel: origin + column * across + row * down; in double, rounded once per row.
+    double origin[3], across[3], down[3];
+    std::int32_t size[3];
+
+    // Voxels of the bundle: BrickVolume's tables and pools, and the values of uniform bricks as
+    // words. Null boundary_table: no surfaces.
+    const std::int32_t *label_table, *label_pool, *label_uniform;
+    const std::int32_t *boundary_table, *boundary_pool, *boundary_uniform;
+    // One byte per brick: its label, or 255 where it holds several labels or a surface.
+    const std::int32_t* brick_label;
+    std::int32_t bricks_x, bricks_xy;
+    std::int32_t label_count;
+    float pulse_vx = 0;          // outward shift of arterial walls
+    const std::int32_t* swells;  // # labels: 1 for arteries
+    const std::int32_t* hard;    // # labels: 1 for what casts a shadow
+
+    // Contact; null gap: no beam has one. Per ray.
+    const float* gap_mm = nullptr;
+    float per_reach = 0;         // log2 e / reach, 1/mm
+    float beam_x[3], beam_z[3];  // voxels per mm along the probe's x and z
+    bool fan = true;
+    float radius_mm = 0, mm_per_px = 0, origin_x_px = 0, origin_y_px = 0;
+
+    // Breathing; null weight: none.
+    const float* weight = nullptr;
+    std::int32_t lattice[3];
+    float first_vx[3], per_voxel = 0, shift_vx[3];
+};
+
+// One run of pixels.
+struct TruthRun {
+    int row = 0, begin = 0, count = 0;   // pixels of the picture
+    const std::uint16_t* ray = nullptr;  // # count, and a vector's width of slack
+    const float* r_mm = nullptr;         // depth along the beam; likewise
+};
+
+// Writes labels, counts them, and lowers first_hard_mm (# rays, or empty) of the rays whose pixels
+// are hard. rays_per_px_at_face: that lie within a pixel's width where the beams leave the probe.
+void truth_labels(SimdTarget simd,
+                  const TruthFrameRows& frame,
+                  const TruthRun& run,
+                  std::uint8_t* labels,
+                  std::uint32_t* count_of_label,
+                  std::span<float> first_hard_mm,
+                  float rays_per_px_at_face);
+
+// shadowed[i] = r > first_hard_mm[ray].
+void truth_shadows(SimdTarget simd,
+                   const TruthRun& run,
+                   const float* first_hard_mm,
+                   std::uint8_t* shadowed);
+
+// depth = r + gap exp(-r / reach) - entry; see TruthPlanes::skin_depth_mm.
+void truth_depths(SimdTarget simd,
+                  const TruthFrameRows& frame,
+                  const TruthRun& run,
+                  const float* entry_mm,
+                  float* depth_mm);
+
+}  // namespace sonocase::runtime

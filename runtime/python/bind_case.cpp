@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include <pybind11/stl.h>
+
+#include "bindings.h"
+#include "formats/files/recording_file.h"
+#include "formats/recording/session.h"
+#include "formats/scoring/session_score.h"
+#include "numpy_values.h"
+#include "opened_case.h"
+
+namespace sonocase::python {
+namespace {
+
+using Shared = std::shared_ptr<OpenedCase>;
+
+const CaseBundle& bundle_of(const OpenedCase& opened) {
+    check(usable(opened));
+    return *opened.bundle;
+}
+
+py::array_t<std::uint8_t> label_volume(const OpenedCase& opened) {
+    const CaseBundle& bundle = bundle_of(opened);
+    const Int3 size = bundle.grid.size;
+    py::array_t<std::uint8_t> volume({size.z, size.y, size.x});
+    const std::span<std::uint8_t> out(volume.mutable_data(), bundle.grid.voxel_count());
+    {
+        const py::gil_scoped_release free_to_run;
+        const std::vector<std::uint8_t> dense = dense_from_bricks(bundle.label_bricks);
+        std::copy(dense.begin(), dense.end(), out.begin());
+    }
+    return volume;
+}
+
+// Where the skin is on the line through `near` along `direction`.
+py::object skin_point(const OpenedCase& opened,
+                      py::handle near,
+                      py::handle direction,
+                      double reach_mm) {
+    const runtime::Skin skin(bundle_of(opened));
+    if (!(reach_mm > 0 && reach_mm <= 1000)) throw py::value_error("reach_mm: give 0 to 1000 mm");
+    const auto found = skin.project(point_from(near, "near"),
+                                    normalized(vector_from(direction, "direction")), reach_mm);
+    return found ? py::object(array_of(*found)) : py::none();
+}
+
+py::object skin_normal(const OpenedCase& opened, py::handle point, double radius_mm) {
+    const runtime::Skin skin(bundle_of(opened));
+    if (!(radius_mm > 0 && radius_mm <= 100)) throw py::value_error("radius_mm: give 0 to 100 mm");
+    const Vector3 normal = skin.normal(point_from(point, "point"), radius_mm);
+    return norm(normal) > 0 ? py::object(array_of(normal)) : py::none();
+}
+
+std::vector<int> labels_at(const OpenedCase& opened, py::handle points) {
+    const CaseBundle& bundle = bundle_of(opened);
+    const py::array a = numbers_from(points, "points");
+    if (a.ndim() != 2 || a.shape(1) != 3)
+        throw py::value_error("points: give an array of shape (n, 3), mm, frame `mannequin`");
+    const py::array_t<double, py::array::c_style | py::array::forcecast> d(a);
+    const CaseAnatomy anatomy(opened.bundle);
+    std::vector<int> labels;
+    for (py::ssize_t n = 0; n < d.shape(0); ++n)
+        labels.push_back(anatomy.label({d.at(n, 0), d.at(n, 1), d.at(n, 2)}));
+    (void)bundle;
+    return labels;
+}
+
+std::string score_text(const OpenedCase& opened,
+                       const std::string& session_path,
+                       const std::optional<Exercise>& given) {
+    const CaseBundle& bundle = bundle_of(opened);
+    const py::gil_scoped_release free_to_run;
+    const Sequence sequence = value_of(load_sequence(session_path));
+    const Session session =
+        value_of(session_from_sequence(sequence, guess_names(sequence), session_path));
+    const Exercise exercise =
+        given ? *given : value_of(exercise_named(opened, session.header.exercise));
+    const CaseAnatomy anatomy(opened.bundle, breathing_shown(exercise, session.header));
+    return score_json(score_session(session, exercise, &anatomy, bundle.labels), exercise);
+}
+
+// Poses and times of a recorded session.
+py::dict read_session(const std::string& path) {
+    const Sequence sequence = value_of(load_sequence(path));
+    const Session session = value_of(session_from_sequence(sequence, guess_names(sequence), path));
+    const auto count = static_cast<py::ssize_t>(session.samples.size());
+    py::array_t<double> time_s(count), probe({count, py::ssize_t{4}, py::ssize_t{4}}),
+        needle({count, py::ssize_t{4}, py::ssize_t{4}});
+    py::array_t<bool> probe_ok(count), needle_ok(count);
+    py::array_t<std::int64_t> frame(count);
+    const auto put = [](py::array_t<double>& to, py::ssize_t n, const Rigid& pose) {
+        const py::array_t<double> from = array_of(pose);
+        std::copy_n(from.data(), 16, to.mutable_data(n));
+    };
+    for (py::ssize_t n = 0; n < count; ++n) {
+        const SessionSample& sample = session.samples[static_cast<std::size_t>(n)];
+        time_s.mutable_at(n) = sample.time_s;
+        frame.mutable_at(n) = sample.frame;
+        probe_ok.mutable_at(n) = sample.probe_ok;
+        needle_ok.mutable_at(n) = sample.needle_ok;
+        put(probe, n, sample.mannequin_from_probe);
+        put(needle, n, sample.mannequin_from_drawn);
+    }
+    return py::dict("exercise"_a = session.header.exercise, "case"_a = session.header.case_name,
+                    "render"_a = session.header.render, "time_s"_a = time_s, "frame"_a = frame,
+                    "probe_ok"_a = probe_ok, "mannequin_from_probe"_a = probe,
+                    "needle_ok"_a = needle_ok, "mannequin_from_drawn_needle"_a = needle);
+}
+
+void bind_label(py::module_& module) {
+    py::class_<Label>(module, "Label", "One entry of a case's palette.")
+        .def_readonly("name", &Label::name)
+        .def_readonly("tissue", &Label::tissue)
+        .def_property_readonly(
+            "colour",
+            [](const Label& l) { return py::make_tuple(l.colour[0], l.colour[1], l.colour[2]); },
+            "sRGB, 0 to 255.")
+        .def("__repr__",
+             [](const Label& l) { return "<sonocase.Label " + l.name + " (" + l.tissue + ")>"; });
+}
+
+}  // namespace
+
+void bind_case(py::module_& module) {
+    bind_label(module);
+    py::class_<OpenedCase, Shared>(module, "Case", "A case bundle, opened with Case.open(path).")
+        .def_static(
+            "open",
+            [](const py::object& path) {
+                const auto text =
+                    py::cast<std::string>(py::module_::import("os").attr("fspath")(path));
+                const py::gil_scoped_release free_to_run;
+                return value_of(open_case(text));
+            },
+            "path"_a, "Opens a bundle; raises sonocase.Error where it is none.")
+        .def(
+            "close", [](OpenedCase& c) { c.closed = true; },
+            "Ends the use of the case: it, and renderers made from it, raise from then on.")
+        .def_property_readonly("closed", [](const OpenedCase& c) { return c.closed.load(); })
+        .def("__enter__", [](Shared c) { return c; })
+        .def("__exit__", [](OpenedCase& c, const py::args&) { c.closed = true; })
+        .def_readonly("path", &OpenedCase::path)
+        .def_readonly("warnings", &OpenedCase::warnings, "Whole sentences.")
+        .def_property_readonly("name",
+                               [](const OpenedCase& c) { return bundle_of(c).manifest.case_name; })
+        .def_property_readonly(
+            "labels", [](const OpenedCase& c) { return bundle_of(c).labels; },
+            "List of Label; an index in truth arrays is an index into it, 0 is outside the body.")
+        .def_property_readonly("exercises", [](const OpenedCase& c) { return c.exercises; })
+        .def(
+            "exercise",
+            [](const OpenedCase& c, const std::string& name) {
+                return value_of(exercise_named(c, name));
+            },
+            "name"_a = "", "By name; the first by default.")
+        .def_property_readonly(
+            "size",
+            [](const OpenedCase& c) {
+                const Int3 s = bundle_of(c).grid.size;
+                return py::make_tuple(s.x, s.y, s.z);
+            },
+            "Voxels along x, y, z.")
+        .def_property_readonly("voxel_mm",
+                               [](const OpenedCase& c) { return bundle_of(c).grid.spacing_mm.x; })
+        .def_property_readonly(
+            "origin_mm", [](const OpenedCase& c) { return array_of(bundle_of(c).grid.origin_mm); },
+            "Centre of voxel (0, 0, 0), frame `mannequin`; shape (3,).")
+        .def("label_volume", label_volume,
+             "Every voxel's own label: uint8 array of shape (z, y, x), a copy.")
+        .def("labels_at", labels_at, "points"_a,
+             "Label indices at points (n, 3), mm, frame `mannequin`, at rest, with the surfaces "
+             "inside voxels as pictures show them.")
+        .def("skin_point", skin_point, "near"_a, "direction"_a, "reach_mm"_a = 60.0,
+             "Skin point (3,) on the line through `near` along `direction`, or None.")
+        .def("skin_normal", skin_normal, "point"_a, "radius_mm"_a = 12.0,
+             "Outward unit normal (3,) of the skin, averaged over a ball, or None.")
+        .def("_score", score_text, "session"_a, "exercise"_a = py::none())
+        .def("__repr__", [](const OpenedCase& c) {
+            return "<sonocase.Case " + c.path + (c.closed ? ", closed>" : ">");
+        });
+    module.def("read_session", read_session, "path"_a,
+               "Poses, times and frame numbers of a recorded session, as a dict of arrays.");
+}
+
+}  // namespace sonocase::python

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include <pybind11/stl.h>
+
+#include <atomic>
+#include <limits>
+#include <optional>
+
+#include "bindings.h"
+#include "formats/files/machine_file.h"
+#include "frame_renderer.h"
+#include "truth_values.h"
+
+namespace sonocase::python {
+namespace {
+
+using Bytes = py::array_t<std::uint8_t, py::array::c_style>;
+
+// One at a time: raises where another thread is inside.
+class Turn {
+  public:
+    explicit Turn(std::atomic<bool>& busy) : busy_(busy) {
+        if (busy_.exchange(true))
+            throw std::runtime_error(
+                "renderer: in use by another thread; give each thread a Renderer of its own, or "
+                "use render_batch(threads=...)");
+    }
+    ~Turn() { busy_ = false; }
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+  private:
+    std::atomic<bool>& busy_;
+};
+
+class PyRenderer {
+  public:
+    explicit PyRenderer(std::unique_ptr<FrameRenderer> renderer) : renderer_(std::move(renderer)) {}
+
+    const FrameRenderer& inner() const { return *renderer_; }
+    py::ssize_t width() const { return renderer_->options().width_px; }
+    py::ssize_t height() const { return renderer_->options().height_px; }
+    bool contact() const { return contact_; }
+
+    py::object render(py::handle pose,
+                      py::handle needle,
+                      double time_s,
+                      std::int64_t frame,
+                      double gain_db,
+                      py::object out) {
+        FrameTask task;
+        task.input.mannequin_from_probe = rigid_from(pose, "pose");
+        set_needle(needle, task.input);
+        set_scalars(time_s, frame, gain_db, task.input);
+        py::object picture = out.is_none() ? py::object(Bytes({height(), width()}))
+                                           : checked_out(out, {height(), width()});
+        task.pixels = {static_cast<Bytes&>(picture).mutable_data(),
+                       static_cast<std::size_t>(width() * height())};
+        const Turn turn(busy_);
+        check(usable(renderer_->opened()));
+        {
+            const py::gil_scoped_release free_to_run;
+            renderer_->render(task);
+        }
+        check(usable(renderer_->opened()));
+        contact_ = task.status != runtime::FrameStatus::no_contact;
+        last_ = task.input;
+        return picture;
+    }
+
+    // The last frame's: (planes, facts).
+    py::tuple truth(const std::vector<std::string>& names) {
+        FrameTask task;
+        task.input = last();
+        const TruthArrays arrays = TruthArrays::make(names, -1, height(), width());
+        task.planes = arrays.planes(0, static_cast<std::size_t>(width() * height()));
+        const Turn turn(busy_);
+        check(usable(renderer_->opened()));
+        check(renderer_->prepare_truth());
+        {
+            const py::gil_scoped_release free_to_run;
+            renderer_->describe(task);
+        }
+        check(usable(renderer_->opened()));
+        return py::make_tuple(arrays, facts_of(task.truth, renderer_->opened().bundle->labels,
+                                               renderer_->exercise()));
+    }
+
+    py::object render_batch(py::handle poses,
+                            py::handle needles,
+                            py::handle times_s,
+                            std::int64_t first_frame,
+                            double gain_db,
+                            py::object out,
+                            int threads,
+                            const std::optional<std::vector<std::string>>& truth) {
+        if (threads < 1 || threads > 256) throw py::value_error("threads: give 1 to 256");
+        std::vector<FrameTask> tasks = batch_tasks(poses, needles, times_s, first_frame, gain_db);
+        const auto count = static_cast<py::ssize_t>(tasks.size());
+        py::object pictures = out.is_none() ? py::object(Bytes({count, height(), width()}))
+                                            : checked_out(out, {count, height(), width()});
+        std::uint8_t* to = static_cast<Bytes&>(pictures).mutable_data();
+        const auto area = static_cast<std::size_t>(width() * height());
+        TruthArrays arrays;
+        if (truth) arrays = TruthArrays::make(*truth, count, height(), width());
+        for (std::size_t n = 0; n < tasks.size(); ++n) {
+            tasks[n].pixels = {to + n * area, area};
+            tasks[n].wants_truth = truth.has_value();
+            tasks[n].planes = arrays.planes(n, area);
+        }
+        const Turn turn(busy_);
+        check(usable(renderer_->opened()));
+        std::optional<Result<bool>> whole;
+        {
+            const py::gil_scoped_release free_to_run;
+            whole = renderer_->render_all(tasks, threads, [] {
+                const py::gil_scoped_acquire hold;
+                return PyErr_CheckSignals() != 0;
+            });
+        }
+        if (!value_of(*whole)) throw py::error_already_set();  // Ctrl-C, as Python's own exception
+        check(usable(renderer_->opened()));
+        if (!tasks.empty()) last_ = tasks.back().input;
+        if (!truth) return pictures;
+        py::list facts;
+        for (const FrameTask& task : tasks)
+            facts.append(
+                facts_of(task.truth, renderer_->opened().bundle->labels, renderer_->exercise()));
+        return py::make_tuple(pictures, arrays, facts);
+    }
+
+    const runtime::FrameInput& last() const {
+        if (!last_) throw std::runtime_error("renderer: no frame has been rendered yet");
+        return *last_;
+    }
+
+  private:
+    static void set_scalars(double time_s,
+                            std::int64_t frame,
+                            double gain_db,
+                            runtime::FrameInput& input) {
+        if (!std::isfinite(time_s)) throw py::value_error("time_s: not finite");
+        if (!std::isfinite(gain_db)) throw py::value_error("gain_db: not finite");
+        if (frame < 0 || frame > std::numeric_limits<std::uint32_t>::max())
+            throw py::value_error("frame: give 0 to 2^32 - 1");
+        input.time_s = time_s;
+        input.frame = static_cast<std::uint32_t>(frame);
+        input.settings.gain_db = gain_db;
+    }
+
+    static py::object checked_out(const py::object& out, const std::vector<py::ssize_t>& shape) {
+        if (!py::isinstance<Bytes>(out))
+            throw py::type_error("out: give a C-contiguous array of dtype uint8");
+        const Bytes a = py::reinterpret_borrow<Bytes>(out);
+        bool fits = a.ndim() == static_cast<py::ssize_t>(shape.size());
+        std::string wanted;
+        for (std::size_t i = 0; i < shape.size(); ++i) {
+            fits = fits && a.shape(static_cast<py::ssize_t>(i)) == shape[i];
+            wanted += (i > 0 ? ", " : "") + std::to_string(shape[i]);
+        }
+        if (!fits) throw py::value_error("out: give an array of shape (" + wanted + ")");
+        if (!a.writeable()) throw py::value_error("out: the array is read-only");
+        return out;
+    }
+
+    std::vector<FrameTask> batch_tasks(py::handle poses,
+                                       py::handle needles,
+                                       py::handle times_s,
+                                       std::int64_t first_frame,
+                                       double gain_db) const {
+        using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+        const py::array a = numbers_from(poses, "poses");
+        if (a.ndim() != 3 || a.shape(1) != 4 || a.shape(2) != 4)
+            throw py::value_error("poses: give an array of shape (n, 4, 4), rigid motions in mm");
+        const Doubles rows(a);
+        std::vector<FrameTask> tasks(static_cast<std::size_t>(rows.shape(0)));
+        std::optional<Doubles> times;
+        if (!times_s.is_none()) {
+            times = Doubles(numbers_from(times_s, "times_s"));
+            if (times->ndim() != 1 || times->shape(0) != rows.shape(0))
+                throw py::value_error("times_s: give one number per pose");
+        }
+        py::sequence needle_of;
+        if (!needles.is_none()) {
+            needle_of = py::reinterpret_borrow<py::sequence>(needles);
+            if (!PySequence_Check(needles.ptr()) ||
+                py::len(needle_of) != static_cast<std::size_t>(rows.shape(0)))
+                throw py::value_error("needles: give one per pose; None for no needle");
+        }
+        for (std::size_t n = 0; n < tasks.size(); ++n) {
+            runtime::FrameInput& input = tasks[n].input;
+            input.mannequin_from_probe = rigid_from(rows.data(static_cast<py::ssize_t>(n)),
+                                                    "poses[" + std::to_string(n) + "]");
+            if (!needles.is_none()) set_needle(py::object(needle_of[n]), input);
+            set_scalars(times ? times->at(static_cast<py::ssize_t>(n)) : 0,
+                        first_frame + static_cast<std::int64_t>(n), gain_db, input);
+        }
+        return tasks;
+    }
+
+    std::unique_ptr<FrameRenderer> renderer_;
+    std::atomic<bool> busy_{false};
+    bool contact_ = true;
+    std::optional<runtime::FrameInput> last_;
+};
+
+// What the arguments ask for.
+std::unique_ptr<PyRenderer> make_renderer(const std::shared_ptr<OpenedCase>& opened,
+                                          const py::object& exercise,
+                                          const std::optional<Probe>& probe,
+                                          const std::string& model,
+                                          const std::string& machine,
+                                          const py::object& effects,
+                                          std::pair<int, int> size,
+                                          std::uint32_t seed,
+                                          const std::string& kind) {
+    check(usable(*opened));
+    Exercise chosen;
+    if (py::isinstance<Exercise>(exercise)) {
+        chosen = py::cast<Exercise>(exercise);
+    } else if (exercise.is_none() || py::isinstance<py::str>(exercise)) {
+        chosen = value_of(exercise_named(
+            *opened, exercise.is_none() ? std::string() : py::cast<std::string>(exercise)));
+    } else {
+        throw py::type_error("exercise: give a name or an Exercise");
+    }
+    if (probe) chosen.probe = *probe;
+    runtime::RenderOptions options;
+    const std::string wanted = model.empty() ? chosen.model : model;
+    if (wanted != "paper" && wanted != "physical")
+        throw py::value_error("model: no model " + wanted + "; give physical or paper");
+    options.model = wanted == "paper" ? runtime::ImageModel::paper : runtime::ImageModel::physical;
+    if (kind != "fast" && kind != "reference")
+        throw py::value_error("renderer: no renderer " + kind + "; give fast or reference");
+    options.kind = kind == "fast" ? runtime::RendererKind::fast : runtime::RendererKind::reference;
+    options.width_px = size.first;
+    options.height_px = size.second;
+    options.seed = seed;
+    if (effects.is_none()) {
+        options.effects = chosen.effects;
+    } else if (py::isinstance<py::str>(effects)) {
+        options.effects = {py::cast<std::string>(effects)};
+    } else {
+        options.effects = py::cast<std::vector<std::string>>(effects);
+    }
+    const py::gil_scoped_release free_to_run;
+    if (!machine.empty()) options.machine = value_of(load_machine(machine));
+    return std::make_unique<PyRenderer>(value_of(FrameRenderer::create(opened, chosen, options)));
+}
+
+}  // namespace
+
+void bind_renderer(py::module_& module) {
+    py::class_<PyRenderer>(module, "Renderer", "Renders frames of a case, as sonoplay does.")
+        .def(py::init(&make_renderer), "case"_a, "exercise"_a = py::none(), "probe"_a = py::none(),
+             py::kw_only(), "model"_a = "", "machine"_a = "", "effects"_a = py::none(),
+             "size"_a = std::pair<int, int>(512, 512), "seed"_a = 1u, "renderer"_a = "fast",
+             "exercise: a name or an Exercise, the case's first by default; probe: instead of the "
+             "exercise's; model, machine, effects: as on sonoplay's command line, by default the "
+             "exercise's; size: (width, height) in pixels; seed: of the noise.")
+        .def("render", &PyRenderer::render, "pose"_a, "needle"_a = py::none(), "time_s"_a = 0.0,
+             py::kw_only(), "frame"_a = 0, "gain_db"_a = 0.0, "out"_a = py::none(),
+             "One frame: uint8 array (height, width). pose: mannequin_from_probe, 4 x 4, mm. "
+             "needle: None, mannequin_from_needle (4 x 4; tip at the origin, z from hub to tip), "
+             "or (tip, direction). time_s: drives breathing and pulse. frame: seeds the noise; "
+             "sonoplay counts 0, 1, 2, ... out: written to instead of a new array.")
+        .def("render_batch", &PyRenderer::render_batch, "poses"_a, "needles"_a = py::none(),
+             "times_s"_a = py::none(), py::kw_only(), "first_frame"_a = 0, "gain_db"_a = 0.0,
+             "out"_a = py::none(), "threads"_a = 1, "truth"_a = py::none(),
+             "Many frames: uint8 array (n, height, width). poses: (n, 4, 4). needles: a sequence "
+             "of what render() takes. Frame i has number first_frame + i. The pixels do not "
+             "depend on `threads`. truth: names of planes; then (pictures, TruthPlanes, list of "
+             "facts) is returned. Ctrl-C raises KeyboardInterrupt after the frames in hand.")
+        .def("truth", &PyRenderer::truth,
+             "planes"_a = std::vector<std::string>{"labels", "needle", "shadowed", "skin_depth_mm"},
+             "What the last frame shows: (TruthPlanes, facts). facts: a dict of `visible` organs "
+             "with their areas, `targets` with their distances, the needle's `tip`, `contact`.")
+        .def_property_readonly("contact", &PyRenderer::contact,
+                               "Whether the probe of the last render() touched the skin.")
+        .def_property_readonly(
+            "size", [](const PyRenderer& r) { return py::make_tuple(r.width(), r.height()); })
+        .def_property_readonly("exercise", [](const PyRenderer& r) { return r.inner().exercise(); })
+        .def_property_readonly(
+            "mm_per_px",
+            [](const PyRenderer& r) { return r.inner().engine().renderer().layout().mm_per_px; })
+        .def_property_readonly(
+            "origin_px",
+            [](const PyRenderer& r) {
+                const auto layout = r.inner().engine().renderer().layout();
+                return py::make_tuple(layout.origin_x_px, layout.origin_y_px);
+            },
+            "Pixel (u, v) of the middle of the probe's face: x_mm = (u - u0) * mm_per_px, "
+            "z_mm = (v - v0) * mm_per_px in the frame `probe`.");
+    module.def("simd_targets", &runtime::simd_targets,
+               "Names of the instruction sets of this machine and build, best first.");
+}
+
+}  // namespace sonocase::python

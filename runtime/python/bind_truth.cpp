@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include <cmath>
+#include <string>
+
+#include "bindings.h"
+#include "truth_values.h"
+
+namespace sonocase::python {
+namespace {
+
+template <class T>
+std::span<T> plane_of(const py::object& array, std::size_t n, std::size_t area) {
+    if (array.is_none()) return {};
+    auto values = py::reinterpret_borrow<py::array_t<T>>(array);
+    return {values.mutable_data() + n * area, area};
+}
+
+py::list organs_of(const runtime::FrameTruth& truth, const std::vector<Label>& labels) {
+    py::list organs;
+    for (std::size_t i = 1; i < labels.size(); ++i) {
+        if (truth.pixels_of_label[i] == 0) continue;
+        organs.append(
+            py::dict("index"_a = i, "name"_a = labels[i].name,
+                     "area_mm2"_a = truth.pixels_of_label[i] * truth.mm2_per_px,
+                     "shadowed_mm2"_a = truth.shadowed_pixels_of_label[i] * truth.mm2_per_px));
+    }
+    return organs;
+}
+
+py::list targets_of(const runtime::FrameTruth& truth, const Exercise& exercise) {
+    py::list targets;
+    for (std::size_t i = 0; i < truth.targets.size(); ++i) {
+        const runtime::TargetTruth& target = truth.targets[i];
+        targets.append(py::dict("name"_a = exercise.targets[i].name,
+                                "centre_mm"_a = array_of(target.centre),
+                                "plane_mm"_a = target.plane_mm, "in_image"_a = target.in_image,
+                                "tip_mm"_a = target.tip_mm));
+    }
+    return targets;
+}
+
+}  // namespace
+
+TruthArrays TruthArrays::make(const std::vector<std::string>& names,
+                              py::ssize_t count,
+                              py::ssize_t height,
+                              py::ssize_t width) {
+    TruthArrays arrays;
+    std::vector<py::ssize_t> shape{height, width};
+    if (count >= 0) shape.insert(shape.begin(), count);
+    for (const std::string& name : names) {
+        if (name == "labels") {
+            arrays.labels = py::array_t<std::uint8_t>(shape);
+        } else if (name == "needle") {
+            arrays.needle = py::array_t<std::uint8_t>(shape);
+        } else if (name == "shadowed") {
+            arrays.shadowed = py::array_t<std::uint8_t>(shape);
+        } else if (name == "skin_depth_mm") {
+            arrays.skin_depth_mm = py::array_t<float>(shape);
+        } else {
+            throw py::value_error("truth: no plane " + name +
+                                  "; give labels, needle, shadowed or skin_depth_mm");
+        }
+    }
+    if (!arrays.shadowed.is_none() && arrays.labels.is_none())
+        throw py::value_error("truth: shadowed is found from the labels; ask for both");
+    return arrays;
+}
+
+runtime::TruthPlanes TruthArrays::planes(std::size_t n, std::size_t area) const {
+    return {plane_of<std::uint8_t>(labels, n, area), plane_of<std::uint8_t>(needle, n, area),
+            plane_of<std::uint8_t>(shadowed, n, area), plane_of<float>(skin_depth_mm, n, area)};
+}
+
+py::dict facts_of(const runtime::FrameTruth& truth,
+                  const std::vector<Label>& labels,
+                  const Exercise& exercise) {
+    py::dict facts(
+        "time_s"_a = truth.time_s, "mannequin_from_probe"_a = array_of(truth.mannequin_from_probe),
+        "contact"_a = truth.beams > 0 ? static_cast<double>(truth.beams_touching) / truth.beams : 0,
+        "visible"_a = organs_of(truth, labels), "targets"_a = targets_of(truth, exercise),
+        "tip"_a = py::none());
+    if (truth.has_needle) {
+        facts["tip"] =
+            py::dict("probe_mm"_a = array_of(truth.tip_probe), "in_plane"_a = truth.tip_in_plane,
+                     "label"_a = truth.tip_label, "shaft_in_image_mm"_a = truth.needle_in_image_mm);
+    }
+    return facts;
+}
+
+// The arrays and facts of one frame, or of a batch.
+void bind_truth(py::module_& module) {
+    py::class_<TruthArrays>(module, "TruthPlanes",
+                            "What each pixel shows: arrays (height, width), or (n, height, width) "
+                            "of a batch; None where not asked for.")
+        .def_readonly("labels", &TruthArrays::labels,
+                      "uint8, index into Case.labels; 0: outside the body or the scanned area.")
+        .def_readonly("needle", &TruthArrays::needle, "uint8; 0: none, 1: shaft, 2: tip.")
+        .def_readonly("shadowed", &TruthArrays::shadowed,
+                      "uint8; 1: the beam met bone or gas before it came here.")
+        .def_readonly("skin_depth_mm", &TruthArrays::skin_depth_mm,
+                      "float32, along the beam from the skin; NaN outside the scanned area.");
+}
+
+}  // namespace sonocase::python

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The parts of the module, in the order in which module.cpp adds them.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace sonocase::python {
+
+void bind_exercise(pybind11::module_& module);  // Probe, Needle, Target, Exercise
+void bind_case(pybind11::module_& module);      // Label, Case
+void bind_truth(pybind11::module_& module);     // Truth
+void bind_renderer(pybind11::module_& module);  // Renderer, simd_targets, effect_names
+
+}  // namespace sonocase::python

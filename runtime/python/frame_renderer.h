@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Frames as `sonoplay --headless` renders them, one at a time or many on several threads. Nothing
+// here knows Python.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "opened_case.h"
+#include "runtime/engine/scan_engine.h"
+#include "runtime/imaging/truth/frame_truth.h"
+
+namespace sonocase::python {
+
+// Where one frame of a batch goes.
+struct FrameTask {
+    runtime::FrameInput input;
+    std::span<std::uint8_t> pixels;  // # width * height
+    runtime::FrameStatus status = runtime::FrameStatus::rendered;
+    // Where truth is asked for.
+    bool wants_truth = false;
+    runtime::TruthPlanes planes;
+    runtime::FrameTruth truth;
+};
+
+class FrameRenderer {
+  public:
+    // Errors: those of ScanEngine::create.
+    static Result<std::unique_ptr<FrameRenderer>> create(std::shared_ptr<OpenedCase> opened,
+                                                         const Exercise& exercise,
+                                                         const runtime::RenderOptions& options);
+
+    void render(FrameTask& task);
+    // Before the first frame with truth. Errors: those of TruthRenderer::create.
+    Status prepare_truth();
+    // Of a frame that was rendered before.
+    void describe(FrameTask& task);
+    // Renders all, with truth where tasks want it, on `threads` threads, the caller's included;
+    // each has an engine of its own, which is kept for the next time. interrupted: asked by the
+    // caller's thread every now and then; true ends the batch, and false is returned. Errors: an
+    // engine cannot be made.
+    Result<bool> render_all(std::span<FrameTask> tasks,
+                            int threads,
+                            const std::function<bool()>& interrupted);
+
+    const OpenedCase& opened() const { return *opened_; }
+    const Exercise& exercise() const { return exercise_; }
+    const runtime::RenderOptions& options() const { return options_; }
+    const runtime::ScanEngine& engine() const { return workers_.front()->engine; }
+
+  private:
+    FrameRenderer(std::shared_ptr<OpenedCase> opened,
+                  const Exercise& exercise,
+                  const runtime::RenderOptions& options)
+        : opened_(std::move(opened)), exercise_(exercise), options_(options) {}
+    // A thread's own: a renderer is for one thread at a time.
+    struct Worker {
+        explicit Worker(runtime::ScanEngine e) : engine(std::move(e)) {}
+        runtime::ScanEngine engine;
+        std::unique_ptr<runtime::TruthRenderer> truth;  // null until asked for
+    };
+    Status add_worker();
+    Status add_truth(Worker& worker);
+    static void render_with(Worker& worker, FrameTask& task);
+
+    std::shared_ptr<OpenedCase> opened_;
+    Exercise exercise_;
+    runtime::RenderOptions options_;
+    std::vector<std::unique_ptr<Worker>> workers_;  // at least one
+};
+
+}  // namespace sonocase::python

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ultrasound frames, labels and scores of case bundles.
+
+    import sonocase
+    case = sonocase.Case.open("real-torso.sonocase")
+    renderer = sonocase.Renderer(case, exercise="liver-biopsy", size=(512, 512))
+    picture = renderer.render(pose)             # uint8, (height, width)
+
+Millimetres, seconds, radians; right-handed frames; poses are 4 x 4 arrays `mannequin_from_probe`
+(x along the face, y across it, z into the body). Failures of the outside world raise
+`sonocase.Error` with one line that says what, where and what was expected.
+"""
+
+from . import _core
+from . import pose as Pose
+from ._core import (
+    Case,
+    Error,
+    Exercise,
+    Label,
+    Needle,
+    Probe,
+    Renderer,
+    Target,
+    __version__,
+    simd_targets,
+)
+
+__all__ = [
+    "Case", "Error", "Exercise", "Label", "Needle", "Pose", "Probe", "Renderer", "Target",
+    "__version__", "read_session", "score", "simd_targets",
+]
+
+
+def read_session(path):
+    """Poses, times and frame numbers of a recorded session, as a dict of arrays."""
+    import os
+
+    return _core.read_session(os.fspath(path))
+
+
+def score(case, session, exercise=None):
+    """Scores of a recorded session, as a dict: docs/metrics.md defines each.
+
+    case      the Case that it was recorded on
+    session   path of the recording
+    exercise  an Exercise; by default the one that the recording names
+    """
+    import json
+    import os
+
+    return json.loads(case._score(os.fspath(session), exercise))
+
+
+def __getattr__(name):
+    # Only programs that use environments pay for them.
+    if name == "environment":
+        import importlib
+
+        return importlib.import_module(".environment", __name__)
+    raise AttributeError(f"module 'sonocase' has no attribute {name!r}")

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A small case and a session on it, written by core_write_case: a round body with a vessel."""
+
+import os
+import pathlib
+import subprocess
+
+import pytest
+
+import sonocase
+
+BIN = pathlib.Path(os.environ["SONOCASE_BIN"])
+
+
+@pytest.fixture(scope="session")
+def small(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("case")
+    case, session = folder / "small.sonocase", folder / "small.igs.mha"
+    subprocess.run([BIN / "core_write_case", case, session], check=True)
+    return case, session
+
+
+@pytest.fixture
+def case(small):
+    return sonocase.Case.open(small[0])
+
+
+@pytest.fixture
+def pose(case):
+    return sonocase.Pose.on_skin(case, case.exercise().start_pose[:3, 3], (0, 0, -1))
+
+
+@pytest.fixture(scope="session")
+def sonoplay():
+    def run(*arguments, check=True):
+        return subprocess.run([BIN / "sonoplay", *map(str, arguments)], check=check,
+                              capture_output=True, text=True)
+    return run

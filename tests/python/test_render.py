@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames: the same pixels as the player's, in any order, by any number of threads."""
+
+import json
+import pathlib
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+import sonocase
+from pictures import read_png
+
+
+def test_nothing_of_the_pipeline_or_the_window_is_linked():
+    module = pathlib.Path(sys.modules["sonocase._core"].__file__)
+    libraries = subprocess.run(["ldd", module], capture_output=True, text=True, check=True).stdout
+    for name in ("ITK", "vtk", "openvdb", "ceres", "OpenImageIO", "tbb", "glfw", "imgui", "GL.so",
+                 "sqlite"):
+        assert name not in libraries
+
+
+@pytest.mark.parametrize("model", ["physical", "paper"])
+def test_pixels_are_those_of_the_player(small, sonoplay, tmp_path, model):
+    path, _ = small
+    sonoplay(path, "--headless", "--frames", 5, "--size", "200x160", "--model", model,
+             "--out", tmp_path / "out", "--truth", tmp_path / "truth")
+    case = sonocase.Case.open(path)
+    renderer = sonocase.Renderer(case, model=model, size=(200, 160))
+    for line in (tmp_path / "truth" / "truth.jsonl").read_text().splitlines():
+        truth = json.loads(line)
+        needle = truth["mannequin_from_needle"]
+        picture = renderer.render(truth["mannequin_from_probe"], needle, truth["time_s"],
+                                  frame=truth["frame"])
+        np.testing.assert_array_equal(
+            picture, read_png(tmp_path / "out" / f"frame_{truth['frame']:05d}.png"))
+
+
+def test_a_batch_is_the_frames_one_by_one(case, pose):
+    renderer = sonocase.Renderer(case, model="physical", size=(96, 80))
+    poses = np.stack([sonocase.Pose.moved(pose, (0, 2.0 * n, 0)) for n in range(9)])
+    times = np.linspace(0, 3, 9)
+    needle = sonocase.Pose.looking((20, 0, 43), (-8, 0, -9))
+    needles = [needle if n % 2 else None for n in range(9)]
+    alone = np.stack([renderer.render(poses[n], needles[n], times[n], frame=5 + n)
+                      for n in range(9)])
+    for threads in (1, 2, 7):
+        batch = renderer.render_batch(poses, needles, times, first_frame=5, threads=threads)
+        np.testing.assert_array_equal(batch, alone)
+    out = np.empty((9, 80, 96), np.uint8)
+    assert renderer.render_batch(poses, needles, times, first_frame=5, out=out) is out
+    np.testing.assert_array_equal(out, alone)
+
+
+def test_a_needle_is_a_pose_or_a_tip_and_a_direction(case, pose):
+    renderer = sonocase.Renderer(case, size=(96, 80))
+    needle = sonocase.Pose.looking((20, 0, 43), (-8, 0, -9))
+    with_pose = renderer.render(pose, needle)
+    np.testing.assert_array_equal(with_pose, renderer.render(pose, (needle[:3, 3], needle[:3, 2])))
+    assert (with_pose != renderer.render(pose)).any()
+
+
+def test_poses_of_any_layout_give_the_same_picture(case, pose):
+    renderer = sonocase.Renderer(case, size=(64, 64))
+    picture = renderer.render(pose)
+    np.testing.assert_array_equal(picture, renderer.render(np.asfortranarray(pose)))
+    np.testing.assert_array_equal(picture, renderer.render(pose.tolist()))
+    wide = np.zeros((8, 8))
+    wide[::2, ::2] = pose
+    np.testing.assert_array_equal(picture, renderer.render(wide[::2, ::2]))
+
+
+def test_the_seed_and_the_frame_change_the_noise_alone(case, pose):
+    first = sonocase.Renderer(case, model="paper", size=(64, 64))
+    second = sonocase.Renderer(case, model="paper", size=(64, 64), seed=2)
+    assert (first.render(pose) != second.render(pose)).any()
+    assert (first.render(pose) != first.render(pose, frame=1)).any()
+    np.testing.assert_array_equal(first.render(pose), first.render(pose, frame=0))
+
+
+def test_contact_is_said(case, pose):
+    renderer = sonocase.Renderer(case, size=(64, 64))
+    renderer.render(pose)
+    assert renderer.contact
+    renderer.render(sonocase.Pose.moved(pose, (0, 0, -60)))
+    assert not renderer.contact
+
+
+def bad_poses():
+    mirror = np.diag([-1.0, 1, 1, 1])
+    skewed = np.eye(4)
+    skewed[0, 1] = 0.1
+    holed = np.eye(4)
+    holed[0, 3] = np.nan
+    flat = np.eye(4)
+    flat[3, 0] = 1
+    return [(mirror, ValueError, "mirrors"), (skewed, ValueError, "not a rigid motion"),
+            (2 * np.eye(4), ValueError, "last row"), (holed, ValueError, "not finite"),
+            (flat, ValueError, "last row"), (np.eye(3), ValueError, "(3, 3)"),
+            (np.zeros((1, 4, 4)), ValueError, "(1, 4, 4)"), ("pose", TypeError, "<U4"),
+            (None, TypeError, "pose"), (np.eye(4, dtype=complex), TypeError, "complex"),
+            ([[1, 2], [3]], (TypeError, ValueError), "pose")]
+
+
+@pytest.mark.parametrize("bad, error, words", bad_poses())
+def test_a_bad_pose_is_an_exception_of_one_line(case, bad, error, words):
+    renderer = sonocase.Renderer(case, size=(32, 32))
+    with pytest.raises(error) as raised:
+        renderer.render(bad)
+    assert words in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_the_bad_pose_of_a_batch_is_named(case, pose):
+    renderer = sonocase.Renderer(case, size=(32, 32))
+    poses = np.stack([pose] * 4)
+    poses[2, 0, 0] = 7
+    with pytest.raises(ValueError, match=r"poses\[2\]"):
+        renderer.render_batch(poses)
+    assert renderer.render_batch(np.empty((0, 4, 4))).shape == (0, 32, 32)
+    with pytest.raises(ValueError, match="one number per pose"):
+        renderer.render_batch(np.stack([pose] * 3), times_s=[0, 1])
+    with pytest.raises(ValueError, match="one per pose"):
+        renderer.render_batch(np.stack([pose] * 3), [None])
+
+
+@pytest.mark.parametrize("out, error", [
+    (np.zeros((32, 32)), TypeError), (np.zeros((32, 31), np.uint8), ValueError),
+    (np.zeros((64, 64), np.uint8)[::2, ::2], TypeError), ([0], TypeError)])
+def test_out_is_checked(case, pose, out, error):
+    renderer = sonocase.Renderer(case, size=(32, 32))
+    with pytest.raises(error, match="out"):
+        renderer.render(pose, out=out)
+    locked = np.zeros((32, 32), np.uint8)
+    locked.flags.writeable = False
+    with pytest.raises(ValueError, match="read-only"):
+        renderer.render(pose, out=locked)
+
+
+def test_errors_are_those_of_the_programs(small, sonoplay, tmp_path):
+    missing = tmp_path / "missing.sonocase"
+    with pytest.raises(sonocase.Error) as raised:
+        sonocase.Case.open(missing)
+    assert f"sonoplay: {raised.value}\n" == sonoplay(missing, "--headless", check=False).stderr
+    cut = tmp_path / "cut.sonocase"
+    cut.write_bytes(small[0].read_bytes()[:1000])
+    with pytest.raises(sonocase.Error) as raised:
+        sonocase.Case.open(cut)
+    assert f"sonoplay: {raised.value}\n" == sonoplay(cut, "--headless", check=False).stderr
+    case = sonocase.Case.open(small[0])
+    with pytest.raises(sonocase.Error, match="no exercise named nothing"):
+        sonocase.Renderer(case, "nothing")
+    for wrong, words in ((dict(effects="glitter"), "glitter"), (dict(size=(0, 5)), "0 x 5"),
+                         (dict(machine="toaster"), "toaster")):
+        with pytest.raises(sonocase.Error, match=words):
+            sonocase.Renderer(case, **wrong)
+    with pytest.raises(ValueError, match="no model"):
+        sonocase.Renderer(case, model="oil")
+    with pytest.raises(TypeError):
+        sonocase.Renderer(case, exercise=3)
+
+
+def test_a_closed_case_says_so(small, pose):
+    with sonocase.Case.open(small[0]) as case:
+        renderer = sonocase.Renderer(case, size=(32, 32))
+    assert case.closed
+    for use in (lambda: renderer.render(pose), lambda: case.labels, lambda: case.label_volume(),
+                lambda: renderer.render_batch(np.stack([pose] * 2)),
+                lambda: sonocase.Renderer(case)):
+        with pytest.raises(sonocase.Error, match="the case is closed"):
+            use()
+
+
+def test_one_renderer_is_for_one_thread_at_a_time(case, pose):
+    renderer = sonocase.Renderer(case, size=(512, 512))
+    poses = np.stack([pose] * 200)
+    started, refused = threading.Event(), []
+
+    def batch():
+        started.set()
+        renderer.render_batch(poses)
+
+    thread = threading.Thread(target=batch)
+    thread.start()
+    started.wait()
+    while thread.is_alive() and not refused:
+        try:
+            renderer.render(pose)
+        except RuntimeError as error:
+            refused.append(str(error))
+    thread.join()
+    assert refused and "another thread" in refused[0]
+    renderer.render(pose)  # and works again
+
+
+def test_ctrl_c_ends_a_batch(small):
+    """In a process of its own, whose interrupt comes from another thread while a batch runs."""
+    program = f"""
+import _thread, sys, threading
+import numpy as np, sonocase
+case = sonocase.Case.open({str(small[0])!r})
+pose = sonocase.Pose.on_skin(case, case.exercise().start_pose[:3, 3], (0, 0, -1))
+renderer = sonocase.Renderer(case, size=(256, 256))
+poses = np.stack([pose] * 100000)
+out = np.empty((1, 256, 256), np.uint8)
+try:
+    threading.Thread(target=_thread.interrupt_main, daemon=True).start()
+    for n in range(100000):
+        renderer.render_batch(poses[:64], threads=2)
+except KeyboardInterrupt:
+    renderer.render(pose)
+    sys.exit(42)
+"""
+    assert subprocess.run([sys.executable, "-c", program]).returncode == 42
