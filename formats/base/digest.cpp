@@ -5,7 +5,7 @@
 #include <xxhash.h>
 
 #include <array>
-#include <bit>
+#include <cstring>
 
 namespace sonocase {
 namespace {
@@ -70,7 +70,10 @@ Digest& Digest::add(std::int64_t value) {
 }
 
 Digest& Digest::add(double value) {
-    return add(std::bit_cast<std::int64_t>(value == 0 ? 0.0 : value));
+    const double plain = value == 0 ? 0.0 : value;
+    std::int64_t bits = 0;  // libc++ 13 has no std::bit_cast
+    std::memcpy(&bits, &plain, sizeof(bits));
+    return add(bits);
 }
 
 std::string Digest::hex() const {

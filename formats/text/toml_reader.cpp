@@ -48,8 +48,12 @@ std::string plain_text_of(const toml::node& node) {
     if (node.is_boolean()) return **node.as_boolean() ? "true" : "false";
     if (node.is_integer()) return std::to_string(**node.as_integer());
     if (node.is_floating_point()) {
+#ifdef __cpp_lib_to_chars
         char text[32];
         return {text, std::to_chars(text, text + sizeof text, **node.as_floating_point()).ptr};
+#else
+        return number_text(**node.as_floating_point());
+#endif
     }
     return node.is_array() ? "(a list)" : node.is_table() ? "(a table)" : "(a date or time)";
 }

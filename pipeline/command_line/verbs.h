@@ -42,6 +42,7 @@ int verb_map(int argc, char** argv);
 int verb_pack(int argc, char** argv);
 int verb_plan(int argc, char** argv);
 int verb_progress(int argc, char** argv);
+int verb_publish(int argc, char** argv);
 int verb_register(int argc, char** argv);
 int verb_review(int argc, char** argv);
 int verb_score(int argc, char** argv);

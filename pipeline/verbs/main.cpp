@@ -36,6 +36,7 @@ const std::vector<Verb>& hand_written_verbs() {
         {kCase, "inspect", "show what a bundle holds", verb_inspect, ""},
         {kCase, "validate", "check a bundle", verb_validate, ""},
         {kCase, "export", "unpack a bundle for other tools", verb_export, ""},
+        {kCase, "publish", "write a site that plays cases in browsers", verb_publish, ""},
         {kCase, "look", "measure how a real machine draws", verb_look, ""},
         {kCase, "tradeoff", "sweep accuracy against time", verb_tradeoff, ""},
         {kStage, "align", "lay the skin on the mannequin rigidly", verb_align, "surface"},

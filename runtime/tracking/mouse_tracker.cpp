@@ -134,6 +134,14 @@ bool MouseTracker::place_needle_beside_probe(double offset_mm, bool in_plane) {
     return true;
 }
 
+bool MouseTracker::take_needle(const Probe& probe, bool in_plane) {
+    // Far enough that hand and probe do not meet.
+    const double half = probe.shape == ProbeShape::curvilinear
+                            ? probe.radius_mm * std::sin(0.5 * probe.field_of_view_rad)
+                            : 0.5 * probe.width_mm;
+    return place_needle_beside_probe(in_plane ? half + 8 : 18, in_plane);
+}
+
 void MouseTracker::aim_needle(double in_plane_rad, double out_of_plane_rad) {
     if (!has_needle_) return;
     const Rigid probe = mannequin_from_probe();
@@ -141,6 +149,14 @@ void MouseTracker::aim_needle(double in_plane_rad, double out_of_plane_rad) {
                          rotation_about(probe.rotation.column(0), out_of_plane_rad);
     shaft_ = normalized(turn * shaft_);
     changed_ = true;
+}
+
+bool MouseTracker::aim_needle_at(Point3 p) {
+    const Vector3 way = p - entry_;
+    if (!has_needle_ || dot(way, -normal_) <= 0) return false;
+    shaft_ = normalized(way);
+    changed_ = true;
+    return true;
 }
 
 void MouseTracker::advance_needle(double mm) {

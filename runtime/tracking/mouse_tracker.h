@@ -36,7 +36,12 @@ class MouseTracker final : public Tracker {
     bool place_needle(Point3 near, Vector3 towards);
     // Beside the probe, `offset_mm` from the middle of the face along x (in plane) or along y.
     bool place_needle_beside_probe(double offset_mm, bool in_plane);
+    // As above, just beside the probe's face.
+    bool take_needle(const Probe& probe, bool in_plane);
     void aim_needle(double in_plane_rad, double out_of_plane_rad);  // about the probe's y and x
+    // Turns the needle about its entry, so that pushed on it meets p. False: no needle, or p lies
+    // outside the skin at the entry.
+    bool aim_needle_at(Point3 p);
     void advance_needle(double mm);  // > 0 deeper; limited to [-60 mm, the needle's length]
     void slide_needle(double lateral_mm, double elevation_mm);  // only while it is not inserted
     void withdraw_needle();                                     // takes it away

@@ -3,6 +3,8 @@
 // Times of the passes of a frame, by the clock that the program brings. Changes no pixel.
 #pragma once
 
+#include <atomic>
+
 #include "runtime/imaging/host/host.h"
 
 namespace sonocase::runtime {
@@ -24,5 +26,12 @@ class PassTimer {
     Clock clock_;
     double last_s_;
 };
+
+// sum += ms, from any thread. std::atomic<double>::fetch_add, which libc++ 13 lacks.
+inline void add_ms(std::atomic<double>& sum, double ms) {
+    double before = sum.load();
+    while (!sum.compare_exchange_weak(before, before + ms)) {
+    }
+}
 
 }  // namespace sonocase::runtime

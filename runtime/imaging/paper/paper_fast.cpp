@@ -217,7 +217,7 @@ double PaperFast::sample_beams(const PaperFrame& frame, bool keep_all) {
         if (needle && strip.prepare_block(*frame.needle, g, line, keep_all, row, k0, k1)) {
             PassTimer timer(context_.clock);
             draw_paper_needle(context_.simd, b, row, k0, k1);
-            needle_ms.fetch_add(timer.lap_ms());
+            add_ms(needle_ms, timer.lap_ms());
             needle_met.store(true, std::memory_order_relaxed);
         }
         b.with_shadow = frame.effects.shadow && ((met & PaperBlock::kCastsShadow) != 0 || keep_all);

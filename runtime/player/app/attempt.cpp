@@ -3,47 +3,13 @@
 #include "runtime/player/app/attempt.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 
 #include "runtime/player/app/user_folders.h"
 #include "runtime/player/session/clock.h"
+#include "runtime/recording/event_words.h"
 
 namespace sonocase::runtime {
-namespace {
-
-std::string words_of(const LiveEvent& event,
-                     const Exercise& exercise,
-                     const std::vector<Label>& labels) {
-    const auto target = [&] {
-        const auto i = static_cast<std::size_t>(event.index);
-        return event.index >= 0 && i < exercise.targets.size() && !exercise.targets[i].name.empty()
-                   ? exercise.targets[i].name
-                   : "target " + std::to_string(event.index + 1);
-    };
-    const auto label = [&] {
-        const auto i = static_cast<std::size_t>(event.index);
-        std::string name = event.index >= 0 && i < labels.size() ? labels[i].name : "a structure";
-        std::replace(name.begin(), name.end(), '_', ' ');
-        return name;
-    };
-    char number[32];
-    std::snprintf(number, sizeof number, "%.0f mm", event.value);
-    switch (event.kind) {
-        case LiveEventKind::needle_entry: return "Insertion " + std::to_string(event.index);
-        case LiveEventKind::needle_exit: return std::string("Needle out, was ") + number + " deep";
-        case LiveEventKind::target_hit: return "Reached: " + target();
-        case LiveEventKind::target_scanned: return "Seen: " + target();
-        case LiveEventKind::no_go_contact: return "Touched: " + label();
-        case LiveEventKind::no_go_left: return "Left: " + label();
-        case LiveEventKind::needle_lost: return "Needle lost";
-        case LiveEventKind::probe_lost: return "Probe lost";
-        default: return {};
-    }
-}
-
-}  // namespace
-
 std::string new_session_path(const std::string& case_name, const std::string& exercise) {
     if (data_folder().empty()) return {};
     const std::string folder = data_folder() + "/sessions";
@@ -82,7 +48,7 @@ void Attempt::observe(const FrameRecord& record,
     view_.tip_in_view = monitor.tip_in_view();
     view_.in_no_go = monitor.in_no_go();
     for (const LiveEvent& event : events) {
-        std::string words = words_of(event, exercise_, open_->bundle->labels);
+        std::string words = event_words(event, exercise_, open_->bundle->labels);
         if (words.empty()) continue;
         view_.events.push_back(std::move(words));
         if (view_.events.size() > 6) view_.events.erase(view_.events.begin());

@@ -3,7 +3,6 @@
 #include "runtime/player/app/tracker_steps.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <iterator>
 
@@ -83,11 +82,7 @@ void toggle_needle(TrackerInUse& tracker, const Probe& probe, bool in_plane, Not
         tracker.mouse->withdraw_needle();
         return;
     }
-    // Beside the face: far enough that hand and probe do not meet.
-    const double half = probe.shape == ProbeShape::curvilinear
-                            ? probe.radius_mm * std::sin(0.5 * probe.field_of_view_rad)
-                            : 0.5 * probe.width_mm;
-    if (!tracker.mouse->place_needle_beside_probe(in_plane ? half + 8 : 18, in_plane))
+    if (!tracker.mouse->take_needle(probe, in_plane))
         notices.news("There is no skin beside the probe to put the needle on.");
 }
 

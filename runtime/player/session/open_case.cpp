@@ -2,35 +2,15 @@
 
 #include "runtime/player/session/open_case.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "formats/base/digest.h"
+#include "formats/exercise/case_exercises.h"
 #include "formats/files/atomic_file.h"
 #include "formats/files/bundle_file.h"
 #include "formats/scoring/anatomy.h"
 
 namespace sonocase::runtime {
-
-Exercise free_scan(const CaseBundle& bundle) {
-    Exercise exercise;
-    exercise.name = "free-scan";
-    exercise.title = "Free scan";
-    exercise.description = "Look around: slide, rock and fan the probe and name what you see.";
-    exercise.kind = "scan";
-    const Box3 box = bundle.grid.bounds();
-    exercise.start_probe = box.centre();
-    exercise.start_probe.y = box.upper.y;
-    exercise.start_beam = {0, -1, 0};
-    // The front of the body faces +y or +z, depending on the mannequin: the shorter way through the
-    // body wins.
-    if (box.extent().z < box.extent().y) {
-        exercise.start_probe = box.centre();
-        exercise.start_probe.z = box.upper.z;
-        exercise.start_beam = {0, 0, -1};
-    }
-    return exercise;
-}
 
 Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
     Result<StreamedBundle> bundle = open_bundle(path);
@@ -38,17 +18,10 @@ Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
     auto open = std::make_unique<OpenCase>();
     open->path = path;
     open->bundle = std::move(*bundle);
-    for (const EmbeddedExercise& embedded : open->bundle->exercises) {
-        Result<Exercise> exercise = parse_exercise(embedded.toml, path + ":" + embedded.name);
-        if (!exercise) {
-            open->warnings.push_back(exercise.error().message());
-            continue;
-        }
-        if (exercise->name.empty()) exercise->name = embedded.name;
-        open->exercises.push_back(std::move(*exercise));
-        open->exercise_digests.push_back(digest_of(embedded.toml));
-    }
-    if (open->exercises.empty()) open->exercises.push_back(free_scan(*open->bundle));
+    CaseExercises found = exercises_of(*open->bundle, path);
+    open->exercises = std::move(found.exercises);
+    open->warnings = std::move(found.warnings);
+    open->exercise_digests = std::move(found.digests);
     return open;
 }
 

@@ -38,7 +38,4 @@ Result<int> find_exercise(const OpenCase& open, const std::string& name);
 // that cannot be read or parsed, or that is written for a CT, and targets outside the body.
 Result<int> choose_or_load_exercise(OpenCase& open, const std::string& name_or_file);
 
-// A free scan of any bundle: the probe starts above the middle of its volume.
-Exercise free_scan(const CaseBundle& bundle);
-
 }  // namespace sonocase::runtime

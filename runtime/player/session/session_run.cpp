@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <optional>
 
-#include "formats/base/digest.h"
 #include "formats/files/recording_file.h"
 #include "formats/progress_book/progress_book.h"
 #include "formats/threads/thread_jobs.h"
+#include "runtime/recording/session_header.h"
 #include "runtime/recording/settings_text.h"
 
 namespace sonocase::runtime {
@@ -43,12 +43,6 @@ std::optional<LiveEventKind> tissue_event(NeedleEventKind kind) {
     return {};
 }
 
-std::string joined(const std::vector<std::string>& words) {
-    std::string out;
-    for (const std::string& word : words) out += (out.empty() ? "" : ",") + word;
-    return out;
-}
-
 }  // namespace
 
 SessionRun::SessionRun(const OpenCase& open, const ScanEngine& engine, std::string path)
@@ -68,24 +62,15 @@ Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
                                                       double now_s,
                                                       std::uint64_t attempt_seed) {
     std::unique_ptr<SessionRun> run(new SessionRun(open, engine, path));
-    SessionHeader header;
-    header.case_name = open.bundle->manifest.case_name;
-    header.exercise = run->exercise_.name;
+    SessionHeader header =
+        session_header(*open.bundle, run->exercise_, engine.render_options(), trainee, started);
+    // An exercise from a file of its own is not in the bundle.
     for (std::size_t i = 0; i < std::min(open.exercises.size(), open.exercise_digests.size());
          ++i) {
         if (open.exercises[i].name == header.exercise)
             header.exercise_digest = open.exercise_digests[i];
     }
     if (attempt_seed != 0) header.attempt = "seed=" + std::to_string(attempt_seed);
-    header.trainee = trainee;
-    header.started = started;
-    header.program = "sonoplay";
-    const RenderOptions& render = engine.render_options();
-    header.render =
-        std::string("model=") + (render.model == ImageModel::paper ? "paper" : "physical") +
-        (render.machine ? " machine=" + render.machine->name : "") +
-        " effects=" + joined(render.effects) + " size=" + std::to_string(render.width_px) + "x" +
-        std::to_string(render.height_px) + " seed=" + std::to_string(render.seed);
     auto recorder = SessionRecorder::start(path, header, run->exercise_, open.bundle->labels);
     if (!recorder) return recorder.error();
     run->recorder_ = std::move(*recorder);

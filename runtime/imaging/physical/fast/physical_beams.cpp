@@ -352,7 +352,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         if (needle && strip.prepare_block(*f.needle, g, line, keep_all, row, k0, k1)) {
             PassTimer timer(context_.clock);
             draw_physical_needle(context_.simd, b, row, k0, k1);
-            needle_ms.fetch_add(timer.lap_ms());
+            add_ms(needle_ms, timer.lap_ms());
             met.needle.store(true, std::memory_order_relaxed);
         }
         tail_from_[static_cast<std::size_t>(block)] = b.tail_from;

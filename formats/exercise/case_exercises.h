@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The exercises that a case brings, ready to be played.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
+
+namespace sonocase {
+
+struct CaseExercises {
+    std::vector<Exercise> exercises;    // at least one: without any, a free scan
+    std::vector<std::string> digests;   // of each exercise's text; a free scan has none
+    std::vector<std::string> warnings;  // one per exercise that does not parse and is left out
+};
+
+// where: names the bundle in warnings.
+CaseExercises exercises_of(const CaseBundle& bundle, const std::string& where);
+
+// A free scan of any bundle: the probe starts above the middle of its volume.
+Exercise free_scan(const CaseBundle& bundle);
+
+}  // namespace sonocase

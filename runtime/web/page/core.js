@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The program (program/exports.cpp) as an object: memory, texts and calls. Runs in pages and in
+// node alike.
+
+// In the order of exports.cpp.
+export const kValues = [
+    'side', 'mm_per_px', 'origin_x', 'origin_y', 'depth_mm', 'focus_mm', 'model_paper', 'has_needle',
+    'needle_depth_mm', 'in_contact', 'press_mm', 'kept', 'attempt', 'seconds', 'insertions',
+    'targets_hit', 'tip_to_target_mm', 'tip_in_view', 'in_no_go', 'damaged', 'frame_number'];
+
+export const kFrameStatus = ['rendered', 'held_bad_pose', 'no_contact'];
+
+// The smallest module that uses a 128-bit instruction: (func (result v128) i32.const 0 i8x16.splat ...).
+const kSimdModule = new Uint8Array([
+    0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15,
+    253, 98, 11]);
+export const has_simd = () => WebAssembly.validate(kSimdModule);
+
+// A failure in words for the person at the page.
+export class PlainError extends Error {}
+
+export class Core {
+    // program: a WebAssembly.Module
+    static async create(program) {
+        const core = new Core();
+        const unused = () => 0;
+        const imports = {
+            env: {emscripten_notify_memory_growth: unused},
+            wasi_snapshot_preview1: {
+                proc_exit: () => { throw new PlainError('The program stopped. Load the page again.'); },
+                fd_write: (fd, parts, count, written) => core.write(parts, count, written),
+                fd_close: unused, fd_seek: unused, fd_read: unused,
+                environ_sizes_get: (count, bytes) => {
+                    new DataView(core.memory.buffer).setUint32(count, 0, true);
+                    new DataView(core.memory.buffer).setUint32(bytes, 0, true);
+                    return 0;
+                },
+                environ_get: unused,
+                clock_time_get: unused,
+            },
+        };
+        for (const {module, name} of WebAssembly.Module.imports(program)) {
+            if (!imports[module] || !imports[module][name])
+                throw new PlainError(`The program asks for ${module}.${name}, which this page lacks.`);
+        }
+        const instance = await WebAssembly.instantiate(program, imports);
+        core.calls = instance.exports;
+        core.memory = instance.exports.memory;
+        instance.exports._initialize?.();
+        if (core.calls.value_count() !== kValues.length)
+            throw new PlainError('Page and program are of different versions. Load the page again.');
+        return core;
+    }
+
+    write(parts, count, written) {  // what the standard library says before it aborts
+        const view = new DataView(this.memory.buffer);
+        let bytes = 0, text = '';
+        for (let n = 0; n < count; ++n) {
+            const from = view.getUint32(parts + 8 * n, true), size = view.getUint32(parts + 8 * n + 4, true);
+            text += this.words(from, size);
+            bytes += size;
+        }
+        view.setUint32(written, bytes, true);
+        console.error(text);
+        return 0;
+    }
+
+    words(from, size) {
+        return new TextDecoder().decode(new Uint8Array(this.memory.buffer, from, size).slice());
+    }
+    text() { return this.words(this.calls.text(), this.calls.text_bytes()); }
+    set_text(text) {
+        const bytes = new TextEncoder().encode(text);
+        new Uint8Array(this.memory.buffer).set(bytes, this.calls.reserve_text(bytes.length));
+    }
+    // Throws the program's own sentence where a call failed.
+    check(done) {
+        if (!done) throw new PlainError(this.text());
+    }
+
+    // Where a case of `bytes` bytes goes; fill it with put() and then open().
+    reserve(bytes) {
+        this.case_at = this.calls.reserve(bytes);
+        this.case_bytes = bytes;
+    }
+    put(bytes, at) { new Uint8Array(this.memory.buffer).set(bytes, this.case_at + at); }
+    digest_of(at, count) {
+        this.calls.digest(this.case_at + at, count);
+        return this.text();
+    }
+    // Returns the description of page_json.h.
+    open(name) {
+        this.set_text(name);
+        this.check(this.calls.open_case());
+        return JSON.parse(this.text());
+    }
+    choose_exercise(index, side_px) { this.check(this.calls.choose_exercise(index, side_px)); }
+    set_image({model_paper, side, depth_mm, focus_mm}) {
+        this.check(this.calls.set_image(model_paper ? 1 : 0, side, depth_mm, focus_mm));
+    }
+    set_console({gain_db, range_db, tgc_db, flip}) {
+        this.calls.set_console(gain_db, range_db, flip ? 1 : 0);
+        tgc_db.forEach((db, n) => this.calls.set_tgc(n, db));
+    }
+    values() {
+        const from = new Float64Array(this.memory.buffer, this.calls.values(), kValues.length);
+        return Object.fromEntries(kValues.map((name, n) => [name, from[n]]));
+    }
+    // A view of the program's memory, valid until the next call.
+    pixels() {
+        const side = this.values().side;
+        return new Uint8Array(this.memory.buffer, this.calls.pixels(), side * side);
+    }
+    // probe, needle: 16 numbers, rows of mannequin_from_...; needle may be null.
+    put_tools(now_s, probe, needle) {
+        const to = new Float64Array(this.memory.buffer, this.calls.poses(), 32);
+        to.set(probe);
+        if (needle) to.set(needle, 16);
+        this.calls.put_tools(now_s, needle ? 1 : 0);
+    }
+    start_attempt(trainee, started, now_s) {
+        this.set_text(`${trainee.replaceAll('\n', ' ')}\n${started}`);
+        this.calls.start_attempt(now_s);
+    }
+    attempt_words() {
+        this.calls.attempt_words();
+        return this.text().split('\n').filter((line) => line);
+    }
+    // {recording: bytes of an .igs.mha, score_text: JSON text, score}
+    finish_attempt() {
+        this.check(this.calls.finish_attempt());
+        const recording = new Uint8Array(this.memory.buffer, this.calls.bytes(), this.calls.bytes_count()).slice();
+        const score_text = this.text();
+        return {recording, score_text, score: JSON.parse(score_text)};
+    }
+    metric_words() {
+        this.calls.metric_words();
+        return JSON.parse(this.text());
+    }
+}

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The picture on its canvas, and what lies over it: depth scale, mark of the probe, measurements.
+
+const kWhite = '#e6e8ea';
+
+export class Picture {
+    constructor(box, canvas, overlay) {
+        this.box = box;
+        this.canvas = canvas;
+        this.overlay = overlay;
+        this.context = canvas.getContext('2d', {alpha: false});
+        this.grey = new Uint32Array(256).map((unused, grey) => 0xff000000 | grey << 16 | grey << 8 | grey);
+    }
+
+    // Side of the picture in pixels of the screen, for the room that the page has.
+    wanted_side() {
+        const {width, height} = this.box.getBoundingClientRect();
+        const side = Math.min(width - 44, height) * devicePixelRatio;
+        return Math.max(256, Math.min(1024, 64 * Math.round(side / 64)));
+    }
+    place(side) {
+        const {width, height} = this.box.getBoundingClientRect();
+        this.css_side = Math.max(64, Math.min(width - 44, height));
+        if (this.canvas.width !== side) this.canvas.width = this.canvas.height = side;
+        this.image = this.context.createImageData(side, side);
+        this.words = new Uint32Array(this.image.data.buffer);
+        // In the middle, but for the room that the depth scale takes.
+        this.left = Math.max(0, Math.min((width - this.css_side) / 2, width - this.css_side - 44));
+        this.canvas.style.left = `${this.left}px`;
+        this.canvas.style.width = this.canvas.style.height = `${this.css_side}px`;
+        this.overlay.width = Math.round(width * devicePixelRatio);
+        this.overlay.height = Math.round(height * devicePixelRatio);
+        this.overlay.style.width = `${width}px`;
+        this.overlay.style.height = `${height}px`;
+    }
+
+    // pixels: # side * side, grey
+    show(pixels) {
+        const {words, grey} = this;
+        for (let n = 0; n < pixels.length; ++n) words[n] = grey[pixels[n]];
+        this.context.putImageData(this.image, 0, 0);
+    }
+
+    // Place in the scan plane, mm from the middle of the face, of a point of the window.
+    mm_at(client_x, client_y, values) {
+        const rect = this.canvas.getBoundingClientRect(), px = values.side / rect.width;
+        return {x: ((client_x - rect.left) * px - values.origin_x) * values.mm_per_px,
+                z: ((client_y - rect.top) * px - values.origin_y) * values.mm_per_px};
+    }
+
+    draw_over(values, flip, measures, first) {
+        const to = this.overlay.getContext('2d'), ratio = devicePixelRatio;
+        to.setTransform(ratio, 0, 0, ratio, 0, 0);
+        const height = this.overlay.height / ratio;
+        to.clearRect(0, 0, this.overlay.width / ratio, height);
+        const per_mm = this.css_side / values.side / values.mm_per_px;
+        const left = this.left, top = (height - this.css_side) / 2;
+        const x_of = (mm) => left + values.origin_x * this.css_side / values.side + mm * per_mm;
+        const y_of = (mm) => top + values.origin_y * this.css_side / values.side + mm * per_mm;
+        to.font = '13px "Noto Sans", "DejaVu Sans", sans-serif';
+        const line = (x0, y0, x1, y1) => {
+            for (const [style, thick] of [['#000', 3], [kWhite, 1]]) {
+                to.strokeStyle = style;
+                to.lineWidth = thick;
+                to.beginPath();
+                to.moveTo(x0, y0);
+                to.lineTo(x1, y1);
+                to.stroke();
+            }
+        };
+        const say = (text, x, y) => {
+            to.strokeStyle = '#000';
+            to.lineWidth = 3;
+            to.strokeText(text, x, y);
+            to.fillStyle = kWhite;
+            to.fillText(text, x, y);
+        };
+        const scale_x = left + this.css_side + 6;
+        for (let cm = 0; cm * 10 <= values.depth_mm + 0.5; ++cm) {
+            const y = y_of(10 * cm), is_fifth = cm % 5 === 0;
+            line(scale_x, y, scale_x + (is_fifth ? 10 : 5), y);
+            if (is_fifth && cm > 0) say(String(cm), scale_x + 14, y + 4);
+        }
+        say('S', x_of(flip * -0.22 * values.depth_mm), top + 14);
+        measures.forEach(([a, b], n) => {
+            line(x_of(flip * a.x), y_of(a.z), x_of(flip * b.x), y_of(b.z));
+            const mm = Math.hypot(a.x - b.x, a.z - b.z);
+            say(`${n + 1}: ${mm.toFixed(1)} mm`, left + 8, top + this.css_side - 10 - 18 * (measures.length - 1 - n));
+        });
+        if (first) line(x_of(flip * first.x) - 5, y_of(first.z), x_of(flip * first.x) + 5, y_of(first.z));
+    }
+}

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Attempts that are kept in this browser, and statements to a learning record store.
+
+const kDatabase = 'sonocase', kStore = 'attempts';
+
+function request(work) {
+    return new Promise((done, failed) => {
+        work.onsuccess = () => done(work.result);
+        work.onerror = () => failed(work.error);
+    });
+}
+
+// null: this browser keeps nothing here.
+let database;
+async function open_database() {
+    if (database !== undefined) return database;
+    try {
+        const opening = indexedDB.open(kDatabase, 1);
+        opening.onupgradeneeded = () => opening.result.createObjectStore(kStore, {keyPath: 'id', autoIncrement: true});
+        database = await request(opening);
+    } catch {
+        database = null;
+    }
+    return database;
+}
+
+async function store(mode) {
+    const open = await open_database();
+    return open && open.transaction(kStore, mode).objectStore(kStore);
+}
+
+// attempt: {started, trainee, case_name, exercise, title, passed, recording, score_text}.
+// false: nothing was kept.
+export async function keep_attempt(attempt) {
+    try {
+        const to = await store('readwrite');
+        if (to) await request(to.add(attempt));
+        return Boolean(to);
+    } catch {
+        return false;
+    }
+}
+export async function kept_attempts() {
+    const from = await store('readonly');
+    return from ? request(from.getAll()) : null;
+}
+export async function remove_attempts() {
+    const from = await store('readwrite');
+    if (from) await request(from.clear());
+}
+
+export function trainee() {
+    try {
+        return localStorage.getItem('trainee') ?? '';
+    } catch {
+        return '';
+    }
+}
+export function set_trainee(name) {
+    try {
+        localStorage.setItem('trainee', name);
+    } catch {
+        // No storage: the name holds for this visit alone, in the field itself.
+    }
+}
+
+export function download(name, type, content) {
+    const link = document.createElement('a');
+    link.href = URL.createObjectURL(new Blob([content], {type}));
+    link.download = name;
+    link.click();
+    URL.revokeObjectURL(link.href);
+}
+
+// "20260131T120000Z_case_exercise", as the desktop names recordings.
+export function file_name(attempt) {
+    const stamp = attempt.started.replaceAll(/[:-]/g, '');
+    return `${stamp}_${attempt.case_name}_${attempt.exercise}`.replaceAll(/[^0-9A-Za-z_-]/g, '-');
+}
+
+const kVerb = {
+    attempted: 'http://adlnet.gov/expapi/verbs/attempted',
+    completed: 'http://adlnet.gov/expapi/verbs/completed',
+    scored: 'http://adlnet.gov/expapi/verbs/scored',
+};
+
+// An xAPI 1.0.3 statement. verb: of kVerb. score: of score_json, or null.
+export function statement(verb, attempt, score) {
+    const site = location.href.replace(/[?#].*/, '');
+    const out = {
+        actor: {objectType: 'Agent', account: {homePage: site, name: attempt.trainee || 'nobody'}},
+        verb: {id: kVerb[verb], display: {en: verb}},
+        object: {
+            objectType: 'Activity',
+            id: `${site}?case=${encodeURIComponent(attempt.case_name)}&exercise=${encodeURIComponent(attempt.exercise)}`,
+            definition: {name: {en: attempt.title}, type: 'http://adlnet.gov/expapi/activities/simulation'},
+        },
+        timestamp: attempt.started,
+    };
+    if (score) {
+        const extensions = {};
+        for (const [name, value] of Object.entries(score.metrics)) extensions[`${site}#${name}`] = value;
+        out.result = {success: score.passed, completion: true, extensions};
+        const marks = score.pass_marks;
+        if (verb === 'scored' && marks.length)
+            out.result.score = {scaled: marks.filter((mark) => mark.passed).length / marks.length};
+    }
+    return out;
+}
+
+// endpoint: the store's address, "" for none. Returns true if the store took them all.
+export async function send_statements(endpoint, statements) {
+    if (!endpoint) return true;
+    try {
+        const response = await fetch(`${endpoint.replace(/\/$/, '')}/statements`, {
+            method: 'POST',
+            credentials: 'include',
+            headers: {'Content-Type': 'application/json', 'X-Experience-API-Version': '1.0.3'},
+            body: JSON.stringify(statements),
+        });
+        return response.ok;
+    } catch {
+        return false;
+    }
+}

@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The scanning page: picture, console, cine and attempts.
+import {Hands} from './hands.js';
+import {Picture} from './picture.js';
+
+const kIdleRate = 40;  // pictures per second while nothing moves: tissue breathes, noise changes
+const kSliders = 8;
+const $ = (id) => document.getElementById(id);
+const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+
+export class ScanPage {
+    // page: app.js, for what leads away from scanning
+    constructor(page) {
+        this.page = page;
+        this.picture = new Picture($('picture-box'), $('picture'), $('overlay'));
+        this.console = {gain_db: 0, range_db: 60, tgc_db: new Array(kSliders).fill(0), flip: false};
+        this.values = {};
+        this.measures = [];
+        this.frozen = false;
+        this.frames = 0;
+        this.make_sliders();
+        this.listen();
+        this.hands = new Hands(this, $('picture'));
+        new ResizeObserver(() => this.fit_later()).observe($('picture-box'));
+    }
+
+    make_sliders() {
+        for (let n = 0; n < kSliders; ++n) {
+            const slider = document.createElement('input');
+            Object.assign(slider, {type: 'range', min: -20, max: 20, step: 1, value: 0});
+            slider.setAttribute('aria-label', `Depth gain ${n + 1} of ${kSliders}, dB`);
+            slider.addEventListener('input', () => this.set_tgc(n, Number(slider.value)));
+            slider.addEventListener('dblclick', () => this.set_tgc(n, 0));
+            $('tgc').append(slider);
+        }
+    }
+
+    listen() {
+        const click = (id, what) => $(id).addEventListener('click', what);
+        click('freeze', () => this.freeze(!this.frozen));
+        click('needle', () => this.toggle_needle(true));
+        click('needle-across', () => this.toggle_needle(false));
+        click('probe-home', () => { this.core.calls.probe_home(); this.touched(); });
+        click('attempt', () => this.toggle_attempt());
+        click('level', () => this.level());
+        click('flip', () => this.flip());
+        click('measure', () => this.measure(!this.measuring));
+        click('save-picture', () => this.save_picture());
+        click('full-screen', () => this.full_screen());
+        $('cine').addEventListener('input', () => this.look_back(this.values.kept - 1 - Number($('cine').value)));
+        $('exercise').addEventListener('change', () => this.page.choose_exercise(Number($('exercise').value)));
+        $('model').addEventListener('change', () => this.choose_model($('model').value === 'paper'));
+        $('needle-depth').addEventListener('input', () => this.push_to(Number($('needle-depth').value)));
+        $('device-tilt').addEventListener('change', (e) => this.device_tilt(e.target));
+        this.number('depth', (cm) => this.set_image({depth_mm: 10 * cm}));
+        this.number('focus', (cm) => this.set_image({focus_mm: 10 * cm}));
+        this.number('gain', (db) => this.set_console({gain_db: db}));
+        this.number('range', (db) => this.set_console({range_db: db}));
+        document.addEventListener('visibilitychange', () => { this.last_s = undefined; });
+    }
+    number(id, use) {
+        const field = $(id);
+        field.addEventListener('change', () => {
+            const value = Number(field.value), good = field.value !== '' && field.checkValidity();
+            field.setAttribute('aria-invalid', String(!good));
+            if (good) use(value);
+            else this.notice(`${field.labels[0].textContent}: from ${field.min} to ${field.max}.`);
+        });
+    }
+
+    // core: a case and an exercise of it are open. description: of the case
+    show(core, description, exercise) {
+        this.core = core;
+        this.description = description;
+        this.frozen = false;
+        this.measures = [];
+        this.first_point = null;
+        this.measure(false);
+        const options = description.exercises.map((one, n) => new Option(one.title || one.name, n));
+        $('exercise').replaceChildren(...options);
+        $('exercise').value = exercise;
+        $('case-title').textContent = description.case_name;
+        $('task-words').textContent = description.exercises[exercise].description;
+        this.core.set_console(this.console);
+        this.values = core.values();
+        this.fit();
+        this.say_console();
+        this.last_s = undefined;
+        if (!this.running) {
+            this.running = true;
+            requestAnimationFrame((ms) => this.tick(ms));
+        }
+        this.touched();
+    }
+    hide() { this.running = false; }
+    shown() { return this.running && !$('scan').hidden; }
+    side() { return this.picture.wanted_side(); }
+
+    // The side follows the window once it has stopped changing.
+    fit_later() {
+        if (!this.shown()) return;
+        this.picture.place(this.values.side);
+        clearTimeout(this.fitting);
+        this.fitting = setTimeout(() => this.shown() && this.fit(), 150);
+    }
+    fit() {
+        const side = this.side();
+        if (side !== this.values.side) this.core.set_image({...this.values, side});
+        this.values = this.core.values();
+        this.picture.place(this.values.side);
+        this.touched();
+    }
+
+    tick(ms) {
+        if (!this.running) return;
+        requestAnimationFrame((next) => this.tick(next));
+        const now_s = ms / 1000;
+        // After an hour in the background the hands have not moved for an hour.
+        const seconds = Math.min(now_s - (this.last_s ?? now_s), 0.1);
+        this.last_s = now_s;
+        if (!document.querySelector('dialog[open]')) this.hands.step(seconds);
+        if (this.hands.held.size) this.moved = true;
+        if (this.playing) this.play(now_s);
+        if (this.frozen ? !this.moved : !this.moved && now_s - this.drawn_s < 0.98 / kIdleRate) return;
+        this.draw(now_s);
+    }
+    touched() { this.moved = true; }
+
+    draw(now_s) {
+        this.moved = false;
+        this.drawn_s = now_s;
+        const before = performance.now();
+        this.status = this.frozen ? this.core.calls.frame_again(this.back) : this.core.calls.frame(now_s);
+        this.values = this.core.values();
+        this.picture.show(this.core.pixels());
+        this.frame_ms = performance.now() - before;
+        this.picture.draw_over(this.values, this.flip_sign(), this.measures, this.first_point);
+        this.say();
+        if (++this.frames === 1) performance.mark('first-picture');
+        this.page.frame_shown();
+    }
+
+    say() {
+        const v = this.values, number = (x, digits, unit) => Number.isFinite(x) ? `${x.toFixed(digits)} ${unit}` : '–';
+        const put = (id, text) => { if ($(id).textContent !== text) $(id).textContent = text; };
+        const attempt = v.attempt === 1;
+        put('value-time', attempt ? minutes(v.seconds) : '–');
+        put('value-tip', attempt && v.has_needle ? number(v.tip_to_target_mm, 1, 'mm') : '–');
+        put('value-view', attempt && v.has_needle ? (v.tip_in_view ? 'Yes' : 'No') : '–');
+        put('value-punctures', attempt ? String(v.insertions) : '–');
+        put('value-depth', v.has_needle ? number(Math.max(v.needle_depth_mm, 0), 0, 'mm') : '–');
+        put('attempt', attempt ? 'Finish attempt' : 'Start attempt');
+        put('needle', v.has_needle ? 'Withdraw' : 'Needle');
+        $('needle-across').disabled = v.has_needle === 1;
+        $('recording').hidden = !attempt;
+        $('needle-depth').disabled = !v.has_needle;
+        if (document.activeElement !== $('needle-depth')) $('needle-depth').value = v.needle_depth_mm;
+        if (attempt && this.frames % 10 === 0) this.say_events();
+        const age = this.frozen ? this.core.calls.kept_age_s(this.back) : 0;
+        put('cine-words', this.frozen ? `FROZEN ${age.toFixed(1)} s ago` : 'Live, last 20 s');
+        $('cine').disabled = !this.frozen;
+        $('cine').max = Math.max(v.kept - 1, 0);
+        $('cine').value = Math.max(v.kept - 1, 0) - (this.back ?? 0);
+    }
+    say_events() {
+        const words = this.core.attempt_words();
+        if (words.join() === this.events_said) return;
+        this.events_said = words.join();
+        $('events').replaceChildren(...words.map((line) => Object.assign(document.createElement('li'), {textContent: line})));
+    }
+    say_console() {
+        $('depth').value = this.values.depth_mm / 10;
+        $('focus').value = this.values.focus_mm / 10;
+        $('gain').value = Math.round(this.console.gain_db * 10) / 10;
+        $('range').value = this.console.range_db;
+        $('model').value = this.values.model_paper ? 'paper' : 'physical';
+        for (const id of ['depth', 'focus', 'gain', 'range']) $(id).setAttribute('aria-invalid', 'false');
+        [...$('tgc').children].forEach((slider, n) => { slider.value = this.console.tgc_db[n]; });
+        $('flip').setAttribute('aria-pressed', String(this.console.flip));
+    }
+    notice(text) { $('bar-notice').textContent = text; }
+
+    set_image(change) {
+        const v = this.values;
+        const image = {model_paper: v.model_paper, side: v.side, depth_mm: v.depth_mm, focus_mm: v.focus_mm, ...change};
+        image.depth_mm = clamp(image.depth_mm, 30, 300);
+        image.focus_mm = clamp(image.focus_mm, 10, image.depth_mm);
+        try {
+            this.core.set_image(image);
+        } catch (error) {
+            this.notice(error.message);
+        }
+        this.freeze(false);
+        this.values = this.core.values();
+        this.say_console();
+    }
+    choose_model(paper) { this.set_image({model_paper: paper}); }
+    set_console(change) {
+        Object.assign(this.console, change);
+        this.core.set_console(this.console);
+        this.say_console();
+        this.touched();
+    }
+    set_tgc(slider, db) {
+        this.console.tgc_db[slider] = clamp(db, -20, 20);
+        this.set_console({});
+    }
+    level() { this.set_console({tgc_db: new Array(kSliders).fill(0)}); }
+    flip() { this.set_console({flip: !this.console.flip}); }
+    flip_sign() { return this.console.flip ? -1 : 1; }
+    mm_per_css_px() { return this.values.mm_per_px * this.values.side / this.picture.css_side; }
+
+    freeze(frozen) {
+        this.frozen = frozen && this.values.kept > 0;
+        this.back = 0;
+        this.playing = false;
+        $('freeze').textContent = this.frozen ? 'Live' : 'Freeze';
+        this.touched();
+    }
+    look_back(back) {
+        if (!this.frozen) this.freeze(true);
+        this.back = clamp(back, 0, Math.max(this.values.kept - 1, 0));
+        this.touched();
+    }
+    play(now_s) {
+        if (now_s - this.drawn_s < 0.98 / 60) return;
+        this.look_back(this.back > 0 ? this.back - 1 : this.values.kept - 1);
+    }
+
+    toggle_needle(in_plane) {
+        const calls = this.core.calls;
+        if (this.values.has_needle) calls.withdraw_needle();
+        else if (!calls.take_needle(in_plane ? 1 : 0)) this.notice('There is no skin beside the probe to put the needle on.');
+        this.touched();
+    }
+    needle_to(client_x, client_y) {
+        const at = this.picture.mm_at(client_x, client_y, this.values);
+        if (!this.core.calls.needle_to(this.flip_sign() * at.x, at.z))
+            this.notice('There is no skin beside the probe to put the needle on.');
+        this.touched();
+    }
+    push_to(mm) {
+        this.core.calls.advance_needle(mm - this.values.needle_depth_mm);
+        this.touched();
+    }
+    async device_tilt(box) {
+        if (box.checked && !await this.hands.use_tilt(true)) {
+            box.checked = false;
+            this.notice('This device does not tell its tilt, or you did not allow it.');
+        } else if (!box.checked) {
+            this.hands.use_tilt(false);
+        }
+    }
+
+    measure(on) {
+        this.measuring = on;
+        this.first_point = null;
+        $('measure').setAttribute('aria-pressed', String(on));
+        this.touched();
+    }
+    measure_at(client_x, client_y) {
+        const at = this.picture.mm_at(client_x, client_y, this.values);
+        at.x *= this.flip_sign();
+        if (this.first_point) {
+            this.measures = [...this.measures, [this.first_point, at]].slice(-2);
+            this.first_point = null;
+        } else {
+            this.first_point = at;
+        }
+        this.touched();
+    }
+    clear() {
+        this.measures = [];
+        this.first_point = null;
+        this.touched();
+    }
+    save_picture() {
+        $('picture').toBlob((blob) => this.page.download('sonocase.png', 'image/png', blob));
+    }
+    full_screen() {
+        if (document.fullscreenElement) document.exitFullscreen();
+        else document.documentElement.requestFullscreen?.().catch(() => this.notice('This browser does not allow full screen.'));
+    }
+
+    toggle_attempt() {
+        if (this.values.attempt) this.page.finish_attempt();
+        else this.page.start_attempt();
+    }
+
+    // One press of a key; true if it did something.
+    key(code, {shift}, repeated) {
+        const v = this.values;
+        const digit = [...this.hands.held].some((one) => /^Digit[1-8]$/.test(one));
+        const stepping = {
+            BracketLeft: () => this.set_image({depth_mm: v.depth_mm - 10}),
+            BracketRight: () => this.set_image({depth_mm: v.depth_mm + 10}),
+            Semicolon: () => this.set_image({focus_mm: v.focus_mm - 5}),
+            Quote: () => this.set_image({focus_mm: v.focus_mm + 5}),
+            Comma: () => digit || this.look_back((this.frozen ? this.back : 0) + 1),
+            Period: () => digit || this.look_back((this.frozen ? this.back : 0) - 1),
+        };
+        const once = {
+            Space: () => this.freeze(!this.frozen),
+            KeyP: () => { this.playing = this.frozen && !this.playing; },
+            KeyN: () => this.toggle_needle(!shift),
+            KeyM: () => this.measure(!this.measuring),
+            KeyC: () => this.clear(),
+            KeyF: () => this.flip(),
+            KeyB: () => this.toggle_attempt(),
+            Home: () => { this.core.calls.probe_home(); this.touched(); },
+            Digit0: () => this.level(),
+            F1: () => this.page.help(),
+            F2: () => this.page.to_cases(),
+            F5: () => this.page.choose_exercise(Number($('exercise').value) + (shift ? -1 : 1)),
+            F6: () => this.choose_model(!v.model_paper),
+            F11: () => this.full_screen(),
+            F12: () => this.save_picture(),
+        };
+        const act = stepping[code] ?? (repeated ? undefined : once[code]);
+        act?.();
+        return Boolean(act);
+    }
+    // Keys of the console that act while they are held.
+    held_console(seconds, axis, held) {
+        const gain = axis('Minus', 'Equal');
+        if (gain) this.set_console({gain_db: clamp(this.console.gain_db + 12 * gain * seconds, -30, 30)});
+        const digit = [...held].find((one) => /^Digit[1-8]$/.test(one)), by = axis('Comma', 'Period');
+        if (digit && by) {
+            const n = Number(digit.slice(5)) - 1;
+            this.set_tgc(n, this.console.tgc_db[n] + 12 * by * seconds);
+        }
+    }
+}
+
+export function minutes(seconds) {
+    const whole = Math.floor(seconds);
+    return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, '0')}`;
+}

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Service worker: after one visit the page works without a network. The program and the page come
+// from the cache and are renewed in the background of the next visit; cases are kept by source.js.
+const kCache = 'sonocase-page-@VERSION@';
+const kFiles = ['./', 'index.html', 'style.css', 'sonoplay.js', 'sonoplay.wasm', 'cases.json'];
+
+addEventListener('install', (e) => {
+    skipWaiting();
+    e.waitUntil(caches.open(kCache).then((cache) => cache.addAll(kFiles)));
+});
+addEventListener('activate', (e) => e.waitUntil((async () => {
+    for (const name of await caches.keys()) {
+        if (name.startsWith('sonocase-page-') && name !== kCache) await caches.delete(name);
+    }
+    await clients.claim();
+})()));
+addEventListener('fetch', (e) => {
+    const url = new URL(e.request.url);
+    if (e.request.method !== 'GET' || url.origin !== location.origin || url.pathname.endsWith('.sonocase')) return;
+    e.respondWith(answer(e.request, url));
+});
+
+async function answer(request, url) {
+    const cache = await caches.open(kCache);
+    const options = {ignoreSearch: request.mode === 'navigate'};
+    // The list may have new cases: the network first, where there is one.
+    if (url.pathname.endsWith('/cases.json')) {
+        try {
+            const fresh = await fetch(request);
+            if (fresh.ok) await cache.put(request, fresh.clone());
+            return fresh;
+        } catch {
+            return await cache.match(request) ?? Response.error();
+        }
+    }
+    const kept = await cache.match(request, options);
+    if (kept) return kept;
+    const response = await fetch(request);
+    if (response.ok) await cache.put(request, response.clone());
+    return response;
+}

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What the page shows about a case and its exercises, as JSON text.
+#pragma once
+
+#include <string>
+
+#include "runtime/web/page_player.h"
+
+namespace sonocase::runtime {
+
+// {"case_name", "exercises": [{"name", "title", "description", "kind", "difficulty", "targets":
+// [names], "pass_marks": [{"metric", "at_most", "at_least"}]}], "labels": [names], "warnings":
+// [texts]}; a limit that does not exist is null.
+std::string case_json(const PagePlayer& player);
+
+// [{"name", "group", "title", "unit"}] of every score, in the order of metric_table().
+std::string metric_words_json();
+
+}  // namespace sonocase::runtime

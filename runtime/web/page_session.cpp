@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/web/page_session.h"
+
+#include <optional>
+#include <span>
+
+#include "runtime/recording/event_words.h"
+#include "runtime/recording/session_header.h"
+#include "runtime/recording/settings_text.h"
+
+namespace sonocase::runtime {
+namespace {
+
+constexpr std::size_t kWords = 6;
+
+// As SessionRun tells them (runtime/player/session).
+std::optional<LiveEventKind> tissue_event(NeedleEventKind kind) {
+    switch (kind) {
+        case NeedleEventKind::puncture: return LiveEventKind::tissue_puncture;
+        case NeedleEventKind::posterior_wall: return LiveEventKind::posterior_wall;
+        case NeedleEventKind::stopped: return LiveEventKind::needle_stopped;
+        case NeedleEventKind::withdrawn: break;
+    }
+    return {};
+}
+
+bool same(const ImageSettings& a, const ImageSettings& b) {
+    return a.gain_db == b.gain_db && a.dynamic_range_db == b.dynamic_range_db &&
+           a.tgc_db == b.tgc_db && a.press_mm == b.press_mm &&
+           a.flip_left_right == b.flip_left_right;
+}
+
+}  // namespace
+
+PageSession::PageSession(const CaseBundle& bundle,
+                         const ScanEngine& engine,
+                         const std::string& trainee,
+                         const std::string& started)
+    : bundle_(bundle),
+      exercise_(engine.exercise()),
+      first_anatomy_(engine.anatomy()),
+      anatomy_(first_anatomy_),
+      monitor_(exercise_, first_anatomy_.get(), bundle.labels) {
+    session_.header = session_header(bundle, exercise_, engine.render_options(), trainee, started);
+}
+
+void PageSession::observe(const FrameRecord& record) {
+    const FrameInput& input = record.input;
+    SessionSample sample;
+    sample.time_s = input.time_s;
+    sample.frame = input.frame;
+    sample.probe_ok = record.tools.has_probe;
+    sample.needle_ok = record.tools.has_needle;
+    sample.mannequin_from_probe = record.tools.mannequin_from_probe;
+    sample.mannequin_from_needle = record.tools.mannequin_from_needle;
+    sample.mannequin_from_drawn = record.needle.mannequin_from_drawn;
+    if (session_.samples.empty() || !same(settings_, input.settings))
+        sample.settings = settings_text(input.settings);
+    settings_ = input.settings;
+    sample.has_press = record.press.solved;
+    sample.press = {record.press.force_n, record.press.pressure_kpa, record.press.vein_open};
+    monitor_.update(sample.time_s, sample.frame, sample.probe_ok, sample.mannequin_from_probe,
+                    sample.needle_ok, sample.mannequin_from_drawn);
+    for (int n = 0; n < record.puncture.event_count; ++n) {
+        const NeedleEvent& event = record.puncture.events[static_cast<std::size_t>(n)];
+        if (const auto kind = tissue_event(event.kind))
+            monitor_.report(*kind, event.layer, event.force_n);
+    }
+    const std::span<const LiveEvent> events = monitor_.events();
+    for (const LiveEvent& event : events) {
+        session_.events.push_back(session_event(event, exercise_, bundle_.labels));
+        std::string words = event_words(event, exercise_, bundle_.labels);
+        if (words.empty()) continue;
+        words_.push_back(std::move(words));
+        if (words_.size() > kWords) words_.erase(words_.begin());
+    }
+    session_.samples.push_back(std::move(sample));
+}
+
+double PageSession::seconds() const {
+    return session_.samples.empty() ? 0 : session_.samples.back().time_s;
+}
+
+Result<FinishedSession> PageSession::finish() const {
+    FinishedSession out;
+    out.recording = write_sequence(sequence_from_session(session_), SequenceForm::mha);
+    const auto sequence = read_sequence(out.recording, "recording");
+    if (!sequence) return sequence.error();
+    const auto session = session_from_sequence(*sequence, guess_names(*sequence), "recording");
+    if (!session) return session.error();
+    out.score = score_session(*session, exercise_, anatomy_.get(), bundle_.labels);
+    out.score_json = score_json(out.score, exercise_);
+    return out;
+}
+
+}  // namespace sonocase::runtime

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What the page calls: plain functions over one PagePlayer. Texts and bytes come back through
+// text() and bytes(), numbers that the page shows through values(). Functions that can fail return
+// 0 and leave the reason in text(). page/core.js is the other side.
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "formats/base/digest.h"
+#include "runtime/web/page_json.h"
+#include "runtime/web/page_player.h"
+
+#define SONOCASE_EXPORT(name) extern "C" __attribute__((export_name(#name)))
+
+using namespace sonocase;
+using namespace sonocase::runtime;
+
+namespace {
+
+// Order of values(); page/core.js names them in the same order.
+enum Value {
+    kSide,
+    kMmPerPx,
+    kOriginX,
+    kOriginY,
+    kDepthMm,
+    kFocusMm,
+    kModelPaper,
+    kHasNeedle,
+    kNeedleDepthMm,
+    kInContact,
+    kPressMm,
+    kKept,
+    kAttempt,
+    kSeconds,
+    kInsertions,
+    kTargetsHit,
+    kTipToTargetMm,
+    kTipInView,
+    kInNoGo,
+    kDamaged,
+    kFrameNumber,
+    kValueCount
+};
+
+// The page is single and so is its player: this file plays the part of main().
+struct Page {
+    RawVector<std::uint8_t> incoming;
+    std::unique_ptr<PagePlayer> player;
+    ImageSettings settings;
+    std::string text;
+    std::vector<std::uint8_t> bytes;
+    std::array<double, kValueCount> values{};
+    std::array<double, 32> poses{};
+};
+Page page;
+
+int answer(const Status& status) {
+    page.text = status ? std::string() : status.error().message();
+    return status ? 1 : 0;
+}
+
+Rigid rigid_at(const double* rows) {
+    Rigid out;
+    for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) out.rotation(r, c) = rows[4 * r + c];
+    out.translation = {rows[3], rows[7], rows[11]};
+    return out;
+}
+
+void fill_values() {
+    PagePlayer& p = *page.player;
+    const ScanEngine& engine = p.engine();
+    const Renderer::Layout layout = engine.renderer().layout();
+    auto& v = page.values;
+    v = {};
+    v[kSide] = p.image().side_px;
+    v[kMmPerPx] = layout.mm_per_px;
+    v[kOriginX] = layout.origin_x_px;
+    v[kOriginY] = layout.origin_y_px;
+    v[kDepthMm] = p.image().depth_mm;
+    v[kFocusMm] = p.image().focus_mm;
+    v[kModelPaper] = p.image().model == ImageModel::paper;
+    v[kHasNeedle] = engine.last().tools.has_needle;
+    v[kNeedleDepthMm] = p.hands().needle_depth_mm();
+    v[kInContact] = p.hands().in_contact();
+    v[kPressMm] = p.hands().press_mm();
+    v[kKept] = p.kept();
+    v[kDamaged] = p.bundle().blocks() && p.bundle().blocks()->damaged();
+    v[kFrameNumber] = engine.last().input.frame;
+    if (const PageSession* attempt = p.attempt()) {
+        const SessionMonitor& monitor = attempt->monitor();
+        v[kAttempt] = 1;
+        v[kSeconds] = attempt->seconds();
+        v[kInsertions] = monitor.insertions();
+        v[kTargetsHit] = monitor.targets_hit();
+        v[kTipToTargetMm] = monitor.tip_to_target_mm();
+        v[kTipInView] = monitor.tip_in_view();
+        v[kInNoGo] = monitor.in_no_go();
+    }
+}
+
+}  // namespace
+
+SONOCASE_EXPORT(text) const char* text() {
+    return page.text.data();
+}
+SONOCASE_EXPORT(text_bytes) std::size_t text_bytes() {
+    return page.text.size();
+}
+SONOCASE_EXPORT(bytes) const std::uint8_t* bytes() {
+    return page.bytes.data();
+}
+SONOCASE_EXPORT(bytes_count) std::size_t bytes_count() {
+    return page.bytes.size();
+}
+SONOCASE_EXPORT(values) const double* values() {
+    if (page.player) fill_values();
+    return page.values.data();
+}
+SONOCASE_EXPORT(value_count) int value_count() {
+    return kValueCount;
+}
+
+// Room for the next case's bytes; the page writes them there and calls open_case().
+SONOCASE_EXPORT(reserve) std::uint8_t* reserve(std::size_t count) {
+    page.incoming = {};
+    page.incoming.resize(count);
+    return page.incoming.data();
+}
+// Room for a text that the page hands over; its address is that of reserve_text().
+SONOCASE_EXPORT(reserve_text) char* reserve_text(std::size_t count) {
+    page.text.assign(count, ' ');
+    return page.text.data();
+}
+// XXH3-128 of the bytes at `from`, as 32 hex digits in text().
+SONOCASE_EXPORT(digest) void digest(const std::uint8_t* from, std::size_t count) {
+    page.text = digest_of(std::span<const std::uint8_t>(from, count));
+}
+
+// text(): name of the case, for errors; on success its description (page_json.h).
+SONOCASE_EXPORT(open_case) int open_case() {
+    const std::string name = page.text;
+    auto opened = PagePlayer::open(std::move(page.incoming), name);
+    page.incoming = {};
+    if (!opened) return answer(opened.error());
+    page.player = std::move(*opened);
+    page.text = case_json(*page.player);
+    return 1;
+}
+SONOCASE_EXPORT(close_case) void close_case() {
+    page.player.reset();
+}
+SONOCASE_EXPORT(metric_words) void metric_words() {
+    page.text = metric_words_json();
+}
+
+SONOCASE_EXPORT(choose_exercise) int choose_exercise(int index, int side_px) {
+    return answer(page.player->choose_exercise(index, side_px));
+}
+SONOCASE_EXPORT(set_image) int set_image(int paper, int side_px, double depth_mm, double focus_mm) {
+    PageImage image;
+    image.model = paper ? ImageModel::paper : ImageModel::physical;
+    image.side_px = side_px;
+    image.depth_mm = depth_mm;
+    image.focus_mm = focus_mm;
+    return answer(page.player->set_image(image));
+}
+SONOCASE_EXPORT(set_console) void set_console(double gain_db, double range_db, int flip) {
+    page.settings.gain_db = gain_db;
+    page.settings.dynamic_range_db = range_db;
+    page.settings.flip_left_right = flip != 0;
+}
+SONOCASE_EXPORT(set_tgc) void set_tgc(int slider, double db) {
+    page.settings.tgc_db[static_cast<std::size_t>(slider) % page.settings.tgc_db.size()] = db;
+}
+
+SONOCASE_EXPORT(frame) int frame(double now_s) {
+    return static_cast<int>(page.player->frame(now_s, page.settings));
+}
+SONOCASE_EXPORT(frame_again) int frame_again(int back) {
+    return static_cast<int>(page.player->frame_again(back, page.settings));
+}
+SONOCASE_EXPORT(kept_age_s) double kept_age_s(int back) {
+    return page.player->kept_age_s(back);
+}
+SONOCASE_EXPORT(pixels) const std::uint8_t* pixels() {
+    return page.player->pixels().data();
+}
+
+SONOCASE_EXPORT(slide) void slide(double x_mm, double y_mm) {
+    page.player->hands().slide(x_mm, y_mm);
+}
+SONOCASE_EXPORT(tilt) void tilt(double rock_rad, double fan_rad) {
+    if (rock_rad != 0) page.player->hands().rock(rock_rad);
+    if (fan_rad != 0) page.player->hands().fan(fan_rad);
+}
+SONOCASE_EXPORT(turn) void turn(double angle_rad) {
+    page.player->hands().rotate(angle_rad);
+}
+SONOCASE_EXPORT(press) void press(double mm) {
+    page.player->hands().press(mm);
+}
+SONOCASE_EXPORT(probe_home) void probe_home() {
+    page.player->hands().reset();
+}
+SONOCASE_EXPORT(take_needle) int take_needle(int in_plane) {
+    return page.player->hands().take_needle(page.player->exercise().probe, in_plane != 0);
+}
+// A needle in the plane, aimed at a place of the scan plane (probe frame); one that is out already
+// is aimed anew.
+SONOCASE_EXPORT(needle_to) int needle_to(double x_mm, double z_mm) {
+    MouseTracker& hands = page.player->hands();
+    if (!hands.has_needle() && !hands.take_needle(page.player->exercise().probe, true)) return 0;
+    (void)hands.aim_needle_at(hands.mannequin_from_probe() * Point3{x_mm, 0, z_mm});
+    return 1;
+}
+SONOCASE_EXPORT(withdraw_needle) void withdraw_needle() {
+    page.player->hands().withdraw_needle();
+}
+SONOCASE_EXPORT(aim_needle) void aim_needle(double in_rad, double out_rad) {
+    page.player->hands().aim_needle(in_rad, out_rad);
+}
+SONOCASE_EXPORT(advance_needle) void advance_needle(double mm) {
+    page.player->hands().advance_needle(mm);
+}
+SONOCASE_EXPORT(slide_needle) void slide_needle(double x_mm, double y_mm) {
+    page.player->hands().slide_needle(x_mm, y_mm);
+}
+// Two 4 x 4 matrices row by row, mannequin_from_probe and mannequin_from_needle, for put_tools().
+SONOCASE_EXPORT(poses) double* poses() {
+    return page.poses.data();
+}
+SONOCASE_EXPORT(put_tools) void put_tools(double now_s, int has_needle) {
+    TrackerReading reading;
+    reading.time_s = now_s;
+    reading.in_mannequin = true;
+    reading.sensor_count = 2;
+    reading.sensors[kProbeSensor] = {SensorState::ok, rigid_at(page.poses.data()), 1.0f, 0};
+    if (has_needle)
+        reading.sensors[kNeedleSensor] = {SensorState::ok, rigid_at(page.poses.data() + 16), 1.0f,
+                                          0};
+    page.player->put_tools(now_s, reading);
+}
+
+// text(): trainee, a line break, start as ISO 8601.
+SONOCASE_EXPORT(start_attempt) void start_attempt(double now_s) {
+    const std::size_t end = page.text.find('\n');
+    page.player->start_attempt(page.text.substr(0, end), page.text.substr(end + 1), now_s);
+}
+SONOCASE_EXPORT(drop_attempt) void drop_attempt() {
+    page.player->drop_attempt();
+}
+// The last events in words, one per line.
+SONOCASE_EXPORT(attempt_words) void attempt_words() {
+    page.text.clear();
+    if (!page.player->attempt()) return;
+    for (const std::string& words : page.player->attempt()->words()) page.text += words + "\n";
+}
+// bytes(): the recording; text(): its scores (score_json).
+SONOCASE_EXPORT(finish_attempt) int finish_attempt() {
+    Result<FinishedSession> finished = page.player->finish_attempt();
+    if (!finished) return answer(finished.error());
+    page.bytes = std::move(finished->recording);
+    page.text = std::move(finished->score_json);
+    return 1;
+}

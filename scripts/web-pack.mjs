@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// web-pack.mjs PAGE WASM OUT: what `sonocase publish` copies. The page's modules become one script, so that a visit
+// asks for few files, and single.html holds page, style, script and program in one file; its places <!--LIST--> and
+// <!--CASES--> are publish's to fill.
+import {createHash} from 'node:crypto';
+import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
+
+const [page, wasm, out] = process.argv.slice(2);
+const read = (name) => readFileSync(`${page}/${name}`, 'utf8');
+const hash = (data) => createHash('sha256').update(data).digest('base64');
+
+// Modules in the order in which they need each other. Each imports by one line per module and exports declarations
+// only, and top-level names are unique: then the text without those words is the same program.
+const modules = ['core.js', 'source.js', 'results.js', 'picture.js', 'hands.js', 'scan.js', 'app.js'];
+const seen = new Map();
+let script = '// SPDX-License-Identifier: Apache-2.0\n';
+for (const name of modules) {
+    const lines = read(name).split('\n').filter((line) => !/^import .* from '\.\/[a-z]+\.js';$/.test(line));
+    for (const line of lines) {
+        if (/^import\b/.test(line)) throw new Error(`${name}: an import on more than one line: ${line}`);
+        const top = /^(?:export )?(?:async )?(?:function|class|const|let) ([A-Za-z_$]+)/.exec(line);
+        if (!top || top[1] === '$') continue;
+        if (seen.has(top[1])) throw new Error(`${name}: ${top[1]} is declared in ${seen.get(top[1])} too`);
+        seen.set(top[1], name);
+    }
+    script += lines.map((line) => line.replace(/^export /, '')).filter((line) => !/^\/\/ SPDX/.test(line)).join('\n');
+}
+// Each module has its own $, the same everywhere.
+let first = true;
+script = script.split('\n').filter((line) => {
+    if (!/^const \$ = /.test(line)) return true;
+    const keep = first;
+    first = false;
+    return keep;
+}).join('\n');
+
+mkdirSync(out, {recursive: true});
+const style = read('style.css'), index = read('index.html'), binary = readFileSync(`${wasm}/sonoplay.wasm`);
+const scalar = readFileSync(`${wasm}/sonoplay-scalar.wasm`);
+const version = createHash('sha256').update(script).update(style).update(index).update(binary).update(scalar).digest('hex').slice(0, 16);
+writeFileSync(`${out}/index.html`, index);
+writeFileSync(`${out}/style.css`, style);
+writeFileSync(`${out}/sonoplay.js`, script);
+writeFileSync(`${out}/worker.js`, read('worker.js').replace('@VERSION@', version));
+writeFileSync(`${out}/sonoplay.wasm`, binary);
+writeFileSync(`${out}/sonoplay-scalar.wasm`, scalar);
+
+const policy = `default-src 'none'; script-src 'sha256-${hash(script)}' 'wasm-unsafe-eval'; style-src 'sha256-${hash(style)}'; `
+    + `img-src blob: data:; connect-src 'none'; base-uri 'none'; form-action 'none'`;
+const single = index
+    .replace(/content="default-src[^"]*"/, () => `content="${policy}"`)
+    .replace('<link rel="stylesheet" href="style.css">', () => `<style>${style}</style>`)
+    .replace('<script type="module" src="sonoplay.js"></script>', '')
+    .replace('</body>', () => `<!--LIST-->\n<!--CASES-->\n<script type="text/plain" id="program">${binary.toString('base64')}</script>\n`
+        + `<script type="module">${script}</script>\n</body>`);
+if (!single.includes(policy) || !single.includes('<style>')) throw new Error('index.html no longer has what single.html replaces');
+writeFileSync(`${out}/single.html`, single);

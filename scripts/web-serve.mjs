@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// web-serve.mjs SITE [PORT]: serves a folder on loopback alone, with byte ranges, for trying a site out. Port 0 takes a
+// free one; the address is printed.
+import {createReadStream, statSync} from 'node:fs';
+import {createServer} from 'node:http';
+import {extname, join, normalize} from 'node:path';
+
+const kTypes = {'.html': 'text/html; charset=utf-8', '.css': 'text/css', '.js': 'text/javascript', '.json': 'application/json',
+    '.wasm': 'application/wasm', '.png': 'image/png'};
+
+// site: a folder. before(request, response): for tests; true where it has answered itself. Returns the server; listen()
+// it.
+export function site_server(site, before = () => false) {
+    return createServer((request, response) => {
+        if (before(request, response)) return;
+        const path = decodeURIComponent(new URL(request.url, 'http://x').pathname);
+        const file = join(site, normalize(path.endsWith('/') ? `${path}index.html` : path));
+        let size;
+        try {
+            if (!file.startsWith(join(site, '/')) || !statSync(file).isFile()) throw new Error();
+            size = statSync(file).size;
+        } catch {
+            response.writeHead(404).end('not found');
+            return;
+        }
+        const headers = {'Content-Type': kTypes[extname(file)] ?? 'application/octet-stream', 'Accept-Ranges': 'bytes',
+            'Cache-Control': 'no-cache'};
+        const range = /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? '');
+        let start = 0, end = size - 1;
+        if (range) {
+            [start, end] = [Number(range[1]), Math.min(Number(range[2]), size - 1)];
+            if (start > end) {
+                response.writeHead(416, {'Content-Range': `bytes */${size}`}).end();
+                return;
+            }
+            headers['Content-Range'] = `bytes ${start}-${end}/${size}`;
+        }
+        response.writeHead(range ? 206 : 200, {...headers, 'Content-Length': size === 0 ? 0 : end - start + 1});
+        if (request.method === 'HEAD' || size === 0) response.end();
+        else createReadStream(file, {start, end}).pipe(response);
+    });
+}
+
+if (process.argv[1] === new URL(import.meta.url).pathname) {
+    const [site, port] = process.argv.slice(2);
+    const server = site_server(site);
+    server.listen(Number(port ?? 8000), '127.0.0.1', () => console.log(`http://127.0.0.1:${server.address().port}/`));
+}

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/publish/publish.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "formats/base/digest.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/files/atomic_file.h"
+#include "support/small_case.h"
+#include "support/temporary_folder.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using sonocase::testing::TemporaryFolder;
+
+class Publish : public ::testing::Test {
+  protected:
+    void SetUp() override {
+        const auto put = [&](const std::string& name, const std::string& text) {
+            ASSERT_TRUE(write_file(folder_.path() + "/" + name, std::string_view(text)));
+        };
+        put("program/index.html", "<meta content=\"connect-src 'self'; img-src 'self'\">");
+        put("program/single.html", "<meta content=\"connect-src 'none'\"><!--LIST--><!--CASES-->");
+        for (const char* name :
+             {"style.css", "sonoplay.js", "sonoplay.wasm", "sonoplay-scalar.wasm", "worker.js"})
+            put(std::string("program/") + name, name);
+        CaseBundle bundle = sonocase::testing::small_case();
+        bundle.manifest.case_name = "Round </script> body";
+        bytes_ = write_bundle(bundle);
+        ASSERT_TRUE(write_file(case_path("round body"), std::span<const std::uint8_t>(bytes_)));
+        options_.program_folder = folder_.path() + "/program";
+    }
+    std::string case_path(const std::string& name) const {
+        return folder_.path() + "/" + name + ".sonocase";
+    }
+    std::string site(const std::string& name = "") const { return folder_.path() + "/site" + name; }
+    std::string text_of(const std::string& path) const { return *read_text_file(path); }
+
+    TemporaryFolder folder_;
+    std::vector<std::uint8_t> bytes_;
+    PublishOptions options_;
+};
+
+TEST_F(Publish, a_site_holds_page_program_and_the_cases_bytes) {
+    const auto published = publish({case_path("round body")}, site(), options_);
+    ASSERT_TRUE(published) << published.error().message();
+    for (const std::string& file : published->files) EXPECT_TRUE(fs::is_regular_file(file)) << file;
+    EXPECT_EQ(text_of(site("/sonoplay.wasm")), "sonoplay.wasm");
+    const std::string digest = digest_of(bytes_);
+    const auto copy = read_file(site("/round-body-" + digest.substr(0, 8) + ".sonocase"));
+    ASSERT_TRUE(copy);
+    EXPECT_EQ(*copy, bytes_);
+    const std::string list = text_of(site("/cases.json"));
+    EXPECT_NE(list.find("\"digest\":\"" + digest + "\""), std::string::npos) << list;
+    EXPECT_NE(list.find("\"name\":\"round-body\""), std::string::npos);
+    EXPECT_NE(list.find("\"title\":\"Find the vessel\""), std::string::npos);
+}
+
+TEST_F(Publish, the_same_cases_give_the_same_site) {
+    ASSERT_TRUE(publish({case_path("round body")}, site(), options_));
+    const std::string first = text_of(site("/cases.json"));
+    ASSERT_TRUE(publish({case_path("round body")}, site(), options_));
+    EXPECT_EQ(text_of(site("/cases.json")), first);
+}
+
+TEST_F(Publish, a_record_store_is_allowed_by_the_policy_and_no_other_host) {
+    options_.xapi = "https://store.example.org/xapi";
+    ASSERT_TRUE(publish({case_path("round body")}, site(), options_));
+    EXPECT_NE(text_of(site("/index.html")).find("connect-src 'self' https://store.example.org;"),
+              std::string::npos);
+    EXPECT_NE(text_of(site("/cases.json")).find("\"xapi\":\"https://store.example.org/xapi\""),
+              std::string::npos);
+    for (const char* wrong : {"store.example.org", "http://store.example.org/x",
+                              "https://a; script-src *", "javascript://x/"}) {
+        options_.xapi = wrong;
+        EXPECT_FALSE(publish({case_path("round body")}, site("-wrong"), options_)) << wrong;
+    }
+}
+
+TEST_F(Publish, one_page_holds_the_case_and_no_text_of_it_ends_the_element) {
+    options_.single_file = true;
+    const auto published = publish({case_path("round body")}, site(".html"), options_);
+    ASSERT_TRUE(published) << published.error().message();
+    const std::string page = text_of(site(".html"));
+    EXPECT_EQ(page.find("<!--"), std::string::npos);
+    EXPECT_NE(page.find("Round \\u003c/script> body"), std::string::npos);
+    // Length of base64: four digits for three bytes.
+    const std::string mark = "id=\"case-round-body\">";
+    const std::size_t from = page.find(mark) + mark.size();
+    EXPECT_EQ(page.find("</script>", from) - from, (bytes_.size() + 2) / 3 * 4);
+    EXPECT_FALSE(
+        publish({case_path("round body"), case_path("round body")}, site("2.html"), options_));
+}
+
+TEST_F(Publish, what_cannot_be_published_is_refused_and_leaves_no_list) {
+    ASSERT_TRUE(write_file(case_path("holiday"), std::string_view("holiday")));
+    const auto damaged = publish({case_path("round body"), case_path("holiday")}, site(), options_);
+    ASSERT_FALSE(damaged);
+    EXPECT_NE(damaged.error().message().find("holiday"), std::string::npos);
+    fs::create_directory(folder_.path() + "/other");
+    fs::copy(case_path("round body"), folder_.path() + "/other/round body.sonocase");
+    EXPECT_FALSE(publish({case_path("round body"), folder_.path() + "/other/round body.sonocase"},
+                         site(), options_));
+    options_.program_folder = folder_.path() + "/nowhere";
+    EXPECT_FALSE(publish({case_path("round body")}, site(), options_));
+    EXPECT_FALSE(fs::exists(site("/cases.json")));
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline

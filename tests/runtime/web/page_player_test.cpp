@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The player of the page, run on the desktop: the same pictures as the engine, the same scores as a
+// replay of its recording.
+#include "runtime/web/page_player.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "runtime/web/page_json.h"
+#include "support/small_case.h"
+
+namespace sonocase::runtime {
+namespace {
+
+RawVector<std::uint8_t> bytes_of(const CaseBundle& bundle) {
+    const std::vector<std::uint8_t> bytes = write_bundle(bundle);
+    return {bytes.begin(), bytes.end()};
+}
+
+std::unique_ptr<PagePlayer> open_small() {
+    auto player = PagePlayer::open(bytes_of(testing::small_case()), "small");
+    EXPECT_TRUE(player);
+    EXPECT_TRUE((*player)->choose_exercise(0, 128));
+    return std::move(*player);
+}
+
+std::vector<std::uint8_t> copy(std::span<const std::uint8_t> pixels) {
+    return {pixels.begin(), pixels.end()};
+}
+
+TEST(PagePlayer, refuses_bytes_that_are_no_case_and_says_which) {
+    RawVector<std::uint8_t> bytes(100, std::uint8_t{7});
+    const auto player = PagePlayer::open(std::move(bytes), "holiday.png");
+    ASSERT_FALSE(player);
+    EXPECT_NE(player.error().message().find("holiday.png"), std::string::npos);
+}
+
+TEST(PagePlayer, a_kept_picture_is_rendered_again_to_the_same_pixels) {
+    const auto player = open_small();
+    std::vector<std::vector<std::uint8_t>> shown;
+    for (int n = 0; n < 10; ++n) {
+        player->hands().slide(0, 2);
+        player->frame(0.1 * n, {});
+        shown.push_back(copy(player->pixels()));
+    }
+    ASSERT_EQ(player->kept(), 10);
+    for (int back : {0, 3, 9}) {
+        player->frame_again(back, {});
+        EXPECT_EQ(copy(player->pixels()), shown[static_cast<std::size_t>(9 - back)]) << back;
+        EXPECT_NEAR(player->kept_age_s(back), 0.1 * back, 1e-12);
+    }
+}
+
+TEST(PagePlayer, an_attempt_is_scored_as_its_recording_is) {
+    const auto player = open_small();
+    player->start_attempt("somebody", "2026-01-31T12:00:00Z", 50);
+    ASSERT_TRUE(player->hands().take_needle(player->exercise().probe, true));
+    ASSERT_TRUE(player->hands().aim_needle_at({0, 0, 25}));
+    for (int n = 0; n < 200; ++n) {
+        player->hands().advance_needle(0.4);
+        player->frame(50 + 0.05 * n, {});
+    }
+    ASSERT_TRUE(player->attempt());
+    EXPECT_EQ(player->attempt()->monitor().insertions(), 1);
+    EXPECT_EQ(player->attempt()->monitor().targets_hit(), 1);
+    const auto finished = player->finish_attempt();
+    ASSERT_TRUE(finished);
+    EXPECT_EQ(player->attempt(), nullptr);
+
+    const auto sequence = read_sequence(finished->recording, "");
+    ASSERT_TRUE(sequence);
+    const auto session = session_from_sequence(*sequence, guess_names(*sequence), "");
+    ASSERT_TRUE(session);
+    EXPECT_EQ(session->samples.size(), 200u);
+    EXPECT_EQ(session->header.trainee, "somebody");
+    EXPECT_EQ(session->header.exercise, "scan");
+    const auto whole = testing::small_case();
+    const CaseAnatomy anatomy(whole, breathing_shown(player->exercises()[0], session->header));
+    const SessionScore replayed =
+        score_session(*session, player->exercises()[0], &anatomy, whole.labels);
+    EXPECT_EQ(score_json(replayed, player->exercises()[0]), finished->score_json);
+}
+
+TEST(PagePlayer, another_image_goes_on_with_the_session) {
+    const auto player = open_small();
+    player->start_attempt("", "2026-01-31T12:00:00Z", 0);
+    player->frame(0, {});
+    PageImage image = player->image();
+    image.depth_mm = 60;
+    image.model = ImageModel::physical;
+    ASSERT_TRUE(player->set_image(image));
+    player->frame(1, {});
+    EXPECT_EQ(player->engine().last().input.frame, 1u);
+    EXPECT_EQ(player->attempt()->seconds(), 1);
+    EXPECT_EQ(player->kept(), 1);
+}
+
+TEST(PagePlayer, an_image_that_cannot_be_made_leaves_the_one_before) {
+    const auto player = open_small();
+    PageImage image = player->image();
+    image.side_px = 0;
+    EXPECT_FALSE(player->set_image(image));
+    EXPECT_FALSE(player->choose_exercise(0, 0));
+    EXPECT_EQ(player->image().side_px, 128);
+    player->frame(0, {});
+    EXPECT_NE(*std::max_element(player->pixels().begin(), player->pixels().end()), 0);
+}
+
+TEST(PageJson, names_what_the_page_shows) {
+    const auto player = open_small();
+    const std::string json = case_json(*player);
+    EXPECT_NE(json.find("\"case_name\":\"cylinder\""), std::string::npos) << json;
+    EXPECT_NE(json.find("\"title\":\"Find the vessel\""), std::string::npos) << json;
+    EXPECT_NE(json.find("\"warnings\":[]"), std::string::npos) << json;
+    EXPECT_NE(metric_words_json().find("\"elapsed_time_s\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace sonocase::runtime

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// page_test.mjs PROGRAM_FOLDER BIN_FOLDER: the published site in Chromium, driven by injected input.
+import {readFileSync, writeFileSync} from 'node:fs';
+import {createServer} from 'node:http';
+import {join} from 'node:path';
+import {site_server} from '../../../scripts/web-serve.mjs';
+import {Browser, expect, expect_equal, folder, run, run_tests} from './support.mjs';
+
+const [program, bin] = process.argv.slice(2);
+const work = folder();
+const case_file = join(work, 'small.sonocase'), session_file = join(work, 'small.igs.mha'), site = join(work, 'site');
+run(join(bin, 'core_write_case'), case_file, session_file);
+run(join(bin, 'sonocase'), 'publish', case_file, '-o', site, '--program', program);
+
+async function serve(of) {
+    const started = site_server(of);
+    await new Promise((done) => started.listen(0, '127.0.0.1', done));
+    return [started, `http://127.0.0.1:${started.address().port}/`];
+}
+const [server, url] = await serve(site);
+const browser = await Browser.start();
+const kFrames = 'sonoplay.app.scan.frames';
+
+async function scanning(page, query = '?case=small&exercise=scan') {
+    await page.open(url + query);
+    await page.until(`${kFrames} > 0`);
+    expect_equal(page.errors.join(), '', 'errors on the console');
+}
+const seconds_attempt = 'sonoplay.app.scan.values.seconds';
+
+await run_tests({
+    async shows_the_cases_and_opens_one_by_keyboard() {
+        const page = await browser.page();
+        await page.open(url);
+        await page.until('document.querySelectorAll("#cases button").length === 1 && sonoplay.app.ready');
+        for (let presses = 0; await page.value('!document.activeElement.closest("#cases")'); ++presses) {
+            expect(presses < 20, 'a case is reached by Tab');
+            await page.key('Tab');
+        }
+        await page.key('Enter');
+        await page.until(`${kFrames} > 3`);
+        expect(await page.value('sonoplay.frame().pixels.some((grey) => grey > 100)'), 'there is a picture');
+        await page.close();
+    },
+    async pixels_in_the_browser_are_the_desktops() {
+        const page = await browser.page();
+        await scanning(page);
+        for (const model of ['paper', 'physical']) {
+            const wanted = JSON.parse(run(join(bin, 'web_oracle'), 'frames', case_file, session_file, model, '512'));
+            const digests = await page.value(`(async () => {
+                const {core, scan} = sonoplay.app;
+                scan.hide();
+                core.choose_exercise(0, 512);
+                core.set_image({model_paper: ${model === 'paper'}, side: 512, depth_mm: 0, focus_mm: 0});
+                core.set_console({gain_db: 0, range_db: 60, tgc_db: new Array(8).fill(0), flip: false});
+                const out = [];
+                for (const frame of ${JSON.stringify(wanted.map(({time_s, probe, needle}) => ({time_s, probe, needle})))}) {
+                    core.put_tools(frame.time_s, frame.probe, frame.needle);
+                    core.calls.frame(frame.time_s);
+                    const pixels = sonoplay.frame().pixels;
+                    core.reserve(pixels.length);
+                    core.put(pixels, 0);
+                    out.push(core.digest_of(0, pixels.length));
+                }
+                return out;
+            })()`);
+            expect_equal(digests.join(), wanted.map((frame) => frame.digest).join(), model);
+            expect(wanted.length >= 60, '60 frames');
+        }
+        await page.close();
+    },
+    async an_attempt_by_injected_input_has_the_scores_of_the_desktops_replay() {
+        const page = await browser.page();
+        await scanning(page);
+        await page.value('document.getElementById("trainee").value = "somebody"');
+        await page.key('KeyB');
+        await page.until('sonoplay.app.scan.values.attempt');
+        await page.key('KeyN');
+        await page.until('sonoplay.app.scan.values.has_needle');
+        await page.key('KeyW', 0, 'down');
+        await page.until('sonoplay.app.scan.values.needle_depth_mm > 30');
+        await page.key('KeyW', 0, 'up');
+        await page.key('ArrowRight', 0, 'down');
+        await page.until(`${seconds_attempt} > 5.2`);
+        await page.key('ArrowRight', 0, 'up');
+        await page.key('KeyB');
+        await page.until('!document.getElementById("after").hidden');
+        const {recording, text} = await page.value('({recording: [...sonoplay.app.attempt.recording], text: sonoplay.app.attempt.score_text})');
+        const file = join(work, 'attempt.igs.mha');
+        writeFileSync(file, Buffer.from(recording));
+        expect_equal(text, run(join(bin, 'web_oracle'), 'score', case_file, file), 'scores');
+        expect(JSON.parse(text).insertions.length === 1, 'one insertion');
+        // Kept for the next visit.
+        await page.until('sonoplay.app.settled === sonoplay.app.started');
+        await page.click('after-cases');
+        await page.click('open-scores');
+        await page.until('document.querySelectorAll("#attempts tr").length === 1');
+        await page.close();
+    },
+    async mouse_and_fingers_move_the_probe() {
+        const page = await browser.page();
+        await scanning(page);
+        const pixels = () => page.value('sonoplay.frame().pixels.reduce((sum, grey, n) => (sum + grey * (n % 997)) % 1e9, 0)');
+        const {x, y} = await page.value('(({left, top, width, height}) => ({x: left + width / 2, y: top + height / 2}))(document.getElementById("picture").getBoundingClientRect())');
+        const before = await pixels();
+        await page.send('Input.dispatchMouseEvent', {type: 'mousePressed', x, y, button: 'left', buttons: 1, clickCount: 1});
+        await page.send('Input.dispatchMouseEvent', {type: 'mouseMoved', x: x + 60, y: y + 40, button: 'left', buttons: 1});
+        await page.send('Input.dispatchMouseEvent', {type: 'mouseReleased', x: x + 60, y: y + 40, button: 'left', clickCount: 1});
+        await page.until(`${kFrames} > ${await page.value(kFrames)} + 1`);
+        expect(await pixels() !== before, 'a drag of the mouse slides');
+        const touch = (type, ...points) => page.send('Input.dispatchTouchEvent', {type, touchPoints: points.map(([px, py], id) => ({x: px, y: py, id}))});
+        // A long press brings the needle; nothing moves meanwhile.
+        await touch('touchStart', [x, y + 40]);
+        await page.until('sonoplay.app.scan.values.has_needle');
+        await touch('touchEnd');
+        const tilted = await pixels();
+        await touch('touchStart', [x - 40, y], [x + 40, y]);
+        await touch('touchMove', [x - 40, y + 30], [x + 40, y + 30]);
+        await touch('touchEnd');
+        await page.until(`${kFrames} > ${await page.value(kFrames)} + 1`);
+        expect(await pixels() !== tilted, 'two fingers tilt');
+        await page.close();
+    },
+    async freezing_holds_the_picture_and_looks_back() {
+        const page = await browser.page();
+        await scanning(page);
+        await page.until('sonoplay.app.scan.values.kept > 5');
+        await page.key('Space');
+        await page.until('sonoplay.app.scan.frozen');
+        await page.key('Comma');
+        await page.key('Comma');
+        await page.until('sonoplay.app.scan.back === 2 && document.getElementById("cine-words").textContent.startsWith("FROZEN")');
+        await page.key('Space');
+        await page.until('!sonoplay.app.scan.frozen');
+        await page.close();
+    },
+    async no_request_goes_to_another_host_and_the_second_visit_needs_none() {
+        const page = await browser.page();
+        await scanning(page);
+        await page.value('navigator.serviceWorker.ready.then(() => true)');
+        await page.until('navigator.serviceWorker.controller');
+        for (const request of page.requests) expect(request.startsWith(url) || request.startsWith('data:') || request.startsWith('blob:'), request);
+        await page.value(`caches.open('sonocase-cases-1').then((cache) => cache.keys()).then((keys) => keys.length > 0)`);
+        await page.send('Network.emulateNetworkConditions', {offline: true, latency: 0, downloadThroughput: -1, uploadThroughput: -1});
+        server.closeAllConnections?.();
+        const offline = new Promise((done) => server.close(done));
+        await offline;
+        const loaded = page.once('Page.loadEventFired');
+        await page.send('Page.reload');
+        await loaded;
+        await page.until(`${kFrames} > 3`);
+        await new Promise((done) => server.listen(Number(new URL(url).port), '127.0.0.1', done));
+        await page.close();
+    },
+    async every_control_has_a_name_and_words_have_contrast() {
+        const page = await browser.page();
+        await scanning(page);
+        const faults = await page.value(`(() => {
+            const faults = [];
+            const luminance = (colour) => {
+                const [r, g, b] = colour.match(/[\\d.]+/g).map(Number).map((c) => (c /= 255) <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+                return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+            };
+            const fill = (e) => { for (; e; e = e.parentElement) { const c = getComputedStyle(e).backgroundColor; if (!/rgba\\(.*, 0\\)/.test(c)) return c; } return 'rgb(255,255,255)'; };
+            const look = (where) => {
+                for (const e of document.querySelectorAll('button, input, select, a, canvas[tabindex], summary')) {
+                    if (!e.checkVisibility()) continue;
+                    const name = e.getAttribute('aria-label') || e.textContent.trim() || e.labels?.[0]?.textContent.trim();
+                    if (!name) faults.push(where + ': no name: ' + e.outerHTML.slice(0, 80));
+                    if (e.tabIndex < 0) faults.push(where + ': not by keyboard: ' + name);
+                }
+                for (const e of document.querySelectorAll('*')) {
+                    if (!e.checkVisibility() || ![...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim())) continue;
+                    const [a, b] = [luminance(getComputedStyle(e).color), luminance(fill(e))].sort((x, y) => y - x);
+                    if ((a + 0.05) / (b + 0.05) < 4.5) faults.push(where + ': contrast ' + ((a + 0.05) / (b + 0.05)).toFixed(2) + ': ' + e.textContent.trim().slice(0, 40));
+                }
+            };
+            look('scan');
+            for (const name of ['start', 'after', 'scores']) { sonoplay.app.show(name); look(name); }
+            document.getElementById('help').showModal(); look('help');
+            return faults;
+        })()`);
+        expect_equal(faults.join('\n'), '', 'faults');
+        await page.close();
+    },
+    async a_phone_held_upright_shows_picture_needle_and_attempt_without_sideways_scrolling() {
+        const page = await browser.page(390, 844);
+        Object.assign(page, {mobile: true, ratio: 2});
+        await scanning(page);
+        expect(await page.value('document.documentElement.scrollWidth <= innerWidth'), 'no sideways scrolling');
+        expect(await page.value('document.getElementById("picture").getBoundingClientRect().bottom < innerHeight'), 'the picture is whole');
+        await page.close();
+    },
+    async bad_cases_are_refused_in_words() {
+        const page = await browser.page();
+        await page.open(`${url}?case=nobody`);
+        await page.until('document.getElementById("notice").textContent.includes("no case named nobody")');
+        for (const [bytes, words] of [[Buffer.from('holiday'), 'mine.sonocase'], [readFileSync(case_file).subarray(0, 5000), 'mine.sonocase']]) {
+            await page.value(`sonoplay.app.open_file(new File([new Uint8Array(${JSON.stringify([...bytes])})], 'mine.sonocase'))`);
+            await page.until(`document.getElementById("notice").textContent.includes(${JSON.stringify(words)}) && !document.getElementById("start").hidden`);
+        }
+        await page.close();
+    },
+    async results_reach_a_learning_record_store_where_one_is_set_up() {
+        const statements = [];
+        const store = createServer((request, response) => {
+            const headers = {'Access-Control-Allow-Origin': request.headers.origin ?? '*', 'Access-Control-Allow-Credentials': 'true',
+                'Access-Control-Allow-Headers': 'content-type, x-experience-api-version'};
+            let text = '';
+            request.on('data', (data) => { text += data; });
+            request.on('end', () => {
+                if (request.method === 'POST' && request.url === '/xapi/statements') statements.push(...JSON.parse(text));
+                response.writeHead(request.method === 'OPTIONS' ? 204 : 200, headers).end('[]');
+            });
+        });
+        await new Promise((done) => store.listen(0, '127.0.0.1', done));
+        const with_store = join(work, 'with-store');
+        run(join(bin, 'sonocase'), 'publish', case_file, '-o', with_store, '--program', program, '--xapi', `http://127.0.0.1:${store.address().port}/xapi`);
+        const [its_server, its_url] = await serve(with_store);
+        const page = await browser.page();
+        await page.open(`${its_url}?case=small`);
+        await page.until(`${kFrames} > 0`);
+        await page.key('KeyB');
+        await page.until(`${seconds_attempt} > 5.2`);
+        await page.key('KeyB');
+        await page.until('sonoplay.app.settled === sonoplay.app.started');
+        expect_equal(await page.value('document.getElementById("after-notice").textContent.includes("store")'), false, 'the store took it');
+        const verbs = () => statements.map((one) => one.verb.display.en).sort().join();
+        expect_equal(verbs(), 'attempted,completed,scored', 'statements');
+        for (const one of statements) expect(one.actor.account && one.object.id.includes('exercise=scan') && one.timestamp, 'a whole statement');
+        await page.close();
+        for (const one of [store, its_server]) { one.closeAllConnections?.(); one.close(); }
+    },
+    async one_page_opens_from_disk() {
+        const file = join(work, 'one.html');
+        run(join(bin, 'sonocase'), 'publish', case_file, '-o', file, '--single-file', '--program', program);
+        const page = await browser.page();
+        await page.open(`file://${file}`);
+        await page.until('sonoplay.app.ready && document.querySelectorAll("#cases button").length === 1');
+        await page.value('document.querySelector("#cases button").click()');
+        await page.until(`${kFrames} > 3`);
+        expect_equal(page.errors.join(), '', 'errors on the console');
+        await page.close();
+    },
+});
+await browser.stop();
+server.closeAllConnections?.();
+server.close();
