@@ -41,7 +41,7 @@ struct Bench {
         noise = make_physical_noise(scene.textures->normal_levels, 1, 192 + 128);
         gain.assign(512, 0.0f);
         renderer = std::make_unique<PhysicalFast>(
-            scene, geometry, tables, noise,
+            scene, geometry, tables, noise, press::press_face(exercise.probe),
             RenderContext{workers, serial_jobs(), available_simd_targets().front()});
         frame.row_gain_db = gain;
         // What organs and the wall add would blur the measures of the physics.
