@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Bundles: since exercises draw their targets. Physical frames: since the skirt of the point spread.
+// Bundles: since exercises draw targets. Physical frames: since the skirt of the point spread.
 // Paper: commit aa0be5b.
 constexpr const char* kDraft = "8f3b795c66eb0585e4055d5844a746ec";
 constexpr const char* kBalanced = "eb6f972f531d439020739e93c9184033";
