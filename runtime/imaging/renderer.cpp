@@ -295,7 +295,7 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
     }
     const FrameStatus status =
         m.formation->render_fast(m.governor.level(), request, pixels, m.costs);
-    if (m.probe) m.costs[static_cast<std::size_t>(m.deformation)].ms += press_ms;
+    if (pressed != nullptr) m.costs[static_cast<std::size_t>(m.deformation)].ms += press_ms;
     m.governor.frame_took(press_ms + timer.lap_ms());
     return status;
 }

@@ -25,14 +25,15 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Bundles: since skin not fitted is marked. Physical frames: since machines. Paper: commit aa0be5b.
-constexpr const char* kDraft = "f69508b6aef4b073068e1e53256a6adc";
-constexpr const char* kBalanced = "4c5d9b7ec9afadcfc9d382757066800f";
-constexpr const char* kSlender = "3c3201254fbe664b33d2a8d1f54be463";
-constexpr const char* kReal = "583739f7d1591ffe5c6fc50825c76315";
-constexpr const char* kDraftPhysical = "9b0098324bc2cdc6cccec08969a2ccdf";
+// Bundles: since exercises draw targets. Physical frames: since the skirt of the point spread.
+// Paper: commit aa0be5b.
+constexpr const char* kDraft = "8f3b795c66eb0585e4055d5844a746ec";
+constexpr const char* kBalanced = "eb6f972f531d439020739e93c9184033";
+constexpr const char* kSlender = "c40b23a8abebc0889118ce220965c463";
+constexpr const char* kReal = "673259490cd074179f83b35b2be76e69";
+constexpr const char* kDraftPhysical = "5b379a736449ca4ce643b69677eb3796";
 constexpr const char* kDraftPaper = "1628db3a0fe630d2e2b3a86b0621208a";
-constexpr const char* kRealPhysical = "14787e6e050cc9b2e04ab33ab0b7c385";
+constexpr const char* kRealPhysical = "a2f3f46cc8dcebdaa82d8f45cf215f0f";
 constexpr const char* kRealPaper = "83a09d20a889780ad24fa8f66478cdef";
 
 class SameBytes : public ::testing::Test {
