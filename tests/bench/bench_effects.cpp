@@ -24,6 +24,7 @@
 #include "formats/files/bundle_file.h"
 #include "runtime/imaging/paper/paper_fast.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
+#include "runtime/imaging/press/press_plane.h"
 
 namespace sonocase::bench {
 namespace {
@@ -108,7 +109,12 @@ struct PhysicalRig {
     explicit PhysicalRig(const CaseBundle& bundle, const std::vector<Target>& targets = {})
         : scene(*runtime::make_physical_scene(bundle, targets)),
           breathing(bundle),
-          fast(scene, geometry, tables, noise, context_of(workers)) {}
+          fast(scene,
+               geometry,
+               tables,
+               noise,
+               runtime::press::press_face(exercise.probe),
+               context_of(workers)) {}
 
     void render(std::size_t pose,
                 const PhysicalEffects& effects,
@@ -143,7 +149,11 @@ struct PhysicalRig {
 struct PaperRig {
     explicit PaperRig(const CaseBundle& bundle)
         : scene(*runtime::make_paper_scene(bundle)),
-          fast(scene, geometry, noise, context_of(workers)) {}
+          fast(scene,
+               geometry,
+               noise,
+               runtime::press::press_face(exercise.probe),
+               context_of(workers)) {}
 
     void render(std::size_t pose, const PaperEffects& effects, bool needle) {
         runtime::PaperFrame frame;
