@@ -83,7 +83,8 @@ bool clear_of_others(const Anatomy& anatomy, Point3 p, int label, double clearan
     if (anatomy.label(p) != label) return false;
     for (const double part : {0.5, 1.0}) {
         for (int i = 0; i < 27; ++i) {
-            const Vector3 v{i % 3 - 1.0, i / 3 % 3 - 1.0, i / 9 - 1.0};
+            const int column = i % 3 - 1, row = i / 3 % 3 - 1, layer = i / 9 - 1;
+            const Vector3 v{double(column), double(row), double(layer)};
             if (i == 13) continue;
             const double length = std::sqrt(dot(v, v));
             if (anatomy.label(p + (part * clearance_mm / length) * v) != label) return false;

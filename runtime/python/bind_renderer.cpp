@@ -47,7 +47,7 @@ class PyRenderer {
                       double time_s,
                       std::int64_t frame,
                       double gain_db,
-                      py::object out) {
+                      const py::object& out) {
         FrameTask task;
         task.input.mannequin_from_probe = rigid_from(pose, "pose");
         set_needle(needle, task.input);
@@ -91,7 +91,7 @@ class PyRenderer {
                             py::handle times_s,
                             std::int64_t first_frame,
                             double gain_db,
-                            py::object out,
+                            const py::object& out,
                             int threads,
                             const std::optional<std::vector<std::string>>& truth) {
         if (threads < 1 || threads > 256) throw py::value_error("threads: give 1 to 256");
