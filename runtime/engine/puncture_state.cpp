@@ -2,6 +2,8 @@
 
 #include "runtime/engine/puncture_state.h"
 
+#include <optional>
+
 #include <algorithm>
 
 #include "formats/volume/tissue_mechanics.h"
@@ -61,6 +63,28 @@ PunctureReport PunctureState::update(double time_s,
     for (int n = first; n < needle_.event_count(); ++n)
         report.events[static_cast<std::size_t>(report.event_count++)] = needle_.event(n);
     return report;
+}
+
+namespace {
+
+std::optional<LiveEventKind> tissue_event(NeedleEventKind kind) {
+    switch (kind) {
+        case NeedleEventKind::puncture: return LiveEventKind::tissue_puncture;
+        case NeedleEventKind::posterior_wall: return LiveEventKind::posterior_wall;
+        case NeedleEventKind::stopped: return LiveEventKind::needle_stopped;
+        case NeedleEventKind::withdrawn: break;  // needle_exit and the depth say it
+    }
+    return {};
+}
+
+}  // namespace
+
+void report_punctures(const PunctureReport& report, SessionMonitor& monitor) {
+    for (int n = 0; n < report.event_count; ++n) {
+        const NeedleEvent& event = report.events[static_cast<std::size_t>(n)];
+        if (const auto kind = tissue_event(event.kind))
+            monitor.report(*kind, event.layer, event.force_n);
+    }
 }
 
 }  // namespace sonocase::runtime

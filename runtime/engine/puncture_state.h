@@ -10,6 +10,7 @@
 #include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "formats/scoring/anatomy.h"
+#include "formats/scoring/session_monitor.h"
 #include "runtime/imaging/renderer.h"
 #include "runtime/needle/needle_puncture.h"
 
@@ -24,6 +25,9 @@ struct PunctureReport {
     std::array<NeedleEvent, kMostEvents> events{};  // layer: a label
     int event_count = 0;
 };
+
+// Tells the monitor what scores count: punctures, posterior walls, stops at bone.
+void report_punctures(const PunctureReport& report, SessionMonitor& monitor);
 
 class PunctureState {
   public:

@@ -14,17 +14,6 @@ namespace {
 
 constexpr std::size_t kWords = 6;
 
-// As SessionRun tells them (runtime/player/session).
-std::optional<LiveEventKind> tissue_event(NeedleEventKind kind) {
-    switch (kind) {
-        case NeedleEventKind::puncture: return LiveEventKind::tissue_puncture;
-        case NeedleEventKind::posterior_wall: return LiveEventKind::posterior_wall;
-        case NeedleEventKind::stopped: return LiveEventKind::needle_stopped;
-        case NeedleEventKind::withdrawn: break;
-    }
-    return {};
-}
-
 bool same(const ImageSettings& a, const ImageSettings& b) {
     return a.gain_db == b.gain_db && a.dynamic_range_db == b.dynamic_range_db &&
            a.tgc_db == b.tgc_db && a.press_mm == b.press_mm &&
@@ -62,11 +51,7 @@ void PageSession::observe(const FrameRecord& record) {
     sample.press = {record.press.force_n, record.press.pressure_kpa, record.press.vein_open};
     monitor_.update(sample.time_s, sample.frame, sample.probe_ok, sample.mannequin_from_probe,
                     sample.needle_ok, sample.mannequin_from_drawn);
-    for (int n = 0; n < record.puncture.event_count; ++n) {
-        const NeedleEvent& event = record.puncture.events[static_cast<std::size_t>(n)];
-        if (const auto kind = tissue_event(event.kind))
-            monitor_.report(*kind, event.layer, event.force_n);
-    }
+    report_punctures(record.puncture, monitor_);
     const std::span<const LiveEvent> events = monitor_.events();
     for (const LiveEvent& event : events) {
         session_.events.push_back(session_event(event, exercise_, bundle_.labels));

@@ -33,16 +33,6 @@ const char* picture_reason(std::span<const LiveEvent> events) {
     return nullptr;
 }
 
-std::optional<LiveEventKind> tissue_event(NeedleEventKind kind) {
-    switch (kind) {
-        case NeedleEventKind::puncture: return LiveEventKind::tissue_puncture;
-        case NeedleEventKind::posterior_wall: return LiveEventKind::posterior_wall;
-        case NeedleEventKind::stopped: return LiveEventKind::needle_stopped;
-        case NeedleEventKind::withdrawn: break;  // needle_exit and the depth say it
-    }
-    return {};
-}
-
 }  // namespace
 
 SessionRun::SessionRun(const OpenCase& open, const ScanEngine& engine, std::string path)
@@ -106,11 +96,7 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
     frame.press = {record.press.force_n, record.press.pressure_kpa, record.press.vein_open};
     monitor_.update(frame.time_s, frame.frame, frame.probe_ok, frame.mannequin_from_probe,
                     frame.needle_ok, frame.mannequin_from_drawn);
-    for (int n = 0; n < record.puncture.event_count; ++n) {
-        const NeedleEvent& event = record.puncture.events[static_cast<std::size_t>(n)];
-        if (const auto kind = tissue_event(event.kind))
-            monitor_.report(*kind, event.layer, event.force_n);
-    }
+    report_punctures(record.puncture, monitor_);
     const auto events = monitor_.events();
     recorder_->push(frame, events);
     if (const char* why = picture_reason(events)) {

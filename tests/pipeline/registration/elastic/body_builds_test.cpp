@@ -17,6 +17,7 @@
 #include "pipeline/registration/map/fold_proof.h"
 #include "pipeline/registration/map/inverse_map.h"
 #include "pipeline/registration/map/one_to_one_proof.h"
+#include "support/fit_report.h"
 #include "support/paths.h"
 #include "support/torso_builds.h"
 #include "support/warped_skin.h"
@@ -25,14 +26,6 @@ namespace sonocase::pipeline {
 namespace {
 
 using namespace sonocase::testing;
-
-double measure(const RegisterResult& r, const std::string& name) {
-    for (const Measure& m : r.report.measures) {
-        if (m.name == name) return m.value;
-    }
-    ADD_FAILURE() << name;
-    return -1;
-}
 
 std::string note(const RegisterResult& r, const std::string& name) {
     for (const Note& n : r.report.notes) {

@@ -8,20 +8,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "support/fit_report.h"
 #include "support/torso_builds.h"
 
 namespace sonocase::pipeline {
 namespace {
 
 using namespace sonocase::testing;
-
-double measure(const RegisterResult& r, const std::string& name) {
-    for (const Measure& m : r.report.measures) {
-        if (m.name == name) return m.value;
-    }
-    ADD_FAILURE() << name;
-    return -1;
-}
 
 RegisterOptions hints(const BuiltMannequin& mannequin) {
     RegisterOptions options;

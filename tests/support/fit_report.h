@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What tests read in the report of a fit.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "pipeline/registration/register_surfaces.h"
+
+namespace sonocase::testing {
+
+// A measure of a fit's report.
+inline double measure(const pipeline::RegisterResult& r, const std::string& name) {
+    for (const Measure& m : r.report.measures) {
+        if (m.name == name) return m.value;
+    }
+    ADD_FAILURE() << name;
+    return -1;
+}
+
+}  // namespace sonocase::testing
