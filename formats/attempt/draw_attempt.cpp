@@ -7,6 +7,8 @@
 #include <cmath>
 #include <optional>
 
+#include "formats/attempt/difficulty.h"
+
 namespace sonocase {
 namespace {
 
@@ -222,10 +224,11 @@ AttemptDraw draw_attempt(const Exercise& exercise,
                          std::uint64_t seed) {
     AttemptDraw out{exercise, {}};
     if (seed == 0) return out;
+    apply_difficulty(attempt_difficulty(seed), out.exercise);
     Draws draws(seed);
     const Body body(exercise, anatomy, labels);
     for (std::size_t t = 0; t < exercise.targets.size(); ++t) {
-        if (!(exercise.targets[t].spread_mm > 0)) continue;
+        if (!(out.exercise.targets[t].spread_mm > 0)) continue;
         if (const auto place = draw_target(out.exercise, t, body, labels, draws)) {
             out.exercise.targets[t].centre = *place;
         } else {
@@ -235,7 +238,7 @@ AttemptDraw draw_attempt(const Exercise& exercise,
                                    "inside, spread_mm and clearance_mm.");
         }
     }
-    if (exercise.start_spread_mm > 0 && !draw_start(out.exercise, anatomy, draws)) {
+    if (out.exercise.start_spread_mm > 0 && !draw_start(out.exercise, anatomy, draws)) {
         out.warnings.push_back(
             "No place away from the target was found for the probe, so it "
             "begins at start_probe: raise start_spread_mm.");

@@ -24,7 +24,7 @@ struct AttemptDraw {
 // exercise   as written
 // anatomy    of the case, at rest
 // labels     palette of the anatomy
-// seed       0: the exercise as written; any other: a draw
+// seed       0: the exercise as written; any other: a draw, as hard as its attempt_difficulty()
 //
 // Each target with spread_mm > 0 is placed uniformly in the ball of that radius about its centre,
 // where

@@ -32,6 +32,10 @@ std::string digest_of(std::span<const std::uint8_t> bytes) {
     return hex_of(XXH3_128bits(bytes.data(), bytes.size()));
 }
 
+std::uint64_t hash_of(std::span<const std::uint8_t> bytes) {
+    return XXH3_64bits(bytes.data(), bytes.size());
+}
+
 std::string digest_of(std::string_view text) {
     return digest_of(bytes_of(text));
 }

@@ -14,6 +14,8 @@ namespace sonocase {
 
 std::string digest_of(std::span<const std::uint8_t> bytes);
 std::string digest_of(std::string_view text);
+// XXH3, 64 bits, for lists of many: whether parts of a file have come as they were sent.
+std::uint64_t hash_of(std::span<const std::uint8_t> bytes);
 
 // Several parts under one hash. Every part is hashed with its length, so that ("ab", "c") and
 // ("a", "bc") differ.

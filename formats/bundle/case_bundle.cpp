@@ -2,7 +2,9 @@
 
 #include "formats/bundle/case_bundle.h"
 
+#include "formats/bundle/attribution.h"
 #include "formats/bundle/codec/bundle_parts.h"
+#include "formats/bundle/codec/flow_codec.h"
 #include "formats/bundle/codec/packed_volumes.h"
 #include "formats/bundle/codec/volume_json.h"
 #include "formats/text/stage_report_json.h"
@@ -11,6 +13,22 @@ namespace sonocase {
 namespace {
 
 using detail::Json;
+
+// The answer key, for other programs: what the stage "pathology" reports of each lesion, as an
+// object of its own. Readers take it from the stage's report.
+Json pathology_of(const StageReport& report) {
+    Json out = Json::array();
+    for (const MeasureGroup& lesion : report.groups) {
+        Json item = Json::object();
+        item["name"] = lesion.name;
+        const std::string prefix = lesion.name + ".";
+        for (const Note& note : report.notes)
+            if (note.name.starts_with(prefix)) item[note.name.substr(prefix.size())] = note.text;
+        for (const Measure& measure : lesion.values) item[measure.name] = measure.value;
+        out.push_back(std::move(item));
+    }
+    return out;
+}
 
 Json manifest_of(const CaseBundle& bundle) {
     Json out = Json::object();
@@ -41,10 +59,23 @@ Json manifest_of(const CaseBundle& bundle) {
     }
     out["inputs"] = std::move(inputs);
     out["stages"] = detail::json_of(bundle.manifest.stages);
+    // A case without lesions or an attribution keeps its bytes.
+    for (const StageReport& report : bundle.manifest.stages) {
+        if (!report.groups.empty() && report.stage == "pathology")
+            out["pathology"] = pathology_of(report);
+    }
+    if (const std::string text = attribution_of(bundle); !text.empty()) out["attribution"] = text;
     return out;
 }
 
 }  // namespace
+
+std::string attribution_of(const CaseBundle& bundle) {
+    for (const StageReport& report : bundle.manifest.stages)
+        for (const Note& note : report.notes)
+            if (report.stage == "import" && note.name == "attribution") return note.text;
+    return {};
+}
 
 std::vector<int> tissue_of_label(const CaseBundle& bundle) {
     std::vector<int> out;
@@ -70,6 +101,7 @@ std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle, JobRunner& jobs
     if (!bundle.skin_unfitted.empty()) writer.add_array("skin.fit", false, bundle.skin_unfitted);
     if (!bundle.mannequin_skin.points.empty())
         detail::add_surface(writer, "skin.man", bundle.mannequin_skin);
+    if (!bundle.flow.empty()) writer.add("flow", false, detail::flow_bytes(bundle.flow));
     if (!bundle.preview_png.empty()) writer.add_array("preview", false, bundle.preview_png);
     return writer.write(jobs);
 }

@@ -11,6 +11,7 @@
 #include "formats/base/jobs.h"
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
+#include "formats/flow/flow_field.h"
 #include "formats/volume/brick_volume.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/solid_texture.h"
@@ -56,6 +57,7 @@ struct CaseBundle {
     // mannequin, so that it was not fitted; empty: fitted everywhere, or not known.
     std::vector<std::uint8_t> skin_unfitted;
     Surface mannequin_skin;                 // `mannequin` frame, as digitised
+    FlowField flow;                         // blood in the vessels; may be empty
     std::vector<std::uint8_t> preview_png;  // may be empty
 };
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The readers of case_bundle.h and streamed_bundle.h.
+#include <algorithm>
+#include <array>
 #include <optional>
 
 #include "formats/bundle/case_bundle.h"
 #include "formats/bundle/codec/bundle_parts.h"
+#include "formats/bundle/codec/flow_codec.h"
 #include "formats/bundle/codec/packed_volumes.h"
 #include "formats/bundle/codec/volume_json.h"
 #include "formats/bundle/streamed_bundle.h"
@@ -17,9 +20,11 @@ using detail::Json;
 using detail::JsonFault;
 using detail::JsonObject;
 
-constexpr std::string_view kKnownChunks[] = {
-    "manifest", SONOCASE_VOLUME_CHUNKS, "textures", "speckle", "skin.pat", "skin.fit", "skin.man",
-    "preview"};
+constexpr std::string_view kKnownChunks[] = {"manifest", SONOCASE_VOLUME_CHUNKS,
+                                             "textures", "speckle",
+                                             "skin.pat", "skin.fit",
+                                             "skin.man", "flow",
+                                             "preview"};
 constexpr std::size_t kMaxPreviewBytes = std::size_t{64} << 20;
 
 void read_manifest_into(CaseBundle& bundle, JsonObject& manifest) {
@@ -58,65 +63,115 @@ void read_manifest_into(CaseBundle& bundle, JsonObject& manifest) {
     }
 }
 
-// Textures, surfaces and preview: small enough for one thread.
-Status read_small_parts(CaseBundle& bundle,
-                        const ChunkReader& reader,
-                        const Json& json,
-                        const std::string& where) {
-    JsonFault fault{where + ": manifest", {}};
-    JsonObject manifest(json, "", fault);
-    auto textures = detail::read_textures(reader, manifest);
-    if (!textures) return textures.error();
-    bundle.textures = std::move(*textures);
-    auto speckle = detail::read_speckle(reader, manifest);
-    if (!speckle) return speckle.error();
-    bundle.speckle = std::move(*speckle);
-    if (fault.error) return *fault.error;
-    auto patient = detail::read_surface(reader, "skin.pat");
-    if (!patient) return patient.error();
-    bundle.patient_skin = std::move(*patient);
-    if (reader.has("skin.fit")) {
-        auto unfitted =
-            reader.read_array<std::uint8_t>("skin.fit", bundle.patient_skin.points.size());
-        if (!unfitted) return unfitted.error();
-        bundle.skin_unfitted = std::move(*unfitted);
-    }
-    auto mannequin = detail::read_surface(reader, "skin.man");
-    if (!mannequin) return mannequin.error();
-    bundle.mannequin_skin = std::move(*mannequin);
-    if (!reader.has("preview")) return Done{};
-    auto preview = reader.read("preview", kMaxPreviewBytes);
-    if (!preview) return preview.error();
-    bundle.preview_png = std::move(*preview);
+// Textures, surfaces and preview: small enough for one thread, and not needed by the first picture
+// of model `physical`. Each step reads one chunk, and nothing where the bundle has none.
+struct SmallPart {
+    const char* type;
+    Status (*read)(CaseBundle&, const ChunkReader&, JsonObject& manifest);
+};
+
+template <class Value>
+Status put(Result<Value> from, Value& to) {
+    if (!from) return from.error();
+    to = std::move(*from);
     return Done{};
+}
+
+constexpr std::array kSmallParts{
+    SmallPart{"textures",
+              [](CaseBundle& b, const ChunkReader& r, JsonObject& manifest) {
+                  return put(detail::read_textures(r, manifest), b.textures);
+              }},
+    SmallPart{"speckle",
+              [](CaseBundle& b, const ChunkReader& r, JsonObject& manifest) {
+                  return put(detail::read_speckle(r, manifest), b.speckle);
+              }},
+    SmallPart{"skin.pat",
+              [](CaseBundle& b, const ChunkReader& r, JsonObject&) {
+                  return put(detail::read_surface(r, "skin.pat"), b.patient_skin);
+              }},
+    SmallPart{"skin.fit",
+              [](CaseBundle& b, const ChunkReader& r, JsonObject&) -> Status {
+                  if (!r.has("skin.fit")) return Done{};
+                  return put(r.read_array<std::uint8_t>("skin.fit", b.patient_skin.points.size()),
+                             b.skin_unfitted);
+              }},
+    SmallPart{"skin.man",
+              [](CaseBundle& b, const ChunkReader& r, JsonObject&) {
+                  return put(detail::read_surface(r, "skin.man"), b.mannequin_skin);
+              }},
+    SmallPart{"flow",
+              [](CaseBundle& b, const ChunkReader& r, JsonObject&) -> Status {
+                  if (!r.has("flow")) return Done{};
+                  const auto bytes = r.read("flow", detail::kMaxFlowBytes);
+                  if (!bytes) return bytes.error();
+                  return put(detail::flow_from_bytes(*bytes, r.where()), b.flow);
+              }},
+    SmallPart{"preview",
+              [](CaseBundle& b, const ChunkReader& r, JsonObject&) -> Status {
+                  if (!r.has("preview")) return Done{};
+                  return put(r.read("preview", kMaxPreviewBytes), b.preview_png);
+              }},
+};
+
+// Reads those of `pending` whose bytes are there, in their order, and takes them off the list.
+// "skin.fit" belongs to the points of "skin.pat" and waits for them.
+Status read_small_parts(std::vector<const SmallPart*>& pending,
+                        CaseBundle& bundle,
+                        const ChunkReader& reader,
+                        const Json& json) {
+    JsonFault fault{reader.where() + ": manifest", {}};
+    JsonObject manifest(json, "", fault);
+    Status first_fault = Done{};
+    std::erase_if(pending, [&](const SmallPart* part) {
+        const bool waits =
+            part->type == std::string_view("skin.fit") && !reader.is_here("skin.pat");
+        if (waits || !reader.is_here(part->type)) return false;
+        Status read = part->read(bundle, reader, manifest);
+        if (fault.error) read = *fault.error;
+        if (!read && first_fault) first_fault = read;
+        return true;
+    });
+    return first_fault;
+}
+
+std::vector<const SmallPart*> all_small_parts() {
+    std::vector<const SmallPart*> out;
+    for (const SmallPart& part : kSmallParts) out.push_back(&part);
+    return out;
 }
 
 // A bundle whose blocks are still packed; blocks is null where the file's layout has none.
 struct PackedBundle {
     CaseBundle bundle;
     std::unique_ptr<VoxelBlocks> blocks;
+    // For what is read later.
+    ChunkReader reader;
+    Json json;
+    std::vector<const SmallPart*> pending = all_small_parts();
 };
 
 Result<PackedBundle> read_packed(std::span<const std::uint8_t> bytes,
+                                 const Arrivals* arrivals,
                                  const std::string& where,
                                  JobRunner& jobs) {
-    const auto reader = ChunkReader::open(bytes, "CASE", kKnownChunks, where);
+    auto reader = ChunkReader::open(bytes, "CASE", kKnownChunks, where, arrivals);
     if (!reader) return reader.error();
-    const auto json = detail::read_manifest(*reader);
+    auto json = detail::read_manifest(*reader);
     if (!json) return json.error();
-    PackedBundle out;
+    PackedBundle out{{}, {}, std::move(*reader), std::move(*json)};
     CaseBundle& bundle = out.bundle;
     JsonFault fault{where + ": manifest", {}};
-    JsonObject manifest(*json, "", fault);
+    JsonObject manifest(out.json, "", fault);
     read_manifest_into(bundle, manifest);
     if (fault.error) return *fault.error;
     std::optional<Result<detail::VoxelVolumes>> volumes;
     Status small_parts = Done{};
     jobs.run(2, [&](std::size_t job) {
         if (job == 1) {
-            small_parts = read_small_parts(bundle, *reader, *json, where);
+            small_parts = read_small_parts(out.pending, bundle, out.reader, out.json);
         } else {
-            volumes = detail::read_volumes(*reader, manifest, bundle.grid.size,
+            volumes = detail::read_volumes(out.reader, manifest, bundle.grid.size,
                                            bundle.labels.size(), jobs);
         }
     });
@@ -136,7 +191,7 @@ Result<PackedBundle> read_packed(std::span<const std::uint8_t> bytes,
 Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,
                                const std::string& where,
                                JobRunner& jobs) {
-    auto packed = read_packed(bytes, where, jobs);
+    auto packed = read_packed(bytes, nullptr, where, jobs);
     if (!packed) return packed.error();
     if (packed->blocks) {
         packed->blocks->load_all(jobs);
@@ -145,10 +200,43 @@ Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,
     return std::move(packed->bundle);
 }
 
+struct StreamedBundle::Arriving {
+    Arrivals arrivals;
+    std::optional<PackedBundle> packed;  // what is left to read; its bundle has moved on
+};
+
+StreamedBundle::StreamedBundle() = default;
+StreamedBundle::StreamedBundle(CaseBundle whole) : bundle_(std::move(whole)) {}
+StreamedBundle::~StreamedBundle() = default;
+StreamedBundle::StreamedBundle(StreamedBundle&&) noexcept = default;
+StreamedBundle& StreamedBundle::operator=(StreamedBundle&&) noexcept = default;
+
+const Arrivals* StreamedBundle::arrivals() const {
+    return arriving_ ? &arriving_->arrivals : nullptr;
+}
+
+void StreamedBundle::arrived(std::size_t segment) {
+    arriving_->arrivals.add(segment);
+}
+
+Status StreamedBundle::look_again() {
+    if (blocks_) blocks_->look_again();
+    PackedBundle& rest = *arriving_->packed;
+    return read_small_parts(rest.pending, bundle_, rest.reader, rest.json);
+}
+
+bool StreamedBundle::has_textures() const {
+    if (!arriving_) return true;
+    const auto& pending = arriving_->packed->pending;
+    return std::none_of(pending.begin(), pending.end(), [](const SmallPart* part) {
+        return part->type == std::string_view("textures");
+    });
+}
+
 Result<StreamedBundle> stream_bundle(RawVector<std::uint8_t> bytes,
                                      const std::string& where,
                                      JobRunner& jobs) {
-    auto packed = read_packed(bytes, where, jobs);
+    auto packed = read_packed(bytes, nullptr, where, jobs);
     if (!packed) return packed.error();
     StreamedBundle out;
     out.bundle_ = std::move(packed->bundle);
@@ -157,6 +245,22 @@ Result<StreamedBundle> stream_bundle(RawVector<std::uint8_t> bytes,
         out.blocks_ = std::move(packed->blocks);
         out.bytes_ = std::move(bytes);  // the storage stays where the blocks refer to it
     }
+    return out;
+}
+
+Result<StreamedBundle> stream_bundle_in_parts(RawVector<std::uint8_t> bytes,
+                                              Arrivals arrivals,
+                                              const std::string& where,
+                                              JobRunner& jobs) {
+    StreamedBundle out;
+    out.arriving_.reset(new StreamedBundle::Arriving{std::move(arrivals), {}});
+    auto packed = read_packed(bytes, &out.arriving_->arrivals, where, jobs);
+    if (!packed) return packed.error();
+    out.bytes_ = std::move(bytes);
+    out.bundle_ = std::move(packed->bundle);
+    out.blocks_ = std::move(packed->blocks);
+    if (out.blocks_) out.blocks_->use_small_pages();
+    out.arriving_->packed = std::move(*packed);
     return out;
 }
 

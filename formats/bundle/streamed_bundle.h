@@ -6,11 +6,16 @@
 //
 //     StreamedBundle   owns such a bundle, the bytes of its file and what unpacks them
 //     CaseView         what renderers and scores take: any bundle, whole or streamed
+//
+// A file may also arrive in segments, as over a network: stream_bundle_in_parts().
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "formats/base/arrivals.h"
 #include "formats/base/jobs.h"
 #include "formats/base/raw_vector.h"
 #include "formats/base/result.h"
@@ -24,9 +29,12 @@ namespace sonocase {
 // everything else is as read_bundle() gives it. Views of a bundle end when it is moved from.
 class StreamedBundle {
   public:
-    StreamedBundle() = default;
+    StreamedBundle();
     // A bundle in which everything is loaded; blocks() is null.
-    explicit StreamedBundle(CaseBundle whole) : bundle_(std::move(whole)) {}
+    explicit StreamedBundle(CaseBundle whole);
+    ~StreamedBundle();
+    StreamedBundle(StreamedBundle&&) noexcept;
+    StreamedBundle& operator=(StreamedBundle&&) noexcept;
 
     const CaseBundle& operator*() const { return bundle_; }
     const CaseBundle* operator->() const { return &bundle_; }
@@ -34,12 +42,30 @@ class StreamedBundle {
     // a constant bundle allows it.
     VoxelBlocks* blocks() const { return blocks_.get(); }
 
+    // What follows is for bundles of stream_bundle_in_parts(), on the thread that renders.
+    // Null: all of the file was there from the start.
+    const Arrivals* arrivals() const;
+    // The file; a segment's bytes are written here before arrived() is told.
+    std::span<std::uint8_t> bytes() { return bytes_; }
+    void arrived(std::size_t segment);
+    // Reads what has become readable: the next frame shows it. Error: a part is damaged; the others
+    // are read all the same.
+    Status look_again();
+    // False: the textures of model `paper` have not arrived yet.
+    bool has_textures() const;
+
   private:
+    struct Arriving;
     friend Result<StreamedBundle> stream_bundle(RawVector<std::uint8_t>,
                                                 const std::string&,
                                                 JobRunner&);
+    friend Result<StreamedBundle> stream_bundle_in_parts(RawVector<std::uint8_t>,
+                                                         Arrivals,
+                                                         const std::string&,
+                                                         JobRunner&);
     CaseBundle bundle_;
     RawVector<std::uint8_t> bytes_;  // the file; blocks_ reads from it
+    std::unique_ptr<Arriving> arriving_;
     std::unique_ptr<VoxelBlocks> blocks_;
 };
 
@@ -66,5 +92,28 @@ class CaseView {
 Result<StreamedBundle> stream_bundle(RawVector<std::uint8_t> bytes,
                                      const std::string& where,
                                      JobRunner& jobs = serial_jobs());
+
+// The same of a file that arrives in segments, of which those of parts_to_open() must be there.
+// Blocks that are not there yet look as voxel_blocks.h says; textures, surfaces, blood flow and
+// preview are empty until they come. bytes: # the whole file, 0 where nothing is there yet.
+// Checksums of chunks that are read block by block are not checked: whoever adds segments checks
+// those.
+Result<StreamedBundle> stream_bundle_in_parts(RawVector<std::uint8_t> bytes,
+                                              Arrivals arrivals,
+                                              const std::string& where,
+                                              JobRunner& jobs = serial_jobs());
+
+// What of a file must be there before it can be opened in parts, rising and apart from each other.
+// bytes: a whole bundle's. Error: bytes that are not a bundle.
+Result<std::vector<ByteRange>> parts_to_open(std::span<const std::uint8_t> bytes,
+                                             const std::string& where);
+
+// The same bundle with its chunks in the order in which a player that loads it in parts needs them,
+// packed as small as zstd can; textures before the blocks if they are needed `at_once`. Error:
+// bytes that are not a bundle.
+Result<std::vector<std::uint8_t>> arranged_for_loading(std::span<const std::uint8_t> bytes,
+                                                       bool textures_at_once,
+                                                       const std::string& where,
+                                                       JobRunner& jobs = serial_jobs());
 
 }  // namespace sonocase

@@ -31,7 +31,8 @@ VoxelBlocks::VoxelBlocks(std::unique_ptr<detail::BlockParts> parts)
       count_(parts_->grid.count()),
       lower_(count_),
       state_(std::make_unique<std::atomic<State>[]>(count_)),
-      left_(count_) {
+      left_(count_),
+      asked_(std::make_unique<std::atomic<std::uint8_t>[]>(count_)) {
     for (std::size_t n = 0; n < kWorkers; ++n)
         workers_[n].unpacker = std::make_unique<detail::BlockUnpacker>(*parts_);
     for (std::size_t block = 0; block < count_; ++block) {
@@ -64,9 +65,34 @@ void VoxelBlocks::finish(std::size_t block, bool valid) noexcept {
     left_.fetch_sub(1, std::memory_order_release);
 }
 
+void VoxelBlocks::await(std::size_t block) noexcept {
+    if (asked_[block].exchange(1, std::memory_order_relaxed) == 0)
+        awaited_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void VoxelBlocks::forget_awaited() noexcept {
+    if (awaited() == 0) return;
+    for (std::size_t block = 0; block < count_; ++block)
+        asked_[block].store(0, std::memory_order_relaxed);
+    awaited_ = 0;
+}
+
+void VoxelBlocks::look_again() noexcept {
+    for (std::size_t block = 0; block < count_; ++block) {
+        State filled_in = kFilledIn;
+        if (parts_->is_here(block)) state_[block].compare_exchange_strong(filled_in, kPacked);
+    }
+}
+
+std::array<ByteRange, 2> VoxelBlocks::places(std::size_t block) const noexcept {
+    return {parts_->corrections ? parts_->corrections->place(block) : ByteRange{},
+            parts_->offsets ? parts_->offsets->place(block) : ByteRange{}};
+}
+
 void VoxelBlocks::unpack(std::size_t block) noexcept {
     if (!take(block)) {
         state_[block].wait(kBeingUnpacked, std::memory_order_acquire);
+        if (state_[block].load(std::memory_order_relaxed) == kFilledIn) await(block);
         return;
     }
     for (std::size_t n = 0;; n = (n + 1) % kWorkers) {
@@ -76,7 +102,14 @@ void VoxelBlocks::unpack(std::size_t block) noexcept {
         } else if (!lock.try_lock()) {
             continue;
         }
-        finish(block, workers_[n].unpacker->unpack(*parts_, block));
+        if (parts_->is_here(block)) {
+            finish(block, workers_[n].unpacker->unpack(*parts_, block));
+            return;
+        }
+        workers_[n].unpacker->fill_in(*parts_, block);
+        state_[block].store(kFilledIn, std::memory_order_release);
+        state_[block].notify_all();
+        await(block);
         return;
     }
 }
@@ -87,7 +120,8 @@ void VoxelBlocks::load_all(JobRunner& jobs) {
     jobs.run((count_ + row - 1) / row, [&](std::size_t job) {
         detail::BlockUnpacker unpacker(*parts_);
         for (std::size_t block = job * row; block < std::min((job + 1) * row, count_); ++block) {
-            if (take(block)) finish(block, unpacker.unpack(*parts_, block));
+            if (parts_->is_here(block) && take(block))
+                finish(block, unpacker.unpack(*parts_, block));
         }
     });
     for (std::size_t block = 0; block < count_; ++block)  // that other threads have begun

@@ -7,13 +7,18 @@
 // Asking neither allocates nor throws, so that a frame may do it; any thread may. A block costs
 // about 0.1 ms the first time. A block whose contents are invalid although their checksum is right
 // is found when it is asked for: it then holds no surfaces and offsets of 0, and status() says so.
+//
+// Of a bundle that arrives in segments (streamed_bundle.h) a block that is asked for before its
+// bytes are there holds surfaces without corrections and offsets of 0, and is awaited.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "formats/base/arrivals.h"
 #include "formats/base/geometry.h"
 #include "formats/base/jobs.h"
 #include "formats/base/result.h"
@@ -49,12 +54,25 @@ class VoxelBlocks {
     bool damaged() const noexcept { return damaged_.load(std::memory_order_relaxed); }
     Status status() const;
 
+    // For bundles that arrive in segments; on the thread that asks for blocks.
+    std::size_t awaited() const noexcept { return awaited_.load(std::memory_order_relaxed); }
+    bool is_awaited(std::size_t block) const noexcept {
+        return asked_[block].load(std::memory_order_relaxed) != 0;
+    }
+    void forget_awaited() noexcept;  // counts again from here
+    // Segments have come: blocks whose bytes are now there are unpacked when next asked for.
+    void look_again() noexcept;
+    std::size_t count() const noexcept { return count_; }
+    Int3 lower(std::size_t block) const noexcept { return lower_[block]; }  // first voxel
+    // Where the block's bytes lie in the file: records, echo offsets.
+    std::array<ByteRange, 2> places(std::size_t block) const noexcept;
+
     // Keeps the system from providing a page of 2 MB for a block of a tenth of that, where the
     // pools are large enough for such pages. To be called before any block is asked for.
     void use_small_pages() noexcept;
 
   private:
-    enum State : std::uint8_t { kPacked, kBeingUnpacked, kLoaded };
+    enum State : std::uint8_t { kPacked, kBeingUnpacked, kFilledIn, kLoaded };
     struct Worker;
 
     bool is_loaded(std::size_t block) const noexcept {
@@ -63,6 +81,7 @@ class VoxelBlocks {
     bool take(std::size_t block) noexcept;  // claims it; false: another thread has
     void finish(std::size_t block, bool valid) noexcept;
     void unpack(std::size_t block) noexcept;
+    void await(std::size_t block) noexcept;
 
     std::unique_ptr<detail::BlockParts> parts_;
     std::unique_ptr<Worker[]> workers_;  // threads that can unpack at the same time
@@ -72,6 +91,8 @@ class VoxelBlocks {
     std::vector<Int3> lower_;  // first voxel of each block
     std::unique_ptr<std::atomic<State>[]> state_;
     std::atomic<std::size_t> left_{0};
+    std::unique_ptr<std::atomic<std::uint8_t>[]> asked_;  // though not there
+    std::atomic<std::size_t> awaited_{0};
     std::atomic<bool> damaged_{false};
 };
 

@@ -27,7 +27,6 @@ constexpr std::size_t kHeaderBytes = 64;
 constexpr std::size_t kEntryBytes = 64;
 constexpr std::uint32_t kRequired = 1;
 constexpr std::uint32_t kZstd = 2;
-constexpr int kZstdLevel = 6;
 constexpr const char* kRemake = "the file is damaged; copy it again or make it again";
 
 template <class T>
@@ -47,7 +46,9 @@ std::size_t aligned(std::size_t offset) {
 
 // Independent zstd frames of kFrameBytes each, so that they can be compressed and decompressed in
 // parallel. Empty when compression saves less than an eighth.
-std::vector<std::uint8_t> compressed(std::span<const std::uint8_t> raw, JobRunner& jobs) {
+std::vector<std::uint8_t> compressed(std::span<const std::uint8_t> raw,
+                                     int level,
+                                     JobRunner& jobs) {
     if (raw.size() < 64) return {};
     const std::size_t frames = (raw.size() + kFrameBytes - 1) / kFrameBytes;
     std::vector<std::vector<std::uint8_t>> parts(frames);
@@ -56,7 +57,7 @@ std::vector<std::uint8_t> compressed(std::span<const std::uint8_t> raw, JobRunne
             raw.subspan(i * kFrameBytes, std::min(kFrameBytes, raw.size() - i * kFrameBytes));
         parts[i].resize(ZSTD_compressBound(from.size()));
         const std::size_t n =
-            ZSTD_compress(parts[i].data(), parts[i].size(), from.data(), from.size(), kZstdLevel);
+            ZSTD_compress(parts[i].data(), parts[i].size(), from.data(), from.size(), level);
         parts[i].resize(ZSTD_isError(n) ? 0 : n);
     });
     std::size_t total = 0;
@@ -111,13 +112,13 @@ void ChunkWriter::add_packed(std::string type, bool required, std::vector<std::u
     chunks_.back().packed = true;
 }
 
-std::vector<std::uint8_t> ChunkWriter::write(JobRunner& jobs) const {
+std::vector<std::uint8_t> ChunkWriter::write(JobRunner& jobs, int level) const {
     const std::size_t table_bytes = kEntryBytes * chunks_.size();
     std::vector<std::uint8_t> out(kHeaderBytes + table_bytes);
     for (std::size_t i = 0; i < chunks_.size(); ++i) {
         const Chunk& chunk = chunks_[i];
         const std::vector<std::uint8_t> packed =
-            chunk.packed ? std::vector<std::uint8_t>() : compressed(chunk.view, jobs);
+            chunk.packed ? std::vector<std::uint8_t>() : compressed(chunk.view, level, jobs);
         const std::span<const std::uint8_t> stored =
             packed.empty() ? chunk.view : std::span(packed);
         const std::size_t offset = aligned(out.size());
@@ -149,10 +150,14 @@ Error ChunkReader::fault(const std::string& what, const std::string& expected) c
 Result<ChunkReader> ChunkReader::open(std::span<const std::uint8_t> bytes,
                                       std::string_view kind,
                                       std::span<const std::string_view> known,
-                                      const std::string& where) {
+                                      const std::string& where,
+                                      const Arrivals* arrivals) {
     ChunkReader reader;
     reader.bytes_ = bytes;
     reader.where_ = where;
+    reader.arrivals_ = arrivals;
+    if (bytes.size() >= kHeaderBytes && !reader.here({0, kHeaderBytes}))
+        return reader.fault("has not arrived yet", "load its beginning first");
     if (Status header = reader.check_header(kind); !header) return header.error();
     const std::size_t count = get<std::uint32_t>(bytes, 24);
     const auto table = bytes.subspan(kHeaderBytes, count * kEntryBytes);
@@ -209,6 +214,8 @@ Status ChunkReader::check_header(std::string_view kind) const {
         return fault("table of " + std::to_string(count) + " chunks does not fit the file",
                      kRemake);
     }
+    if (!here({kHeaderBytes, count * kEntryBytes}))
+        return fault("has not arrived yet", "load its beginning first");
     if (!all_zero(bytes.subspan(28, 20)))
         return fault("reserved header bytes are not zero", kRemake);
     const auto table = bytes.subspan(kHeaderBytes, count * kEntryBytes);
@@ -232,7 +239,8 @@ Result<ChunkReader::Entry> ChunkReader::read_entry(std::span<const std::uint8_t>
     if (offset != aligned(end) || offset > bytes_.size() || stored > bytes_.size() - offset) {
         return fault(name + " at offset " + std::to_string(offset) + " is out of place", kRemake);
     }
-    if (!all_zero(bytes_.subspan(end, static_cast<std::size_t>(offset) - end))) {
+    const ByteRange padding{end, static_cast<std::size_t>(offset) - end};
+    if (here(padding) && !all_zero(bytes_.subspan(padding.at, padding.count))) {
         return fault("bytes before " + name + " are not zero", kRemake);
     }
     if ((flags & ~(kRequired | kZstd)) != 0 || !all_zero(raw.subspan(12, 4)) ||
@@ -261,6 +269,25 @@ const ChunkReader::Entry* ChunkReader::find(std::string_view type) const {
 
 bool ChunkReader::has(std::string_view type) const {
     return find(type) != nullptr;
+}
+
+bool ChunkReader::is_compressed(std::string_view type) const {
+    const Entry* entry = find(type);
+    return entry != nullptr && entry->compressed;
+}
+
+bool ChunkReader::is_required(std::string_view type) const {
+    const Entry* entry = find(type);
+    return entry != nullptr && entry->required;
+}
+
+ByteRange ChunkReader::place(std::string_view type) const {
+    const Entry* entry = find(type);
+    return entry ? ByteRange{entry->offset, entry->stored} : ByteRange{};
+}
+
+bool ChunkReader::is_here(std::string_view type) const {
+    return here(place(type));
 }
 
 std::size_t ChunkReader::raw_bytes(std::string_view type) const {
@@ -301,6 +328,8 @@ Result<std::vector<std::uint8_t>> ChunkReader::read(std::string_view type,
 }
 
 Status ChunkReader::check_sum(const Entry& entry) const {
+    if (!here({entry.offset, entry.stored}))
+        return fault("chunk '" + entry.type + "' has not arrived yet", "load it first");
     if (XXH3_64bits(bytes_.data() + entry.offset, entry.stored) == entry.checksum) return Done{};
     return fault("chunk '" + entry.type + "' checksum does not match", kRemake);
 }
@@ -311,6 +340,17 @@ Result<std::span<const std::uint8_t>> ChunkReader::packed(std::string_view type)
     if (entry->compressed)
         return fault("chunk '" + entry->type + "' is compressed twice", "make the file again");
     if (Status sum = check_sum(*entry); !sum) return sum.error();
+    return bytes_.subspan(entry->offset, entry->stored);
+}
+
+Result<std::span<const std::uint8_t>> ChunkReader::packed_in_part(std::string_view type,
+                                                                  std::size_t head) const {
+    const Entry* entry = find(type);
+    if (!entry || is_here(type)) return packed(type);
+    if (entry->compressed)
+        return fault("chunk '" + entry->type + "' is compressed twice", "make the file again");
+    if (!here({entry->offset, std::min(head, entry->stored)}))
+        return fault("chunk '" + entry->type + "' has not arrived yet", "load its beginning first");
     return bytes_.subspan(entry->offset, entry->stored);
 }
 

@@ -15,6 +15,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "formats/base/arrivals.h"
 #include "formats/base/jobs.h"
 #include "formats/base/result.h"
 
@@ -24,6 +25,7 @@ inline constexpr std::uint32_t kContainerVersion = 1;
 inline constexpr std::size_t kChunkAlignment = 64;
 inline constexpr std::size_t kMaxChunks = 4096;
 inline constexpr std::size_t kFrameBytes = std::size_t{1} << 20;  // raw bytes of one zstd frame
+inline constexpr int kChunkLevel = 6;                             // of zstd
 
 // kind      four characters that say what the file is: "CASE", "LABL", "TXTR", "SURF"
 // type      up to eight characters that say what a chunk is
@@ -42,8 +44,8 @@ class ChunkWriter {
         add_view(type, required,
                  {reinterpret_cast<const std::uint8_t*>(values.data()), values.size() * sizeof(T)});
     }
-    // Chunks in the order added. The bytes do not depend on `jobs`.
-    std::vector<std::uint8_t> write(JobRunner& jobs = serial_jobs()) const;
+    // Chunks in the order added. The bytes do not depend on `jobs`. level: of zstd.
+    std::vector<std::uint8_t> write(JobRunner& jobs = serial_jobs(), int level = kChunkLevel) const;
 
   private:
     struct Chunk {
@@ -61,12 +63,21 @@ class ChunkWriter {
 // that every required chunk is one of `known`; a chunk's checksum is checked when it is read.
 class ChunkReader {
   public:
+    // arrivals: null for a whole file; of a file that arrives in segments, which must outlive the
+    // reader. bytes: # the whole file. Reading a chunk of which bytes are missing is an error.
     static Result<ChunkReader> open(std::span<const std::uint8_t> bytes,
                                     std::string_view kind,
                                     std::span<const std::string_view> known,
-                                    const std::string& where);
+                                    const std::string& where,
+                                    const Arrivals* arrivals = nullptr);
 
     bool has(std::string_view type) const;
+    bool is_compressed(std::string_view type) const;
+    bool is_required(std::string_view type) const;
+    ByteRange place(std::string_view type) const;  // empty if absent
+    // True if all bytes of the chunk are there, or if there is no such chunk.
+    bool is_here(std::string_view type) const;
+    const Arrivals* arrivals() const { return arrivals_; }
     std::size_t raw_bytes(std::string_view type) const;  // 0 if absent
     // max_bytes: the most that the caller can use; more is an error before anything is allocated.
     Result<std::vector<std::uint8_t>> read(std::string_view type,
@@ -74,6 +85,10 @@ class ChunkReader {
                                            JobRunner& jobs = serial_jobs()) const;
     // The bytes of a chunk of add_packed() as they are in the file; their checksum is checked.
     Result<std::span<const std::uint8_t>> packed(std::string_view type) const;
+    // The same where bytes may be missing: only its first `head` bytes must be there, and no
+    // checksum is checked.
+    Result<std::span<const std::uint8_t>> packed_in_part(std::string_view type,
+                                                         std::size_t head) const;
     // count: the number of values, which the chunk must hold exactly.
     template <class T, class Values = std::vector<T>>
     Result<Values> read_array(std::string_view type,
@@ -110,9 +125,21 @@ class ChunkReader {
     Status check_sum(const Entry& entry) const;
     Status unpack(std::string_view type, std::span<std::uint8_t> to, JobRunner& jobs) const;
 
+    bool here(ByteRange range) const { return arrivals_ == nullptr || arrivals_->has(range); }
+
     std::span<const std::uint8_t> bytes_;
+    const Arrivals* arrivals_ = nullptr;
     std::vector<Entry> entries_;
     std::string where_;
 };
+
+// The same chunks in another order: those of `order` first, the others after them as they were.
+// What is compressed is compressed again at `level` of zstd. bytes: a whole file of this kind.
+Result<std::vector<std::uint8_t>> rearranged(std::span<const std::uint8_t> bytes,
+                                             std::string_view kind,
+                                             std::span<const std::string_view> order,
+                                             int level,
+                                             const std::string& where,
+                                             JobRunner& jobs = serial_jobs());
 
 }  // namespace sonocase

@@ -18,6 +18,9 @@ constexpr const char* kSites = "Sites 2007";
 constexpr const char* kYeo = "Yeo 2011";
 // Complications rise with the number of passes: Mansfield et al., N. Engl. J. Med. 331:1735.
 constexpr const char* kMansfield = "Mansfield 1994";
+// Angle and place of the gate as sources of error in measured velocities: Lui et al., J. Vasc.
+// Surg. 42:972.
+constexpr const char* kLui = "Lui 2005";
 constexpr const char* kOutcome = "outcome";
 
 constexpr MetricInfo kTable[] = {
@@ -44,7 +47,7 @@ constexpr MetricInfo kTable[] = {
     {"depth_perception_mm", "needle", "Tip motion along the needle, both directions", kLess},
     {"correct_vessel_punctured", "needle", "First vessel punctured was the target's", kMore,
      kOutcome},
-    {"vein_collapse_at_puncture_percent", "needle", "Loss of the vein's height at its puncture",
+    {"vein_collapse_at_puncture_percent", "needle", "Loss of the vein's area at its puncture",
      kLess},
     {"posterior_wall_punctures", "needle", "Punctures of a vessel's far wall", kLess, kOutcome},
     {"no_go_contacts", "needle", "Critical structures touched", kLess, kOutcome},
@@ -73,6 +76,20 @@ constexpr MetricInfo kTable[] = {
     {"needle_plane_distance_max_mm", "guidance", "Tip to scan plane, greatest in tissue", kLess},
     {"needle_plane_angle_mean_deg", "guidance",
      "Angle between needle and scan plane, mean in tissue", kNeutral},
+
+    {"vessels_shown_in_colour", "doppler", "Vessels of the targets shown in colour", kMore,
+     kOutcome},
+    {"vessels_measured", "doppler", "Vessels of the targets whose velocity was measured", kMore,
+     kOutcome},
+    {"correct_vessel_measured", "doppler", "Velocities were measured in the targets' vessels alone",
+     kMore, kOutcome},
+    {"gate_in_vessel_fraction", "doppler", "Share of the gate in the blood of a target's vessel",
+     kMore, kLui},
+    {"doppler_angle_max_deg", "doppler", "Angle between beam and flow where it was measured", kLess,
+     kLui},
+    {"angle_cursor_error_deg", "doppler", "Angle cursor off the direction of flow", kLess, kLui},
+    {"peak_velocity_error_percent", "doppler", "Measured peak velocity off the true one", kLess,
+     kOutcome},
 
     {"probe_force_mean_n", "probe", "Force on the probe while it presses, mean", kLess},
     {"probe_force_max_n", "probe", "Force on the probe, greatest", kLess},
@@ -110,9 +127,13 @@ const char* metric_range(std::string_view name) {
     const auto ends = [&](std::string_view ending) {
         return name.size() > ending.size() && name.substr(name.size() - ending.size()) == ending;
     };
-    if (name == "correct_vessel_punctured" || ends("_fraction")) return "0 to 1";
+    if (name == "correct_vessel_punctured" || name == "correct_vessel_measured" ||
+        ends("_fraction"))
+        return "0 to 1";
     if (name == "vein_collapse_at_puncture_percent" || ends("_scanned_percent")) return "0 to 100";
-    if (name == "needle_plane_angle_mean_deg") return "0 to 90";
+    if (name == "needle_plane_angle_mean_deg" || name == "doppler_angle_max_deg" ||
+        name == "angle_cursor_error_deg")
+        return "0 to 90";
     if (name == "final_angle_deg") return "0 to 180";
     return "0 and up";
 }

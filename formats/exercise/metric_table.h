@@ -16,7 +16,7 @@ enum class MetricSense { neutral, less_is_better, more_is_better };
 
 struct MetricInfo {
     const char* name;
-    const char* group;  // "session", "needle", "probe", "targets", "guidance"
+    const char* group;  // "session", "needle", "probe", "targets", "guidance", "doppler"
     const char* title;
     MetricSense sense;
     // The study in which it told experts from novices or went with harm, or "outcome": it is what

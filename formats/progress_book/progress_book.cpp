@@ -15,13 +15,13 @@
 namespace sonocase {
 namespace {
 
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;               // 2: seed
 constexpr int kApplication = 0x534F4E4F;  // "SONO"
 
 constexpr const char* kSchema =
     "CREATE TABLE session(id INTEGER PRIMARY KEY, trainee TEXT NOT NULL, case_name TEXT NOT NULL,"
     " exercise TEXT NOT NULL, started TEXT NOT NULL, recording TEXT NOT NULL, passed INTEGER NOT "
-    "NULL,"
+    "NULL, seed INTEGER NOT NULL DEFAULT 0,"
     " UNIQUE(trainee, exercise, started));"
     "CREATE TABLE score(session INTEGER NOT NULL REFERENCES session(id) ON DELETE CASCADE,"
     " metric TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY(session, metric)) WITHOUT ROWID;";
@@ -129,6 +129,15 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
     } else if (version > kVersion) {
         return Error{"comes from a newer program (version " + std::to_string(version) + ")", path,
                      "update this one"};
+    } else if (version < kVersion) {
+        if (!impl->run(
+                "BEGIN IMMEDIATE; ALTER TABLE session ADD COLUMN seed INTEGER NOT NULL DEFAULT 0;"
+                "PRAGMA user_version=2; COMMIT;")) {
+            impl->run("ROLLBACK");
+            // Another program may have done it at the same moment.
+            if (impl->pragma("PRAGMA user_version") != kVersion)
+                return impl->fault("cannot bring the book to this version");
+        }
     }
     return ProgressBook(std::move(impl));
 }
@@ -149,13 +158,14 @@ Status ProgressBook::add(const ProgressEntry& entry) {
         }
         Statement row(
             impl.db,
-            "INSERT INTO session(trainee, case_name, exercise, started, recording, passed)"
-            " VALUES(?,?,?,?,?,?)");
+            "INSERT INTO session(trainee, case_name, exercise, started, recording, passed, seed)"
+            " VALUES(?,?,?,?,?,?,?)");
         row.bind(1, entry.trainee)
             .bind(2, entry.case_name)
             .bind(3, entry.exercise)
             .bind(4, entry.started);
         row.bind(5, entry.recording).bind(6, std::int64_t{entry.passed});
+        row.bind(7, static_cast<std::int64_t>(entry.seed));
         if (row.step() != SQLITE_DONE) return give_up();
         const std::int64_t id = sqlite3_last_insert_rowid(impl.db);
         Statement score(impl.db,
@@ -176,7 +186,7 @@ Result<std::vector<ProgressEntry>> ProgressBook::sessions(const std::string& tra
     std::vector<ProgressEntry> entries;
     Statement rows(
         impl_->db,
-        "SELECT id, trainee, case_name, exercise, started, recording, passed FROM session"
+        "SELECT id, trainee, case_name, exercise, started, recording, passed, seed FROM session"
         " WHERE (?1='' OR trainee=?1) AND (?2='' OR exercise=?2) ORDER BY started, id");
     rows.bind(1, trainee).bind(2, exercise);
     int state = 0;
@@ -189,6 +199,7 @@ Result<std::vector<ProgressEntry>> ProgressBook::sessions(const std::string& tra
         e.started = rows.text(4);
         e.recording = rows.text(5);
         e.passed = rows.integer(6) != 0;
+        e.seed = static_cast<std::uint64_t>(rows.integer(7));
         entries.push_back(std::move(e));
     }
     if (state != SQLITE_DONE) return impl_->fault("cannot read");
@@ -241,12 +252,13 @@ Result<std::string> ProgressBook::csv(const std::string& trainee,
                                       const std::string& exercise) const {
     const auto entries = sessions(trainee, exercise);
     if (!entries) return entries.error();
-    std::string out = "trainee,case,exercise,started,passed";
+    std::string out = "trainee,case,exercise,started,passed,seed";
     for (const MetricInfo& info : metric_table()) out += std::string(",") + info.name;
     out += "\r\n";
     for (const ProgressEntry& e : *entries) {
         out += csv_cell(e.trainee) + "," + csv_cell(e.case_name) + "," + csv_cell(e.exercise) +
-               "," + csv_cell(e.started) + "," + (e.passed ? "1" : "0");
+               "," + csv_cell(e.started) + "," + (e.passed ? "1" : "0") + "," +
+               std::to_string(e.seed);
         std::size_t next = 0;
         for (const MetricInfo& info : metric_table()) {
             out += ',';
@@ -269,6 +281,7 @@ ProgressEntry progress_entry(const SessionHeader& header,
     entry.started = header.started;
     entry.recording = recording;
     entry.passed = score.passed;
+    entry.seed = attempt_seed(header);
     for (const Metric& metric : score.metrics) {
         if (std::isfinite(metric.value)) entry.metrics.push_back(metric);
     }

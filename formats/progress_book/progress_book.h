@@ -7,6 +7,7 @@
 // A room of its own, so that nothing else depends on a database.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,13 +22,15 @@ struct ProgressEntry {
     std::string trainee, case_name, exercise, started;  // started: ISO 8601, UTC
     std::string recording;                              // path of the session file; empty: not kept
     bool passed = false;
+    std::uint64_t seed = 0;       // that the attempt's targets were drawn with; 0: as written
     std::vector<Metric> metrics;  // those that were defined
 };
 
 class ProgressBook {
   public:
-    // Creates the file and its folder if they are missing. An Error for a file that is not a
-    // progress book or was written by a newer program.
+    // Creates the file and its folder if they are missing. A book of version 1 is brought to
+    // version 2; its sessions get the seed 0. An Error for a file that is not a progress book or
+    // was written by a newer program.
     static Result<ProgressBook> open(const std::string& path);
     ~ProgressBook();
     ProgressBook(ProgressBook&&) noexcept;

@@ -14,6 +14,7 @@ namespace {
 constexpr const char* kEventField = "Event";
 constexpr const char* kSettingsField = "Settings";
 constexpr const char* kPressField = "Press";
+constexpr const char* kDopplerField = "Doppler";
 
 struct HeaderField {
     const char* name;
@@ -80,6 +81,53 @@ std::string press_text(const PressSample& press) {
     if (press.force_n > 0) text += " pressure_kpa=" + number_text(press.pressure_kpa, 6);
     if (press.vein_open >= 0) text += " vein_open=" + number_text(press.vein_open, 6);
     return text;
+}
+
+// A label as one word of such a text.
+std::string word_of(std::string label) {
+    for (char& c : label) {
+        if (std::string(" =,;|").find(c) != std::string::npos) c = '_';
+    }
+    return label;
+}
+
+// "coloured=NAME,NAME", or "gate=NAME fill=0.9 angle_deg=52 cursor_deg=50 psv_cm_s=78 ...".
+bool read_doppler(const std::string& text, DopplerSample& to) {
+    const auto number = [&](const char* key, double& value) {
+        double read = 0;
+        if (parse_number(detail_value(text, key), read) && std::isfinite(read)) value = read;
+    };
+    std::string names = detail_value(text, "coloured");
+    while (!names.empty()) {
+        const std::size_t end = std::min(names.find(','), names.size());
+        if (end > 0) to.coloured.push_back(names.substr(0, end));
+        names.erase(0, end + 1);
+    }
+    to.gate = detail_value(text, "gate");
+    number("fill", to.gate_fill);
+    number("angle_deg", to.angle_deg);
+    number("cursor_deg", to.cursor_deg);
+    number("psv_cm_s", to.psv_cm_s);
+    number("true_psv_cm_s", to.true_psv_cm_s);
+    double beats = 0;
+    number("beats", beats);
+    to.beats = static_cast<int>(std::clamp(beats, 0.0, 1e6));
+    return true;
+}
+
+std::string doppler_text(const DopplerSample& doppler) {
+    std::string text;
+    for (const std::string& name : doppler.coloured)
+        text += (text.empty() ? "coloured=" : ",") + word_of(name);
+    if (doppler.gate.empty()) return text.empty() ? "coloured=" : text;
+    text += (text.empty() ? "gate=" : " gate=") + word_of(doppler.gate);
+    text += " fill=" + number_text(doppler.gate_fill, 4);
+    text += " angle_deg=" + number_text(doppler.angle_deg, 5);
+    text += " cursor_deg=" + number_text(doppler.cursor_deg, 5);
+    if (doppler.beats == 0) return text;
+    text += " psv_cm_s=" + number_text(doppler.psv_cm_s, 6);
+    text += " true_psv_cm_s=" + number_text(doppler.true_psv_cm_s, 6);
+    return text + " beats=" + std::to_string(doppler.beats);
 }
 
 // Turns the needle's own frame so that its axis is z.
@@ -170,6 +218,8 @@ Result<Session> session_from_sequence(const Sequence& sequence,
         for (const SequenceField& field : frame.fields) {
             if (field.name == kSettingsField) sample.settings = field.value;
             if (field.name == kPressField) sample.has_press = read_press(field.value, sample.press);
+            if (field.name == kDopplerField)
+                sample.has_doppler = read_doppler(field.value, sample.doppler);
             if (field.name == kEventField) read_events(field.value, sample, session.events);
         }
         session.samples.push_back(std::move(sample));
@@ -188,6 +238,7 @@ SequenceFrame frame_from_sample(const SessionSample& sample,
                    {sample.needle_ok, matrix_from_rigid(sample.mannequin_from_drawn)}};
     if (!sample.settings.empty()) frame.fields.push_back({kSettingsField, sample.settings});
     if (sample.has_press) frame.fields.push_back({kPressField, press_text(sample.press)});
+    if (sample.has_doppler) frame.fields.push_back({kDopplerField, doppler_text(sample.doppler)});
     std::string text;
     for (const SessionEvent& event : events) {
         if (!text.empty()) text += ";";

@@ -36,10 +36,21 @@ struct SessionHeader {
 // What the probe did to the tissue in a frame (effect deformation).
 struct PressSample {
     double force_n = 0, pressure_kpa = 0;
-    // Height of the draining lumens under the face over their height at rest; negative: there is
-    // none, or nothing is pressed.
+    // Area of the draining lumens under the face over that at rest, in the scan plane; negative:
+    // there is none, or nothing is pressed.
     double vein_open = -1;
     friend bool operator==(const PressSample&, const PressSample&) = default;
+};
+
+// What a Doppler mode showed in a frame, and what was true there. Vessels by their labels.
+struct DopplerSample {
+    std::vector<std::string> coloured;       // with colour in the box
+    std::string gate;                        // that most of the spectral gate lies in; empty: none
+    double gate_fill = 0;                    // share of the gate in its blood
+    double angle_deg = 0, cursor_deg = 0;    // of beam and flow, [0, 90]: true, and by the cursor
+    double psv_cm_s = 0, true_psv_cm_s = 0;  // peak velocity: measured over `beats`, and true
+    int beats = 0;
+    friend bool operator==(const DopplerSample&, const DopplerSample&) = default;
 };
 
 struct SessionSample {
@@ -54,6 +65,8 @@ struct SessionSample {
     std::string settings;
     bool has_press = false;  // false in recordings of before, and of other programs
     PressSample press;
+    bool has_doppler = false;  // a Doppler mode was on
+    DopplerSample doppler;
 };
 
 // Events have fixed names; `detail` holds "key=value" words. docs/metrics.md lists them.

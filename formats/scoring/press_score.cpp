@@ -9,7 +9,8 @@
 namespace sonocase::detail {
 namespace {
 
-constexpr double kShut = 0.1, kOpen = 0.5;  // of a vein's height at rest
+// Of a vein's area at rest: its walls touch, and it is open again.
+constexpr double kShut = 0.1, kOpen = 0.5;
 
 void score_force(const ScoreInput& input, MetricValues& values) {
     double pressed_s = 0, over_s = 0, force_sum = 0, pressure_sum = 0, greatest = 0;

@@ -67,6 +67,9 @@ void score_targets_scanned(const ScoreInput& input,
 // Part 6 of docs/metrics.md: force of the probe, veins under it, vessels punctured.
 void score_press(const ScoreInput& input, MetricValues& values);
 
+// Part 6 as well: vessels in colour, the spectral gate, measured velocities.
+void score_doppler(const ScoreInput& input, MetricValues& values);
+
 // Part 5: needle and image together, and the probe on the skin.
 void score_guidance(const ScoreInput& input, MetricValues& values);
 void score_probe_use(const ScoreInput& input, MetricValues& values);

@@ -115,6 +115,7 @@ SessionScore score_session(const Session& session,
     detail::score_probe_use(input, values);
     detail::score_targets_scanned(input, values, out.targets);
     detail::score_press(input, values);
+    detail::score_doppler(input, values);
     out.curves = curves_of(input);
     finish(exercise, values, out);
     return out;

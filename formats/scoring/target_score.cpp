@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/base/arc_tangent.h"
 #include "formats/scoring/image_region.h"
 #include "formats/scoring/score_parts.h"
 #include "formats/scoring/target_tree.h"
@@ -23,9 +24,9 @@ void score_last_insertion(const ScoreInput& input,
     const Vector3 line = last.target_centre - last.entry;
     if (!(norm(line) > 0)) return;
     const Vector3 u = normalized(line);
-    // atan2 keeps full precision at small angles, where acos loses half of it.
+    // An arc tangent keeps full precision at small angles, where an arc cosine loses half of it.
     values["final_angle_deg"] =
-        kDegrees * std::atan2(norm(cross(last.final_direction, u)), dot(last.final_direction, u));
+        kDegrees * arc_tangent(norm(cross(last.final_direction, u)), dot(last.final_direction, u));
     double greatest = 0, sum = 0, weight = 0;
     for (std::size_t i = 0; i < input.readings.size(); ++i) {
         if (!input.readings[i].inside || input.time(i) < last.entry_s ||

@@ -36,6 +36,22 @@ void clear(const BlockParts& parts, std::size_t block, const BrickSpans<T>& volu
     });
 }
 
+// The records that the brick's patches make.
+std::uint32_t* records_of(const BlockParts& parts, std::size_t brick, std::uint32_t entry) {
+    BrickLabels uniform;
+    const std::uint32_t label_entry = parts.labels.table[brick];
+    const std::uint8_t* label = uniform.data();
+    if (label_entry & kUniformBrick) {
+        uniform.fill(parts.labels.uniform[label_entry & ~kUniformBrick]);
+    } else {
+        label = parts.labels.pool.data() + static_cast<std::size_t>(label_entry) * kBrickVoxels;
+    }
+    std::uint32_t* to = parts.boundary.pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels;
+    records_from_patches(parts.patches.subspan(parts.first_patch[entry], parts.patch_count[entry]),
+                         label, parts.reach_steps, to);
+    return to;
+}
+
 }  // namespace
 
 BlockUnpacker::BlockUnpacker(const BlockParts& parts) : context_(ZSTD_createDCtx()) {
@@ -55,14 +71,31 @@ bool BlockUnpacker::unpack(const BlockParts& parts, std::size_t block) noexcept 
     return has_records && has_offsets;
 }
 
+void BlockUnpacker::fill_in(const BlockParts& parts, std::size_t block) noexcept {
+    if (!parts.boundary.table.empty()) {
+        parts.grid.each_brick(block, [&](std::size_t brick, bool, bool) {
+            const std::uint32_t entry = parts.boundary.table[brick];
+            if (!(entry & kUniformBrick)) (void)records_of(parts, brick, entry);
+        });
+    }
+    if (!parts.echo.table.empty()) clear(parts, block, parts.echo, std::int8_t{0});
+}
+
 bool BlockUnpacker::records(const BlockParts& parts, std::size_t block) noexcept {
-    if (!context_ || !parts.corrections->unpack(context_, block, bytes_.data())) return false;
+    if (!context_) return false;
+    const auto bytes = parts.corrections->unpack(context_, block, bytes_.data());
+    return bytes && records_with(parts, block, *bytes);
+}
+
+// Records as patches make them, with corrections: the first `bytes` of bytes_.
+bool BlockUnpacker::records_with(const BlockParts& parts,
+                                 std::size_t block,
+                                 std::size_t bytes) noexcept {
     std::size_t corrected_bricks = 0;
     parts.grid.each_brick(block, [&](std::size_t brick, bool, bool) {
         const std::uint32_t entry = parts.boundary.table[brick];
         if (!(entry & kUniformBrick)) corrected_bricks += parts.corrected[entry];
     });
-    const std::size_t bytes = parts.corrections->bytes(block);
     constexpr std::size_t kMask = kBrickVoxels / 8;
     if (bytes < kMask * corrected_bricks || (bytes - kMask * corrected_bricks) % 4 != 0)
         return false;
@@ -74,19 +107,7 @@ bool BlockUnpacker::records(const BlockParts& parts, std::size_t block) noexcept
     parts.grid.each_brick(block, [&](std::size_t brick, bool, bool) {
         const std::uint32_t entry = parts.boundary.table[brick];
         if (entry & kUniformBrick) return;
-        BrickLabels uniform;
-        const std::uint32_t label_entry = parts.labels.table[brick];
-        const std::uint8_t* label = uniform.data();
-        if (label_entry & kUniformBrick) {
-            uniform.fill(parts.labels.uniform[label_entry & ~kUniformBrick]);
-        } else {
-            label = parts.labels.pool.data() + static_cast<std::size_t>(label_entry) * kBrickVoxels;
-        }
-        std::uint32_t* to =
-            parts.boundary.pool.data() + static_cast<std::size_t>(entry) * kBrickVoxels;
-        records_from_patches(
-            parts.patches.subspan(parts.first_patch[entry], parts.patch_count[entry]), label,
-            parts.reach_steps, to);
+        std::uint32_t* to = records_of(parts, brick, entry);
         if (!parts.corrected[entry]) return;
         std::uint64_t wrong;
         std::memcpy(&wrong, mask, kMask);
@@ -108,9 +129,11 @@ bool BlockUnpacker::records(const BlockParts& parts, std::size_t block) noexcept
 }
 
 bool BlockUnpacker::offsets(const BlockParts& parts, std::size_t block) noexcept {
-    if (!context_ || !parts.offsets->unpack(context_, block, bytes_.data())) return false;
+    if (!context_) return false;
+    const auto bytes = parts.offsets->unpack(context_, block, bytes_.data());
+    if (!bytes) return false;
     const std::uint8_t* from = bytes_.data();
-    const std::uint8_t* const end = from + parts.offsets->bytes(block);
+    const std::uint8_t* const end = from + *bytes;
     bool good = true;
     parts.grid.each_brick(block, [&](std::size_t brick, bool has_left, bool has_front) {
         const std::uint32_t entry = parts.echo.table[brick];

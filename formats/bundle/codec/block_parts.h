@@ -43,6 +43,11 @@ struct BlockParts {
     RawVector<std::uint8_t> corrected;  // of each stored brick of `boundary`
     RawVector<std::uint8_t> in_cells;   // of each stored brick of `echo`
     std::optional<BlockFrames> corrections, offsets;
+
+    bool is_here(std::size_t block) const noexcept {
+        return (!corrections || corrections->is_here(block)) &&
+               (!offsets || offsets->is_here(block));
+    }
 };
 
 // Unpacks blocks, one at a time. Where zstd finds no memory for its context, every block fails.
@@ -54,9 +59,12 @@ class BlockUnpacker {
     BlockUnpacker& operator=(const BlockUnpacker&) = delete;
     // False where the block's bytes are not valid; the block is then empty.
     bool unpack(const BlockParts& parts, std::size_t block) noexcept;
+    // For a block that is not there: surfaces as its patches make them, offsets of 0.
+    void fill_in(const BlockParts& parts, std::size_t block) noexcept;
 
   private:
     bool records(const BlockParts& parts, std::size_t block) noexcept;
+    bool records_with(const BlockParts& parts, std::size_t block, std::size_t bytes) noexcept;
     bool offsets(const BlockParts& parts, std::size_t block) noexcept;
 
     ZSTD_DCtx_s* context_;

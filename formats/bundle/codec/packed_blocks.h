@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +19,8 @@
 struct ZSTD_DCtx_s;
 
 namespace sonocase::detail {
+
+inline constexpr int kLargestBlock = 32;  // bricks per edge
 
 // Blocks, and the bricks of a block, lie x fastest.
 struct BlockGrid {
@@ -68,7 +71,8 @@ std::vector<std::uint8_t> pack_blocks(
     JobRunner& jobs,
     const std::function<void(std::size_t block, std::vector<std::uint8_t>*)>& content);
 
-// Where the frames of such a chunk lie. Refers to the bytes of the reader's file.
+// Where the frames of such a chunk lie. Refers to the bytes of the reader's file and to its
+// arrivals: of a file that arrives in segments, the chunk's list of sizes must be there.
 class BlockFrames {
   public:
     // max_bytes: the most that a block can hold.
@@ -76,16 +80,28 @@ class BlockFrames {
                                     const std::string& type,
                                     std::size_t blocks,
                                     std::size_t max_bytes);
-    std::size_t bytes(std::size_t block) const { return frames_[block].bytes; }  // unpacked
+    // At least the unpacked bytes of any block.
     std::size_t largest() const { return largest_; }
-    // to: # bytes(block). False: the frame is damaged.
-    bool unpack(ZSTD_DCtx_s* context, std::size_t block, std::uint8_t* to) const noexcept;
+    // In the file.
+    ByteRange place(std::size_t block) const {
+        return {at_ + static_cast<std::size_t>(frames_[block].at), frames_[block].stored};
+    }
+    bool is_here(std::size_t block) const noexcept {
+        return arrivals_ == nullptr || arrivals_->has(place(block));
+    }
+    // to: # largest(). Returns how many bytes the block has, or nothing if the frame is damaged.
+    // Only where is_here(block).
+    std::optional<std::size_t> unpack(ZSTD_DCtx_s* context,
+                                      std::size_t block,
+                                      std::uint8_t* to) const noexcept;
 
   private:
     struct Frame {
         std::uint64_t at = 0;
-        std::uint32_t stored = 0, bytes = 0;
+        std::uint32_t stored = 0;
     };
+    const Arrivals* arrivals_ = nullptr;
+    std::size_t at_ = 0;  // of the chunk
     std::span<const std::uint8_t> stored_;
     std::vector<Frame> frames_;
     std::size_t largest_ = 0;

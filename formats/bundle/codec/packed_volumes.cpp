@@ -15,7 +15,7 @@
 namespace sonocase::detail {
 namespace {
 
-constexpr int kLeastBlock = 8, kLargestBlock = 32;  // bricks per edge
+constexpr int kLeastBlock = 8;  // bricks per edge
 constexpr std::size_t kMostBlocks = 4096;
 constexpr int kMostPatchStep = 16;
 
