@@ -12,6 +12,10 @@
 namespace sonocase::pipeline {
 namespace {
 
+const TorsoAnatomy& anatomy_of(const AnalyticBody& body) {
+    return body.tubes ? tube_phantom() : torso_anatomy();
+}
+
 // From a body to the standard torso: organs follow the change of proportions.
 Point3 standard_point(Point3 p, const AnalyticBody& body) {
     return {p.x / body.width_scale, p.y / body.depth_scale, p.z};
@@ -20,22 +24,28 @@ Point3 standard_point(Point3 p, const AnalyticBody& body) {
 }  // namespace
 
 std::vector<std::string> analytic_body_names() {
-    return {"standard", "slender"};
+    return {"standard", "slender", "flow-phantom"};
 }
 
 std::optional<AnalyticBody> analytic_body(std::string_view name) {
     if (name == "standard") return AnalyticBody{};
     if (name == "slender") return AnalyticBody{0.88, 0.92, 4, 2};
+    if (name == "flow-phantom") {
+        AnalyticBody body;
+        body.belly_mm = 0;
+        body.tubes = true;
+        return body;
+    }
     return std::nullopt;
 }
 
-std::vector<Label> analytic_torso_labels() {
-    return torso_anatomy().labels;
+std::vector<Label> analytic_torso_labels(const AnalyticBody& body) {
+    return anatomy_of(body).labels;
 }
 
 std::uint8_t analytic_torso_label(Point3 ct, const AnalyticBody& body) {
     const Point3 p = standard_point(ct, body);
-    const auto& solids = torso_anatomy().solids;
+    const auto& solids = anatomy_of(body).solids;
     if (!inside(solids.front(), p, body.belly_mm)) return 0;
     for (auto it = solids.rbegin(); it != solids.rend(); ++it) {
         if (inside(*it, p, body.belly_mm)) return static_cast<std::uint8_t>(it->label);
@@ -74,7 +84,8 @@ Grid analytic_torso_grid(Vector3 spacing_mm) {
 }
 
 LabelVolume sample_analytic_torso(const Grid& grid, const AnalyticBody& body) {
-    LabelVolume out{grid, std::vector<std::uint8_t>(grid.voxel_count()), analytic_torso_labels()};
+    LabelVolume out{grid, std::vector<std::uint8_t>(grid.voxel_count()),
+                    analytic_torso_labels(body)};
     parallel_for(static_cast<std::size_t>(grid.size.z), 1, [&](std::size_t begin, std::size_t end) {
         for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
             for (int j = 0; j < grid.size.y; ++j) {

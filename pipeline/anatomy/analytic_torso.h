@@ -27,15 +27,18 @@ struct AnalyticBody {
     double depth_scale = 1;  // front to back, [0.7, 1.4]
     double belly_mm = 12;    // how far the belly protrudes, [0, 40]
     int warp = 1;            // which of the known warps makes the mannequin, 1 or 2
+    bool tubes = false;      // no organs, but straight tubes of blood: a flow phantom
 };
 
-// The bodies that a recipe can name: "standard", and "slender", which is narrower and shallower and
-// whose mannequin is made by the second warp. Empty for any other name.
+// The bodies that a recipe can name: "standard"; "slender", which is narrower and shallower and
+// whose mannequin is made by the second warp; and "flow-phantom", skin and one even material with
+// straight tubes of 4, 6, 8 and 12 mm and one of 10 mm with a stenosis of 6 mm, 50 degrees from a
+// beam straight down. Empty for any other name.
 std::optional<AnalyticBody> analytic_body(std::string_view name);
 std::vector<std::string> analytic_body_names();
 
 // Palette, outside first. Names are those of TotalSegmentator's classes where it has the structure.
-std::vector<Label> analytic_torso_labels();
+std::vector<Label> analytic_torso_labels(const AnalyticBody& body = {});
 
 // Palette index at a point. Cost: about 100 ns.
 std::uint8_t analytic_torso_label(Point3 ct, const AnalyticBody& body = {});

@@ -2,49 +2,31 @@
 
 #include "pipeline/cook/memory_need.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <limits>
 
 #include "pipeline/base/line_text.h"
+#include "pipeline/base/memory_limit.h"
 #include "pipeline/cook/case_size.h"
 #include "pipeline/stage/stage_plan.h"
 
 namespace sonocase::pipeline {
 
-MemoryNeed memory_need(const Recipe& recipe) {
+MemoryNeed memory_need(const Recipe& recipe, double limit_mb) {
+    const double limit = limit_mb > 0 ? limit_mb : machine_memory_mb();
     MemoryNeed need;
     need.size = case_size(recipe);
     for (const PlannedStage& stage : plan_stages(recipe, {})) {
         if (stage.is_step()) continue;
-        const double mb = stage.descriptor->cost.memory_mb(need.size);
+        const StageCost& cost = stage.descriptor->cost;
+        const double all = cost.memory_mb(need.size);
+        const double mb =
+            all <= limit ? all : std::max<double>(cost.least_mb(need.size), std::min(all, limit));
         if (mb <= need.mb) continue;
         need.mb = mb;
         need.stage = stage.stage;
     }
     return need;
-}
-
-double machine_memory_mb() {
-    double limit = std::numeric_limits<double>::infinity();
-    const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
-    if (pages > 0 && page > 0) limit = static_cast<double>(pages) * static_cast<double>(page) / 1e6;
-    // Version 2 of control groups names one path below its root; "max" means no limit.
-    std::ifstream groups("/proc/self/cgroup");
-    std::string line, path;
-    while (std::getline(groups, line)) {
-        if (line.starts_with("0::/")) path = line.substr(3);
-    }
-    while (!path.empty()) {
-        std::ifstream file("/sys/fs/cgroup" + path + "/memory.max");
-        double bytes = 0;
-        if (file >> bytes) limit = std::min(limit, bytes / 1e6);
-        path.resize(path == "/" ? 0 : path.rfind('/'));
-    }
-    return limit;
 }
 
 Status check_memory(const MemoryNeed& need, double limit_mb) {

@@ -16,12 +16,10 @@ struct MemoryNeed {
     double mb = 0;      // of that stage, with what the program itself takes
 };
 
-// By the formulas of docs/farm.md (StageDescriptor::cost); reads headers and the mannequin only.
-MemoryNeed memory_need(const Recipe& recipe);
-
-// The least of the machine's memory and of the limits of the control groups that this process is
-// in, MB; infinite where neither is known.
-double machine_memory_mb();
+// By the formulas of docs/farm.md (StageDescriptor::cost); reads headers and the mannequin only. A
+// stage that can do with less than it would take needs what the limit leaves it, but no less than
+// its least. limit_mb  0: that of the machine
+MemoryNeed memory_need(const Recipe& recipe, double limit_mb = 0);
 
 // Error: the need exceeds the limit. limit_mb  0: that of the machine
 Status check_memory(const MemoryNeed& need, double limit_mb);

@@ -8,8 +8,10 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "formats/bundle/attribution.h"
 #include "formats/exercise/exercise.h"
 #include "formats/files/atomic_file.h"
+#include "formats/flow/flow_summary.h"
 #include "formats/volume/tissue_mechanics.h"
 
 namespace sonocase::pipeline {
@@ -119,6 +121,35 @@ Json tissue_json(const Tissue& tissue) {
             {"source", tissue.source}};
 }
 
+constexpr double kBeat_s = 60.0 / 70;
+
+Json vessel_json(const VesselSummary& v) {
+    Json json{{"name", v.name}, {"kind", name_of(v.kind)}, {"flow_ml_min", v.mean_ml_min}};
+    if (v.course) {
+        json["length_mm"] = v.length_mm;
+        json["diameter_mm"] = v.diameter_mm;
+        json["mean_cm_s"] = v.mean_cm_s;
+        json["peak_cm_s"] = v.peak_cm_s;
+        json["resistive_index"] = v.resistive_index;
+    }
+    return json;
+}
+
+std::string vessels_text(const FlowField& flow) {
+    if (flow.empty()) return "";
+    std::string text = line(
+        "\nvessels, at 70 beats a minute          length    wide   mL/min    mean   peak cm/s   "
+        "RI");
+    for (const VesselSummary& v : vessel_summaries(flow, kBeat_s)) {
+        if (v.course)
+            text += line("  %-36s %5.0f %7.1f %8.0f %7.1f %9.1f %6.2f", v.name.c_str(), v.length_mm,
+                         v.diameter_mm, v.mean_ml_min, v.mean_cm_s, v.peak_cm_s, v.resistive_index);
+        else
+            text += line("  %-50s %8.0f", v.name.c_str(), v.mean_ml_min);
+    }
+    return text;
+}
+
 }  // namespace
 
 LabelVolumes label_volumes(const CaseBundle& bundle) {
@@ -193,6 +224,9 @@ std::string inspection_json(const CaseBundle& bundle, const Inspection& inspecti
                                   {"tissue", bundle.labels[i].tissue},
                                   {"mechanics", mechanics_json(label_mechanics(bundle, i))},
                                   {"volume_ml", volumes.ml[i]}});
+    json["vessels"] = Json::array();
+    for (const VesselSummary& v : vessel_summaries(bundle.flow, kBeat_s))
+        json["vessels"].push_back(vessel_json(v));
     json["tissues"] = Json::array();
     for (const Tissue& tissue : bundle.tissues) json["tissues"].push_back(tissue_json(tissue));
     json["stages"] = Json::array();
@@ -219,6 +253,7 @@ std::string inspection_json(const CaseBundle& bundle, const Inspection& inspecti
     for (const SolidTexture& texture : bundle.textures)
         json["textures"].push_back(
             {{"name", texture.name}, {"edge", texture.edge}, {"voxel_mm", texture.voxel_mm}});
+    if (const std::string from = attribution_of(bundle); !from.empty()) json["attribution"] = from;
     json["has"] = {{"boundary", !bundle.boundary.table.empty()},
                    {"echo_offset", !bundle.echo_offset.table.empty()},
                    {"speckle_edge", bundle.speckle.edge}};
@@ -233,6 +268,8 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
     text += line("  file       %.1f MB, digest %s", static_cast<double>(inspection.bytes) / 1e6,
                  inspection.digest.c_str());
     text += line("  made by    %s", bundle.manifest.producer.c_str());
+    if (const std::string from = attribution_of(bundle); !from.empty())
+        text += "  from       " + from + "\n";
     text += line("  grid       %d x %d x %d voxels of %g mm, origin (%.1f, %.1f, %.1f) mm",
                  grid.size.x, grid.size.y, grid.size.z, grid.spacing_mm.x, grid.origin_mm.x,
                  grid.origin_mm.y, grid.origin_mm.z);
@@ -244,6 +281,7 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
         text += line("  %3zu  %-32s %-22s %10.2f%s", i, bundle.labels[i].name.c_str(),
                      bundle.labels[i].tissue.c_str(), volumes.ml[i],
                      mechanics_text(label_mechanics(bundle, i)).c_str());
+    text += vessels_text(bundle.flow);
     text += line("\ntissues (%zu)              echo dB  dB/cm/MHz  MRayl  kind     texture",
                  bundle.tissues.size() - 1);
     for (std::size_t i = 1; i < bundle.tissues.size(); ++i) {
@@ -266,7 +304,8 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
         all_known = all_known && seconds >= 0;
         for (const Measure& measure : stage.measures)
             text += line("      %-28s %.6g", measure.name.c_str(), measure.value);
-        for (const Note& note : stage.notes) text += "      " + note.name + ": " + note.text + "\n";
+        for (const Note& note : stage.notes)
+            if (note.name != "attribution") text += "      " + note.name + ": " + note.text + "\n";
         for (const MeasureGroup& group : stage.groups) {
             text += line("      %s", group.name.c_str());
             for (const Measure& value : group.values)

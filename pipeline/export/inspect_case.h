@@ -50,4 +50,7 @@ struct Finding {
 // the body, volumes are not zero.
 std::vector<Finding> validate_case(const CaseBundle& bundle);
 
+// Tissues that ask for a texture that the bundle lacks. They point into the bundle.
+std::vector<const Tissue*> tissues_without_texture(const CaseBundle& bundle);
+
 }  // namespace sonocase::pipeline

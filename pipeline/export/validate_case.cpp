@@ -39,15 +39,9 @@ void check_palette(const CaseBundle& bundle, Findings& findings) {
                             "' has no voxel: it was lost on the way");
     }
     if (body == 0) findings.error("the case holds no body");
-    for (const Tissue& tissue : bundle.tissues) {
-        const bool there =
-            tissue.texture.empty() ||
-            std::any_of(bundle.textures.begin(), bundle.textures.end(),
-                        [&](const SolidTexture& t) { return t.name == tissue.texture; });
-        if (!there)
-            findings.error("tissue '" + tissue.name + "' asks for the missing texture '" +
-                           tissue.texture + "'");
-    }
+    for (const Tissue* tissue : tissues_without_texture(bundle))
+        findings.error("tissue '" + tissue->name + "' asks for the missing texture '" +
+                       tissue->texture + "'");
     if (bundle.speckle.edge == 0)
         findings.remark("no speckle volume: the physical model needs one");
 }
@@ -126,6 +120,17 @@ void check_exercises(const CaseBundle& bundle, Findings& findings) {
 }
 
 }  // namespace
+
+std::vector<const Tissue*> tissues_without_texture(const CaseBundle& bundle) {
+    std::vector<const Tissue*> found;
+    for (const Tissue& tissue : bundle.tissues) {
+        const auto its_own = [&](const SolidTexture& t) { return t.name == tissue.texture; };
+        if (!tissue.texture.empty() &&
+            std::none_of(bundle.textures.begin(), bundle.textures.end(), its_own))
+            found.push_back(&tissue);
+    }
+    return found;
+}
 
 std::vector<Finding> validate_case(const CaseBundle& bundle) {
     Findings findings;

@@ -10,30 +10,15 @@
 
 #include "formats/bundle/stage_files.h"
 #include "formats/files/stage_file.h"
+#include "formats/text/nearest_name.h"
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/plausible_size.h"
+#include "pipeline/import/label_colour.h"
 #include "pipeline/import/source/source_path.h"
 #include "pipeline/import/structure_list.h"
 
 namespace sonocase::pipeline {
 namespace {
-
-// A colour that depends on the name alone, so that a structure keeps it from case to case.
-std::array<std::uint8_t, 3> colour_of(const std::string& name) {
-    std::uint32_t hash = 2166136261u;  // FNV-1a
-    for (const char c : name) hash = (hash ^ static_cast<std::uint8_t>(c)) * 16777619u;
-    const double hue = static_cast<double>(hash % 360u) / 60.0;  // sixths of the circle
-    const double low = 90 + static_cast<double>((hash >> 10) % 60u);
-    const double high = 200 + static_cast<double>((hash >> 20) % 50u);
-    std::array<std::uint8_t, 3> rgb{};
-    for (int c = 0; c < 3; ++c) {
-        double away = std::abs(hue - 2.0 * c);  // from the hue of this channel
-        away = std::min(away, 6.0 - away);
-        const double share = away <= 1 ? 1 : away >= 2 ? 0 : 2 - away;
-        rgb[static_cast<std::size_t>(c)] = static_cast<std::uint8_t>(low + share * (high - low));
-    }
-    return rgb;
-}
 
 Status check_names(const std::vector<Structure>& structures, const std::string& path) {
     for (std::size_t i = 0; i < structures.size(); ++i) {
@@ -52,11 +37,27 @@ Status check_names(const std::vector<Structure>& structures, const std::string& 
     return Done{};
 }
 
-// The tissue of a structure: by its name if that is known, else by the class in its table.
+// The tissue of a structure: by the class in its table, else by its name. "fluid" says no more than
+// what kind of tissue it is: the name says which one, if it names a fluid.
 TissueChoice tissue_of(const LabelTableEntry& entry) {
     const TissueChoice by_name = tissue_for_label(entry.name);
-    if (by_name.known || entry.tissue_class.empty()) return by_name;
-    return tissue_for_label(entry.tissue_class);
+    if (entry.tissue_class.empty()) return by_name;
+    if (entry.tissue_class != "fluid") return tissue_for_label(entry.tissue_class);
+    const Tissue* named = find_tissue(by_name.tissue);
+    return named != nullptr && named->kind == TissueKind::fluid ? by_name
+                                                                : TissueChoice{"cyst", true};
+}
+
+Status check_classes(const std::vector<Structure>& structures, const std::string& table) {
+    std::vector<std::string> names;
+    for (const Tissue& tissue : built_in_tissues()) names.push_back(tissue.name);
+    for (const Structure& structure : structures) {
+        const std::string& given = structure.entry.tissue_class;
+        if (given.empty() || given == "fluid" || tissue_for_label(given).known) continue;
+        return Error{"'" + structure.entry.name + "' has the unknown tissue_class '" + given + "'",
+                     table, suggest_name(given, names)};
+    }
+    return Done{};
 }
 
 // A .labels file of this program's own import, unchanged.
@@ -103,7 +104,7 @@ int fill_palette(const std::vector<Structure>& structures,
         if (!choice.known && !entry.name.starts_with("label_"))
             strangers += (stranger_count++ > 0 ? ", " : "") + entry.name;
         labels.labels.push_back({entry.name, std::string(choice.tissue), entry.value,
-                                 entry.colour.value_or(colour_of(entry.name))});
+                                 entry.colour.value_or(label_colour(entry.name))});
     }
     if (stranger_count > 0)
         warnings.push_back(
@@ -198,6 +199,8 @@ Result<ImportedLabels> import_label_map(const std::string& path,
         structures.begin(), structures.end(),
         [](const Structure& a, const Structure& b) { return a.entry.value < b.entry.value; });
     if (auto status = check_names(structures, path); !status) return status.error();
+    const std::string& table = options.table.empty() ? path : options.table;
+    if (auto status = check_classes(structures, table); !status) return status.error();
 
     report_progress(progress, 0.6, "painting labels");
     LabelVolume& labels = result.labels;

@@ -30,9 +30,9 @@ inline constexpr int kImportVersion = 2;
 //       structure); a folder with a DICOM series whose pixels are label values; or a .labels file
 //       that import wrote, returned unchanged.
 // The palette holds the labels that occur, in order of value, after [0], the outside. Label::tissue
-// comes from the built-in tissue table by the name, or by the table's tissue_class if the name is
-// not known. Where masks or segments overlap the smaller structure remains: a vessel stays in its
-// liver.
+// comes from the table's tissue_class, else from the built-in tissue table by the name; a class
+// that does not exist is an error. Where masks or segments overlap the smaller structure remains: a
+// vessel stays in its liver.
 //
 // Errors, each with what was found and what to do: no such file; a pipe or a device; unreadable or
 // truncated; no body; two labels of one name; more than 254 labels; an extent that cannot be a

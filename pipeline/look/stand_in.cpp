@@ -134,6 +134,17 @@ double frequency_scale(const Machine& m) {
 
 }  // namespace
 
+ScanPlace stand_in_fan() {
+    ScanPlace place;
+    place.mm_per_px = 0.36;
+    place.apex_x_px = 259;
+    place.apex_y_px = -100;
+    place.radius_mm = 50;
+    place.half_angle_rad = 0.5;
+    place.depth_mm = 135;
+    return place;
+}
+
 double axial_width_mm(const Machine& m) {
     constexpr double kUnknown = 0.58;  // of model `physical` at 3.5 MHz
     return (m.beam.axial_mm > 0 ? m.beam.axial_mm : kUnknown) * frequency_scale(m);

@@ -14,6 +14,10 @@
 
 namespace sonocase::pipeline {
 
+// A curved probe's picture of this size, for stand-ins that nobody's frames ask for.
+inline constexpr int kStandInWidth = 520, kStandInHeight = 430;
+ScanPlace stand_in_fan();
+
 // What parenchyma adds to plain speckle. The defaults are those found for a living liver.
 struct Parenchyma {
     double middle_db = 1.5;  // sd of the echo, over some 5 mm

@@ -2,9 +2,12 @@
 
 #include "pipeline/pack/exercise_frame.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <sstream>
+
+#include "formats/text/nearest_name.h"
 
 // toml++ 3.3 asserts of input what hostile input ("[[[") does not hold; without the assertion it
 // reports the error.
@@ -113,7 +116,67 @@ void each_table(toml::table& parent, std::string_view key, Visit visit) {
         if (toml::table* table = node.as_table()) visit(*table);
 }
 
+// Gives a target the place and size of an entry of the key.
+void take_from_key(toml::table& target, const KeyTarget& e) {
+    set_triple(target, "centre", e.centre - Point3{}, 1e-3);
+    const double radius_mm = std::round(1000 * e.radius_mm) / 1000;
+    if (!target.contains("name")) target.insert("name", e.name);
+    if (!target.contains("radius_mm")) target.insert("radius_mm", std::max(0.5, radius_mm));
+    if (!target.contains("look")) target.insert("look", "none");
+    if (!target.contains("inside")) target.insert("inside", e.name);
+}
+
 }  // namespace
+
+Result<std::string> targets_from_key(const std::string& stripped_toml,
+                                     const std::string& where,
+                                     const std::vector<KeyTarget>& key) {
+    toml::parse_result parsed = toml::parse(stripped_toml, std::string_view(where));
+    if (!parsed) return not_toml(parsed.error(), where);
+    toml::table& root = parsed.table();
+    std::vector<std::string> names;
+    for (const KeyTarget& e : key) names.push_back(e.name);
+    bool changed = false;
+    std::optional<Error> error;
+    const auto find = [&](const std::string& name) {
+        return std::find_if(key.begin(), key.end(),
+                            [&](const KeyTarget& e) { return e.name == name; });
+    };
+    each_table(root, "targets", [&](toml::table& target) {
+        const toml::node* node = target.get("pathology");
+        if (node == nullptr || error) return;
+        const auto name = node->value<std::string>();
+        const auto found = find(name.value_or(""));
+        if (found == key.end()) {
+            error = Error{"no pathology '" + name.value_or("") + "' in this case",
+                          where + ":" + std::to_string(node->source().begin.line),
+                          suggest_name(name.value_or(""), names)};
+            return;
+        }
+        target.erase("pathology");
+        take_from_key(target, *found);
+        changed = true;
+    });
+    if (error) return *error;
+    const bool scan = root["kind"].value_or(std::string("biopsy")) == "scan";
+    if (!root.contains("targets") && !scan) {
+        toml::array targets;
+        for (const KeyTarget& e : key) {
+            if (!e.by_default) continue;
+            toml::table target;
+            take_from_key(target, e);
+            targets.push_back(std::move(target));
+        }
+        if (!targets.empty()) {
+            root.insert("targets", std::move(targets));
+            changed = true;
+        }
+    }
+    if (!changed) return stripped_toml;
+    std::ostringstream out;
+    out << toml::toml_formatter(root) << "\n";
+    return out.str();
+}
 
 Result<FramedExercise> strip_frame(std::string_view text, const std::string& where) {
     const toml::parse_result parsed = toml::parse(text, std::string_view(where));

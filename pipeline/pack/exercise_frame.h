@@ -9,6 +9,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "formats/base/result.h"
 #include "formats/registration/registration.h"
@@ -23,6 +24,22 @@ struct FramedExercise {
     bool in_ct = false;
 };
 Result<FramedExercise> strip_frame(std::string_view toml, const std::string& where);
+
+// A lesion of the answer key that exercises may aim at.
+struct KeyTarget {
+    std::string name;
+    Point3 centre;
+    double radius_mm = 5;
+    bool by_default = false;  // a target of every exercise that has none of its own
+};
+
+// A target with `pathology = "NAME"` gets its centre and radius from the key, look "none" and
+// inside NAME where it says nothing else; an exercise without targets, unless it is a scan, gets
+// those that are so by default. The text is returned unchanged where there is nothing to do.
+// Errors: a name that the key lacks.
+Result<std::string> targets_from_key(const std::string& stripped_toml,
+                                     const std::string& where,
+                                     const std::vector<KeyTarget>& key);
 
 // The same exercise in `mannequin`, as new TOML. A point goes through the map. A probe's beam aims
 // at where the map carries the anatomy in its middle; its lateral axis is turned by the Jacobian at

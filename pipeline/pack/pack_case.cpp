@@ -115,6 +115,7 @@ Result<PackResult> pack_case(const PackInput& input) {
         bundle.skin_unfitted = input.skin_unfitted;
     }
     bundle.mannequin_skin = input.mannequin;
+    bundle.flow = input.flow;
     bundle.preview_png = png_of(preview_picture(volume));
 
     for (EmbeddedExercise& embedded : bundle.exercises) {
@@ -129,6 +130,9 @@ Result<PackResult> pack_case(const PackInput& input) {
             if (!mapped) return mapped.error();
             embedded.toml = std::move(*mapped);
         }
+        auto aimed = targets_from_key(embedded.toml, embedded.name, input.key);
+        if (!aimed) return aimed.error();
+        embedded.toml = std::move(*aimed);
         auto exercise = parse_exercise(embedded.toml, embedded.name);
         if (!exercise) return exercise.error();
         check_exercise(*exercise, volume, &report.warnings);

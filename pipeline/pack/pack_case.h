@@ -10,6 +10,7 @@
 #include "formats/bundle/case_bundle.h"
 #include "formats/bundle/stage_files.h"
 #include "formats/registration/registration.h"
+#include "pipeline/pack/exercise_frame.h"
 
 namespace sonocase::pipeline {
 
@@ -28,6 +29,9 @@ struct PackInput {
     const std::vector<Tissue>& tissues;  // every one that the palette names
     // # points of ct_skin, 1 where it was not fitted; empty: fitted everywhere, or not known.
     std::vector<std::uint8_t> skin_unfitted = {};
+    // Lesions that were put in; targets of exercises may name them.
+    std::vector<KeyTarget> key = {};
+    FlowField flow = {};  // may be empty
 };
 
 struct PackResult {
@@ -35,7 +39,7 @@ struct PackResult {
     StageReport report;  // stage "pack": voxels, labels, bytes of each part
 };
 
-inline constexpr int kPackVersion = 2;
+inline constexpr int kPackVersion = 3;
 
 // Errors: a label names a tissue that is missing; an exercise that cannot be read, or that is in
 // the frame `ct` without a registration. Targets of exercises outside the body or outside the label

@@ -52,27 +52,52 @@ Status replace_once(std::string& text, const std::string& what, const std::strin
     return Done{};
 }
 
-// "https://store.example.org" of a store's address.
-Result<std::string> origin_of(const std::string& address) {
+bool is_plain(const std::string& origin) {
+    return origin.find_first_not_of(
+               "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-:/") == origin.npos;
+}
+std::string without_path(const std::string& address) {
     const std::size_t scheme = address.find("://");
-    const std::size_t end = scheme == address.npos ? scheme : address.find('/', scheme + 3);
-    const std::string origin = address.substr(0, end);
+    return scheme == address.npos ? "" : address.substr(0, address.find('/', scheme + 3));
+}
+
+// "https://store.example.org" of a store's address.
+Result<std::string> store_origin(const std::string& address) {
+    const std::string origin = without_path(address);
     const bool local =
         origin.starts_with("http://127.0.0.1:") || origin.starts_with("http://localhost:");
-    const bool plain =
-        origin.find_first_not_of(
-            "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-:/") == origin.npos;
-    if (scheme == address.npos || !plain || (!origin.starts_with("https://") && !local)) {
+    if (!is_plain(origin) || (!origin.starts_with("https://") && !local)) {
         return Error{"'" + address + "' is not the address of a learning record store", "--xapi",
                      "expected https://HOST/PATH"};
     }
     return origin;
 }
 
-struct ReadCase {
-    SiteCase site;
-    RawVector<std::uint8_t> bytes;
-};
+// "ws://127.0.0.1:18946" of a pose server's address.
+Result<std::string> pose_origin(const std::string& address) {
+    const std::string origin = without_path(address);
+    if (!is_plain(origin) || (!origin.starts_with("ws://") && !origin.starts_with("wss://"))) {
+        return Error{"'" + address + "' is not the address of a pose server", "--poses",
+                     "expected ws://HOST:PORT"};
+    }
+    return origin;
+}
+
+// The hosts that the page may talk to besides its own.
+Result<std::string> other_hosts(const PublishOptions& options) {
+    std::string out;
+    if (!options.xapi.empty()) {
+        const auto origin = store_origin(options.xapi);
+        if (!origin) return origin.error();
+        out += " " + *origin;
+    }
+    if (!options.poses.empty()) {
+        const auto origin = pose_origin(options.poses);
+        if (!origin) return origin.error();
+        out += " " + *origin;
+    }
+    return out;
+}
 
 Result<std::vector<ReadCase>> read_cases(const std::vector<std::string>& paths) {
     std::vector<ReadCase> out;
@@ -80,12 +105,12 @@ Result<std::vector<ReadCase>> read_cases(const std::vector<std::string>& paths) 
     for (const std::string& path : paths) {
         auto bytes = read_large_file(path);
         if (!bytes) return bytes.error();
-        auto site = site_case(*bytes, path);
-        if (!site) return site.error();
-        if (!names.insert(site->name).second) {
-            return Error{"two cases are named " + site->name, path, "rename one of the files"};
+        auto read = site_case(*bytes, path);
+        if (!read) return read.error();
+        if (!names.insert(read->site.name).second) {
+            return Error{"two cases are named " + read->site.name, path, "rename one of the files"};
         }
-        out.push_back({std::move(*site), std::move(*bytes)});
+        out.push_back(std::move(*read));
     }
     return out;
 }
@@ -93,7 +118,7 @@ Result<std::vector<ReadCase>> read_cases(const std::vector<std::string>& paths) 
 Result<Published> publish_page(const std::vector<ReadCase>& cases,
                                const std::string& program,
                                const std::string& path,
-                               const std::string& xapi) {
+                               const PublishOptions& options) {
     if (cases.size() != 1) {
         return Error{"one page holds one case, and " + std::to_string(cases.size()) + " are given",
                      "--single-file", "give one case"};
@@ -103,13 +128,13 @@ Result<Published> publish_page(const std::vector<ReadCase>& cases,
     SiteCase site = cases[0].site;
     site.preview.clear();
     const std::string list = "<script type=\"application/json\" id=\"site-list\">" +
-                             inside_page(site_list_json({site}, xapi)) + "</script>";
+                             inside_page(site_list_json({site}, options.xapi)) + "</script>";
     const std::string data = "<script type=\"text/plain\" id=\"case-" + site.name + "\">" +
                              base64(cases[0].bytes) + "</script>";
-    if (!xapi.empty()) {
-        const auto origin = origin_of(xapi);
-        if (!origin) return origin.error();
-        if (Status s = replace_once(*page, "connect-src 'none'", "connect-src " + *origin); !s)
+    const auto hosts = other_hosts(options);
+    if (!hosts) return hosts.error();
+    if (!hosts->empty()) {
+        if (Status s = replace_once(*page, "connect-src 'none'", "connect-src" + *hosts); !s)
             return s.error();
     }
     if (Status s = replace_once(*page, "<!--LIST-->", list); !s) return s.error();
@@ -149,14 +174,14 @@ Result<Published> publish(const std::vector<std::string>& cases,
     }
     const auto read = read_cases(cases);
     if (!read) return read.error();
-    if (options.single_file) return publish_page(*read, program, site, options.xapi);
+    if (options.single_file) return publish_page(*read, program, site, options);
 
     auto index = read_text_file(program + "/index.html");
     if (!index) return index.error();
-    if (!options.xapi.empty()) {
-        const auto origin = origin_of(options.xapi);
-        if (!origin) return origin.error();
-        if (Status s = replace_once(*index, "connect-src 'self'", "connect-src 'self' " + *origin);
+    const auto hosts = other_hosts(options);
+    if (!hosts) return hosts.error();
+    if (!hosts->empty()) {
+        if (Status s = replace_once(*index, "connect-src 'self'", "connect-src 'self'" + *hosts);
             !s)
             return s.error();
     }
@@ -170,6 +195,7 @@ Result<Published> publish(const std::vector<std::string>& cases,
     std::vector<SiteCase> list;
     for (const ReadCase& one : *read) {
         write(one.site.file, std::span<const std::uint8_t>(one.bytes));
+        write(one.site.file + ".segments", std::span<const std::uint8_t>(segment_list(one.site)));
         if (!one.site.preview.empty())
             write(one.site.name + ".png", std::span<const std::uint8_t>(one.site.preview));
         list.push_back(one.site);

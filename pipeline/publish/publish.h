@@ -14,6 +14,7 @@ namespace sonocase::pipeline {
 struct PublishOptions {
     std::string program_folder;  // what scripts/web built; empty: looked for, see find_program()
     std::string xapi;            // address of a learning record store; empty: none
+    std::string poses;           // origin of a pose server, ws://HOST:PORT; empty: none
     bool single_file = false;    // one .html; then there must be one case
 };
 

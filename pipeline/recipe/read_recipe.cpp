@@ -10,6 +10,7 @@
 #include "formats/text/nearest_name.h"
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/pack/exercise_frame.h"
+#include "pipeline/pathology/pathology.h"
 #include "pipeline/recipe/embedded_scenario.h"
 #include "pipeline/recipe/recipe_sections.h"
 
@@ -17,6 +18,16 @@ namespace sonocase::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+
+// Null: the recipe's stages do not include it.
+PathologyOptions* pathology_options(StageSettings& settings) {
+    if (settings.table().find("pathology") == nullptr) return nullptr;
+    return &settings.of<PathologyOptions>("pathology");
+}
+const PathologyOptions* pathology_options(const StageSettings& settings) {
+    if (settings.table().find("pathology") == nullptr) return nullptr;
+    return &settings.of<PathologyOptions>("pathology");
+}
 
 // Everything but the options of the stages, which come after the preset.
 void read_contents(const TomlTable& root, Recipe& recipe, std::vector<std::string>* exercises) {
@@ -28,6 +39,8 @@ void read_contents(const TomlTable& root, Recipe& recipe, std::vector<std::strin
     if (const auto table = root.table("inputs")) read_inputs(*table, recipe.inputs);
     if (const auto table = root.table("analytic")) read_analytic(*table, recipe.inputs);
     if (const auto table = root.table("labels")) read_labels(*table, recipe.labels);
+    if (PathologyOptions* pathology = pathology_options(recipe.settings))
+        read_pathology(root, pathology->requests, recipe.tissues);
     if (const auto table = root.table("tissues")) read_tissues(*table, recipe.tissues);
 }
 
@@ -118,7 +131,14 @@ Status check_exercises(const Recipe& recipe) {
         const std::string where = (fs::path(recipe.folder) / (exercise.name + ".toml")).string();
         auto framed = strip_frame(exercise.toml, where);
         if (!framed) return framed.error();
-        if (auto parsed = parse_exercise(framed->toml, where); !parsed) return parsed.error();
+        // Places are known once the lesions are there; names can be checked now.
+        std::vector<KeyTarget> names;
+        if (const PathologyOptions* pathology = pathology_options(recipe.settings))
+            for (const PathologyRequest& request : pathology->requests)
+                names.push_back({request.name, {}, 5, request.target});
+        auto aimed = targets_from_key(framed->toml, where, names);
+        if (!aimed) return aimed.error();
+        if (auto parsed = parse_exercise(*aimed, where); !parsed) return parsed.error();
     }
     return Done{};
 }

@@ -50,13 +50,7 @@ void read_tissue(const TomlTable& table, const std::string& name, std::vector<Ti
     table.flag("casts_shadow", tissue.casts_shadow);
     table.text("texture", tissue.texture);
     table.text("source", tissue.source);
-    table.number("grey_mean", tissue.grey_mean, 0, 255);
-    table.number("grey_sd", tissue.grey_sd, 0, 255);
-    table.number("echo_db", tissue.echo_db, -120, 60);
-    table.number("structure_db", tissue.structure_db, 0, 30);
-    table.number("attenuation_db_cm_mhz", tissue.attenuation_db_cm_mhz, 0, 100);
-    table.number("impedance_mrayl", tissue.impedance_mrayl, 0, 20);
-    table.number("sound_speed_m_s", tissue.sound_speed_m_s, 100, 6000);
+    read_figures(table, tissue);
     read_mechanics(table, tissue);
     table.finish();
     if (Tissue* known = find_tissue(tissues, name))
@@ -66,6 +60,16 @@ void read_tissue(const TomlTable& table, const std::string& name, std::vector<Ti
 }
 
 }  // namespace
+
+void read_figures(const TomlTable& table, Tissue& tissue) {
+    table.number("grey_mean", tissue.grey_mean, 0, 255);
+    table.number("grey_sd", tissue.grey_sd, 0, 255);
+    table.number("echo_db", tissue.echo_db, -120, 60);
+    table.number("structure_db", tissue.structure_db, 0, 30);
+    table.number("attenuation_db_cm_mhz", tissue.attenuation_db_cm_mhz, 0, 100);
+    table.number("impedance_mrayl", tissue.impedance_mrayl, 0, 20);
+    table.number("sound_speed_m_s", tissue.sound_speed_m_s, 100, 6000);
+}
 
 void read_inputs(const TomlTable& table, RecipeInputs& inputs) {
     table.text("labels", inputs.labels);

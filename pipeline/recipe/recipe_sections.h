@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/text/toml_reader.h"
+#include "pipeline/pathology/pathology.h"
 #include "pipeline/stage/recipe.h"
 
 namespace sonocase::pipeline {
@@ -16,5 +17,11 @@ void read_analytic(const TomlTable& table, RecipeInputs& inputs);            // 
 void read_labels(const TomlTable& table, std::vector<LabelChoice>& labels);  // [labels]
 // [tissues]: changes those in the list, and adds new ones to it.
 void read_tissues(const TomlTable& table, std::vector<Tissue>& tissues);
+// The figures of a tissue that the table gives, over those that it has.
+void read_figures(const TomlTable& table, Tissue& tissue);
+// [[pathology]]: adds the tissues of its kinds, and those that it changes, to the list.
+void read_pathology(const TomlTable& root,
+                    std::vector<PathologyRequest>& pathology,
+                    std::vector<Tissue>& tissues);
 
 }  // namespace sonocase::pipeline

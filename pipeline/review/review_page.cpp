@@ -110,11 +110,8 @@ std::string score_groups(const ReviewInput& input, bool evidence) {
     static constexpr struct {
         const char* group;
         const char* title;
-    } kGroups[] = {{"session", "Session"},
-                   {"targets", "Targets"},
-                   {"guidance", "Guidance"},
-                   {"needle", "Needle"},
-                   {"probe", "Probe"}};
+    } kGroups[] = {{"session", "Session"}, {"targets", "Targets"}, {"guidance", "Guidance"},
+                   {"needle", "Needle"},   {"doppler", "Doppler"}, {"probe", "Probe"}};
     const bool compare = !input.earlier.empty();
     std::string groups;
     for (const auto& group : kGroups) {

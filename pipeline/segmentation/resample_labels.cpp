@@ -29,6 +29,8 @@ SampledField resample_by_shape(const ResampleInput& input,
                               .sigma_slices = options.sigma_slices,
                               .follow_shift = options.follow_shift};
     field_options.block = options.block_vx;
+    field_options.held_mb =
+        static_cast<std::size_t>(std::clamp(options.held_mb, 0.0, 1.0 * LabelFieldOptions::kAll));
     LabelField field(input.ct_labels, field_options, progress);
     result->seconds.distances = watch.lap();
     const Registration registration = with_voxel_rim(input.registration, input.ct_labels.grid);

@@ -12,7 +12,8 @@
 //
 // A label whose anatomy is smaller than a voxel is kept as one voxel and named in the report. Cost
 // of `shape`: real torso (1.4 M voxels of 3 mm, 67 labels) into 1 mm, about 9 s of processor time
-// and 0.34 GB. Same bytes for any number of threads.
+// and 0.34 GB; maps of tens of millions of voxels are measured in tiles, and distances come and go
+// by layers where memory is short (docs/farm.md). Same bytes for any number of threads.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +48,10 @@ struct ResampleOptions {
     double record_band_vx = 1.5;   // shape: boundary records up to this distance, [0, 2.6]; 0: none
     double snap_vx = 0.07;         // shape: how far surfaces may move onto quadrics; 0: not at all
     int block_vx = 8;              // shape: nodes per edge of a block of distances: 4, 8 or 16
-    LevelSetOptions level_set;     // paper
+    // shape: distances held at a time, MB, besides what else is needed. Less takes longer, since
+    // layers of the map are measured again when they come back; the bytes are the same.
+    double held_mb = 1e9;
+    LevelSetOptions level_set;  // paper
 };
 
 // Incremented whenever the same input and options give different bytes.

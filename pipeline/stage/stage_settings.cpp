@@ -11,6 +11,9 @@ namespace sonocase::pipeline {
 
 StageSettings::StageSettings(const StageTable& table) : table_(&table) {
     for (const OptionGroup* group : table.option_groups()) values_[group->name] = group->defaults;
+    // A stage whose options are no single values (a list of lesions) has a struct all the same.
+    for (const StageDescriptor& stage : table.stages)
+        if (stage.options.defaults.has_value()) values_[stage.name] = stage.options.defaults;
 }
 
 Status StageSettings::set(const std::string& name,

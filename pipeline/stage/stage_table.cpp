@@ -14,9 +14,17 @@ std::vector<StageReport> without_seconds(std::vector<StageReport> reports) {
 }
 
 int StageCost::memory_mb(const CaseSize& size) const {
-    return static_cast<int>(std::ceil(base_mb + per_label_mb * size.label_mb +
-                                      per_label_voxel * size.label_voxels +
+    double voxels_mb = per_label_voxel * size.label_voxels;
+    if (large_mb > 0)
+        voxels_mb = std::min(voxels_mb, large_mb + per_large_voxel * size.label_voxels);
+    return static_cast<int>(std::ceil(base_mb + per_label_mb * size.label_mb + voxels_mb +
                                       per_cooked_voxel * size.cooked_voxels));
+}
+
+int StageCost::least_mb(const CaseSize& size) const {
+    StageCost least = *this;
+    if (per_streamed_voxel > 0) least.per_large_voxel = per_streamed_voxel;
+    return least.memory_mb(size);
 }
 
 const StageDescriptor* StageTable::find(const std::string& stage) const {

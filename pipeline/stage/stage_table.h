@@ -67,12 +67,16 @@ struct CaseSize {
 
 // Cores that a stage's job asks a build farm for, and its peak memory in MB:
 // base + a * MB of the label file + b * million voxels of the label map + c * million cooked
-// voxels. docs/farm.md has the measurements.
+// voxels; for a stage that works through large maps piece by piece, the voxels count at most
+// large_mb + d * million voxels. docs/farm.md has the measurements.
 struct StageCost {
     int threads = 1;
     double base_mb = 240, per_label_mb = 0, per_label_voxel = 0, per_cooked_voxel = 0;
+    double large_mb = 0, per_large_voxel = 0;  // large_mb 0: no map is worked through in pieces
+    double per_streamed_voxel = 0;  // in place of per_large_voxel where memory is short; 0: as that
 
     int memory_mb(const CaseSize& size) const;
+    int least_mb(const CaseSize& size) const;  // where memory is short
 };
 
 // A flag of a stage's verb that says what a recipe's [inputs] would.

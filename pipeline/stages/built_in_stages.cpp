@@ -2,14 +2,16 @@
 
 #include "pipeline/stages/built_in_stages.h"
 
+#include "pipeline/stages/pathology_stage.h"
+
 namespace sonocase::pipeline {
 namespace {
 
 StageTable make_table() {
     StageTable table;
-    table.stages = {mannequin_step(),  import_stage(), surface_stage(), warp_stage(),
-                    resample_stage(),  smooth_stage(), tissues_step(),  texture_stage(),
-                    structure_stage(), pack_stage()};
+    table.stages = {mannequin_step(), import_stage(),    surface_stage(),   warp_stage(),
+                    resample_stage(), smooth_stage(),    pathology_stage(), tissues_step(),
+                    texture_stage(),  structure_stage(), flow_stage(),      pack_stage()};
     table.common = OptionsOf<CaseOptions>("case").number(
         "seed", [](auto& o) { return &o.seed; }, 0, 2e9, "",
         "seed of everything random in the case");

@@ -2,8 +2,8 @@
 
 // The stages that cook a case, each described in a file of its own beside this one.
 //
-//     mannequin  import -> surface -> warp -> resample [-> smooth] -> tissues -> texture, structure
-//                                                                                        -> pack
+//     mannequin  import -> surface -> warp -> resample [-> smooth] [-> pathology]
+//                -> tissues -> texture, structure, flow -> pack
 // mannequin and tissues are steps: they run with the stages that need them.
 #pragma once
 
@@ -23,6 +23,7 @@ StageDescriptor smooth_stage();
 StageDescriptor tissues_step();
 StageDescriptor texture_stage();
 StageDescriptor structure_stage();
+StageDescriptor flow_stage();
 StageDescriptor pack_stage();
 
 // The table's common options, [case].

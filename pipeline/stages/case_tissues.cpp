@@ -10,6 +10,8 @@
 #include "formats/bundle/stage_files.h"
 #include "formats/text/nearest_name.h"
 #include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/import/mesh/node_table.h"
+#include "pipeline/pathology/pathology.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/key_text.h"
 
@@ -54,6 +56,14 @@ std::string palette_text(const std::vector<Label>& palette) {
     return text;
 }
 
+bool is_pathology(const Recipe& recipe, const std::string& label) {
+    for (const PathologyRequest& request :
+         recipe.settings.of<PathologyOptions>("pathology").requests)
+        for (const std::string& name : pathology_labels(request))
+            if (name == label) return true;
+    return false;
+}
+
 }  // namespace
 
 Status assign_tissues(const Recipe& recipe, std::vector<Label>& labels) {
@@ -66,11 +76,24 @@ Status assign_tissues(const Recipe& recipe, std::vector<Label>& labels) {
         if (std::find(tissues.begin(), tissues.end(), choice.tissue) == tissues.end())
             return Error{"unknown tissue '" + choice.tissue + "'", where,
                          suggest_name(choice.tissue, tissues)};
+        if (choice.label.find('*') != std::string::npos) {
+            bool any = false;
+            for (Label& label : labels) {
+                if (!matches_pattern(choice.label, label.name)) continue;
+                label.tissue = choice.tissue;
+                any = true;
+            }
+            if (!any)
+                return Error{"no label matches '" + choice.label + "'", where,
+                             "expected a pattern of the label map's names"};
+            continue;
+        }
         const auto found = std::find(names.begin(), names.end(), choice.label);
         if (found == names.end()) {
             if (std::find(known_class.begin(), known_class.end(), choice.label) !=
                 known_class.end())
                 continue;
+            if (is_pathology(recipe, choice.label)) continue;  // not painted yet
             return Error{"label '" + choice.label + "' is not in the label map", where,
                          suggest_name(choice.label, names)};
         }

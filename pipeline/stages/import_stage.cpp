@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // import: a segmented CT, or the analytic torso, becomes labels in the `ct` frame.
+#include "pipeline/stages/import_inputs.h"
+
 #include "formats/files/stage_file.h"
-#include "pipeline/import/label_map.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
 #include "pipeline/stages/key_text.h"
@@ -30,13 +31,106 @@ LabelFile sample_analytic(const AnalyticInput& in) {
     return file;
 }
 
+void add_meshes(OptionsOf<MeshImportOptions>& options) {
+    options.help_group("Organ meshes")
+        .number(
+            "voxel_mm", [](auto& o) { return &o.mesh.voxel_mm; }, 0.3, 10, "mm",
+            "meshes: edge of the voxels")
+        .number(
+            "low_mm", [](auto& o) { return &o.mesh.low_mm; }, -1e9, 1e9, "mm",
+            "meshes: lowest height that is kept")
+        .number(
+            "high_mm", [](auto& o) { return &o.mesh.high_mm; }, -1e9, 1e9, "mm",
+            "meshes: greatest height that is kept")
+        .number(
+            "weld_mm", [](auto& o) { return &o.mesh.weld_mm; }, 0, 5, "mm",
+            "meshes: corners nearer than this become one")
+        .number(
+            "cap_mm", [](auto& o) { return &o.mesh.cap_mm; }, 0, 5000, "mm",
+            "meshes: longest opening that is closed")
+        .toggle(
+            "allow_long_caps", [](auto& o) { return &o.mesh.allow_long_caps; },
+            "meshes: close longer openings as well")
+        .number(
+            "hole_mm2", [](auto& o) { return &o.mesh.hole_mm2; }, 1, 20000, "mm^2",
+            "meshes: largest section of a lumen")
+        .number(
+            "accuracy", [](auto& o) { return &o.mesh.accuracy; }, 1, 10, "radii",
+            "meshes: how far a box of triangles is taken for a point of an open surface");
+}
+
+void add_body(OptionsOf<MeshImportOptions>& options) {
+    options.section("body")
+        .toggle(
+            "enabled", [](auto& o) { return &o.body.enabled; }, "fill in what meshes lack")
+        .flag("body")
+        .number(
+            "arms_off_mm", [](auto& o) { return &o.body.arms_off_mm; }, 0, 1000, "mm",
+            "parts of slices farther from the midline go; 0: none")
+        .number(
+            "skin_mm", [](auto& o) { return &o.body.skin_mm; }, 0.5, 10, "mm", "thickness")
+        .number(
+            "fat_mm", [](auto& o) { return &o.body.fat_mm; }, 2, 80, "mm", "fat under the skin")
+        .number(
+            "cavity_mm", [](auto& o) { return &o.body.cavity_mm; }, 5, 60, "mm",
+            "gaps between organs that belong to the belly")
+        .number(
+            "muscle_mm", [](auto& o) { return &o.body.muscle_mm; }, 2, 40, "mm",
+            "wall of the belly")
+        .number(
+            "back_muscle_mm", [](auto& o) { return &o.body.back_muscle_mm; }, 5, 80, "mm",
+            "muscle about spine, pelvis and thigh")
+        .toggle(
+            "spine", [](auto& o) { return &o.body.spine; }, "vertebrae, discs, canal")
+        .number(
+            "disc_pitch_mm", [](auto& o) { return &o.body.disc_pitch_mm; }, 15, 60, "mm",
+            "from disc to disc in the loin")
+        .toggle(
+            "ribs", [](auto& o) { return &o.body.ribs; }, "ribs, cartilage, sternum")
+        .number(
+            "rib_mm", [](auto& o) { return &o.body.rib_mm; }, 4, 20, "mm", "height of a rib")
+        .number(
+            "rib_pitch_mm", [](auto& o) { return &o.body.rib_pitch_mm; }, 12, 50, "mm",
+            "from rib to rib")
+        .toggle(
+            "lungs", [](auto& o) { return &o.body.lungs; }, "lungs and diaphragm")
+        .number(
+            "diaphragm_mm", [](auto& o) { return &o.body.diaphragm_mm; }, 1, 10, "mm",
+            "thickness of the diaphragm");
+    options
+        .toggle(
+            "stomach", [](auto& o) { return &o.body.stomach; }, "stomach")
+        .number(
+            "stomach_gas", [](auto& o) { return &o.body.stomach_gas; }, 0, 1, "",
+            "share of the stomach's height that is gas")
+        .toggle(
+            "psoas", [](auto& o) { return &o.body.psoas; }, "psoas muscles")
+        .toggle(
+            "rectus", [](auto& o) { return &o.body.rectus; }, "rectus muscles")
+        .toggle(
+            "leg_vessels", [](auto& o) { return &o.body.leg_vessels; }, "iliac and femoral vessels")
+        .number(
+            "artery_mm", [](auto& o) { return &o.body.artery_mm; }, 2, 20, "mm",
+            "diameter of the iliac artery")
+        .toggle(
+            "gall_bladder", [](auto& o) { return &o.body.gall_bladder; }, "gall bladder")
+        .number(
+            "bladder_ml", [](auto& o) { return &o.body.bladder_ml; }, 0, 1000, "ml",
+            "the bladder is filled to this; 0: as it is");
+}
+
+OptionGroup options() {
+    OptionsOf<MeshImportOptions> options("import");
+    add_meshes(options);
+    add_body(options);
+    return options;
+}
+
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     const RecipeInputs& in = inputs.recipe().inputs;
     if (in.analytic) return StageValue::of(sample_analytic(in.torso));
-    ImportOptions options;
-    options.table = inputs.recipe().resolve(in.label_table);
-    options.scale = in.labels_scale;
-    auto imported = import_label_map(inputs.recipe().resolve(in.labels), options, progress);
+    auto imported =
+        import_inputs(inputs.recipe(), inputs.options<MeshImportOptions>("import"), progress);
     if (!imported) return imported.error();
     return StageValue::of(
         LabelFile{"ct", std::move(imported->labels), {}, {}, {std::move(imported->report)}});
@@ -47,19 +141,25 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
     const RecipeInputs& in = recipe.inputs;
     const AnalyticBody& body = in.torso.body;
     if (in.analytic)
-        return {key_text("analytic", {body.width_scale, body.depth_scale, body.belly_mm,
-                                      in.torso.voxel_mm, in.torso.slice_mm})};
-    return {key_text(digests.labels + " " + digests.label_table, {in.labels_scale})};
+        return {key_text(body.tubes ? "tubes" : "analytic",
+                         {body.width_scale, body.depth_scale, body.belly_mm, in.torso.voxel_mm,
+                          in.torso.slice_mm})};
+    const std::string files = digests.labels + " " + digests.label_table;
+    if (is_mesh_source(recipe.resolve(in.labels)))
+        return {key_text(files, {in.labels_scale, kMeshImportVersion})};
+    return {key_text(files, {in.labels_scale})};
 }
 
 StageVerb verb() {
     StageVerb verb;
     verb.inputs = {
         {"LABELS", "",
-         "NIfTI, NRRD, .seg.nrrd, MetaImage, folder of masks, or folder of DICOM slices", true,
-         &RecipeInputs::labels},
-        {"--table", "FILE.csv", "Names of the values: rows of value,name[,tissue_class]", false,
-         &RecipeInputs::label_table},
+         "NIfTI, NRRD, .seg.nrrd, MetaImage, folder of masks, folder of DICOM slices, or organ "
+         "meshes (GLB, STL, PLY, OBJ, VTP, or a folder of them)",
+         true, &RecipeInputs::labels},
+        {"--table", "FILE.csv",
+         "Names of the values: rows of value,name[,tissue_class]; of meshes: node,label,role",
+         false, &RecipeInputs::label_table},
         {"--scale", "", "Millimetres per unit of the file", false, &RecipeInputs::labels_scale}};
     verb.output_type = "CT.labels";
     verb.output_meaning = "Where to write";
@@ -73,6 +173,22 @@ StageVerb verb() {
 
 }  // namespace
 
+Result<ImportedLabels> import_inputs(const Recipe& recipe,
+                                     const MeshImportOptions& given,
+                                     const Progress& progress) {
+    const RecipeInputs& in = recipe.inputs;
+    const std::string path = recipe.resolve(in.labels), table = recipe.resolve(in.label_table);
+    if (is_mesh_source(path)) {
+        MeshImportOptions options = given;
+        options.mesh.scale = in.labels_scale;
+        return import_meshes(path, table, options, progress);
+    }
+    ImportOptions options;
+    options.table = table;
+    options.scale = in.labels_scale;
+    return import_label_map(path, options, progress);
+}
+
 StageDescriptor import_stage() {
     StageDescriptor stage;
     stage.name = "import";
@@ -80,6 +196,7 @@ StageDescriptor import_stage() {
     stage.summary = "read a label map of any kind";
     stage.about = "Read a label map of any kind into labels in the ct frame (RAS+, mm)";
     stage.provides = "ct_labels";
+    stage.options = options();
     stage.key_texts = key_texts;
     stage.run = run;
     stage.codec = label_codec();

@@ -4,8 +4,10 @@
 // kept in the cache, since the bundle itself is.
 #include "formats/bundle/stage_files.h"
 #include "formats/container/chunk_file.h"
+#include "pipeline/flow/cook_flow.h"
 #include "pipeline/pack/error_budget.h"
 #include "pipeline/pack/pack_case.h"
+#include "pipeline/pathology/answer_key.h"
 #include "pipeline/registration/skin/skin_surface.h"
 #include "pipeline/registration/unfitted_skin.h"
 #include "pipeline/stages/built_in_stages.h"
@@ -27,6 +29,20 @@ void add_error_budget(const std::vector<StageReport>& reported, StageReport& rep
     report.measures.push_back({"known_error_mm", budget.known_mm});
 }
 
+// The answer key as targets: the radius is that of the ball of a lesion's volume.
+std::vector<KeyTarget> targets_of(const StageReport& report, const Recipe& recipe) {
+    std::vector<KeyTarget> targets;
+    for (const PathologyEntry& e : key_of(report)) {
+        KeyTarget target{e.name, e.centre, std::cbrt(3000 * e.volume_ml / (4 * 3.14159265358979)),
+                         false};
+        for (const PathologyRequest& request :
+             recipe.settings.of<PathologyOptions>("pathology").requests)
+            if (request.name == e.name) target.by_default = request.target;
+        targets.push_back(std::move(target));
+    }
+    return targets;
+}
+
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     const auto mannequin = inputs.get<Mannequin>("mannequin");
     const auto skin = inputs.get<SkinSurfaceResult>("skin");
@@ -35,6 +51,7 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     const auto used = inputs.get<CaseTissues>("tissues");
     const auto textures = inputs.get<TextureFile>("textures");
     const auto structure = inputs.get<EchoOffsets>("structure");
+    const auto flow = inputs.get<FlowResult>("flow");
     if (!mannequin) return mannequin.error();
     if (!skin) return skin.error();
     if (!registration) return registration.error();
@@ -42,6 +59,7 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     if (!used) return used.error();
     if (!textures) return textures.error();
     if (!structure) return structure.error();
+    if (!flow) return flow.error();
     report_progress(progress, 0, "packing");
     const Recipe& recipe = inputs.recipe();
     auto unfitted = unfitted_skin((*skin)->skin, (*mannequin)->surface, **registration);
@@ -50,6 +68,9 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
                     *registration,       (*mannequin)->surface, (*labels)->volume, (*used)->palette,
                     (*labels)->boundary, (*structure)->offset,  **textures,        (*used)->tissues,
                     std::move(*unfitted)};
+    input.flow = (*flow)->field;
+    for (const StageReport& report : inputs.reported())
+        if (report.stage == "pathology") input.key = targets_of(report, recipe);
     auto packed = pack_case(input);
     if (!packed) return packed.error();
     add_error_budget(inputs.reported(), packed->report);
@@ -73,7 +94,7 @@ StageDescriptor pack_stage() {
     stage.name = "pack";
     stage.version = kPackVersion;
     stage.takes = {"mannequin", "skin",     "registration", "labels",
-                   "tissues",   "textures", "structure"};
+                   "tissues",   "textures", "structure",    "flow"};
     stage.provides = "case";
     stage.key_texts = key_texts;
     stage.run = run;

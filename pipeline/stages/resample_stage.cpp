@@ -3,6 +3,7 @@
 // resample: the patient's labels through the fitted map into cubic voxels in `mannequin`.
 #include "formats/files/registration_file.h"
 #include "formats/registration/registration.h"
+#include "pipeline/base/memory_limit.h"
 #include "pipeline/export/labels/segmentation_pictures.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/stages/built_in_stages.h"
@@ -105,13 +106,22 @@ OptionGroup options() {
     return options;
 }
 
+// What the limit leaves for distances when all else has been taken: the program, the map's copies,
+// labels, margins and cells near surfaces, and the cooked voxels (docs/farm.md).
+double room_for_distances_mb(const LabelVolume& ct, double voxel_mm) {
+    const double voxels = static_cast<double>(ct.grid.voxel_count()) / 1e6;
+    const double cooked = voxels * ct.grid.voxel_volume_mm3() / (voxel_mm * voxel_mm * voxel_mm);
+    return std::min(1e9, 0.95 * memory_limit_mb()) - (660 + 9 * voxels + 3 * cooked);
+}
+
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     const auto ct = inputs.get<LabelFile>("ct_labels");
     if (!ct) return ct.error();
     const auto registration = inputs.get<Registration>("registration");
     if (!registration) return registration.error();
-    auto result = resample_labels({(*ct)->volume, **registration},
-                                  inputs.options<ResampleOptions>("resample"), progress);
+    ResampleOptions options = inputs.options<ResampleOptions>("resample");
+    options.held_mb = room_for_distances_mb((*ct)->volume, options.voxel_mm);
+    auto result = resample_labels({(*ct)->volume, **registration}, options, progress);
     if (!result) return result.error();
     return label_value("mannequin", std::move(*result));
 }
@@ -159,7 +169,7 @@ StageDescriptor resample_stage() {
     stage.codec = label_codec();
     stage.reports = label_reports;
     stage.share = 0.4;
-    stage.cost = {2, 260, 0, 85, 3};
+    stage.cost = {2, 260, 0, 85, 3, 400, 23.5, 20};
     stage.verb = verb();
     return stage;
 }

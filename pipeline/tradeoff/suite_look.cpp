@@ -10,19 +10,6 @@
 namespace sonocase::pipeline {
 namespace {
 
-constexpr int kWidth = 520, kHeight = 430;
-
-ScanPlace fan() {
-    ScanPlace place;
-    place.mm_per_px = 0.36;
-    place.apex_x_px = 259;
-    place.apex_y_px = -100;
-    place.radius_mm = 50;
-    place.half_angle_rad = 0.5;
-    place.depth_mm = 135;
-    return place;
-}
-
 // A machine unlike the base in everything that is fitted to the texture.
 Machine known_machine() {
     Machine machine;
@@ -45,13 +32,13 @@ Result<Measured> measure_look(const Settings& settings) {
         if (s.key == "look.frames") frames = std::stoi(s.value);
     }
     const Machine truth = known_machine();
-    const ScanPlace place = fan();
+    const ScanPlace place = stand_in_fan();
     const BeamImage grid = beam_grid(place);
     std::vector<std::vector<std::uint8_t>> clip;
     for (int i = 0; i < frames; ++i) {
         const auto seed = static_cast<std::uint64_t>(100 + i);
-        clip.push_back(
-            picture_from_beam(stand_in(truth, place, Parenchyma{}, seed), place, kWidth, kHeight));
+        clip.push_back(picture_from_beam(stand_in(truth, place, Parenchyma{}, seed), place,
+                                         kStandInWidth, kStandInHeight));
     }
     const Stopwatch watch;
     LookGauge gauge(
@@ -60,11 +47,11 @@ Result<Measured> measure_look(const Settings& settings) {
             static_cast<std::size_t>(grid.samples) * static_cast<std::size_t>(grid.lines), 1),
         {}, {});
     for (const auto& frame : clip)
-        gauge.add(gauge.measure(beam_from_picture(frame, kWidth, kHeight, place)));
+        gauge.add(gauge.measure(beam_from_picture(frame, kStandInWidth, kStandInHeight, place)));
     LookMeasures measures = gauge.result();
     measures.black = truth.grey.floor;  // the clip shows none, and it is not what is judged here
     measures.black_seen = true;
-    const Machine found = fit_machine(measures, place, kWidth, kHeight, {}).machine;
+    const Machine found = fit_machine(measures, place, kStandInWidth, kStandInHeight, {}).machine;
     const double seconds = watch.seconds();
     const double errors[] = {
         relative(found.beam.axial_mm, truth.beam.axial_mm),

@@ -30,6 +30,15 @@ Suite calibrate_suite();
 Suite look_suite();
 // Frames of the player beside this program, against its finest sampling.
 Suite render_suite();
+// The press field against the finite element blocks in data/deformation, by the program press_block
+// beside this one.
+Suite press_suite(const std::string& data);
+// Volumes of ten lesions against voxel size.
+Suite pathology_suite();
+// Pulses of colour Doppler and points of the spectral gate, on a tube of known flow, by the program
+// doppler_trial beside this one.
+Suite colour_suite();
+Suite spectrum_suite();
 // The whole chain on the demo torso, or another body of the same family.
 Suite case_suite(const AnalyticBody& body, const std::string& body_name);
 // The whole chain on a user's case, against its own finest setting.

@@ -13,6 +13,7 @@
 #include "pipeline/command_line/verbs.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/verbs/stage/stage_verb.h"
+#include "pipeline/verbs/verb_check.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -35,6 +36,8 @@ const std::vector<Verb>& hand_written_verbs() {
         {kCase, "build", "cook a recipe into a case bundle", verb_build, ""},
         {kCase, "inspect", "show what a bundle holds", verb_inspect, ""},
         {kCase, "validate", "check a bundle", verb_validate, ""},
+        {kCase, "check", "look a case over before it teaches", verb_check, ""},
+        {kCase, "aim", "find windows on the skin for a target", verb_aim, ""},
         {kCase, "export", "unpack a bundle for other tools", verb_export, ""},
         {kCase, "publish", "write a site that plays cases in browsers", verb_publish, ""},
         {kCase, "look", "measure how a real machine draws", verb_look, ""},
@@ -42,6 +45,7 @@ const std::vector<Verb>& hand_written_verbs() {
         {kStage, "align", "lay the skin on the mannequin rigidly", verb_align, "surface"},
         {kStage, "warp", "fit the quadratic and residual warps", verb_warp, "warp"},
         {kStage, "register", "surface, align and warp in one call", verb_register, "warp"},
+        {kStage, "landmarks", "list places for a landmark file", verb_landmarks, "surface"},
         {kStage, "map", "carry points through a fitted map", verb_map, "warp"},
         {kStage, "texture", "learn solid textures from example images", verb_texture, "texture"},
         {kStage, "pack", "put the stages' files into a bundle", verb_pack, "pack"},

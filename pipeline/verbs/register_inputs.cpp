@@ -7,33 +7,15 @@
 #include <cstdio>
 
 #include "formats/text/number_text.h"
-#include "pipeline/import/label_map.h"
 #include "pipeline/import/surface/surface_file.h"
+#include "pipeline/recipe/read_recipe.h"
 #include "pipeline/registration/landmark_file.h"
 #include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/import_inputs.h"
 #include "pipeline/verbs/stage/option_flags.h"
 
 namespace sonocase::pipeline {
 namespace {
-
-Result<Vector3> parse_direction(const std::string& text) {
-    Vector3 v;
-    std::string_view rest = text;
-    for (int axis = 0; axis < 3; ++axis) {
-        const std::size_t comma = axis < 2 ? rest.find(',') : rest.size();
-        if (comma == std::string_view::npos || !parse_number(rest.substr(0, comma), v[axis]) ||
-            !std::isfinite(v[axis])) {
-            return Error{"'" + text + "' is not a direction", "--up",
-                         "three numbers X,Y,Z, e.g. 0,1,0"};
-        }
-        rest = rest.substr(std::min(rest.size(), comma + 1));
-    }
-    if (!(norm(v) > 1e-9)) {
-        return Error{"'" + text + "' has no length", "--up",
-                     "the patient's head direction in the surface's frame, e.g. 0,1,0"};
-    }
-    return v;
-}
 
 // What becomes of a dense scan, without its size.
 std::vector<Measure> reduction_of(const StageReport& report) {
@@ -48,23 +30,77 @@ std::vector<Measure> reduction_of(const StageReport& report) {
 
 }  // namespace
 
+Result<Vector3> parse_direction(const std::string& text, const char* flag) {
+    Vector3 v;
+    std::string_view rest = text;
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::size_t comma = axis < 2 ? rest.find(',') : rest.size();
+        if (comma == std::string_view::npos || !parse_number(rest.substr(0, comma), v[axis]) ||
+            !std::isfinite(v[axis])) {
+            return Error{"'" + text + "' is not a direction", flag,
+                         "three numbers X,Y,Z, e.g. 0,1,0"};
+        }
+        rest = rest.substr(std::min(rest.size(), comma + 1));
+    }
+    if (!(norm(v) > 1e-9)) {
+        return Error{"'" + text + "' has no length", flag,
+                     "a direction of the patient in the surface's frame, e.g. 0,1,0"};
+    }
+    return v;
+}
+
 RegisterArguments::RegisterArguments() {
     recipe.settings = StageSettings(built_in_stages());
 }
 
+Status take_recipe(int argc, char** argv, RegisterArguments& a) {
+    // CLI11 reads these two again, for the help and for typing errors.
+    const auto value_of = [&](std::string_view flag) -> std::string {
+        for (int n = 1; n < argc; ++n) {
+            const std::string_view word = argv[n];
+            if (word == flag && n + 1 < argc) return argv[n + 1];
+            if (word.starts_with(flag) && word.size() > flag.size() && word[flag.size()] == '=')
+                return std::string(word.substr(flag.size() + 1));
+        }
+        return {};
+    };
+    const std::string path = value_of("--recipe");
+    if (path.empty()) return Done{};
+    RecipeOverrides overrides;
+    overrides.data = value_of("--data");
+    auto recipe = load_recipe(path, overrides);
+    if (!recipe) return recipe.error();
+    RecipeInputs& in = recipe->inputs;
+    if (in.analytic)
+        return Error{"the recipe names no files: it has [analytic]", path,
+                     "expected [inputs] with labels and surface"};
+    for (std::string* file : {&in.labels, &in.label_table, &in.surface, &in.landmarks})
+        if (!file->empty()) *file = recipe->resolve(*file);
+    recipe->folder.clear();  // paths of flags start from the working folder
+    recipe->data.clear();
+    a.recipe = std::move(*recipe);
+    if (!a.recipe.inputs.surface.empty()) a.surfaces = {a.recipe.inputs.surface};
+    return Done{};
+}
+
 void add_register_options(CLI::App& app, RegisterArguments& a, bool several) {
     RecipeInputs& in = a.recipe.inputs;
+    app.add_option("--recipe", a.recipe_path,
+                   "Take inputs and options of a recipe, case.toml or its folder; flags go before")
+        ->type_name("CASE.toml");
+    app.add_option("--data", a.data, "Folder that the recipe's input paths start from")
+        ->type_name("DIR");
     app.add_option("--labels", in.labels,
-                   "Label map: NIfTI, NRRD, MetaImage, DICOM or a folder of masks")
+                   "Label map: NIfTI, NRRD, MetaImage, DICOM or a folder of masks; or organ meshes")
         ->type_name("FILE")
-        ->required();
+        ->required(in.labels.empty());
     auto* surface =
         app.add_option("--surface", a.surfaces,
                        several ? "Mannequin: PLY, STL, OBJ, VTP, or CSV of readings; of several, "
                                  "the one that fits best is taken"
                                : "Mannequin: PLY, STL, OBJ, VTP, or CSV of readings")
             ->type_name("FILE")
-            ->required();
+            ->required(a.surfaces.empty());
     surface->expected(1, several ? 100 : 1);
     app.add_option("--table", in.label_table, "CSV of value,name[,tissue_class] for the label map")
         ->type_name("FILE.csv");
@@ -88,8 +124,9 @@ Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Pr
     RegisterInputs inputs;
     inputs.options = a.recipe.settings.of<RegisterOptions>("warp");
     inputs.options.seed = case_seed(a.recipe);
+    if (in.up) inputs.options.up = *in.up;
     if (!a.up.empty()) {
-        const Result<Vector3> up = parse_direction(a.up);
+        const Result<Vector3> up = parse_direction(a.up, "--up");
         if (!up) return up.error();
         inputs.options.up = *up;
     }
@@ -103,9 +140,8 @@ Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Pr
     if (!surface) return surface.error();
     inputs.mannequin = std::move(*surface);
     inputs.reduction = reduction_of(surface_report);
-    ImportOptions import;
-    import.table = in.label_table;
-    Result<ImportedLabels> labels = import_label_map(in.labels, import, progress);
+    Result<ImportedLabels> labels =
+        import_inputs(a.recipe, a.recipe.settings.of<MeshImportOptions>("import"), progress);
     if (!labels) return labels.error();
     inputs.warnings = surface_report.warnings;
     inputs.warnings.insert(inputs.warnings.end(), labels->report.warnings.begin(),

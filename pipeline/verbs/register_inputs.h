@@ -19,8 +19,17 @@ struct RegisterArguments {
     Recipe recipe;                      // inputs, and the options of the stage "warp"
     std::vector<std::string> surfaces;  // mannequins; the first is that of the recipe
     std::string out, up;
+    std::string recipe_path, data;
     CommonOptions common;
 };
+
+// "X,Y,Z" of a flag. Error: no three numbers, or a vector without a length.
+Result<Vector3> parse_direction(const std::string& text, const char* flag);
+
+// Where the command line says --recipe CASE.toml (and --data DIR): its [inputs], [import], [body]
+// and fit options become the defaults of the flags, paths resolved. Call it before
+// add_register_options.
+Status take_recipe(int argc, char** argv, RegisterArguments& arguments);
 
 // Inputs, every option of the stage "warp", --seed, and what all verbs have.
 // several  --surface takes more than one

@@ -15,6 +15,7 @@
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
 #include "formats/threads/thread_jobs.h"
+#include "pipeline/base/memory_limit.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
@@ -175,7 +176,7 @@ int build_one(const BuildOptions& options) {
     if (!recipe) return fail("build", recipe.error());
     const auto choice = choose(options.target, *recipe);
     if (!choice) return fail("build", choice.error());
-    const MemoryNeed need = memory_need(*recipe);
+    const MemoryNeed need = memory_need(*recipe, options.memory_mb);
     if (const Status s = check_memory(need, options.memory_mb); !s) return fail("build", s.error());
     if (!options.common.quiet)
         std::printf("to cook: %.1f million voxels, about %.0f MB (%s)\n", need.size.cooked_voxels,
@@ -257,6 +258,7 @@ int build_several(const BuildOptions& options) {
 
 int build(BuildOptions& options) {
     const ThreadLimit limit(options.common.threads);
+    const MemoryLimit memory(options.memory_mb);
     if (options.surfaces.size() > 1) return build_several(options);
     if (options.surfaces.size() == 1) options.overrides.surface = options.surfaces[0];
     return build_one(options);
@@ -293,8 +295,10 @@ int verb_build(int argc, char** argv) {
                    "Limit of the cache folder's size; 0 means none")
         ->check(CLI::NonNegativeNumber)
         ->type_name("MB");
-    app.add_option("--memory-mb", options.memory_mb,
-                   "Refuse a case that needs more; 0 means what this machine has")
+    app.add_option(
+           "--memory-mb", options.memory_mb,
+           "Work within this where that only takes longer, and refuse a case that needs more;"
+           " 0 means what this machine has")
         ->check(CLI::NonNegativeNumber)
         ->type_name("MB");
     app.add_option("--preview", options.preview, "Write the case's picture as well")

@@ -1,28 +1,56 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase export: a bundle's parts as files that other tools open.
+// sonocase export: a bundle's parts as files that other tools open, or a session's pictures as
+// DICOM.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
 #include "formats/files/bundle_file.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
+#include "pipeline/export/dicom/ultrasound_dicom.h"
 #include "pipeline/export/export_files.h"
 #include "pipeline/export/export_level_sets.h"
 
 namespace sonocase::pipeline {
+namespace {
+
+int export_dicom(const std::string& session, const std::string& file) {
+    const auto film = film_of_session(session);
+    if (!film) return fail("export", film.error());
+    if (const Status written = write_ultrasound_dicom(*film, file); !written)
+        return fail("export", written.error());
+    std::printf("%s: %zu pictures, %d x %d\n", file.c_str(), film->times_s.size(), film->width_px,
+                film->height_px);
+    if (!(film->mm_per_px > 0))
+        std::fprintf(stderr,
+                     "sonocase: the pictures do not say how large a pixel is; viewers cannot "
+                     "measure in them.\n");
+    return kDone;
+}
+
+}  // namespace
 
 int verb_export(int argc, char** argv) {
     CLI::App app(
-        "Unpack a bundle into files for other tools (.seg.nrrd, NRRD, PLY, PNG, TOML, JSON)");
-    std::string path, folder;
+        "Unpack a bundle into files for other tools (.seg.nrrd, NRRD, PLY, PNG, TOML, JSON), or "
+        "write a session's pictures as ultrasound DICOM");
+    std::string path, folder, dicom;
     CommonOptions common;
-    app.add_option("BUNDLE", path, "The bundle")->required();
-    app.add_option("-o,--output", folder, "Folder to write")->type_name("DIR")->required();
+    app.add_option("INPUT", path, "The bundle; with --dicom a recording or a folder of pictures")
+        ->required();
+    auto* to_folder = app.add_option("-o,--output", folder, "Folder to write")->type_name("DIR");
+    app.add_option("--dicom", dicom,
+                   "Write the pictures of the session INPUT as one multi-frame ultrasound file")
+        ->type_name("FILE")
+        ->excludes(to_folder);
     bool level_sets = false;
     app.add_flag("--level-sets", level_sets, "Also labels.vdb: one OpenVDB level set per label");
     add_common_options(app, common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    if (!dicom.empty()) return export_dicom(path, dicom);
+    if (folder.empty())
+        return fail("export", Error{"nowhere to write to", "", "-o DIR, or --dicom FILE"});
     auto bundle = load_bundle(path);
     if (!bundle) return fail("export", bundle.error());
     auto names = export_case(*bundle, folder);

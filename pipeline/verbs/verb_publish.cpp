@@ -26,6 +26,9 @@ int verb_publish(int argc, char** argv) {
     app.add_option("--xapi", options.xapi,
                    "Learning record store that takes the results; the page says so")
         ->type_name("ENDPOINT");
+    app.add_option("--poses", options.poses,
+                   "Pose server (sonoplay --serve-poses) that the page may connect to with ?poses=")
+        ->type_name("ws://HOST:PORT");
     app.add_option("--program", options.program_folder,
                    "Folder with the player for browsers, as scripts/web builds it")
         ->type_name("DIR");

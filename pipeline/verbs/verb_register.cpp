@@ -138,6 +138,8 @@ Status write_fit(const FitArguments& arguments, Fitted& fitted) {
 int run_fit_verb(const FitVerb& verb, int argc, char** argv) {
     CLI::App app(verb.about);
     FitArguments arguments;
+    if (const auto status = take_recipe(argc, argv, arguments.common); !status)
+        return fail(verb.name, status.error());
     add_options(app, verb, arguments);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     const ThreadLimit limit(arguments.common.common.threads);

@@ -70,6 +70,7 @@ std::vector<NamedSuite> suites() {
         {"calibrate", calibrate_suite},
         {"look", look_suite},
         {"render", render_suite},
+        {"pathology", pathology_suite},
         {"case", [] { return case_suite({}, kTimedBody); }},
         {"case", [] { return case_suite(*analytic_body("slender"), "slender"); }},
     };
@@ -83,6 +84,11 @@ int tradeoff(const TradeoffOptions& options) {
                             (options.suite.empty() && options.recipe.empty());
         if (wanted) makers.push_back(named.make);
     }
+    // Need data or programs that packages lack: only by name.
+    if (options.suite == "colour") makers.push_back(colour_suite);
+    if (options.suite == "spectrum") makers.push_back(spectrum_suite);
+    if (options.suite == "press")
+        makers.push_back([data = options.data] { return press_suite(data); });
     if (!options.recipe.empty()) {
         RecipeOverrides overrides;
         overrides.data = options.data;
@@ -171,7 +177,9 @@ int verb_tradeoff(int argc, char** argv) {
     std::vector<std::string> names{"all"};
     for (const NamedSuite& named : suites())
         if (names.back() != named.name) names.emplace_back(named.name);
-    app.add_option("--suite", options.suite, "Which stage; all unless --case is given")
+    for (const char* name : {"press", "colour", "spectrum"}) names.emplace_back(name);
+    app.add_option("--suite", options.suite,
+                   "Which stage; all but the last three unless --case is given")
         ->check(CLI::IsMember(names));
     app.add_flag("--quick", options.quick,
                  "Fewer values, no pairs, one run each: minutes, not an hour");

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -194,7 +195,48 @@ void add_ribs(Builder& t) {
     }
 }
 
+// Tubes side by side, each in its own plane x = const: up towards head and front, 50 degrees from
+// the y axis, 30 mm below the skin at z = 0.
+void add_tubes(Builder& t) {
+    constexpr double kPitch = 30, kDeep = 30, kHalfLength = 34, kSkin = kSkinDepth_mm;
+    const Vector3 along{0, std::cos(kPi * 50 / 180), std::sin(kPi * 50 / 180)};
+    const auto at = [&](double x, double s) {
+        double low = 0, high = 200;  // the skin above (x, 0)
+        for (int i = 0; i < 60; ++i) {
+            const double y = 0.5 * (low + high);
+            (trunk({x, y, 0}, 0, 0) < 0 ? low : high) = y;
+        }
+        return Point3{x, low - kDeep, 0} + s * along;
+    };
+    // A quarter of a millimetre off the lattice of a map of 1 mm: on it, both walls of a tube of 4
+    // mm would fall on voxel centres, and 13 % of its section be lost.
+    double x = -2 * kPitch + 0.25;
+    for (const int diameter : {4, 6, 8, 12}) {
+        const int label =
+            t.add_label("phantom_tube_" + std::to_string(diameter) + "mm", "blood", {170, 40, 40});
+        t.tube(label, {at(x, -kHalfLength), at(x, kHalfLength)}, diameter / 2.0, kSkin);
+        x += kPitch;
+    }
+    // Wide, narrow over 12 mm, wide: round ends of the wide parts make the throat.
+    const int label = t.add_label("phantom_stenosis", "blood", {200, 60, 60});
+    t.tube(label, {at(x, -kHalfLength), at(x, -11)}, 5, kSkin);
+    t.tube(label, {at(x, -11), at(x, 11)}, 3, kSkin);
+    t.tube(label, {at(x, 11), at(x, kHalfLength)}, 5, kSkin);
+}
+
 }  // namespace
+
+const TorsoAnatomy& tube_phantom() {
+    static const TorsoAnatomy instance = [] {
+        Builder t;
+        t.add_label("outside", "outside", {0, 0, 0});
+        t.layer(t.add_label("skin", "skin", {233, 194, 166}), 0);
+        t.layer(t.add_label("phantom_tissue", "liver", {150, 110, 100}), kSkinDepth_mm);
+        add_tubes(t);
+        return std::move(t.anatomy);
+    }();
+    return instance;
+}
 
 const TorsoAnatomy& torso_anatomy() {
     static const TorsoAnatomy instance = [] {

@@ -17,5 +17,6 @@ struct TorsoAnatomy {
 
 // The same object at every call. Thread-safe.
 const TorsoAnatomy& torso_anatomy();
+const TorsoAnatomy& tube_phantom();
 
 }  // namespace sonocase::pipeline

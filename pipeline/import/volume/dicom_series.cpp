@@ -52,7 +52,7 @@ Result<NativeVolume> read_dicom_series(const std::string& folder) {
         if (itk::ExposeMetaData(image.GetMetaDataDictionary(), "ITK_non_uniform_sampling_deviation",
                                 deviation))
             return Error{"slices are unevenly spaced, by up to " + std::to_string(deviation) +
-                             " mm: some may be missing",
+                             " mm: some may be missing or there twice",
                          folder, todo};
         volume.component = Component::i32;
         const auto size = image.GetLargestPossibleRegion().GetSize();

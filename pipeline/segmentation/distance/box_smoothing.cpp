@@ -4,52 +4,123 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "pipeline/segmentation/distance/widest.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-// out[l] = sum_m kernel[m] in[l + (m - half) stride], lines of `width` values.
-void smooth_lines(const float* in,
-                  std::size_t width,
-                  int lines,
-                  std::size_t pitch,
-                  const std::vector<float>& kernel,
-                  int stride,
-                  float* out) {
+// out[i] = sum_m kernel[m] from[m][i] for `count` values, in the order of the taps. The sums of
+// a few neighbours stay in registers over all taps.
+__attribute__((always_inline)) inline void weigh(const float* kernel,
+                                                 std::size_t taps,
+                                                 const float* const* from,
+                                                 std::size_t count,
+                                                 float* out) {
+    typedef float Eight __attribute__((vector_size(32)));
+    constexpr std::size_t kBatch = 32;
+    std::size_t i = 0;
+    for (; i + kBatch <= count; i += kBatch) {
+        Eight a{}, b{}, c{}, d{}, v;
+        for (std::size_t m = 0; m < taps; ++m) {
+            const float* values = from[m] + i;
+            const float k = kernel[m];
+            __builtin_memcpy(&v, values, sizeof v);
+            a += k * v;
+            __builtin_memcpy(&v, values + 8, sizeof v);
+            b += k * v;
+            __builtin_memcpy(&v, values + 16, sizeof v);
+            c += k * v;
+            __builtin_memcpy(&v, values + 24, sizeof v);
+            d += k * v;
+        }
+        __builtin_memcpy(out + i, &a, sizeof a);
+        __builtin_memcpy(out + i + 8, &b, sizeof b);
+        __builtin_memcpy(out + i + 16, &c, sizeof c);
+        __builtin_memcpy(out + i + 24, &d, sizeof d);
+    }
+    for (; i < count; ++i) {
+        float sum = 0;
+        for (std::size_t m = 0; m < taps; ++m) sum += kernel[m] * from[m][i];
+        out[i] = sum;
+    }
+}
+
+// A row of one value costs one value: `constant` holds it, or NaN for a row of several.
+constexpr float kSeveral = std::numeric_limits<float>::quiet_NaN();
+
+// out[l] = sum_m kernel[m] in[l + (m - half) stride], lines of `width` values; constant: of line l
+// in [l * constant_pitch], brought up to date.
+SONOCASE_WIDEST void smooth_lines(const float* in,
+                                  std::size_t width,
+                                  int lines,
+                                  std::size_t pitch,
+                                  const std::vector<float>& kernel,
+                                  int stride,
+                                  float* constant,
+                                  std::size_t constant_pitch,
+                                  float* out) {
     const int half = static_cast<int>(kernel.size() / 2);
+    std::vector<const float*> from(kernel.size());
+    std::vector<float> before(static_cast<std::size_t>(lines));
+    for (std::size_t l = 0; l < before.size(); ++l) before[l] = constant[l * constant_pitch];
     for (int l = 0; l < lines; ++l) {
-        float* to = out + static_cast<std::size_t>(l) * pitch;
-        std::fill(to, to + width, 0.0f);
+        float sum = 0;  // NaN where one of the lines holds several values
         for (int m = -half; m <= half; ++m) {
-            const float* from =
-                in + static_cast<std::size_t>(std::clamp(l + m * stride, 0, lines - 1)) * pitch;
-            const float k = kernel[static_cast<std::size_t>(m + half)];
-            for (std::size_t i = 0; i < width; ++i) to[i] += k * from[i];
+            const auto at = static_cast<std::size_t>(std::clamp(l + m * stride, 0, lines - 1));
+            const auto tap = static_cast<std::size_t>(m + half);
+            from[tap] = in + at * pitch;
+            sum += kernel[tap] * before[at];
+        }
+        float* to = out + static_cast<std::size_t>(l) * pitch;
+        constant[static_cast<std::size_t>(l) * constant_pitch] = sum;
+        if (sum == sum) {
+            std::fill(to, to + width, sum);
+        } else {
+            weigh(kernel.data(), kernel.size(), from.data(), width, to);
         }
     }
 }
 
-void smooth_rows(const float* in,
-                 int count,
-                 std::size_t rows,
-                 const std::vector<float>& kernel,
-                 int stride,
-                 float* out) {
+SONOCASE_WIDEST void smooth_rows(const float* in,
+                                 int count,
+                                 std::size_t rows,
+                                 const std::vector<float>& kernel,
+                                 int stride,
+                                 float* constant,
+                                 float* out) {
     const int reach = static_cast<int>(kernel.size() / 2) * stride;
     std::vector<float> padded(static_cast<std::size_t>(count + 2 * reach));
+    std::vector<const float*> from(kernel.size());
+    for (std::size_t m = 0; m < from.size(); ++m)
+        from[m] = padded.data() + m * static_cast<std::size_t>(stride);
     for (std::size_t r = 0; r < rows; ++r) {
         const float* row = in + r * static_cast<std::size_t>(count);
         float* to = out + r * static_cast<std::size_t>(count);
+        if (constant[r] == constant[r]) {
+            float sum = 0;
+            for (const float k : kernel) sum += k * row[0];
+            std::fill(to, to + count, sum);
+            constant[r] = sum;
+            continue;
+        }
         std::fill(padded.begin(), padded.begin() + reach, row[0]);
         std::copy(row, row + count, padded.begin() + reach);
         std::fill(padded.end() - reach, padded.end(), row[count - 1]);
-        std::fill(to, to + count, 0.0f);
-        for (std::size_t m = 0; m < kernel.size(); ++m) {
-            const float k = kernel[m];
-            const float* from = padded.data() + m * static_cast<std::size_t>(stride);
-            for (int i = 0; i < count; ++i) to[i] += k * from[i];
-        }
+        weigh(kernel.data(), kernel.size(), from.data(), static_cast<std::size_t>(count), to);
     }
+}
+
+std::vector<float> constants_of(const std::vector<float>& values, std::size_t nx) {
+    std::vector<float> constant(values.size() / nx);
+    for (std::size_t r = 0; r < constant.size(); ++r) {
+        const float* row = values.data() + r * nx;
+        const bool same = row[0] == row[nx - 1] && row[0] == row[nx / 2] &&
+                          std::all_of(row, row + nx, [&](float v) { return v == row[0]; });
+        constant[r] = same ? row[0] : kSeveral;
+    }
+    return constant;
 }
 
 }  // namespace
@@ -105,16 +176,18 @@ void smooth_box(const VoxelBox& box,
     const std::size_t nx = static_cast<std::size_t>(box.size.x);
     const std::size_t ny = static_cast<std::size_t>(box.size.y);
     const std::size_t nz = static_cast<std::size_t>(box.size.z);
+    if (values->empty()) return;
+    std::vector<float> constant = constants_of(*values, nx);
     if (!kernels.taps[0].empty()) {
         smooth_rows(values->data(), box.size.x, ny * nz, kernels.taps[0], kernels.stride[0],
-                    scratch->data());
+                    constant.data(), scratch->data());
         values->swap(*scratch);
     }
     if (!kernels.taps[1].empty()) {
         for (std::size_t k = 0; k < nz; ++k) {
             const std::size_t at = k * nx * ny;
             smooth_lines(values->data() + at, nx, box.size.y, nx, kernels.taps[1],
-                         kernels.stride[1], scratch->data() + at);
+                         kernels.stride[1], constant.data() + k * ny, 1, scratch->data() + at);
         }
         values->swap(*scratch);
     }
@@ -122,7 +195,7 @@ void smooth_box(const VoxelBox& box,
         for (std::size_t j = 0; j < ny; ++j) {
             const std::size_t at = j * nx;
             smooth_lines(values->data() + at, nx, box.size.z, nx * ny, kernels.taps[2],
-                         kernels.stride[2], scratch->data() + at);
+                         kernels.stride[2], constant.data() + j, ny, scratch->data() + at);
         }
         values->swap(*scratch);
     }
@@ -141,6 +214,20 @@ void crop(const VoxelBox& box,
             std::copy_n(values.data() + from, part.size.x, out->data() + part.index(0, j, k));
         }
     }
+}
+
+void shrink(const VoxelBox& box, const VoxelBox& part, std::vector<float>* values) {
+    if (box.count() == part.count()) return;
+    for (int k = 0; k < part.size.z; ++k) {
+        for (int j = 0; j < part.size.y; ++j) {
+            const std::size_t from =
+                box.index(part.first.x - box.first.x, part.first.y - box.first.y + j,
+                          part.first.z - box.first.z + k);
+            // No row moves beyond its own place, so those that follow are still whole.
+            std::copy_n(values->data() + from, part.size.x, values->data() + part.index(0, j, k));
+        }
+    }
+    values->resize(part.count());
 }
 
 }  // namespace sonocase::pipeline

@@ -39,4 +39,7 @@ void crop(const VoxelBox& box,
           const VoxelBox& part,
           std::vector<float>* out);
 
+// The same in place. part: within `box`.
+void shrink(const VoxelBox& box, const VoxelBox& part, std::vector<float>* values);
+
 }  // namespace sonocase::pipeline

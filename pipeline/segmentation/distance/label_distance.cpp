@@ -3,6 +3,7 @@
 #include "pipeline/segmentation/distance/label_distance.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 namespace sonocase::pipeline {
@@ -20,6 +21,30 @@ VoxelBox united(const VoxelBox& a, const VoxelBox& b) {
         out.size[i] = std::max(a.first[i] + a.size[i], b.first[i] + b.size[i]) - out.first[i];
     }
     return out;
+}
+
+// `part` grown by `nodes` on each side and cut to `whole`.
+VoxelBox grown_within(const VoxelBox& part, Int3 nodes, const VoxelBox& whole) {
+    VoxelBox out;
+    for (int a = 0; a < 3; ++a) {
+        out.first[a] = std::max(whole.first[a], part.first[a] - nodes[a]);
+        const int end =
+            std::min(whole.first[a] + whole.size[a], part.first[a] + part.size[a] + nodes[a]);
+        out.size[a] = end - out.first[a];
+    }
+    return out;
+}
+
+Int3 larger(Int3 a, Int3 b) {
+    return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
+}
+
+Int3 sum(Int3 a, Int3 b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+
+Int3 reach_of(const BoxKernels& kernels) {
+    return {kernels.reach(0), kernels.reach(1), kernels.reach(2)};
 }
 
 }  // namespace
@@ -125,17 +150,12 @@ void LabelDistance::add_level(double sigma_vx, double tolerance_vx) {
     levels_.push_back(std::move(level));
 }
 
-VoxelBox LabelDistance::distance(const LabelSet& labels,
-                                 std::vector<float>* phi,
-                                 Scratch* scratch) const {
+VoxelBox LabelDistance::reach(const LabelSet& labels) const {
     VoxelBox box;
     for (std::size_t l = 0; l < boxes_.size(); ++l) {
         if (labels[l]) box = united(box, boxes_[l]);
     }
-    if (box.empty()) {
-        phi->clear();
-        return box;
-    }
+    if (box.empty()) return box;
     const Vector3 h = labels_.grid.spacing_mm;
     // Outside the padded box the labels cannot win; the reach of the kernel is added to keep the
     // border out of the result.
@@ -150,21 +170,80 @@ VoxelBox LabelDistance::distance(const LabelSet& labels,
     if (factor_ > 1) {
         box.size.z = (box.size.z - 1) * factor_ + 1;
         box.first.z *= factor_;
-        shape_interpolated(labels, box, phi, scratch);
-    } else {
-        signed_distance(labels_, labels, box, limit_mm_, {true, true, true}, phi);
     }
-    if (levels_.empty()) return box;
-    scratch->smooth = *phi;
-    smooth_box(box, levels_[0].kernels, &scratch->smooth, &scratch->other);
-    scratch->wide = scratch->smooth;
-    smooth_box(box, wide_.kernels, &scratch->wide, &scratch->other);
-    add_detail(labels, box, *phi, 0, &scratch->smooth, scratch);
-    const std::vector<std::size_t> strays =
-        find_strays(labels, box, scratch->wide, wide_.tolerance_vx);
-    phi->swap(scratch->wide);
-    if (!strays.empty()) blend(box, wide_.spread, strays, box, scratch->smooth, phi, scratch);
     return box;
+}
+
+LabelDistance::Margins LabelDistance::margins() const {
+    Margins m{};
+    if (!levels_.empty()) {
+        m.blended = reach_of(wide_.spread);
+        m.widened = sum(m.blended, reach_of(wide_.kernels));
+        // A width's values depend on those of the next finer one and on the strays around.
+        Int3 finer{0, 0, 0};
+        for (std::size_t l = levels_.size(); l-- > 1;) {
+            finer = larger(finer, sum(reach_of(levels_[l].spread), reach_of(levels_[l].kernels)));
+        }
+        m.detailed = larger(m.blended, larger(reach_of(levels_[0].spread), finer));
+        m.smoothed = sum(larger(m.detailed, m.widened), reach_of(levels_[0].kernels));
+    }
+    for (int a = 0; a < 3; ++a) {
+        m.measured[a] =
+            m.smoothed[a] + static_cast<int>(std::ceil(limit_mm_ / nodes_.spacing_mm[a])) + 1;
+    }
+    return m;
+}
+
+VoxelBox LabelDistance::distance(const LabelSet& labels,
+                                 std::vector<float>* phi,
+                                 Scratch* scratch) const {
+    const VoxelBox box = reach(labels);
+    if (box.empty()) {
+        phi->clear();
+    } else {
+        distance_on(labels, box, phi, scratch);
+    }
+    return box;
+}
+
+void LabelDistance::distance_on(const LabelSet& labels,
+                                const VoxelBox& part,
+                                std::vector<float>* phi,
+                                Scratch* scratch) const {
+    const VoxelBox whole = reach(labels);
+    const Margins margin = margins();
+    const VoxelBox measured = grown_within(part, margin.measured, whole);
+    if (factor_ > 1) {
+        assert(part.size.z == whole.size.z);
+        shape_interpolated(labels, measured, phi, scratch);
+    } else {
+        signed_distance(labels_, labels, measured, limit_mm_, {true, true, true}, phi,
+                        {&scratch->other, &scratch->weight});
+    }
+    if (levels_.empty()) {
+        shrink(measured, part, phi);
+        return;
+    }
+    // Each step is done on the nodes that the next ones need and no others.
+    const VoxelBox smoothed = grown_within(part, margin.smoothed, whole),
+                   widened = grown_within(part, margin.widened, whole),
+                   detailed = grown_within(part, margin.detailed, whole),
+                   blended = grown_within(part, margin.blended, whole);
+    std::vector<float>&smooth = scratch->smooth, &wide = scratch->wide;
+    shrink(measured, smoothed, phi);
+    smooth = *phi;
+    smooth_box(smoothed, levels_[0].kernels, &smooth, &scratch->other);
+    crop(smoothed, smooth, widened, &wide);
+    smooth_box(widened, wide_.kernels, &wide, &scratch->other);
+    shrink(widened, blended, &wide);
+    shrink(smoothed, detailed, phi);
+    shrink(smoothed, detailed, &smooth);
+    add_detail(labels, detailed, *phi, 0, &smooth, scratch);
+    shrink(detailed, blended, &smooth);
+    const std::vector<std::size_t> strays = find_strays(labels, blended, wide, wide_.tolerance_vx);
+    phi->swap(wide);
+    if (!strays.empty()) blend(blended, wide_.spread, strays, blended, smooth, phi, scratch);
+    shrink(blended, part, phi);
 }
 
 std::vector<std::size_t> LabelDistance::find_strays(const LabelSet& labels,

@@ -59,10 +59,20 @@ class LabelDistance {
         std::vector<float> flat, within;              // slices
         std::vector<std::uint8_t> capped;
     };
-    // Smooth phi (negative inside, mm) of a union of labels on a box of nodes, which is returned;
-    // phi: # box.count().
-    // Outside `box` the distance exceeds the limit. Thread-safe, with one Scratch per thread.
+    // The box of nodes outside which the distance to a union of labels exceeds the limit; empty:
+    // the union has no voxels.
+    VoxelBox reach(const LabelSet& labels) const;
+    // Smooth phi (negative inside, mm) of a union of labels on reach(labels), which is returned;
+    // phi: # box.count(). Thread-safe, with one Scratch per thread.
     VoxelBox distance(const LabelSet& labels, std::vector<float>* phi, Scratch* scratch) const;
+    // The same on a part of it alone, in memory that goes with the part and not with the map. Along
+    // the axis of slices that are interpolated the part must be as long as reach(labels). Equal to
+    // distance() but where structures too fine for the second width end beside the part's margin:
+    // which of them count as strays there depends on where smoothing stops.
+    void distance_on(const LabelSet& labels,
+                     const VoxelBox& part,
+                     std::vector<float>* phi,
+                     Scratch* scratch) const;
 
   private:
     void shape_interpolated(const LabelSet& labels,
@@ -99,6 +109,11 @@ class LabelDistance {
     };
     bool thick(int axis) const { return axis == 2 && factor_ > 1; }
     double nodes_per_vx(int axis) const;
+    // Nodes beside a part, per axis, on which values are needed for those of the part.
+    struct Margins {
+        Int3 blended, detailed, widened, smoothed, measured;
+    };
+    Margins margins() const;
     double largest_sigma_nodes(int axis) const;
     void add_level(double sigma_vx, double tolerance_vx);
     // Voxels of the map that phi puts on the wrong side of the surface: indices of their nodes in

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstring>
+
+#include "pipeline/segmentation/distance/widest.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -25,30 +28,78 @@ void row_distances(
     }
 }
 
+// What a row of squared distances holds: nothing but zeros, nothing nearer than the limit, or both
+// and more.
+enum class RowKind : std::uint8_t { zeros, limits, mixed };
+
 // One more axis: out[l] = min over lines m of (in[m] + (l - m)^2 spacing^2), lines of `width`
 // values. Few lines are within the limit, and the plain minimum is then faster than an envelope of
 // parabolas.
-void line_distances(const float* in,
-                    std::size_t width,
-                    int lines,
-                    std::size_t stride,
-                    float spacing,
-                    float limit_sq,
-                    float* out) {
+SONOCASE_WIDEST void line_distances(const float* in,
+                                    std::size_t width,
+                                    int lines,
+                                    std::size_t stride,
+                                    float spacing,
+                                    float limit_sq,
+                                    RowKind* kinds,
+                                    std::size_t kinds_pitch,
+                                    float* out) {
+    typedef float Eight __attribute__((vector_size(32)));
+    constexpr std::size_t kBatch = 32;  // values that stay in registers over all lines
     const int reach = static_cast<int>(std::sqrt(limit_sq) / spacing);
+    std::vector<RowKind> before(static_cast<std::size_t>(lines));
+    for (std::size_t l = 0; l < before.size(); ++l) before[l] = kinds[l * kinds_pitch];
+    std::vector<int> near;  // lines that can lower a distance
     for (int l = 0; l < lines; ++l) {
         float* to = out + static_cast<std::size_t>(l) * stride;
         const float* own = in + static_cast<std::size_t>(l) * stride;
-        for (std::size_t i = 0; i < width; ++i) to[i] = own[i];
+        near.clear();
         for (int m = std::max(0, l - reach); m <= std::min(lines - 1, l + reach); ++m) {
-            if (m == l) continue;
-            const float* from = in + static_cast<std::size_t>(m) * stride;
-            const float along = static_cast<float>(l - m) * spacing;
-            const float add = along * along;
-            for (std::size_t i = 0; i < width; ++i) {
-                const float d = from[i] + add;
-                to[i] = d < to[i] ? d : to[i];
+            if (before[static_cast<std::size_t>(m)] != RowKind::limits) near.push_back(m);
+        }
+        RowKind& kind = kinds[static_cast<std::size_t>(l) * kinds_pitch];
+        if (kind == RowKind::zeros || near.empty()) {
+            std::copy(own, own + width, to);
+            continue;
+        }
+        kind = RowKind::mixed;
+        std::size_t i = 0;
+        for (; i + kBatch <= width; i += kBatch) {
+            Eight a, b, c, d, v;
+            __builtin_memcpy(&a, own + i, sizeof a);
+            __builtin_memcpy(&b, own + i + 8, sizeof b);
+            __builtin_memcpy(&c, own + i + 16, sizeof c);
+            __builtin_memcpy(&d, own + i + 24, sizeof d);
+            for (const int m : near) {
+                const float* from = in + static_cast<std::size_t>(m) * stride + i;
+                const float along = static_cast<float>(l - m) * spacing;
+                const float add = along * along;
+                __builtin_memcpy(&v, from, sizeof v);
+                v += add;
+                a = v < a ? v : a;
+                __builtin_memcpy(&v, from + 8, sizeof v);
+                v += add;
+                b = v < b ? v : b;
+                __builtin_memcpy(&v, from + 16, sizeof v);
+                v += add;
+                c = v < c ? v : c;
+                __builtin_memcpy(&v, from + 24, sizeof v);
+                v += add;
+                d = v < d ? v : d;
             }
+            __builtin_memcpy(to + i, &a, sizeof a);
+            __builtin_memcpy(to + i + 8, &b, sizeof b);
+            __builtin_memcpy(to + i + 16, &c, sizeof c);
+            __builtin_memcpy(to + i + 24, &d, sizeof d);
+        }
+        for (; i < width; ++i) {
+            float least = own[i];
+            for (const int m : near) {
+                const float along = static_cast<float>(l - m) * spacing;
+                const float d = in[static_cast<std::size_t>(m) * stride + i] + along * along;
+                least = d < least ? d : least;
+            }
+            to[i] = least;
         }
     }
 }
@@ -94,9 +145,33 @@ VoxelBox grow(const VoxelBox& box, Int3 voxels, Int3 size) {
 namespace {
 
 struct DistanceScratch {
-    std::vector<float> first, second;
+    std::vector<float>&first, &second;
     std::vector<std::uint8_t> mark;
+    std::vector<RowKind> kinds;  // # rows
 };
+
+// phi from squared distances: those to the label first, then, inside it, those to its complement.
+void to_signed(const float* squared,
+               std::size_t count,
+               RowKind kind,
+               bool outside,
+               float limit,
+               float half,
+               float* phi) {
+    if (outside && kind == RowKind::zeros) return;
+    if (kind != RowKind::mixed) {
+        const float d = squared[0] > 0 ? std::min(std::sqrt(squared[0]), limit) : 0.0f;
+        std::fill(phi, phi + count, outside ? half - d : squared[0] > 0 ? d - half : 0.0f);
+    } else if (!outside) {
+        for (std::size_t i = 0; i < count; ++i)
+            phi[i] = squared[i] > 0 ? std::min(std::sqrt(squared[i]), limit) - half : 0.0f;
+    } else {
+        for (std::size_t i = 0; i < count; ++i) {
+            const float d = half - std::min(std::sqrt(squared[i]), limit);
+            phi[i] = squared[i] > 0 ? d : phi[i];
+        }
+    }
+}
 
 // phi: # box.count()
 void distances_on(const LabelVolume& volume,
@@ -121,7 +196,8 @@ void distances_on(const LabelVolume& volume,
     const float half = static_cast<float>(measured > 0 ? 0.5 * sum / measured : 0);
     const float limit = static_cast<float>(limit_mm) + half;
     const float limit_sq = limit * limit;
-    auto& [first, second, mark] = *scratch;
+    auto& [first, second, mark, kinds] = *scratch;
+    kinds.resize(static_cast<std::size_t>(box.size.y) * static_cast<std::size_t>(box.size.z));
     first.resize(count);
     second.resize(count);
     mark.resize(nx);
@@ -133,7 +209,14 @@ void distances_on(const LabelVolume& volume,
                     volume.grid.index(box.first.x, box.first.y + j, box.first.z + k);
                 for (std::size_t i = 0; i < nx; ++i) mark[i] = member[row[i]] != outside;
                 float* to = first.data() + box.index(0, j, k);
-                if (axes[0]) {
+                RowKind& kind =
+                    kinds[static_cast<std::size_t>(j) +
+                          static_cast<std::size_t>(k) * static_cast<std::size_t>(box.size.y)];
+                const bool same = std::memchr(mark.data(), !mark[0], nx) == nullptr;
+                kind = !same ? RowKind::mixed : mark[0] ? RowKind::zeros : RowKind::limits;
+                if (same) {
+                    std::fill(to, to + nx, mark[0] ? 0.0f : limit_sq);
+                } else if (axes[0]) {
                     row_distances(mark.data(), box.size.x, static_cast<float>(h.x), limit_sq, to);
                 } else {
                     for (std::size_t i = 0; i < nx; ++i) to[i] = mark[i] ? 0.0f : limit_sq;
@@ -144,7 +227,10 @@ void distances_on(const LabelVolume& volume,
             for (int k = 0; k < box.size.z; ++k) {
                 const std::size_t at = static_cast<std::size_t>(k) * plane;
                 line_distances(first.data() + at, nx, box.size.y, nx, static_cast<float>(h.y),
-                               limit_sq, second.data() + at);
+                               limit_sq,
+                               kinds.data() + static_cast<std::size_t>(k) *
+                                                  static_cast<std::size_t>(box.size.y),
+                               1, second.data() + at);
             }
             first.swap(second);
         }
@@ -153,19 +239,13 @@ void distances_on(const LabelVolume& volume,
                  ++j) {  // row by row, which keeps the lines in the cache
                 const std::size_t at = static_cast<std::size_t>(j) * nx;
                 line_distances(first.data() + at, nx, box.size.z, plane, static_cast<float>(h.z),
-                               limit_sq, second.data() + at);
+                               limit_sq, kinds.data() + j, static_cast<std::size_t>(box.size.y),
+                               second.data() + at);
             }
             first.swap(second);
         }
-        if (!outside) {
-            for (std::size_t i = 0; i < count; ++i)
-                phi[i] = first[i] > 0 ? std::min(std::sqrt(first[i]), limit) - half : 0.0f;
-        } else {
-            for (std::size_t i = 0; i < count; ++i) {
-                const float d = half - std::min(std::sqrt(first[i]), limit);
-                phi[i] = first[i] > 0 ? d : phi[i];
-            }
-        }
+        for (std::size_t r = 0; r < kinds.size(); ++r)
+            to_signed(first.data() + r * nx, nx, kinds[r], outside, limit, half, phi + r * nx);
     }
 }
 
@@ -176,12 +256,13 @@ void signed_distance(const LabelVolume& volume,
                      const VoxelBox& box,
                      double limit_mm,
                      std::array<bool, 3> axes,
-                     std::vector<float>* phi) {
+                     std::vector<float>* phi,
+                     DistanceSpace space) {
     assert(limit_mm > 0);
     phi->resize(box.count());
     std::array<std::uint8_t, 256> member;
     for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
-    DistanceScratch scratch;
+    DistanceScratch scratch{*space.first, *space.second, {}, {}};
     if (axes[2]) {
         distances_on(volume, member, box, limit_mm, axes, phi->data(), &scratch);
         return;
@@ -193,6 +274,16 @@ void signed_distance(const LabelVolume& volume,
         distances_on(volume, member, slice, limit_mm, axes, phi->data() + box.index(0, 0, k),
                      &scratch);
     }
+}
+
+void signed_distance(const LabelVolume& volume,
+                     const LabelSet& labels,
+                     const VoxelBox& box,
+                     double limit_mm,
+                     std::array<bool, 3> axes,
+                     std::vector<float>* phi) {
+    std::vector<float> first, second;
+    signed_distance(volume, labels, box, limit_mm, axes, phi, {&first, &second});
 }
 
 void signed_distance(const LabelVolume& volume,

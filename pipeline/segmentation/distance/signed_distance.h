@@ -51,7 +51,19 @@ inline LabelSet one_label(std::uint8_t label) {
     return set;
 }
 
+// Scratch space, for callers that measure again and again: newly allocated memory is slow.
+struct DistanceSpace {
+    std::vector<float>*first, *second;
+};
+
 // phi: # box.count(), x fastest. limit_mm > 0.
+void signed_distance(const LabelVolume& volume,
+                     const LabelSet& labels,
+                     const VoxelBox& box,
+                     double limit_mm,
+                     std::array<bool, 3> axes,
+                     std::vector<float>* phi,
+                     DistanceSpace space);
 void signed_distance(const LabelVolume& volume,
                      const LabelSet& labels,
                      const VoxelBox& box,

@@ -59,7 +59,7 @@ LabelField::CandidateSet LabelField::candidate_set(const Block& block,
 void LabelField::read_corners(const float* values, float* out) const {
     const auto mean = [](float a, float b, float c) { return (a + 4 * b + c) * (1.0f / 6); };
     const std::size_t corners = (std::size_t{1} << shift_) + 1;
-    constexpr std::size_t kLargest = 20 * 19;  // row_ * (block_edge() + 3) of a block of 16
+    constexpr std::size_t kLargest = 19 * 19;  // row_ * (block_edge() + 3) of a block of 16
     std::array<float, kLargest * 19> rows;
     std::array<float, kLargest> planes;
     for (std::size_t k = 0; k < corners + 2; ++k) {
@@ -85,11 +85,20 @@ void LabelField::read_corners(const float* values, float* out) const {
 void LabelField::find_candidates(float reach_mm) {
     node_label_.assign(nodes_.voxel_count(), 0);
     node_margin_.assign(nodes_.voxel_count(), 255);
-    parallel_for(blocks_.size(), 16, [&](std::size_t begin, std::size_t end) {
+    reach_mm_ = reach_mm;
+    for (Layer& layer : layers_) layer.has_candidates = false;
+    hold(0, -1);
+}
+
+void LabelField::find_layer_candidates(int layer) {
+    const auto [first, last] = blocks_of_layer(layer);
+    const std::size_t from = first;
+    parallel_for(last - first, 16, [&](std::size_t begin, std::size_t end) {
         std::vector<float> phi_at_corners;
-        for (std::size_t b = begin; b < end; ++b)
-            find_candidates(&blocks_[b], reach_mm, &phi_at_corners);
+        for (std::size_t b = from + begin; b < from + end; ++b)
+            find_candidates(&blocks_[b], reach_mm_, &phi_at_corners);
     });
+    layers_[static_cast<std::size_t>(layer)].has_candidates = true;
 }
 
 void LabelField::find_candidates(Block* block, float reach_mm, std::vector<float>* phi_at_corners) {
@@ -110,8 +119,7 @@ void LabelField::find_candidates(Block* block, float reach_mm, std::vector<float
     const std::vector<std::uint16_t>& phis = block->candidate_sets[0].phis;
     phi_at_corners->resize(phis.size() * corner_count);
     for (std::size_t e = 0; e < phis.size(); ++e) {
-        read_corners(pool_.data() + block->values + phis[e] * phi_,
-                     phi_at_corners->data() + e * corner_count);
+        read_corners(block->values + phis[e] * phi_, phi_at_corners->data() + e * corner_count);
     }
     // From any point of a cell to its nearest corner.
     const float reach = reach_mm + 0.5f * static_cast<float>(norm(nodes_.spacing_mm));

@@ -76,7 +76,7 @@ void LabelField::scores(const Position& position, float* out) const {
     assert(position.candidates != nullptr);
     const CandidateSet& set = *position.candidates;
     const auto& [wx, wy, wz] = position.weights;
-    const float* values = pool_.data() + position.block->values + position.offset;
+    const float* values = position.block->values + position.offset;
     std::array<float, 512> phis;  // at most an edge and an own distance per label
     for (std::size_t e = 0; e < set.phis.size(); ++e) {
         const float* phi = values + set.phis[e] * phi_;
@@ -99,7 +99,7 @@ std::array<float, 4> LabelField::difference(const Position& position,
     const auto& [wx, wy, wz] = position.weights;
     const Four sx = slopes(position.t[0]), sy = slopes(position.t[1]), sz = slopes(position.t[2]);
     const Four w = load(wx.data());
-    const float* values = pool_.data() + position.block->values + position.offset;
+    const float* values = position.block->values + position.offset;
     const Four per_mm{per_mm_[0], per_mm_[1], per_mm_[2], 0};
     Four mean{};
     float weights = 0, count = 0;

@@ -4,8 +4,10 @@
 #include "pipeline/segmentation/field/label_field.h"
 
 #include <algorithm>
-#include <atomic>
+#include <array>
 #include <cassert>
+#include <map>
+#include <utility>
 
 #include "pipeline/base/parallel.h"
 
@@ -14,6 +16,8 @@ namespace {
 
 // A label can win in a block if one of its voxels lies within this many voxels of the block.
 constexpr int kReach = 3;
+
+constexpr int kTile = 128;  // nodes along an edge of the tiles that large distances are cut into
 
 // First and last of the voxels within reach of a block.
 std::pair<Int3, Int3> voxels_near(Int3 first, int block, Int3 size, int factor) {
@@ -31,18 +35,16 @@ std::pair<Int3, Int3> voxels_near(Int3 first, int block, Int3 size, int factor) 
 
 LabelField::LabelField(const LabelVolume& labels,
                        const LabelFieldOptions& options,
-                       const Progress& progress) {
+                       const Progress& progress)
+    : distance_(labels, options.distance), nodes_(distance_.nodes()) {
     report_progress(progress, 0, "distances");
-    const LabelDistance distance(labels, options.distance);
-    source_ = distance.labels();
-    nodes_ = distance.nodes();
-    factor_ = distance.factor();
-    tree_ = nest_labels(source_);
-    volume_offsets_mm_.assign(source_.labels.size(), 0.0f);
+    tree_ = nest_labels(source());
+    volume_offsets_mm_.assign(label_count(), 0.0f);
+    room_ = options.held_mb * 1'000'000 / sizeof(float);
     assert(options.block == 4 || options.block == 8 || options.block == 16);
     shift_ = options.block == 4 ? 2 : options.block == 8 ? 3 : 4;
     const int edge = block_edge(), field_nodes = edge + 3;
-    row_ = static_cast<std::size_t>(edge + 4);  // padded
+    row_ = static_cast<std::size_t>(field_nodes);
     plane_ = row_ * static_cast<std::size_t>(field_nodes);
     phi_ = plane_ * static_cast<std::size_t>(field_nodes);
     for (int a = 0; a < 3; ++a) {
@@ -52,25 +54,26 @@ LabelField::LabelField(const LabelVolume& labels,
     blocks_.resize(static_cast<std::size_t>(block_count_.x) *
                    static_cast<std::size_t>(block_count_.y) *
                    static_cast<std::size_t>(block_count_.z));
-    const std::vector<LabelSet> swept = swept_labels(distance);
+    const std::vector<LabelSet> swept = swept_labels();
     parallel_for(blocks_.size(), 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t b = begin; b < end; ++b) {
             list_labels(b, swept[b]);
             if (blocks_[b].labels.size() > 1) list_phis(&blocks_[b]);
         }
     });
-    measure(distance);
+    list_pieces();
+    hold(0, 0);
 }
 
 // Labels of which an outline is swept through each block on its way from slice to slice.
-std::vector<LabelSet> LabelField::swept_labels(const LabelDistance& distance) const {
+std::vector<LabelSet> LabelField::swept_labels() const {
     const int edge = block_edge();
     std::vector<LabelSet> swept(blocks_.size());
-    const SliceGroups& groups = distance.groups();
+    const SliceGroups& groups = distance_.groups();
     for (std::size_t l = 0; l < groups.of_label.size(); ++l) {
         for (const SliceGroup& group : groups.of_label[l]) {
-            Int3 low{1 << 30, 1 << 30, group.slice * factor_};
-            Int3 high{-1, -1, (group.slice + 1) * factor_};
+            Int3 low{1 << 30, 1 << 30, group.slice * factor()};
+            Int3 high{-1, -1, (group.slice + 1) * factor()};
             for (const int o : {group.lower, group.upper}) {
                 if (o < 0) continue;
                 const VoxelBox& box = groups.outlines.outlines[static_cast<std::size_t>(o)].box;
@@ -95,7 +98,7 @@ std::vector<LabelSet> LabelField::swept_labels(const LabelDistance& distance) co
 
 // Candidates of a block: the labels of the voxels near it and those swept through it.
 void LabelField::list_labels(std::size_t b, const LabelSet& swept) {
-    const Grid& g = source_.grid;
+    const Grid& g = source().grid;
     const int edge = block_edge();
     const int x = static_cast<int>(b % static_cast<std::size_t>(block_count_.x));
     const int y = static_cast<int>(b / static_cast<std::size_t>(block_count_.x) %
@@ -104,11 +107,11 @@ void LabelField::list_labels(std::size_t b, const LabelSet& swept) {
                                    static_cast<std::size_t>(block_count_.y));
     Block& block = blocks_[b];
     block.first = {x * edge, y * edge, z * edge};
-    const auto [low, high] = voxels_near(block.first, edge, g.size, factor_);
+    const auto [low, high] = voxels_near(block.first, edge, g.size, factor());
     LabelSet present = swept;
     for (int k = low.z; k <= high.z; ++k) {
         for (int j = low.y; j <= high.y; ++j) {
-            const std::uint8_t* row = source_.voxels.data() + g.index(0, j, k);
+            const std::uint8_t* row = source().voxels.data() + g.index(0, j, k);
             int last = -1;
             for (int i = low.x; i <= high.x; ++i) {
                 if (row[i] != last) present.set(static_cast<std::size_t>(last = row[i]));
@@ -136,52 +139,81 @@ void LabelField::list_phis(Block* block) const {
     }
 }
 
-// Fills the pool, one union of labels after another.
-void LabelField::measure(const LabelDistance& distance) {
+// Which distances are measured where, and what each layer of blocks holds of them.
+void LabelField::list_pieces() {
+    blocks_per_layer_ =
+        factor() > 1 ? block_count_.z : std::min(kTile / block_edge(), block_count_.z);
+    layers_.resize(
+        static_cast<std::size_t>((block_count_.z + blocks_per_layer_ - 1) / blocks_per_layer_));
     // Blocks that need each distance: first those of the edges, then the labels' own.
-    const std::size_t label_count = source_.labels.size();
+    const std::size_t label_count = this->label_count();
     std::vector<std::vector<std::uint32_t>> blocks_of(2 * label_count);
-    std::size_t values = 0;
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
-        Block& block = blocks_[b];
+        const Block& block = blocks_[b];
         if (block.labels.size() < 2) continue;
-        block.values = values;
-        values += (block.edges.size() + block.own.size()) * phi_;
+        layers_[static_cast<std::size_t>(layer_of(b))].size +=
+            (block.edges.size() + block.own.size()) * phi_;
         for (const std::uint8_t e : block.edges)
             blocks_of[e].push_back(static_cast<std::uint32_t>(b));
         for (const std::uint8_t l : block.own)
             blocks_of[label_count + l].push_back(static_cast<std::uint32_t>(b));
     }
-    pool_.resize(values);
-    // Distances that many blocks need come first, such that the last ones to finish are small.
-    std::vector<std::size_t> order;
-    for (std::size_t l = 0; l < blocks_of.size(); ++l) {
-        if (!blocks_of[l].empty()) order.push_back(l);
-    }
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-        return blocks_of[a].size() > blocks_of[b].size();
-    });
-    const float beyond = static_cast<float>(distance.limit_mm());
-    // Each thread takes the next distance until all are taken, and keeps its scratch space.
-    std::atomic<std::size_t> next{0};
-    parallel_for(order.size(), 1, [&](std::size_t, std::size_t) {
-        std::vector<float> phi;
-        LabelDistance::Scratch scratch;
-        for (std::size_t o = next++; o < order.size(); o = next++) {
-            const bool own = order[o] >= label_count;
-            const auto l = static_cast<std::uint8_t>(order[o] % label_count);
-            const VoxelBox box =
-                distance.distance(own ? one_label(l) : tree_.members[l], &phi, &scratch);
-            for (const std::uint32_t b : blocks_of[order[o]]) {
-                const Block& block = blocks_[b];
-                const auto& held = own ? block.own : block.edges;
-                const std::size_t at = static_cast<std::size_t>(
-                                           std::find(held.begin(), held.end(), l) - held.begin()) +
-                                       (own ? block.edges.size() : 0);
-                copy_phi(box, phi, beyond, block.first, pool_.data() + block.values + at * phi_);
-            }
+    cut_into_pieces(blocks_of);
+}
+
+// Distances on small boxes are measured at once; on large ones tile by tile, where blocks need them
+// and nowhere else. Pieces of many blocks come first, such that the last ones to finish are small.
+void LabelField::cut_into_pieces(const std::vector<std::vector<std::uint32_t>>& blocks_of) {
+    constexpr std::size_t kWhole = 10'000'000;  // nodes: some 400 MB of scratch space
+    constexpr int kColumn = 64;                 // nodes; columns are as long as the stack
+    const std::size_t label_count = this->label_count();
+    std::vector<Piece>& pieces = pieces_;
+    for (std::size_t d = 0; d < blocks_of.size(); ++d) {
+        if (blocks_of[d].empty()) continue;
+        const bool own = d >= label_count;
+        const auto l = static_cast<std::uint8_t>(d % label_count);
+        const VoxelBox box = distance_.reach(own ? one_label(l) : tree_.members[l]);
+        if (box.count() <= kWhole) {
+            pieces.push_back({d, box, blocks_of[d]});
+            continue;
         }
+        const int edge = factor() > 1 ? kColumn : kTile;
+        std::map<std::array<int, 3>, Piece> tiles;
+        for (const std::uint32_t b : blocks_of[d]) {
+            const Int3 first = blocks_[b].first;
+            const std::array<int, 3> tile{first.z / edge * (factor() == 1), first.y / edge,
+                                          first.x / edge};
+            tiles[tile].blocks.push_back(b);
+        }
+        for (auto& [tile, piece] : tiles) {
+            piece.distance = d;
+            piece.part = nodes_of(piece.blocks, box);
+            if (factor() > 1 && !piece.part.empty()) {
+                piece.part.first.z = box.first.z;
+                piece.part.size.z = box.size.z;
+            }
+            pieces.push_back(std::move(piece));
+        }
+    }
+    std::stable_sort(pieces.begin(), pieces.end(), [&](const Piece& a, const Piece& b) {
+        return a.blocks.size() > b.blocks.size();
     });
+}
+
+// The nodes of blocks and of their rims, as far as they lie in `box`.
+VoxelBox LabelField::nodes_of(const std::vector<std::uint32_t>& blocks, const VoxelBox& box) const {
+    VoxelBox out;
+    for (int a = 0; a < 3; ++a) {
+        int low = nodes_.size[a], high = -1;
+        for (const std::uint32_t b : blocks) {
+            low = std::min(low, blocks_[b].first[a] - 1);
+            high = std::max(high, blocks_[b].first[a] + block_edge() + 1);
+        }
+        low = std::max(low, box.first[a]);
+        out.first[a] = low;
+        out.size[a] = std::min(high, box.first[a] + box.size[a] - 1) - low + 1;
+    }
+    return out;
 }
 
 // Copies the nodes of one block, with the rim that the spline needs, from a distance on `box`.
@@ -200,7 +232,6 @@ void LabelField::copy_phi(
                 const int x = std::clamp(first.x - 1 + i, 0, nodes_.size.x - 1) - box.first.x;
                 row[i] = in && x >= 0 && x < box.size.x ? phi[box.index(x, y, z)] : beyond;
             }
-            row[field_nodes] = row[field_nodes - 1];
         }
     }
 }

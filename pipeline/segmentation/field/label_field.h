@@ -14,16 +14,20 @@
 // its own, the distance to that label alone. Gaps and overlaps are impossible by construction.
 //
 // Storage: blocks of nodes. Only blocks near more than one label store distances; elsewhere one
-// byte per node names the label.
+// byte per node names the label. Distances come and go by layers of blocks (hold), such that memory
+// goes with a few layers and not with the map; a layer that comes back has the same values.
 //
 // Between two labels, f = score_second - score_first is zero on their common surface, and
 // f / |grad f| is the distance to it.
 //
-// Call find_candidates() before the first evaluation and after every change of the offsets.
+// Call find_candidates() before the first evaluation and after every change of the offsets, and
+// hold() where not all layers are held.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "formats/volume/label_volume.h"
@@ -38,6 +42,11 @@ struct LabelFieldOptions {
     // Nodes per edge of a block: 4, 8 or 16. Small blocks repeat much of their rims; large blocks
     // hold distances to labels that are far from most of their nodes.
     int block = 8;
+    // Distances held at a time, MB; two layers are held whatever they take. Affects time and memory
+    // alone.
+    std::size_t held_mb = kAll;
+
+    static constexpr std::size_t kAll = 1'000'000'000;
 };
 
 class LabelField {
@@ -47,9 +56,9 @@ class LabelField {
                const Progress& progress = {});
 
     const Grid& nodes() const { return nodes_; }
-    const LabelVolume& source() const { return source_; }  // slices along k
-    int factor() const { return factor_; }                 // nodes per slice
-    std::size_t label_count() const { return source_.labels.size(); }
+    const LabelVolume& source() const { return distance_.labels(); }  // slices along k
+    int factor() const { return distance_.factor(); }                 // nodes per slice
+    std::size_t label_count() const { return source().labels.size(); }
 
     // # labels, mm.
     std::vector<float>& volume_offsets_mm() { return volume_offsets_mm_; }
@@ -68,7 +77,7 @@ class LabelField {
         std::vector<std::uint8_t> labels;  // candidates; if only one, no distances are stored
         std::vector<std::uint8_t> edges;   // tree edges that separate candidates, by lower label
         std::vector<std::uint8_t> own;     // labels that have a phi of their own
-        std::size_t values = 0;  // start in the pool; one phi after another: edges, then own
+        const float* values = nullptr;     // one phi after another: edges, then own; null: not held
         std::vector<CandidateSet> candidate_sets;  // the first holds all candidates
         std::vector<std::uint8_t> set_of_cell;     // block^3; empty: the first set everywhere
     };
@@ -77,6 +86,20 @@ class LabelField {
     const Block& block_of(int i, int j, int k) const {
         return blocks_[block_index(i >> shift_, j >> shift_, k >> shift_)];
     }
+
+    // Layers of blocks along k. Stacks of thick slices have one, since they are measured whole.
+    int layer_count() const { return static_cast<int>(layers_.size()); }
+    int layer_nodes() const { return blocks_per_layer_ << shift_; }
+    bool holds(int layer) const {
+        return layers_[static_cast<std::size_t>(layer)].values != nullptr;
+    }
+    bool holds_all() const;
+    // Blocks [first, second) of a layer.
+    std::pair<std::size_t, std::size_t> blocks_of_layer(int layer) const;
+    // Measures layers [first, last] where they are not held, gives up others where there is no
+    // room, and measures more beside them where there is. Points can be evaluated only in blocks
+    // that are held.
+    void hold(int first, int last);
 
     // The cell of a point in node coordinates (clamped to the grid), with its spline weights.
     struct Position {
@@ -105,7 +128,8 @@ class LabelField {
 
     // For the current offsets: the label of each node with its margin, the distance (mm) within
     // which no other label can win, which answers most queries by one look-up; and for each cell
-    // the few of its block's candidates whose surface may lie within reach_mm.
+    // the few of its block's candidates whose surface may lie within reach_mm. Nodes and cells of
+    // layers that are not held get theirs when they are; labels and margins stay.
     void find_candidates(float reach_mm);
     std::uint8_t node_label(std::size_t node) const { return node_label_[node]; }
     float node_margin_mm(std::size_t node) const {
@@ -120,16 +144,39 @@ class LabelField {
                     static_cast<std::size_t>(block_count_.y) * static_cast<std::size_t>(z));
     }
     // label_field.cpp: which labels and distances each block holds, and their values.
-    std::vector<LabelSet> swept_labels(const LabelDistance& distance) const;
+    std::vector<LabelSet> swept_labels() const;
     void list_labels(std::size_t b, const LabelSet& swept);
     void list_phis(Block* block) const;
-    void measure(const LabelDistance& distance);
+    // One distance on a part of the box in which it matters, and the blocks that take it there.
+    struct Piece {
+        std::size_t distance = 0;  // of a tree edge, or # labels + the label
+        VoxelBox part;             // empty: the distance exceeds its limit in all the blocks
+        std::vector<std::uint32_t> blocks;
+    };
+    void list_pieces();
+    void cut_into_pieces(const std::vector<std::vector<std::uint32_t>>& blocks_of);
+    VoxelBox nodes_of(const std::vector<std::uint32_t>& blocks, const VoxelBox& box) const;
     void copy_phi(const VoxelBox& box,
                   const std::vector<float>& phi,
                   float beyond,
                   Int3 first,
                   float* to) const;
+    // label_layers.cpp: layers of blocks, of which some are held.
+    struct Layer {
+        std::size_t size = 0;  // floats
+        std::unique_ptr<float[]> values;
+        bool has_candidates = false;
+    };
+    int layer_of(std::size_t block) const { return static_cast<int>(block / blocks_in_layer()); }
+    std::size_t blocks_in_layer() const {
+        return static_cast<std::size_t>(block_count_.x) * static_cast<std::size_t>(block_count_.y) *
+               static_cast<std::size_t>(blocks_per_layer_);
+    }
+    std::size_t held_floats() const;
+    void give_up(int layer);
+    void measure(const std::vector<int>& layers);
     // label_candidates.cpp
+    void find_layer_candidates(int layer);
     CandidateSet candidate_set(const Block& block, const std::vector<std::uint8_t>& labels) const;
     void read_corners(const float* values, float* out) const;
     void rank_corners(const Block& block,
@@ -149,17 +196,20 @@ class LabelField {
         }
     }
 
-    LabelVolume source_;
+    LabelDistance distance_;
     LabelTree tree_;
     Grid nodes_;
-    int factor_ = 1;
     int shift_ = 3;  // log2 of the block's edge
     // Values of one phi in a block, with the spline's neighbours: one node below and two above.
     std::size_t row_ = 0, plane_ = 0, phi_ = 0;  // floats per row, plane and phi
     std::array<float, 3> per_mm_{};              // nodes per mm
     Int3 block_count_;
     std::vector<Block> blocks_;
-    std::vector<float> pool_;
+    std::vector<Piece> pieces_;
+    int blocks_per_layer_ = 1;
+    std::vector<Layer> layers_;
+    std::size_t room_ = 0;  // floats
+    float reach_mm_ = 0;    // of the candidates
     std::vector<float> volume_offsets_mm_;
     std::vector<std::uint8_t> node_label_, node_margin_;
 };

@@ -40,7 +40,34 @@ struct Strip {
     std::vector<std::uint32_t> table;  // pool entries count from 0 in the strip
     std::vector<std::uint32_t> pool;
     PreimageCounts counts;
+    float low = 1e30f, high = -1e30f;  // where its voxels lie in the field, nodes along k
 };
+
+// Voxels between two heights of the field, in the layers that are held meanwhile.
+struct Pass {
+    int first_layer = 0, last_layer = 0;
+    float low = -1e29f, high = 1e29f;  // nodes along k
+    bool meets(const Strip& strip) const { return strip.low < high && strip.high >= low; }
+};
+
+// Voxels are read up to half a layer from the border of two, both of which are held.
+std::vector<Pass> passes_through(const LabelField& field, float reach_nodes) {
+    const int layers = field.layer_count(), half = field.layer_nodes() / 2;
+    if (field.holds_all() || reach_nodes > static_cast<float>(half - 2)) return {{0, layers - 1}};
+    std::vector<Pass> passes;
+    for (int p = 0; p <= layers; ++p) {
+        Pass pass;
+        pass.first_layer = std::max(0, p - 1);
+        pass.last_layer = std::min(layers - 1, p);
+        if (p > 0) pass.low = static_cast<float>(p * 2 * half - half);
+        if (p < layers) pass.high = static_cast<float>(p * 2 * half + half);
+        passes.push_back(pass);
+    }
+    if (!field.holds(0)) std::reverse(passes.begin(), passes.end());
+    return passes;
+}
+
+constexpr float kNoHeight = -1e30f;
 
 // Scratch space of one thread.
 struct RowScratch {
@@ -51,13 +78,17 @@ struct RowScratch {
           status(nx),
           record(16 * nx),
           slope(static_cast<std::size_t>(bricks_x)),
-          has_slope(slope.size()) {}
+          has_slope(slope.size()),
+          height(slope.size()) {}
     std::vector<float> x, y, z;
     std::vector<MapStatus> status;
     std::vector<std::uint32_t> record;  // 16 rows
     // d(node) / d(voxel of the grid), one per brick, computed when first needed.
     std::vector<Matrix3> slope;
     std::vector<std::uint8_t> has_slope;
+    // Of the first voxel of each brick that lies in the field, nodes along k: a brick is sampled as
+    // a whole, such that its slope does not depend on the passes. Below all nodes: none yet.
+    std::vector<float> height;
 };
 
 Matrix3 node_slope(const Grid& nodes, const Grid& grid, const Matrix3& frame_from_grid) {
@@ -77,6 +108,8 @@ Matrix3 node_slope(const Grid& nodes, const Grid& grid, const Matrix3& frame_fro
 void store_bricks(
     const Grid& grid, int by, int bz, const std::vector<std::uint32_t>& record, Strip* strip) {
     const int bricks_x = brick_count(grid.size).x;
+    strip->table.clear();
+    strip->pool.clear();
     strip->table.reserve(static_cast<std::size_t>(bricks_x));
     for (int bx = 0; bx < bricks_x; ++bx) {
         std::array<std::uint32_t, kBrickVoxels> brick;
@@ -100,6 +133,23 @@ void store_bricks(
     }
 }
 
+// The rows that store_bricks was given.
+void load_bricks(
+    const Grid& grid, int by, int bz, const Strip& strip, std::vector<std::uint32_t>* record) {
+    for (std::size_t bx = 0; bx < strip.table.size(); ++bx) {
+        if (strip.table[bx] & kUniformBrick) continue;
+        const std::uint32_t* brick =
+            strip.pool.data() + static_cast<std::size_t>(strip.table[bx]) * kBrickVoxels;
+        for (int q = 0; q < kBrickVoxels; ++q) {
+            const int i = 4 * static_cast<int>(bx) + q % 4, j = q / 4 % 4, k = q / 16;
+            if (i >= grid.size.x || 4 * by + j >= grid.size.y || 4 * bz + k >= grid.size.z)
+                continue;
+            (*record)[static_cast<std::size_t>(j + 4 * k) * static_cast<std::size_t>(grid.size.x) +
+                      static_cast<std::size_t>(i)] = brick[q];
+        }
+    }
+}
+
 void join_bricks(std::vector<Strip>* strips, const Grid& grid, BoundaryBricks* boundary) {
     boundary->size = grid.size;
     boundary->uniform = {kNoBoundary};
@@ -119,60 +169,73 @@ void join_bricks(std::vector<Strip>* strips, const Grid& grid, BoundaryBricks* b
     }
 }
 
-// Node at which a label comes nearest to winning; empty if the label is a candidate nowhere.
-std::optional<Int3> nearest_to_winning(const LabelField& field, std::uint8_t label) {
-    float nearest = 1e30f;
-    std::optional<Int3> place;
-    const int edge = field.block_edge();
+// Per label the node at which it comes nearest to winning; empty if it is a candidate nowhere.
+std::vector<std::optional<Int3>> nearest_to_winning(LabelField* field,
+                                                    const std::vector<std::uint8_t>& labels) {
+    std::vector<float> nearest(labels.size(), 1e30f);
+    std::vector<std::optional<Int3>> place(labels.size());
+    const int edge = field->block_edge();
     std::array<float, 256> score;
-    for (const LabelField::Block& block : field.blocks()) {
-        const auto at = std::find(block.labels.begin(), block.labels.end(), label);
-        if (at == block.labels.end() || block.labels.size() < 2) continue;
+    const auto search = [&](const LabelField::Block& block, std::size_t n) {
+        const auto at = std::find(block.labels.begin(), block.labels.end(), labels[n]);
+        if (at == block.labels.end() || block.labels.size() < 2) return;
         const auto own = static_cast<std::size_t>(at - block.labels.begin());
         for (int q = 0; q < edge * edge * edge; ++q) {
             const Int3 node{block.first.x + q % edge, block.first.y + q / edge % edge,
                             block.first.z + q / edge / edge};
-            if (!field.nodes().contains(node.x, node.y, node.z)) continue;
-            LabelField::Position position = field.locate(
+            if (!field->nodes().contains(node.x, node.y, node.z)) continue;
+            LabelField::Position position = field->locate(
                 static_cast<float>(node.x), static_cast<float>(node.y), static_cast<float>(node.z));
             position.candidates = &block.candidate_sets[0];
-            field.scores(position, score.data());
+            field->scores(position, score.data());
             float other = 1e30f;
             for (std::size_t c = 0; c < block.labels.size(); ++c) {
                 if (c != own) other = std::min(other, score[c]);
             }
-            if (score[own] - other < nearest) {
-                nearest = score[own] - other;
-                place = node;
+            if (score[own] - other < nearest[n]) {
+                nearest[n] = score[own] - other;
+                place[n] = node;
             }
+        }
+    };
+    for (int layer = 0; layer < field->layer_count() && !labels.empty(); ++layer) {
+        field->hold(layer, layer);
+        const auto [first, last] = field->blocks_of_layer(layer);
+        for (std::size_t b = first; b < last; ++b) {
+            for (std::size_t n = 0; n < labels.size(); ++n) search(field->blocks()[b], n);
         }
     }
     return place;
 }
 
 // Restores the labels of the source that the result lacks, or reports them as lost.
-void restore_lost(const LabelField& field, const FieldMap& map, SampledField* out) {
+void restore_lost(LabelField* field, const FieldMap& map, SampledField* out) {
     const Grid& grid = out->volume.grid;
     const Int3 bricks = brick_count(grid.size);
     std::array<bool, 256> in_source{}, in_result{};
-    for (const std::uint8_t v : field.source().voxels) in_source[v] = true;
+    for (const std::uint8_t v : field->source().voxels) in_source[v] = true;
     for (const std::uint8_t v : out->volume.voxels) in_result[v] = true;
+    std::vector<std::uint8_t> missing;
     for (std::size_t l = 1; l < out->volume.labels.size(); ++l) {
-        if (!in_source[l] || in_result[l]) continue;
-        const std::optional<Int3> node = nearest_to_winning(field, static_cast<std::uint8_t>(l));
+        if (in_source[l] && !in_result[l]) missing.push_back(static_cast<std::uint8_t>(l));
+    }
+    const std::vector<std::optional<Int3>> nodes = nearest_to_winning(field, missing);
+    for (std::size_t n = 0; n < missing.size(); ++n) {
+        const std::uint8_t l = missing[n];
+        const std::optional<Int3>& node = nodes[n];
         Int3 v{-1, -1, -1};
         if (node) {
-            const Point3 voxel = grid.voxel_from_point(map.forward(field.nodes().point_from_voxel(
+            const Point3 voxel = grid.voxel_from_point(map.forward(field->nodes().point_from_voxel(
                 {static_cast<double>(node->x), static_cast<double>(node->y),
                  static_cast<double>(node->z)})));
             for (int a = 0; a < 3; ++a) v[a] = static_cast<int>(std::lround(voxel[a]));
         }
         if (!grid.contains(v.x, v.y, v.z)) {
-            out->lost.push_back(static_cast<int>(l));
+            out->lost.push_back(l);
             continue;
         }
-        out->volume.voxels[grid.index(v.x, v.y, v.z)] = static_cast<std::uint8_t>(l);
-        out->rescued.push_back(static_cast<int>(l));
+        out->volume.voxels[grid.index(v.x, v.y, v.z)] = l;
+        out->rescued.push_back(l);
         if (out->boundary.table.empty()) continue;
         // No surface crosses the voxel.
         const std::size_t brick =
@@ -209,7 +272,9 @@ SampledField sample_label_field(LabelField* field,
     std::vector<Strip> strips(static_cast<std::size_t>(bricks.y) *
                               static_cast<std::size_t>(bricks.z));
 
-    const auto read_row = [&](int by, int bz, int r, RowScratch* rows, Strip* strip) {
+    bool first_pass = true;
+    const auto read_row = [&](int by, int bz, int r, const Pass& pass, RowScratch* rows,
+                              Strip* strip) {
         const int j = 4 * by + r % 4, k = 4 * bz + r / 4;
         if (j >= grid.size.y || k >= grid.size.z) return;
         map.row(j, k, rows->x.data(), rows->y.data(), rows->z.data(), rows->status.data());
@@ -217,6 +282,7 @@ SampledField sample_label_field(LabelField* field,
         std::uint32_t* record = rows->record.data() + static_cast<std::size_t>(r) * rows->x.size();
         for (std::size_t i = 0; i < rows->x.size(); ++i) {
             if (rows->status[i] != MapStatus::ok) {
+                if (!first_pass) continue;
                 ++(rows->status[i] == MapStatus::outside ? strip->counts.outside
                                                          : strip->counts.no_preimage);
                 continue;
@@ -224,9 +290,14 @@ SampledField sample_label_field(LabelField* field,
             float v[3];
             node_from_frame(rows->x[i], rows->y[i], rows->z[i], v);
             if (reader.beyond(v)) {
-                ++strip->counts.outside;
+                strip->counts.outside += first_pass;
                 continue;
             }
+            strip->low = std::min(strip->low, v[2]);
+            strip->high = std::max(strip->high, v[2]);
+            float& height = rows->height[i / 4];
+            if (height == kNoHeight) height = v[2];
+            if (!(height >= pass.low && height < pass.high)) continue;
             const VoxelSample sample = reader(v, [&]() -> const Matrix3& {
                 Matrix3& slope = rows->slope[i / 4];
                 if (!rows->has_slope[i / 4]) {
@@ -240,30 +311,44 @@ SampledField sample_label_field(LabelField* field,
             record[i] = sample.record;
         }
     };
+    const auto read_strip = [&](std::size_t s, const Pass& pass, RowScratch* rows) {
+        if (!first_pass && !pass.meets(strips[s])) return;
+        const auto y = static_cast<std::size_t>(bricks.y);
+        const int by = static_cast<int>(s % y), bz = static_cast<int>(s / y);
+        std::fill(rows->record.begin(), rows->record.end(), kNoBoundary);
+        std::fill(rows->has_slope.begin(), rows->has_slope.end(), 0);
+        std::fill(rows->height.begin(), rows->height.end(), kNoHeight);
+        load_bricks(grid, by, bz, strips[s], &rows->record);
+        for (int r = 0; r < 16; ++r) read_row(by, bz, r, pass, rows, &strips[s]);
+        if (records) store_bricks(grid, by, bz, rows->record, &strips[s]);
+    };
     // In a few parts, because progress is reported from the calling thread only.
     constexpr std::size_t kParts = 20;
-    for (std::size_t part = 0; part < kParts; ++part) {
-        const std::size_t first = strips.size() * part / kParts;
-        parallel_for(strips.size() * (part + 1) / kParts - first, 4,
-                     [&](std::size_t begin, std::size_t end) {
-                         RowScratch rows(static_cast<std::size_t>(grid.size.x), bricks.x);
-                         for (std::size_t s = first + begin; s < first + end; ++s) {
-                             const auto y = static_cast<std::size_t>(bricks.y);
-                             const int by = static_cast<int>(s % y), bz = static_cast<int>(s / y);
-                             std::fill(rows.record.begin(), rows.record.end(), kNoBoundary);
-                             std::fill(rows.has_slope.begin(), rows.has_slope.end(), 0);
-                             for (int r = 0; r < 16; ++r) read_row(by, bz, r, &rows, &strips[s]);
-                             if (records) store_bricks(grid, by, bz, rows.record, &strips[s]);
-                         }
-                     });
-        report_progress(progress, static_cast<double>(part + 1) / kParts, "voxels");
+    const std::vector<Pass> passes =
+        passes_through(*field, reader.reach_nodes(options.record_band_vx));
+    for (std::size_t p = 0; p < passes.size(); ++p) {
+        field->hold(passes[p].first_layer, passes[p].last_layer);
+        for (std::size_t part = 0; part < kParts; ++part) {
+            const std::size_t first = strips.size() * part / kParts;
+            parallel_for(strips.size() * (part + 1) / kParts - first, 4,
+                         [&](std::size_t begin, std::size_t end) {
+                             RowScratch rows(static_cast<std::size_t>(grid.size.x), bricks.x);
+                             for (std::size_t s = first + begin; s < first + end; ++s)
+                                 read_strip(s, passes[p], &rows);
+                         });
+            report_progress(progress,
+                            static_cast<double>(p * kParts + part + 1) /
+                                static_cast<double>(passes.size() * kParts),
+                            "voxels");
+        }
+        first_pass = false;
     }
     if (records) join_bricks(&strips, grid, &out.boundary);
     for (const Strip& strip : strips) {
         out.counts.outside += strip.counts.outside;
         out.counts.no_preimage += strip.counts.no_preimage;
     }
-    restore_lost(*field, map, &out);
+    restore_lost(field, map, &out);
     return out;
 }
 

@@ -58,12 +58,14 @@ class BlockCutter {
             return;
         }
         interior_.fill(0);
+        near_surface_.clear();
         for (int k = 0; k < count.z; ++k) {
             for (int j = 0; j < count.y; ++j) {
                 for (int i = 0; i < count.x; ++i)
-                    cut_node({block.first.x + i, block.first.y + j, block.first.z + k}, out);
+                    cut_node({block.first.x + i, block.first.y + j, block.first.z + k});
             }
         }
+        out->near_surface.assign(near_surface_.begin(), near_surface_.end());  // no larger
         for (std::size_t l = 0; l < 256; ++l) {
             if (interior_[l] > 0) {
                 out->interior.emplace_back(static_cast<std::uint8_t>(l),
@@ -73,7 +75,7 @@ class BlockCutter {
     }
 
   private:
-    void cut_node(Int3 node, BlockCells* out) {
+    void cut_node(Int3 node) {
         const std::size_t n = field_.nodes().index(node.x, node.y, node.z);
         if (field_.node_margin_mm(n) > certain_mm_) {
             interior_[field_.node_label(n)] += layout_.count_per_node();
@@ -88,7 +90,7 @@ class BlockCutter {
                              static_cast<float>(node.y) + cell_centre(y, cells_y),
                              static_cast<float>(node.z) + cell_centre(z, cells_z));
                     if (can_change(cell)) {
-                        out->near_surface.push_back(cell);
+                        near_surface_.push_back(cell);
                     } else {
                         interior_[cell.label[0]] += 1;
                     }
@@ -122,6 +124,7 @@ class BlockCutter {
     float certain_mm_;                    // no surface reaches a node's cells beyond this margin
     std::array<double, 256> interior_{};  // cells per label
     std::array<float, 256> score_{};
+    std::vector<SurfaceCell> near_surface_;  // of the block
 };
 
 }  // namespace
@@ -135,16 +138,25 @@ CellLayout::CellLayout(const Grid& nodes, double cell_mm) {
     size_mm = static_cast<float>(std::cbrt(volume_mm3));
 }
 
-std::vector<BlockCells> cut_into_cells(const LabelField& field,
+std::vector<BlockCells> cut_into_cells(LabelField* field,
                                        const CellLayout& layout,
                                        float limit_mm,
                                        const std::function<double(Point3)>& weight) {
-    const auto& blocks = field.blocks();
+    const auto& blocks = field->blocks();
     std::vector<BlockCells> cells(blocks.size());
-    parallel_for(blocks.size(), 16, [&](std::size_t begin, std::size_t end) {
-        BlockCutter cutter(field, layout, limit_mm);
-        for (std::size_t b = begin; b < end; ++b) cutter.cut(blocks[b], weight, &cells[b]);
-    });
+    const int layers = field->layer_count();
+    const bool upwards = field->holds(0);  // from where layers are held
+    for (int n = 0; n < layers; ++n) {
+        const int layer = upwards ? n : layers - 1 - n;
+        field->hold(std::max(0, layer - 1), layer);  // cells reach half a node down
+        const auto [first, last] = field->blocks_of_layer(layer);
+        const std::size_t from = first;
+        parallel_for(last - first, 16, [&](std::size_t begin, std::size_t end) {
+            BlockCutter cutter(*field, layout, limit_mm);
+            for (std::size_t b = from + begin; b < from + end; ++b)
+                cutter.cut(blocks[b], weight, &cells[b]);
+        });
+    }
     return cells;
 }
 

@@ -40,7 +40,8 @@ struct BlockCells {
 
 // # field.blocks(). limit_mm: largest offset that will be tried. The field's offsets are zero and
 // its candidates found for surface_reach_mm(). Same result for any number of threads.
-std::vector<BlockCells> cut_into_cells(const LabelField& field,
+// Holds the field's layers one after another.
+std::vector<BlockCells> cut_into_cells(LabelField* field,
                                        const CellLayout& layout,
                                        float limit_mm,
                                        const std::function<double(Point3)>& weight);

@@ -181,7 +181,7 @@ VolumeCorrectionReport correct_up_to(double limit_vx,
     std::vector<float>& offset = field->volume_offsets_mm();
     std::fill(offset.begin(), offset.end(), 0.0f);
     field->find_candidates(surface_reach_mm(layout, limit));
-    const std::vector<BlockCells> cells = cut_into_cells(*field, layout, limit, weight);
+    const std::vector<BlockCells> cells = cut_into_cells(field, layout, limit, weight);
 
     VolumeCorrectionReport report;
     report.target_mm3 = target_volumes(*field, cells, layout.volume_mm3);

@@ -71,6 +71,14 @@ class VoxelReader {
         }
     }
 
+    // Nodes along k from the first voxel of a brick up to which the reader looks for the others:
+    // the diagonal of the brick, the band and what lies behind the foot.
+    float reach_nodes(double band_vx) const {
+        return (5.2f + static_cast<float>(band_vx) + 0.5f + static_cast<float>(kBeyond_vx)) *
+                   stretched_mm_ / h_[2] +
+               2;
+    }
+
     // Whether a point in node coordinates lies more than half a voxel outside the label map, where
     // the map holds no information.
     bool beyond(const float* v) const {

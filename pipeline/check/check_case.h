@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Looks a case over as a careful colleague would: organs and their volumes, sides, vessels, units,
+// the fit, exercises and whether a needle reaches their targets.
+//
+// A fault has a name that a program can go by and a sentence that says what to do:
+//
+//     organ-missing    an organ that the others around it call for is not there, or is empty
+//     sides-swapped    right and left, judged by liver and spleen and by pairs of labels
+//     wrong-unit       a body or organs of a size that no adult has
+//     vessel-broken    the aorta or the lower cava is in pieces
+//     fold             the fit's report does not prove the map free of folds
+//     label-renamed    an exercise names a label that is missing, or a label's name says another
+//                      tissue than it has
+//     texture-missing  a tissue asks for a solid texture that the bundle lacks
+//     target-in-bone   a target that no needle can enter
+//     unreachable      no window on the skin sees the target, or none lets a needle pass
+//     not-passable     a scripted expert plays the exercise through the first windows and misses a
+//                      pass mark
+//     sweep-in-air     a scripted sweep whose probe or needle is not where the body is
+//     not-valid        what `validate` refuses
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/bundle/case_bundle.h"
+
+namespace sonocase::pipeline {
+
+struct Fault {
+    std::string name;
+    std::string what;    // a sentence
+    std::string remedy;  // what to do
+};
+
+struct OrganRow {
+    std::string label;
+    double ml = 0;
+    double low_ml = 0, high_ml = 0;  // normal range of an adult; both 0: none known
+};
+
+struct TargetRow {
+    std::string exercise, target, inside;
+    double depth_mm = 0, blocked = 0;  // of the best window
+    int windows = 0;
+    bool needle = false;
+    double visible = 0;  // share of the needle's path that the image shows
+};
+
+struct ExerciseRow {
+    std::string exercise;
+    bool played = false;              // false: a target has no window, or there is none
+    std::vector<std::string> missed;  // pass marks that the expert missed
+};
+
+struct CheckResult {
+    std::vector<Fault> faults;
+    std::vector<std::string> remarks;  // worth a look, no fault
+    std::vector<OrganRow> organs;
+    std::vector<TargetRow> targets;
+    std::vector<ExerciseRow> exercises;
+    int ribs_right = 0, ribs_left = 0;
+    Vector3 forwards, up;  // of the patient in the grid, judged by organs; zero: not known
+};
+
+// Cost: 1 to 10 s.
+CheckResult check_case(const CaseBundle& bundle);
+
+// One page that opens in any browser, pictures inside.
+std::string check_page(const CaseBundle& bundle, const CheckResult& result);
+
+// {"case", "faults": [{"name", "what", "remedy"}], "remarks", "organs", "targets", "exercises",
+// "ribs": {"right", "left"}}.
+std::string check_json(const CaseBundle& bundle, const CheckResult& result);
+
+// Parts of check_case, in their own files.
+void check_anatomy(const CaseBundle& bundle, CheckResult& result);
+void check_exercises(const CaseBundle& bundle, CheckResult& result);
+
+// RGB rows from the top: organs and bones in their colours, shaded, seen along a direction through
+// a body from which skin, fat and muscle are taken; targets as white dots.
+struct BodyView {
+    int width_px = 0, height_px = 0;
+    std::vector<std::uint8_t> rgb;
+};
+BodyView body_view(const CaseBundle& bundle,
+                   Vector3 along,
+                   Vector3 up,
+                   const std::vector<Point3>& marks);
+
+}  // namespace sonocase::pipeline

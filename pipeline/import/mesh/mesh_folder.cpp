@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/import/mesh/mesh_folder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "formats/files/atomic_file.h"
+#include "pipeline/base/delimited_text.h"
+#include "pipeline/import/mesh/fill_lumen.h"
+#include "pipeline/import/mesh/glb_file.h"
+#include "pipeline/import/mesh/node_table.h"
+#include "pipeline/import/source/source_path.h"
+#include "pipeline/import/surface/surface_file.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_mesh_file(const fs::path& path) {
+    const std::string ending = lower_case(path.extension().string());
+    return ending == ".glb" || ending == ".stl" || ending == ".ply" || ending == ".obj" ||
+           ending == ".vtp";
+}
+
+std::vector<std::string> mesh_files(const std::string& path) {
+    std::error_code code;
+    if (!fs::is_directory(path, code)) return {path};
+    std::vector<std::string> files;
+    for (const auto& entry : fs::directory_iterator(path, code))
+        if (is_mesh_file(entry.path())) files.push_back(entry.path().string());
+    std::sort(files.begin(), files.end());
+    return files;
+}
+
+std::string text_of(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", value);
+    return text;
+}
+
+// Nodes of one label.
+struct Organ {
+    NodeRow row;
+    Surface patches;
+    std::set<std::string> files;
+};
+
+// Everything that the files hold, in RAS+ mm and sorted by label.
+class Collector {
+  public:
+    Collector(const NodeTable& table, const MeshOptions& options)
+        : table_(table), options_(options) {}
+
+    Status add_file(const std::string& path) {
+        if (auto status = check_source_file(path, "expected a mesh"); !status) return status;
+        const std::string name = fs::path(path).filename().string();
+        const bool glb = lower_case(fs::path(path).extension().string()) == ".glb";
+        std::vector<MeshNode> nodes;
+        if (glb) {
+            auto bytes = read_file(path);
+            if (!bytes) return bytes.error();
+            auto read = read_glb(*bytes, path);
+            if (!read) return read.error();
+            nodes = std::move(*read);
+        } else {
+            auto surface = import_surface(path, {1, false});
+            if (!surface) return surface.error();
+            nodes.push_back({name, fs::path(path).stem().string(), std::move(*surface)});
+        }
+        for (MeshNode& node : nodes) {
+            ++nodes_;
+            const NodeRow* row = table_.find(node.name);
+            if (row == nullptr) {
+                unmapped_.push_back(node.name);
+                continue;
+            }
+            if (row->role == NodeRole::skip) continue;
+            add_node(node, *row, name, glb);
+        }
+        return Done{};
+    }
+
+    const std::vector<std::string>& unmapped() const { return unmapped_; }
+    std::vector<Organ>& organs() { return organs_; }
+    int nodes() const { return nodes_; }
+
+  private:
+    void add_node(const MeshNode& node, const NodeRow& row, const std::string& file, bool glb) {
+        const std::string label = row.role == NodeRole::body ? "body" : row.label;
+        auto found = std::find_if(organs_.begin(), organs_.end(),
+                                  [&](const Organ& o) { return o.row.label == label; });
+        if (found == organs_.end()) {
+            organs_.push_back({row, {}, {}});
+            organs_.back().row.label = label;
+            found = organs_.end() - 1;
+        }
+        found->files.insert(file);
+        Surface& to = found->patches;
+        const auto base = static_cast<std::uint32_t>(to.points.size());
+        const double mm = options_.scale * (glb ? 1000 : 1);
+        for (const Point3 given : node.surface.points) {
+            const Point3 p = table_.placed(file, {mm * given.x, mm * given.y, mm * given.z});
+            to.points.push_back(glb ? Point3{-p.x, p.z, p.y} : p);
+        }
+        for (const auto& t : node.surface.triangles)
+            to.triangles.push_back({base + t[0], base + t[1], base + t[2]});
+    }
+
+    const NodeTable& table_;
+    const MeshOptions& options_;
+    std::vector<Organ> organs_;
+    std::vector<std::string> unmapped_;
+    int nodes_ = 0;
+};
+
+Result<Grid> grid_of(const std::vector<Organ>& organs,
+                     const MeshOptions& options,
+                     const std::string& where) {
+    Box3 box;
+    const bool has_body = std::any_of(organs.begin(), organs.end(),
+                                      [](const Organ& o) { return o.row.role == NodeRole::body; });
+    for (const Organ& organ : organs)
+        if (!has_body || organ.row.role == NodeRole::body)
+            for (const Point3 p : organ.patches.points) box.include(p);
+    if (box.empty()) return Error{"no node has a triangle", where, "expected organ meshes"};
+    const Vector3 extent = box.extent();
+    const double longest = std::max({extent.x, extent.y, extent.z});
+    if (longest < 20 || longest > 3000)
+        return Error{"the meshes are " + text_of(longest) + " mm long", where,
+                     longest < 20 ? "are they in metres? give the scale: --scale 1000"
+                                  : "are they in micrometres? give the scale: --scale 0.001"};
+    box.lower.z = std::max(box.lower.z, options.low_mm);
+    box.upper.z = std::min(box.upper.z, options.high_mm);
+    if (!(box.lower.z < box.upper.z))
+        return Error{"nothing lies between low_mm and high_mm", where,
+                     "widen the heights that are kept"};
+    Grid grid;
+    const double v = options.voxel_mm;
+    grid.spacing_mm = {v, v, v};
+    const bool cut[2] = {box.lower.z == options.low_mm, box.upper.z == options.high_mm};
+    for (int axis = 0; axis < 3; ++axis) {
+        const bool whole = axis < 2;
+        const double low = box.lower[axis] - (whole || !cut[0] ? 2 * v : 0);
+        const double high = box.upper[axis] + (whole || !cut[1] ? 2 * v : 0);
+        grid.origin_mm[axis] = v * std::floor(low / v);
+        grid.size[axis] = static_cast<int>(std::ceil((high - grid.origin_mm[axis]) / v)) + 1;
+    }
+    if (static_cast<double>(grid.size.x) * grid.size.y * grid.size.z > 4e8)
+        return Error{"a grid of " + text_of(1e-6 * grid.size.x * grid.size.y * grid.size.z) +
+                         " million voxels",
+                     where, "take larger voxels, or crop with low_mm and high_mm"};
+    return grid;
+}
+
+struct Totals {
+    int caps = 0, open_loops = 0, turned = 0;
+    double longest_cap_mm = 0;
+};
+
+Result<MeshSolid> solid_of(const Organ& organ,
+                           const Grid& grid,
+                           const MeshOptions& options,
+                           const std::string& where,
+                           Totals& totals,
+                           StageReport& report) {
+    MeshSolid out{organ.row.label, organ.row.tissue_class, organ.row.role == NodeRole::body, {}};
+    MendReport mended;
+    const Surface solid = mend_mesh(organ.patches, {options.weld_mm}, &mended);
+    totals.caps += mended.caps;
+    totals.open_loops += mended.open_loops;
+    totals.turned += mended.turned;
+    totals.longest_cap_mm = std::max(totals.longest_cap_mm, mended.longest_cap_mm);
+    if (mended.longest_cap_mm > options.cap_mm && !options.allow_long_caps)
+        return Error{
+            "'" + out.label + "' has an opening of " + text_of(mended.longest_cap_mm) + " mm round",
+            where, "a sheet is no organ: give its nodes the role skip, or raise cap_mm above it"};
+    if (mended.open_loops > 0)
+        report.warnings.push_back("the border of '" + out.label + "' does not close at " +
+                                  std::to_string(mended.open_loops) +
+                                  " places: its inside goes by winding numbers; look at it");
+    out.mask = voxelise(solid, mended.open_loops == 0, grid, 3, options.accuracy);
+    const double voxel_ml = grid.voxel_volume_mm3() / 1000;
+    if (organ.row.role == NodeRole::lumen)
+        fill_lumen(out.mask, {options.voxel_mm,
+                              organ.row.hole_mm2 > 0 ? organ.row.hole_mm2 : options.hole_mm2});
+    MeasureGroup group{out.label,
+                       {{"mesh_ml", mended.volume_ml},
+                        {"voxel_ml", static_cast<double>(out.mask.count()) * voxel_ml},
+                        {"caps", static_cast<double>(mended.caps)},
+                        {"open_loops", static_cast<double>(mended.open_loops)},
+                        {"longest_cap_mm", mended.longest_cap_mm}}};
+    report.groups.push_back(std::move(group));
+    return out;
+}
+
+}  // namespace
+
+bool is_mesh_source(const std::string& path) {
+    std::error_code code;
+    if (!fs::is_directory(path, code)) return is_mesh_file(path);
+    return !mesh_files(path).empty();
+}
+
+Result<MeshBody> read_meshes(const std::string& path,
+                             const std::string& table_path,
+                             const MeshOptions& options,
+                             const Progress& progress) {
+    if (table_path.empty())
+        return Error{"meshes without a table of their nodes", path,
+                     "give --table NODES.csv: rows of node,label,role"};
+    auto text = read_text_file(table_path);
+    if (!text) return text.error();
+    auto table = parse_node_table(*text, table_path);
+    if (!table) return table.error();
+    Collector collector(*table, options);
+    for (const std::string& file : mesh_files(path))
+        if (auto status = collector.add_file(file); !status) return status.error();
+    if (!collector.unmapped().empty()) {
+        std::string names;
+        for (std::size_t n = 0; n < std::min<std::size_t>(collector.unmapped().size(), 8); ++n)
+            names += (n > 0 ? ", " : "") + collector.unmapped()[n];
+        if (collector.unmapped().size() > 8)
+            names += " and " + std::to_string(collector.unmapped().size() - 8) + " more";
+        return Error{std::to_string(collector.unmapped().size()) +
+                         " nodes have no row in the table: " + names,
+                     table_path, "add rows for them, with the role skip if they are not wanted"};
+    }
+    MeshBody body;
+    body.attribution = table->attribution;
+    StageReport& report = body.report;
+    auto grid = grid_of(collector.organs(), options, path);
+    if (!grid) return grid.error();
+    body.grid = *grid;
+    Totals totals;
+    double done = 0;
+    for (const Organ& organ : collector.organs()) {
+        report_progress(progress, 0.6 * done / static_cast<double>(collector.organs().size()),
+                        "voxels of " + organ.row.label);
+        if (organ.files.size() > 1)
+            report.warnings.push_back(
+                "'" + organ.row.label + "' comes from " + std::to_string(organ.files.size()) +
+                " files; give them labels of their own if it is not one organ");
+        auto solid = solid_of(organ, body.grid, options, table_path, totals, report);
+        if (!solid) return solid.error();
+        body.solids.push_back(std::move(*solid));
+        done += 1;
+    }
+    if (totals.turned > 0)
+        report.warnings.push_back(std::to_string(totals.turned) +
+                                  " components faced inwards and were turned");
+    report.measures = {{"nodes", static_cast<double>(collector.nodes())},
+                       {"caps", static_cast<double>(totals.caps)},
+                       {"longest_cap_mm", totals.longest_cap_mm},
+                       {"open_loops", static_cast<double>(totals.open_loops)},
+                       {"turned_components", static_cast<double>(totals.turned)}};
+    return body;
+}
+
+}  // namespace sonocase::pipeline

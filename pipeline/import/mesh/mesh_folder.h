@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Organ meshes as labels on a grid: a folder of them, or one file, and the table that says what
+// each node is (node_table.h).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/base/result.h"
+#include "formats/base/stage_report.h"
+#include "formats/volume/grid.h"
+#include "pipeline/base/progress.h"
+#include "pipeline/import/mesh/mend_mesh.h"
+#include "pipeline/import/mesh/winding_voxels.h"
+
+namespace sonocase::pipeline {
+
+struct MeshOptions {
+    double voxel_mm = 1.5;                // of the grid, [0.3, 10]
+    double scale = 1;                     // mm per unit of the file; GLB: metres per unit
+    double low_mm = -1e9, high_mm = 1e9;  // kept along the head's direction (z)
+    double weld_mm = 0.01;
+    double cap_mm = 400;  // a longer cap is an error, unless
+    bool allow_long_caps = false;
+    double hole_mm2 = 900;  // of a lumen's slices
+    double accuracy = 2;    // of the winding numbers of open meshes
+};
+
+struct MeshSolid {
+    std::string label, tissue_class;
+    bool is_body = false;  // the skin's inside
+    VoxelMask mask;
+};
+
+struct MeshBody {
+    Grid grid;                      // RAS+ mm, direction the identity
+    std::vector<MeshSolid> solids;  // in the order of their labels' first rows
+    std::string attribution;
+    StageReport report;  // measures: nodes, caps, ...; groups: volume_ml by label; warnings
+};
+
+bool is_mesh_source(const std::string& path);  // a mesh file, or a folder with one
+
+// GLB is in metres, y to the head, z to the front, x to the patient's left; everything else is
+// taken as RAS+ mm. Nodes of one label are one solid. Errors: what the readers refuse; nodes
+// without a row, listed; a label that two files give as organs; a cap longer than allowed; no body.
+// Warnings: loops that do not close, components that faced inwards, volumes of voxels and mesh that
+// differ by more than 3 %, lumens that leaked.
+Result<MeshBody> read_meshes(const std::string& path,
+                             const std::string& table_path,
+                             const MeshOptions& options,
+                             const Progress& progress = {});
+
+}  // namespace sonocase::pipeline

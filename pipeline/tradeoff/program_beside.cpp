@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/tradeoff/program_beside.h"
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+
+namespace sonocase::pipeline {
+
+Result<std::string> output_of_program_beside(const std::string& program,
+                                             const std::string& arguments,
+                                             const std::string& suites) {
+    std::error_code failed;
+    const auto self = std::filesystem::read_symlink("/proc/self/exe", failed);
+    const std::string path = (self.parent_path() / program).string();
+    if (failed || !std::filesystem::exists(path))
+        return Error{"the program " + program + " is not beside this one", path,
+                     "build its target, or leave --suite " + suites + " out"};
+    const std::string command = "'" + path + "' " + arguments;
+    std::string text;
+    std::FILE* pipe = popen(command.c_str(), "r");
+    if (pipe == nullptr) return Error{"the program cannot be run", command, ""};
+    std::array<char, 4096> buffer{};
+    while (const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe))
+        text.append(buffer.data(), n);
+    if (pclose(pipe) != 0) return Error{"the program failed", command, "run it to see why"};
+    return text;
+}
+
+}  // namespace sonocase::pipeline
