@@ -16,6 +16,20 @@ void ImageTexture::upload(std::span<const std::uint8_t> pixels, int width_px, in
     assert(pixels.size() == static_cast<std::size_t>(width_px) * height_px);
     rgba_.resize(pixels.size());
     for (std::size_t i = 0; i < pixels.size(); ++i) rgba_[i] = 0xFF000000u | pixels[i] * 0x010101u;
+    send(width_px, height_px);
+}
+
+void ImageTexture::upload_rgb(std::span<const std::uint8_t> rgb, int width_px, int height_px) {
+    assert(rgb.size() == 3 * static_cast<std::size_t>(width_px) * height_px);
+    rgba_.resize(rgb.size() / 3);
+    for (std::size_t i = 0; i < rgba_.size(); ++i)
+        rgba_[i] = 0xFF000000u | static_cast<std::uint32_t>(rgb[3 * i]) |
+                   static_cast<std::uint32_t>(rgb[3 * i + 1]) << 8 |
+                   static_cast<std::uint32_t>(rgb[3 * i + 2]) << 16;
+    send(width_px, height_px);
+}
+
+void ImageTexture::send(int width_px, int height_px) {
     const bool fresh = texture_ == 0 || width_px != width_px_ || height_px != height_px_;
     if (texture_ == 0) glGenTextures(1, &texture_);
     glBindTexture(GL_TEXTURE_2D, texture_);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A grey picture as a texture on the graphics card. All calls belong to the thread of the window.
+// A grey or coloured picture as a texture on the graphics card. All calls belong to the thread of
+// the window.
 #pragma once
 
 #include <cstdint>
@@ -20,11 +21,14 @@ class ImageTexture {
     ImageTexture& operator=(const ImageTexture&) = delete;
     // pixels: # width * height, rows from the top.
     void upload(std::span<const std::uint8_t> pixels, int width_px, int height_px);
+    // rgb: # 3 * width * height.
+    void upload_rgb(std::span<const std::uint8_t> rgb, int width_px, int height_px);
     void* id() const { return reinterpret_cast<void*>(static_cast<std::uintptr_t>(texture_)); }
     unsigned name() const { return texture_; }
     bool empty() const { return texture_ == 0; }
 
   private:
+    void send(int width_px, int height_px);
     unsigned texture_ = 0;
     int width_px_ = 0, height_px_ = 0;
     std::vector<std::uint32_t> rgba_;  // WebGL lacks the swizzle that would spare this

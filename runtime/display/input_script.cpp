@@ -27,14 +27,17 @@ Result<InputScript> InputScript::load(const std::string& path) {
         const bool fine =
             (verb == "wait" && n == 2) || (verb == "move" && n == 3) ||
             (verb == "wheel" && n == 2) || (verb == "shot" && n == 2) ||
+            (verb == "instructor" && n == 2) || (verb == "press" && n >= 2) ||
             (verb == "loop" && n == 2) || (verb == "quit" && n == 1) ||
             ((verb == "down" || verb == "up") && n == 2 && line.words[1].size() == 1 &&
              line.words[1][0] >= '0' && line.words[1][0] <= '2') ||
             (verb == "key" && n >= 2 && key_code(line.words[1]) >= 0) ||
             (verb == "hold" && n >= 3 && key_code(line.words[1]) >= 0);
         if (!fine) {
-            return Error{"line not understood: " + text, path + ":" + std::to_string(number),
-                         "verbs are wait, key, hold, move, down, up, wheel, shot, loop and quit"};
+            return Error{
+                "line not understood: " + text, path + ":" + std::to_string(number),
+                "verbs are wait, key, hold, move, down, up, wheel, press, shot, instructor, "
+                "loop and quit"};
         }
         script.lines_.push_back(std::move(line));
     }
@@ -44,6 +47,7 @@ Result<InputScript> InputScript::load(const std::string& path) {
 
 InjectedInput InputScript::next(double now_s, std::string& shot, bool& quit) {
     input_.wheel = 0;
+    of_instructor_ = false;
     if (waiting_ > 0) {
         --waiting_;
         return input_;
@@ -52,6 +56,11 @@ InjectedInput InputScript::next(double now_s, std::string& shot, bool& quit) {
         input_.keys.clear();
         input_.shift = input_.control = input_.alt = false;
         release_ = false;
+        return input_;
+    }
+    if (press_ > 0) {  // over the control for two pictures, down for one, then up
+        --press_;
+        input_.buttons[0] = press_ == 1;
         return input_;
     }
     if (next_ >= lines_.size()) return input_;
@@ -83,8 +92,13 @@ InjectedInput InputScript::next(double now_s, std::string& shot, bool& quit) {
         input_.buttons[static_cast<std::size_t>(number(1))] = verb == "down";
     } else if (verb == "wheel") {
         input_.wheel = static_cast<float>(number(1));
-    } else if (verb == "shot") {
+    } else if (verb == "press") {
+        std::string name = line.words[1];
+        for (std::size_t i = 2; i < line.words.size(); ++i) name += " " + line.words[i];
+        if (find_ && find_(name, input_.x, input_.y)) press_ = 4;
+    } else if (verb == "shot" || verb == "instructor") {
         shot = line.words[1];
+        of_instructor_ = verb == "instructor";
     } else if (verb == "loop") {
         if (now_s < number(1)) next_ = 0;
     } else if (verb == "quit") {

@@ -9,12 +9,17 @@
 //   down B | up B       button 0 left, 1 right, 2 middle
 //   wheel DY
 //   shot FILE           save the window as PNG
+//   instructor FILE     save the second window as PNG
+//   press NAME          click the control of that name (DrawnBox), wherever it is
 //   loop S              again from the first line until the clock says S seconds
 //   quit
+// A picture lasts 1/60 s for keys that are held, however long it took to draw.
 // Empty lines and lines that start with # are ignored.
 #pragma once
 
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "formats/base/result.h"
@@ -28,10 +33,16 @@ class InputScript {
     static Result<InputScript> load(const std::string& path);
 
     // False after the last command.
-    bool active() const { return next_ < lines_.size() || waiting_ > 0; }
+    bool active() const { return next_ < lines_.size() || waiting_ > 0 || press_ > 0; }
     // The input of the next picture. Sets `shot` to the file in which to save that picture, and
     // `quit` when the script ends. now_s: the clock of `loop`.
     InjectedInput next(double now_s, std::string& shot, bool& quit);
+    // Whether `shot` of the last next() is of the second window.
+    bool of_instructor() const { return of_instructor_; }
+    // Where controls are: the middle of one in window pixels; false: there is none of that name.
+    void set_finder(std::function<bool(const std::string& name, float& x, float& y)> find) {
+        find_ = std::move(find);
+    }
 
   private:
     struct Line {
@@ -42,7 +53,9 @@ class InputScript {
     std::size_t next_ = 0;
     int waiting_ = 0;
     InjectedInput input_;
-    bool release_ = false;
+    bool release_ = false, of_instructor_ = false;
+    int press_ = 0;  // steps of a press that are to come
+    std::function<bool(const std::string&, float&, float&)> find_;
 };
 
 }  // namespace sonocase::runtime

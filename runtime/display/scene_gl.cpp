@@ -65,12 +65,13 @@ void main() {
     vec3 n = normalize(view_normal);
     vec3 to_eye = normalize(-view_position);
     float facing = abs(dot(n, to_eye));
-    float light = 0.5 + 0.5 * abs(dot(n, normalize(vec3(0.35, 0.75, 0.6))));
+    float light = 0.3 + 0.7 * (0.5 + 0.5 * dot(faceforward(n, -to_eye, n),
+                                               normalize(vec3(-0.35, 0.75, 0.6))));
     if (mode == 1) {
-        float rim = pow(1.0 - facing, 2.0);
-        result = vec4(colour.rgb * light + 0.25 * rim, mix(colour.a, 0.92, rim));
+        float rim = pow(1.0 - facing, 1.7);
+        result = vec4(colour.rgb * (0.5 + 0.6 * light), min(colour.a + 0.72 * rim, 1.0));
     } else {
-        vec3 h = normalize(to_eye + normalize(vec3(0.35, 0.75, 0.6)));
+        vec3 h = normalize(to_eye + normalize(vec3(-0.35, 0.75, 0.6)));
         result = vec4(colour.rgb * light + 0.18 * pow(max(dot(n, h), 0.0), 24.0), colour.a);
     }
 })";
@@ -222,7 +223,7 @@ void OffscreenPicture::begin() {
     glEnable(GL_DEPTH_TEST);
     glDepthMask(GL_TRUE);
     glDisable(GL_BLEND);
-    glClearColor(0.075f, 0.09f, 0.11f, 1);
+    glClearColor(0x10 / 255.0f, 0x11 / 255.0f, 0x12 / 255.0f, 1);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
 }
 

@@ -11,7 +11,8 @@ namespace {
 
 struct Samples {
     Int3 n;
-    std::vector<float> body;  // share of body around each sample, [0, 1]
+    double step = 1;          // in voxels
+    std::vector<float> body;  // share of what is looked for around each sample, [0, 1]
     std::size_t index(int i, int j, int k) const {
         return static_cast<std::size_t>(i) +
                static_cast<std::size_t>(n.x) *
@@ -44,35 +45,33 @@ void smooth(Surface& mesh, int passes) {
     }
 }
 
-}  // namespace
-
-Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
+Samples make_samples(const CaseBundle& bundle, double step_mm) {
     const Int3 size = bundle.label_bricks.size;
-    Surface mesh;
-    if (size.x < 2 || size.y < 2 || size.z < 2) return mesh;
-    const double step = std::max(step_mm / bundle.grid.spacing_mm.x, 1.0);  // in voxels
     Samples s;
-    for (int a = 0; a < 3; ++a) s.n[a] = static_cast<int>((size[a] - 1) / step) + 1;
+    if (size.x < 2 || size.y < 2 || size.z < 2) return s;
+    s.step = std::max(step_mm / bundle.grid.spacing_mm.x, 1.0);
+    for (int a = 0; a < 3; ++a) s.n[a] = static_cast<int>((size[a] - 1) / s.step) + 1;
     s.body.resize(static_cast<std::size_t>(s.n.x) * s.n.y * s.n.z);
-    for (int k = 0; k < s.n.z; ++k) {
-        for (int j = 0; j < s.n.y; ++j) {
-            for (int i = 0; i < s.n.x; ++i) {
-                // Eight look-ups, each a quarter step off, so that slanted skin has no steps.
-                float share = 0;
-                for (int c = 0; c < 8; ++c) {
-                    const auto at = [&](int n, int axis, int side) {
-                        const double v = (n + (side ? 0.25 : -0.25)) * step;
-                        return std::clamp(static_cast<int>(v + 0.5), 0, size[axis] - 1);
-                    };
-                    const int label = bundle.label_bricks.at(at(i, 0, c & 1), at(j, 1, c >> 1 & 1),
-                                                             at(k, 2, c >> 2));
-                    if (label != 0) share += 0.125f;
-                }
-                s.body[s.index(i, j, k)] = share;
-            }
-        }
+    return s;
+}
+
+// The labels of eight places about a sample, each a quarter step off, so that slanted surfaces have
+// no steps.
+template <class Use>
+void look_round(const CaseBundle& bundle, const Samples& s, Int3 p, const Use& use) {
+    const Int3 size = bundle.label_bricks.size;
+    for (int c = 0; c < 8; ++c) {
+        const auto at = [&](int n, int axis, int side) {
+            const double v = (n + (side ? 0.25 : -0.25)) * s.step;
+            return std::clamp(static_cast<int>(v + 0.5), 0, size[axis] - 1);
+        };
+        use(bundle.label_bricks.at(at(p.x, 0, c & 1), at(p.y, 1, c >> 1 & 1), at(p.z, 2, c >> 2)));
     }
-    // One vertex per cell that the surface passes, in the middle of the crossed edges.
+}
+
+// One vertex per cell that the surface passes, in the middle of the crossed edges; the index of
+// each cell's vertex, -1 where it has none.
+std::vector<std::int32_t> place_vertices(const Samples& s, const Grid& grid, Surface& mesh) {
     std::vector<std::int32_t> vertex(s.body.size(), -1);
     for (int k = 0; k + 1 < s.n.z; ++k) {
         for (int j = 0; j + 1 < s.n.y; ++j) {
@@ -97,12 +96,17 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
                 if (crossings == 0) continue;
                 const Vector3 in_cell = sum / crossings;
                 vertex[s.index(i, j, k)] = static_cast<std::int32_t>(mesh.points.size());
-                mesh.points.push_back(bundle.grid.point_from_voxel(
-                    {(i + in_cell.x) * step, (j + in_cell.y) * step, (k + in_cell.z) * step}));
+                mesh.points.push_back(
+                    grid.point_from_voxel({(i + in_cell.x) * s.step, (j + in_cell.y) * s.step,
+                                           (k + in_cell.z) * s.step}));
             }
         }
     }
-    // One quad per edge that the surface crosses, between the four cells around it.
+    return vertex;
+}
+
+// One quad per edge that the surface crosses, between the four cells around it.
+void place_quads(const Samples& s, const std::vector<std::int32_t>& vertex, Surface& mesh) {
     for (int k = 1; k + 1 < s.n.z; ++k) {
         for (int j = 1; j + 1 < s.n.y; ++j) {
             for (int i = 1; i + 1 < s.n.x; ++i) {
@@ -131,6 +135,11 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
             }
         }
     }
+}
+
+Surface surface_nets(const Samples& s, const Grid& grid) {
+    Surface mesh;
+    place_quads(s, place_vertices(s, grid, mesh), mesh);
     smooth(mesh, 6);
     mesh.normals.assign(mesh.points.size(), {});
     for (const auto& t : mesh.triangles) {
@@ -140,6 +149,82 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
     }
     for (Vector3& n : mesh.normals) n = normalized(n);
     return mesh;
+}
+
+struct OrganColour {
+    const char* part;  // of a label's name
+    unsigned rgb;
+};
+// The first that fits.
+constexpr OrganColour kOrgans[] = {
+    {"gallbladder", 0x7FA650}, {"portal", 0x7C6BB5},   {"liver", 0x9C4A3C},
+    {"kidney", 0xB8705A},      {"spleen", 0x84506A},   {"stomach", 0xCB8E9A},
+    {"duoden", 0xD9A48C},      {"bowel", 0xD9A48C},    {"colon", 0xD9A48C},
+    {"pancreas", 0xDDB45C},    {"bladder", 0xD9C26A},  {"aorta", 0xCF4B40},
+    {"arter", 0xCF4B40},       {"vena", 0x5A78C8},     {"vein", 0x5A78C8},
+    {"vessel", 0x5A78C8},      {"lung", 0xE3B7B4},     {"heart", 0xB2554C},
+    {"rib", 0xE6DCC3},         {"vertebra", 0xE6DCC3}, {"sacrum", 0xE6DCC3},
+    {"hip", 0xE6DCC3},         {"femur", 0xE6DCC3},    {"sternum", 0xE6DCC3},
+    {"costal", 0xD8D2BE},      {"scapula", 0xE6DCC3},  {"clavic", 0xE6DCC3},
+    {"humer", 0xE6DCC3},       {"bone", 0xE6DCC3},     {"spine", 0xE6DCC3},
+    {"prostate", 0xC99A86},    {"adrenal", 0xD2A86A},
+};
+
+}  // namespace
+
+unsigned organ_colour(const std::string& label) {
+    for (const OrganColour& organ : kOrgans) {
+        if (label.find(organ.part) != std::string::npos) return organ.rgb;
+    }
+    return 0;
+}
+
+Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
+    Samples s = make_samples(bundle, step_mm);
+    for (int k = 0; k < s.n.z; ++k) {
+        for (int j = 0; j < s.n.y; ++j) {
+            for (int i = 0; i < s.n.x; ++i) {
+                float& share = s.body[s.index(i, j, k)];
+                look_round(bundle, s, {i, j, k}, [&](int label) { share += label ? 0.125f : 0; });
+            }
+        }
+    }
+    return s.body.empty() ? Surface{} : surface_nets(s, bundle.grid);
+}
+
+std::vector<OrganMesh> organ_meshes(const CaseBundle& bundle,
+                                    double step_mm,
+                                    const std::atomic<bool>& stop) {
+    std::vector<unsigned> colours;  // of the groups
+    std::vector<int> group(256, -1);
+    for (std::size_t label = 1; label < std::min<std::size_t>(bundle.labels.size(), 256); ++label) {
+        const unsigned rgb = organ_colour(bundle.labels[label].name);
+        if (rgb == 0) continue;
+        const auto at = std::find(colours.begin(), colours.end(), rgb);
+        group[label] = static_cast<int>(at - colours.begin());
+        if (at == colours.end()) colours.push_back(rgb);
+    }
+    Samples s = make_samples(bundle, step_mm);
+    std::vector<std::vector<std::uint8_t>> eighths(colours.size(),
+                                                   std::vector<std::uint8_t>(s.body.size()));
+    for (int k = 0; k < s.n.z && !stop; ++k) {
+        for (int j = 0; j < s.n.y; ++j) {
+            for (int i = 0; i < s.n.x; ++i) {
+                const std::size_t at = s.index(i, j, k);
+                look_round(bundle, s, {i, j, k}, [&](int label) {
+                    const int g = group[static_cast<std::size_t>(label)];
+                    if (g >= 0) ++eighths[static_cast<std::size_t>(g)][at];
+                });
+            }
+        }
+    }
+    std::vector<OrganMesh> meshes;
+    for (std::size_t g = 0; g < colours.size() && !stop; ++g) {
+        for (std::size_t i = 0; i < s.body.size(); ++i) s.body[i] = 0.125f * eighths[g][i];
+        meshes.push_back({surface_nets(s, bundle.grid), colours[g]});
+    }
+    if (stop) meshes.clear();
+    return meshes;
 }
 
 }  // namespace sonocase::runtime

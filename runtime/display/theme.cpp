@@ -13,7 +13,7 @@
 namespace sonocase::runtime {
 namespace {
 
-Fonts g_fonts;  // ImGui itself is one per process
+Fonts g_fonts;  // of ImGui's current context, which is one per process too
 
 std::string first_file(const std::vector<std::string>& files) {
     for (const std::string& file : files) {
@@ -53,73 +53,85 @@ const Fonts& fonts() {
     return g_fonts;
 }
 
+void use_fonts(const Fonts& fonts) {
+    g_fonts = fonts;
+}
+
 void apply_theme(float scale) {
     ImGuiIO& io = ImGui::GetIO();
     io.Fonts->Clear();
-    static const ImWchar kRanges[] = {0x20,   0x17F,  0x370,  0x3FF,  0x400,  0x45F, 0x2013,
-                                      0x2014, 0x2018, 0x2026, 0x2190, 0x2193, 0};
+    // Latin, Greek, Cyrillic, punctuation, arrows, a few signs, and the mark of a missing letter.
+    // DejaVu has all of these and figures of equal width.
+    static const ImWchar kRanges[] = {0x20,   0x24F,  0x370,  0x3FF,  0x400,  0x4FF,
+                                      0x2010, 0x2027, 0x2190, 0x2193, 0x2212, 0x2212,
+                                      0x2264, 0x2265, 0xFFFD, 0xFFFD, 0};
+    // Large letters are few: Latin, and the same signs. Keeps the atlas of a 4K window small.
+    static const ImWchar kFewRanges[] = {0x20,   0x17F,  0x2010, 0x2027, 0x2264,
+                                         0x2265, 0xFFFD, 0xFFFD, 0};
     const std::string body = first_file(candidates(false)), bold = first_file(candidates(true));
-    const auto load = [&](const std::string& file, float size) {
-        if (file.empty()) {
-            ImFontConfig config;
-            config.SizePixels = std::round(size * scale);
-            return io.Fonts->AddFontDefault(&config);
-        }
+    const auto load = [&](const std::string& file, float size, const ImWchar* ranges) {
         ImFontConfig config;
-        config.OversampleH = 2;
-        return io.Fonts->AddFontFromFileTTF(file.c_str(), std::round(size * scale), &config,
-                                            kRanges);
+        config.SizePixels = std::round(size * scale);
+        if (file.empty()) return io.Fonts->AddFontDefault(&config);
+        config.OversampleH = scale < 1.9f ? 2 : 1;
+        return io.Fonts->AddFontFromFileTTF(file.c_str(), config.SizePixels, &config, ranges);
     };
-    g_fonts.body = load(body, 14);
-    g_fonts.heading = load(bold.empty() ? body : bold, 15);
-    g_fonts.small = load(body, 12);
-    g_fonts.title = load(bold.empty() ? body : bold, 27);
+    const std::string& strong = bold.empty() ? body : bold;
+    // In u. DejaVu Sans is an eighth wider than most, so a size smaller than theirs reads the same.
+    g_fonts.body = load(body, 16, kRanges);  // first: ImGui's own
+    g_fonts.small = load(body, 14, kRanges);
+    g_fonts.bold = load(strong, 16, kRanges);
+    g_fonts.heading = load(strong, 19, kRanges);
+    g_fonts.large = load(strong, 26, kFewRanges);
+    g_fonts.title = load(strong, 30, kFewRanges);
 
     ImGuiStyle style;
     ImGui::StyleColorsDark(&style);
-    style.WindowRounding = 0;
-    style.ChildRounding = 5;
-    style.FrameRounding = 4;
+    style.WindowRounding = 8;
+    style.ChildRounding = 8;
+    style.FrameRounding = 6;
     style.GrabRounding = 4;
-    style.PopupRounding = 5;
+    style.PopupRounding = 6;
     style.ScrollbarRounding = 4;
-    style.ScrollbarSize = 11;
+    style.ScrollbarSize = 16;
     style.WindowBorderSize = 0;
     style.ChildBorderSize = 0;
     style.PopupBorderSize = 1;
-    style.FramePadding = {7, 3.5f};
-    style.ItemSpacing = {7, 5};
-    style.ItemInnerSpacing = {6, 4};
-    style.WindowPadding = {10, 9};
-    style.CellPadding = {5, 2};
-    style.GrabMinSize = 9;
+    style.FramePadding = {10, 7};
+    style.ItemSpacing = {8, 6};
+    style.ItemInnerSpacing = {8, 4};
+    style.WindowPadding = {12, 12};
+    style.CellPadding = {5, 3};
+    style.GrabMinSize = 12;
     style.ScaleAllSizes(scale);
     ImVec4* c = style.Colors;
     c[ImGuiCol_Text] = colour_of(colour::kText);
     c[ImGuiCol_TextDisabled] = colour_of(colour::kDim);
-    c[ImGuiCol_WindowBg] = colour_of(colour::rgba(12, 15, 19));
+    c[ImGuiCol_WindowBg] = colour_of(colour::kPanel);
     c[ImGuiCol_ChildBg] = colour_of(colour::kPanel);
-    c[ImGuiCol_PopupBg] = colour_of(colour::rgba(26, 31, 38), 0.98f);
-    c[ImGuiCol_Border] = colour_of(colour::rgba(52, 61, 72));
-    c[ImGuiCol_FrameBg] = colour_of(colour::rgba(36, 43, 52));
-    c[ImGuiCol_FrameBgHovered] = colour_of(colour::rgba(46, 55, 66));
-    c[ImGuiCol_FrameBgActive] = colour_of(colour::rgba(52, 64, 78));
-    c[ImGuiCol_Button] = colour_of(colour::rgba(40, 49, 60));
-    c[ImGuiCol_ButtonHovered] = colour_of(colour::rgba(52, 66, 80));
-    c[ImGuiCol_ButtonActive] = colour_of(colour::rgba(38, 104, 124));
-    c[ImGuiCol_Header] = colour_of(colour::rgba(34, 42, 51));
-    c[ImGuiCol_HeaderHovered] = colour_of(colour::rgba(42, 54, 66));
-    c[ImGuiCol_HeaderActive] = colour_of(colour::rgba(44, 62, 76));
-    c[ImGuiCol_SliderGrab] = colour_of(colour::kAccent, 0.85f);
+    c[ImGuiCol_PopupBg] = colour_of(colour::kRaised);
+    c[ImGuiCol_Border] = colour_of(colour::kLine);
+    c[ImGuiCol_FrameBg] = colour_of(colour::kControl);
+    c[ImGuiCol_FrameBgHovered] = colour_of(colour::kControlHover);
+    c[ImGuiCol_FrameBgActive] = colour_of(colour::kControlPressed);
+    c[ImGuiCol_TitleBg] = colour_of(colour::kRaised);
+    c[ImGuiCol_TitleBgActive] = colour_of(colour::kRaised);
+    c[ImGuiCol_Button] = colour_of(colour::kControl);
+    c[ImGuiCol_ButtonHovered] = colour_of(colour::kControlHover);
+    c[ImGuiCol_ButtonActive] = colour_of(colour::kControlPressed);
+    c[ImGuiCol_Header] = colour_of(colour::kChosen);
+    c[ImGuiCol_HeaderHovered] = colour_of(colour::kControlHover);
+    c[ImGuiCol_HeaderActive] = colour_of(colour::kControlPressed);
+    c[ImGuiCol_SliderGrab] = colour_of(colour::kText);
     c[ImGuiCol_SliderGrabActive] = colour_of(colour::kAccent);
     c[ImGuiCol_CheckMark] = colour_of(colour::kAccent);
-    c[ImGuiCol_Separator] = colour_of(colour::rgba(44, 52, 62));
+    c[ImGuiCol_Separator] = colour_of(colour::kLine);
     c[ImGuiCol_NavHighlight] = colour_of(colour::kAccent);
     c[ImGuiCol_PlotHistogram] = colour_of(colour::kAccent);
     c[ImGuiCol_PlotLines] = colour_of(colour::kAccent);
-    c[ImGuiCol_ModalWindowDimBg] = colour_of(colour::rgba(0, 0, 0), 0.6f);
-    c[ImGuiCol_TableHeaderBg] = colour_of(colour::rgba(30, 36, 44));
-    c[ImGuiCol_ScrollbarBg] = colour_of(colour::kPanel, 0.4f);
+    c[ImGuiCol_ModalWindowDimBg] = colour_of(colour::kPicture, 0.6f);
+    c[ImGuiCol_TableHeaderBg] = colour_of(colour::kRaised);
+    c[ImGuiCol_ScrollbarBg] = colour_of(colour::kPanel);
     ImGui::GetStyle() = style;
 }
 

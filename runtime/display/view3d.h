@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The small 3-D view: translucent skin, probe, scan plane with the live picture on it, needle,
-// targets. All calls belong to the thread of the window.
+// The 3-D view: translucent skin, organs and bones in their colours, probe, scan plane with the
+// live picture on it, needle, targets. All calls belong to the thread of the window.
 #pragma once
 
 #include <memory>
@@ -27,7 +27,10 @@ struct View3dInput {
     bool show_targets = true;
     std::vector<bool> targets_reached;  // # targets
     std::vector<Point3>
-        target_centres;  // # targets, `mannequin` frame; empty: as the exercise has them
+        target_centres;        // # targets, `mannequin` frame; empty: as the exercise has them
+    bool exam = false;         // the skin hides what is inside
+    std::vector<Point3> path;  // of the tip so far, `mannequin` frame; drawn as a line
+    std::vector<Point3> best;  // the way to compare it with; drawn dotted
 };
 
 struct ViewRay {  // `mannequin` frame
@@ -42,26 +45,35 @@ class View3d {
     View3d(const View3d&) = delete;
     View3d& operator=(const View3d&) = delete;
 
-    // A new skin. set_exercise() follows.
+    // A new skin; set_exercise() follows. Organs are made on a thread of their own, so that the
+    // first picture does not wait; the bundle must outlive that: until leave_case() or another
+    // case.
     void set_case(const CaseBundle& bundle);
+    void leave_case();
+    bool busy() const;  // organs are still being made
+    bool& shows_organs() { return shows_organs_; }
     // New tools, and a new home view: the probe points down, the long axis of the body runs across.
     void set_exercise(const Exercise& exercise);
     Orbit& orbit() { return orbit_; }
-    void home() { orbit_ = {}; }
+    void home() { orbit_ = first_; }
     // Where to look from; from outside if the tool is not there.
     ViewFrom& from() { return from_; }
 
     // Draws at width x height pixels and returns the texture for ImGui::Image, whose v runs
     // upwards.
     void* draw(int width_px, int height_px, const View3dInput& input);
+    // The same from outside at the first view, for another display: into a texture of its own, and
+    // without any change to ray(), orbit() and from().
+    void* draw_for_other(int width_px, int height_px, const View3dInput& input);
     // The ray through the pixel (x, y), from the top left, of the last picture.
     ViewRay ray(double x_px, double y_px) const;
 
   private:
     struct Impl;
     std::unique_ptr<Impl> impl_;
-    Orbit orbit_;
+    Orbit orbit_, first_;  // first_: of the exercise
     ViewFrom from_ = ViewFrom::outside;
+    bool shows_organs_ = true;
 };
 
 }  // namespace sonocase::runtime

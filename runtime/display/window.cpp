@@ -19,7 +19,9 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/display/key_taps.h"
 #include "runtime/display/theme.h"
+#include "runtime/display/window_native.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -30,14 +32,16 @@ void on_glfw_error(int, const char* text) {
     g_glfw_error = text ? text : "";
 }
 
-// Keys that went down since the last picture. A tap that is over before the next picture would
-// otherwise be lost: its key is held down for that one picture. GLFW calls back without context.
-std::array<bool, GLFW_KEY_LAST + 1> g_tapped{};
+KeyTaps<GLFW_KEY_LAST + 1> g_taps;  // GLFW calls back without context
 
 void on_key(GLFWwindow* window, int key, int scancode, int action, int modifiers) {
-    if (action == GLFW_PRESS && key >= 0 && key <= GLFW_KEY_LAST)
-        g_tapped[static_cast<std::size_t>(key)] = true;
+    if (action == GLFW_PRESS) g_taps.press(key);
     ImGui_ImplGlfw_KeyCallback(window, key, scancode, action, modifiers);
+}
+
+std::string g_dropped;  // GLFW calls back without context
+void on_drop(GLFWwindow*, int count, const char** paths) {
+    if (count > 0) g_dropped = paths[0];
 }
 
 // Without a graphics card Mesa paints on threads of this process, one per core. One fewer leaves a
@@ -54,9 +58,6 @@ void leave_a_core_to_imaging() {
 struct Window::Impl {
     GLFWwindow* window = nullptr;
     bool imgui = false, imgui_glfw = false, imgui_gl = false;
-    float wanted_scale = 1;
-    bool rebuild = false;
-    std::vector<int> release;  // keys held down for this picture alone
     int windowed[4] = {0, 0, 0, 0};
 };
 
@@ -99,15 +100,15 @@ Result<std::unique_ptr<Window>> Window::open(const WindowOptions& options) {
         float y = 1;
         glfwGetWindowContentScale(impl.window, &scale, &y);
     }
-    window->scale_ = impl.wanted_scale = std::clamp(scale, 0.75f, 4.0f);
+    window->scale_ = window->asked_scale_ = std::clamp(scale, 0.75f, 4.0f);
     IMGUI_CHECKVERSION();
     ImGui::CreateContext();
     impl.imgui = true;
     ImGui::GetIO().IniFilename = nullptr;  // the layout is ours; settings are in the XDG folder
-    ImGui::GetIO().ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
     ImGui::GetIO().ConfigWindowsMoveFromTitleBarOnly = true;
     impl.imgui_glfw = ImGui_ImplGlfw_InitForOpenGL(impl.window, true);
     glfwSetKeyCallback(impl.window, on_key);  // calls ImGui's
+    glfwSetDropCallback(impl.window, on_drop);
     impl.imgui_gl = ImGui_ImplOpenGL3_Init("#version 330 core");
     if (!impl.imgui_glfw || !impl.imgui_gl) {
         return Error{"the OpenGL functions of the window cannot be loaded", "window",
@@ -136,6 +137,16 @@ void Window::set_title(const std::string& title) {
     glfwSetWindowTitle(impl_->window, title.c_str());
 }
 
+bool Window::key_held() const {
+    const ImGuiIO& io = ImGui::GetIO();
+    return std::any_of(std::begin(io.KeysDown), std::end(io.KeysDown), [](bool d) { return d; }) ||
+           std::any_of(std::begin(io.MouseDown), std::end(io.MouseDown), [](bool d) { return d; });
+}
+
+bool Window::typing() const {
+    return ImGui::GetIO().WantTextInput;
+}
+
 void Window::wait_events(double seconds) {
     if (seconds > 0) {
         glfwWaitEventsTimeout(seconds);
@@ -145,14 +156,25 @@ void Window::wait_events(double seconds) {
 }
 
 void Window::set_scale(float scale) {
-    impl_->wanted_scale = std::clamp(scale, 0.75f, 4.0f);
-    impl_->rebuild = impl_->rebuild || std::abs(impl_->wanted_scale - scale_) > 0.01f;
+    asked_scale_ = std::clamp(scale, 0.75f, 4.0f);
+}
+
+Window::Size Window::size() const {
+    Size size;
+    glfwGetFramebufferSize(impl_->window, &size.width_px, &size.height_px);
+    return size;
+}
+
+std::string Window::dropped_file() {
+    return std::exchange(g_dropped, {});
 }
 
 void Window::begin_frame(const InjectedInput& injected) {
-    if (impl_->rebuild) {
-        impl_->rebuild = false;
-        scale_ = impl_->wanted_scale;
+    const Size now = size();
+    const float wanted =
+        fits_ && now.width_px > 0 ? fits_(now.width_px, now.height_px, asked_scale_) : asked_scale_;
+    if (std::abs(wanted - scale_) > 0.01f) {
+        scale_ = wanted;
         ImGui_ImplOpenGL3_DestroyFontsTexture();
         apply_theme(scale_);
         ImGui_ImplOpenGL3_CreateFontsTexture();
@@ -174,39 +196,36 @@ void Window::begin_frame(const InjectedInput& injected) {
         io.KeyCtrl = injected.control;
         io.KeyAlt = injected.alt;
     }
-    std::vector<int> over;  // taps that ended before this picture
-    ImGuiIO& io = ImGui::GetIO();
-    for (int key = 0; key <= GLFW_KEY_LAST; ++key) {
-        bool& tapped = g_tapped[static_cast<std::size_t>(key)];
-        if (tapped && !io.KeysDown[key]) {
-            io.KeysDown[key] = true;
-            over.push_back(key);
-        }
-        tapped = false;
-    }
+    g_taps.hold(ImGui::GetIO().KeysDown);
     ImGui::NewFrame();
-    impl_->release = std::move(over);
 }
 
 void Window::end_frame(bool capture) {
     ImGui::Render();
-    for (const int key : impl_->release) ImGui::GetIO().KeysDown[key] = false;
-    impl_->release.clear();
+    g_taps.release(ImGui::GetIO().KeysDown);
+    paint_window(impl_->window, capture ? &capture_ : nullptr);
+}
+
+void* Window::native() const {
+    return impl_->window;
+}
+
+void paint_window(GLFWwindow* window, Window::Capture* capture) {
     int width = 0, height = 0;
-    glfwGetFramebufferSize(impl_->window, &width, &height);
+    glfwGetFramebufferSize(window, &width, &height);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glViewport(0, 0, width, height);
     // The page's colour: takes less time than a page-sized rectangle where the processor paints.
-    glClearColor(12 / 255.0f, 15 / 255.0f, 19 / 255.0f, 1);
+    glClearColor(0x0B / 255.0f, 0x0C / 255.0f, 0x0D / 255.0f, 1);
     glClear(GL_COLOR_BUFFER_BIT);
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
     if (capture) {
         // Before the swap, after which the content of the buffers is undefined.
         const std::size_t row = static_cast<std::size_t>(width) * 3;
-        std::vector<std::uint8_t>& pixels = capture_.pixels;
+        std::vector<std::uint8_t>& pixels = capture->pixels;
         pixels.resize(row * static_cast<std::size_t>(height));
-        capture_.width_px = width;
-        capture_.height_px = height;
+        capture->width_px = width;
+        capture->height_px = height;
         glPixelStorei(GL_PACK_ALIGNMENT, 1);
         glReadPixels(0, 0, width, height, GL_RGB, GL_UNSIGNED_BYTE, pixels.data());
         for (int y = 0; y < height / 2; ++y) {  // OpenGL counts rows from the bottom
@@ -216,22 +235,34 @@ void Window::end_frame(bool capture) {
             std::swap_ranges(top, top + static_cast<std::ptrdiff_t>(row), bottom);
         }
     }
-    glfwSwapBuffers(impl_->window);
+    glfwSwapBuffers(window);
 }
 
 void Window::toggle_full_screen() {
-    GLFWmonitor* monitor = glfwGetPrimaryMonitor();
-    if (!monitor) return;
-    int* old = impl_->windowed;
-    if (glfwGetWindowMonitor(impl_->window)) {
-        glfwSetWindowMonitor(impl_->window, nullptr, old[0], old[1], old[2], old[3], 0);
+    runtime::toggle_full_screen(impl_->window, impl_->windowed);
+}
+
+void toggle_full_screen(GLFWwindow* window, int windowed[4]) {
+    int* old = windowed;
+    if (glfwGetWindowMonitor(window)) {
+        glfwSetWindowMonitor(window, nullptr, old[0], old[1], old[2], old[3], 0);
         return;
     }
-    glfwGetWindowPos(impl_->window, &old[0], &old[1]);
-    glfwGetWindowSize(impl_->window, &old[2], &old[3]);
+    glfwGetWindowPos(window, &old[0], &old[1]);
+    glfwGetWindowSize(window, &old[2], &old[3]);
+    // The monitor that holds its middle.
+    GLFWmonitor* monitor = glfwGetPrimaryMonitor();
+    int count = 0;
+    GLFWmonitor** all = glfwGetMonitors(&count);
+    for (int i = 0; i < count; ++i) {
+        int x = 0, y = 0, w = 0, h = 0;
+        glfwGetMonitorWorkarea(all[i], &x, &y, &w, &h);
+        const int across = old[0] + old[2] / 2 - x, down = old[1] + old[3] / 2 - y;
+        if (across >= 0 && across < w && down >= 0 && down < h) monitor = all[i];
+    }
+    if (!monitor) return;
     const GLFWvidmode* mode = glfwGetVideoMode(monitor);
-    glfwSetWindowMonitor(impl_->window, monitor, 0, 0, mode->width, mode->height,
-                         mode->refreshRate);
+    glfwSetWindowMonitor(window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
 }
 
 int key_code(const std::string& name) {

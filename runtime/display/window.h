@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -41,6 +42,9 @@ class Window {
 
     bool should_close() const;
     void request_close();
+    // Whether a key or a button is held, and whether a text field has a cursor.
+    bool key_held() const;
+    bool typing() const;
     // Waits for input for at most so long; 0 does not wait.
     void wait_events(double seconds);
     // Begin and end one picture; it shows what is drawn with ImGui between the two.
@@ -54,17 +58,31 @@ class Window {
     };
     const Capture& captured() const { return capture_; }
 
-    float scale() const { return scale_; }  // of fonts and sizes; 1 is for 1280 x 720
-    void set_scale(float scale);            // takes effect with the next picture
+    // Of fonts and sizes; 1 is for 1280 x 720. As asked, or less where the window is too small.
+    float scale() const { return scale_; }
+    float asked_scale() const { return asked_scale_; }
+    void set_scale(float scale);  // takes effect with the next picture
+    // What fits a window of this size out of what is asked; called for every picture.
+    void set_fitting_scale(std::function<float(int width_px, int height_px, double asked)> fits) {
+        fits_ = std::move(fits);
+    }
+    // A file that was dropped on the window since the last call; empty: none.
+    std::string dropped_file();
+    struct Size {
+        int width_px = 0, height_px = 0;
+    };
+    Size size() const;
     void toggle_full_screen();
     void set_title(const std::string& title);
+    void* native() const;  // GLFW's window, for second_window.cpp
 
     struct Impl;
 
   private:
     Window() = default;
     std::unique_ptr<Impl> impl_;
-    float scale_ = 1;
+    float scale_ = 1, asked_scale_ = 1;
+    std::function<float(int, int, double)> fits_;
     Capture capture_;
 };
 

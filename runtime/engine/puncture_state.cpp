@@ -57,6 +57,7 @@ PunctureReport PunctureState::update(double time_s,
     needle_.move_to(depth_mm > 0 ? depth_mm : -kBeforeSkin_mm, {&line, Line::index, Line::layer});
     PunctureReport report;
     report.tent_mm = needle_.tent_mm();
+    report.drag_mm = needle_.drag_mm();
     report.force_n = needle_.force_n();
     report.label = needle_.tip_layer();
     const int first = std::max(0, needle_.event_count() - PunctureReport::kMostEvents);

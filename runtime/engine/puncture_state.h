@@ -19,6 +19,7 @@ namespace sonocase::runtime {
 // Of a frame.
 struct PunctureReport {
     double tent_mm = 0;  // by which the layer before the tip is dented
+    double drag_mm = 0;  // by which tissue is dragged along the shaft
     double force_n = 0;  // on the tip, along the needle
     int label = 0;       // that the tip is in: punctured, not only dented
     static constexpr int kMostEvents = 4;
@@ -35,7 +36,7 @@ class PunctureState {
     PunctureState(const CaseBundle& bundle, const NeedleModel& needle);
     void reset() { needle_.reset(); }
 
-    // The drawn needle of a frame that the renderer has just drawn. depth_mm: inserted length, 0
+    // The needle of a frame for which the renderer has settled. depth_mm: inserted length, 0
     // outside. Cost: one look-up per 0.05 mm of advance, 2 us each while tissue is pressed.
     PunctureReport update(double time_s,
                           Point3 tip,

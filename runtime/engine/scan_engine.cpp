@@ -101,6 +101,18 @@ void ScanEngine::observe(const TrackerReading& reading, bool is_device) {
     tools_ = tools;
 }
 
+void add_probe_motion(const FrameInput& before, FrameInput& input) {
+    const double seconds = input.time_s - before.time_s;
+    if (!(seconds > 1e-4 && seconds < 0.5) || input.frame != before.frame + 1) return;
+    const Rigid &was = before.mannequin_from_probe, &is = input.mannequin_from_probe;
+    input.probe_mm_s = (is.translation - was.translation) / seconds;
+    // Small angles: the axis of R2 R1^T is half of its antisymmetric part.
+    const Matrix3 turn = is.rotation * transpose(was.rotation);
+    input.probe_rad_s =
+        Vector3{turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0), turn(1, 0) - turn(0, 1)} /
+        (2 * seconds);
+}
+
 FrameStatus ScanEngine::frame(double now_s,
                               const ImageSettings& settings,
                               std::span<std::uint8_t> pixels) {
@@ -120,6 +132,7 @@ FrameStatus ScanEngine::frame(double now_s,
     input.time_s = time_s;
     input.frame = frame_++;
     input.settings = settings;
+    if (settings.doppler.mode != DopplerMode::off) add_probe_motion(last_.input, input);
     if (force_watch_.present()) {
         if (force_watch_.fresh())
             sensed_press_mm_ = renderer_.press_mm_for(input.mannequin_from_probe,
@@ -127,11 +140,18 @@ FrameStatus ScanEngine::frame(double now_s,
         force_watch_.taken();
         input.settings.press_mm = sensed_press_mm_;
     }
-    const FrameStatus drawn = renderer_.render(input, pixels);
+    renderer_.settle(input);
     record.press = renderer_.press();
-    if (tools_.has_needle)
+    if (tools_.has_needle) {
         record.puncture = puncture_.update(time_s, input.needle.tip, input.needle.direction,
                                            record.needle.depth_mm, *anatomy_, renderer_);
+        // Tissue yields to what is inserted.
+        if (record.needle.depth_mm > 0) {
+            input.needle.tent_mm = record.puncture.tent_mm;
+            input.needle.drag_mm = record.puncture.drag_mm;
+        }
+    }
+    const FrameStatus drawn = renderer_.render(input, pixels);
     const FrameStatus status = finish(input, drawn, pixels);
     record.skin_not_fitted =
         status == FrameStatus::rendered &&

@@ -24,6 +24,7 @@
 #include "runtime/engine/skin.h"
 #include "runtime/engine/skin_fit.h"
 #include "runtime/engine/tracker_reading.h"
+#include "runtime/imaging/frame/doppler_report.h"
 #include "runtime/imaging/renderer.h"
 
 namespace sonocase::runtime {
@@ -61,6 +62,7 @@ struct FrameRecord {
     NeedleView needle;  // as drawn, after the bend constraint
     PressReport press;  // what the probe does to the tissue
     PunctureReport puncture;
+    DopplerReport doppler;  // of the Doppler view beside the engine, where there is one
     double reading_time_s = 0;
     bool skin_not_fitted = false;  // the probe touches skin that no reading lies near
 };
@@ -74,6 +76,10 @@ struct EngineOptions {
 // True if the probe's face touches the skin somewhere: the body lies within 4 mm, which gel
 // bridges, of one of five points across the face. Constant time.
 bool probe_in_contact(const Skin& skin, const Probe& probe, const Rigid& mannequin_from_probe);
+
+// Fills in the probe's motion since the frame before, which Doppler modes show; none across a gap
+// or at the first frame.
+void add_probe_motion(const FrameInput& before, FrameInput& input);
 
 class ScanEngine {
   public:

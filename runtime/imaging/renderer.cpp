@@ -12,8 +12,7 @@
 #include "runtime/imaging/host/pass_timer.h"
 #include "runtime/imaging/paper/paper_formation.h"
 #include "runtime/imaging/physical/physical_formation.h"
-#include "runtime/imaging/press/press_bundle.h"
-#include "runtime/imaging/press/press_plane.h"
+#include "runtime/imaging/press/probe_press.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -113,55 +112,6 @@ int row_of_effect(const ImageModelInfo& info, std::string_view name) {
     return -1;
 }
 
-// A face this far below the resting skin touches it and does not press yet: gel, and a voxel, since
-// a bundle knows its skin no better, and poses are snapped to it.
-constexpr double kTouch_mm = 1;
-constexpr double kMostPress_mm = 40;
-
-// The probe on the body of the bundle (effect deformation). A pose that stays is solved once. The
-// field is solved for a face kTouch_mm further out and holds for the face itself, so that pressing
-// begins without a step.
-class Pressing {
-  public:
-    Pressing(const CaseBundle& bundle, const Exercise& exercise, SimdTarget simd)
-        : body_(bundle, {exercise.deformation.venous_pressure_mmhg}),
-          field_(press::press_face(exercise.probe)),
-          simd_(simd) {
-        options_.stiffness_scale = exercise.deformation.stiffness_scale;
-    }
-
-    void at(const Rigid& pose) {
-        if (solved_ && pose == pose_) return;
-        Rigid touching = pose;
-        touching.translation = touching.translation - kTouch_mm * pose.rotation.column(2);
-        field_.press(simd_, body_.scene(touching), options_);
-        pose_ = pose;
-        solved_ = true;
-        const press::PressState& s = field_.state();
-        report_ = {
-            true,         s.vein_open, s.pressed,     s.force_n, s.pressed ? s.pressure_kpa : 0,
-            s.deepest_mm, s.excess_mm, s.out_of_reach};
-    }
-    double force_at(Rigid pose, double deeper_mm) {
-        pose.translation = pose.translation + deeper_mm * pose.rotation.column(2);
-        at(pose);
-        return report_.force_n;
-    }
-    const press::PressField* pressed() const { return field_.state().pressed ? &field_ : nullptr; }
-    const press::PressField& field() const { return field_; }
-    const PressReport& report() const { return report_; }
-    const Rigid& pose() const { return pose_; }
-
-  private:
-    press::PressBundle body_;
-    press::PressField field_;
-    SimdTarget simd_;
-    press::PressOptions options_;
-    Rigid pose_;
-    bool solved_ = false;
-    PressReport report_;
-};
-
 // The needle in the probe's frame; false if there is none to draw.
 bool needle_shown(const FrameInput& input, const NeedleModel& model, NeedleShape& needle) {
     const Vector3 d = input.needle.direction;
@@ -197,8 +147,9 @@ struct Renderer::Impl {
     RenderOptions options;
     NeedleModel needle;  // as the model draws it
     EffectChoice effects;
-    int deformation = -1;             // row of the effect
-    std::unique_ptr<Pressing> probe;  // null: the effect is off
+    int deformation = -1;                      // row of the effect
+    std::unique_ptr<press::ProbePress> probe;  // null: the effect is off
+    PressReport press;                         // of the last frame
     Rigid shown_pose;
     std::vector<Level> levels;  // finest first; one without a frame budget
     Governor governor;
@@ -232,9 +183,9 @@ Result<Renderer> Renderer::create(CaseView bundle,
     for (const char* name : info.effects) m.costs.push_back({name, 0, false, ""});
     m.deformation = row_of_effect(info, "deformation");
     if (m.deformation >= 0 && m.effects.on[static_cast<std::size_t>(m.deformation)])
-        m.probe = std::make_unique<Pressing>(*bundle, exercise, *simd);
+        m.probe = std::make_unique<press::ProbePress>(*bundle, exercise, *simd);
     const int lines = options.scanlines > 0 ? options.scanlines : info.scanlines;
-    const int samples = options.samples > 0 ? options.samples : info.samples;
+    const int samples = options.samples > 0 ? options.samples : info.samples(exercise, options);
     Result<std::unique_ptr<ImageFormation>> formation =
         info.create({bundle,
                      m.exercise,
@@ -270,22 +221,18 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
     set_gain(input.settings, level.row_gain_db);
     PassTimer timer(m.options.host.clock);
     FrameInput held = input;
-    const press::PressField* pressed = nullptr;
-    if (m.probe) {
-        Rigid pose = input.mannequin_from_probe;
-        const Vector3 inwards = pose.rotation.column(2);
-        const double deeper = input.settings.press_mm;
-        if (deeper > 0)
-            pose.translation = pose.translation + std::min(deeper, kMostPress_mm) * inwards;
-        m.probe->at(pose);
-        pressed = m.probe->pressed();
-        pose.translation = pose.translation - m.probe->report().excess_mm * inwards;
-        held.mannequin_from_probe = pose;
-    }
-    m.shown_pose = held.mannequin_from_probe;
+    settle(input);
+    held.mannequin_from_probe = m.shown_pose;
     const double press_ms = timer.lap_ms();
     NeedleShape needle;
     const bool shown = needle_shown(held, m.needle, needle);
+    const press::PressField* pressed = nullptr;
+    if (m.probe) {
+        const NeedlePose& in = input.needle;
+        m.probe->dent(shown ? bounded_dent(needle.tip, needle.axis, in.tent_mm, in.drag_mm)
+                            : NeedleDent{});
+        pressed = m.probe->moving();
+    }
     const FrameRequest request{held, shown ? &needle : nullptr, pressed, level.row_gain_db};
     if (m.options.kind == RendererKind::reference) {
         m.formation->render_reference(request, pixels, m.costs);
@@ -300,9 +247,17 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
     return status;
 }
 
+void Renderer::settle(const FrameInput& input) {
+    Impl& m = *impl_;
+    if (!valid_pose(input.mannequin_from_probe)) return;
+    m.shown_pose = input.mannequin_from_probe;
+    if (!m.probe) return;
+    m.shown_pose = m.probe->at(input.mannequin_from_probe, input.settings.press_mm);
+    m.press = m.probe->report();
+}
+
 const PressReport& Renderer::press() const {
-    static const PressReport nothing;
-    return impl_->probe ? impl_->probe->report() : nothing;
+    return impl_->press;
 }
 
 const Rigid& Renderer::shown_pose() const {
@@ -311,39 +266,19 @@ const Rigid& Renderer::shown_pose() const {
 
 double Renderer::press_mm_for(const Rigid& pose, double force_n, double start_mm) {
     if (!impl_->probe || !(force_n > 0) || !valid_pose(pose)) return 0;
-    // Force grows about as the square of depth: between bounds, by the roots of their forces.
-    double low = 0, high = kMostPress_mm, at = std::clamp(start_mm, 0.5, 30.0);
-    double low_n = 0, high_n = -1;
-    for (int step = 0; step < 6; ++step) {
-        const double n = impl_->probe->force_at(pose, at);
-        if (std::abs(n - force_n) < 0.02 * force_n) break;
-        (n < force_n ? low : high) = at;
-        (n < force_n ? low_n : high_n) = n;
-        if (high_n < 0) {
-            at = std::min(2 * at + 1, 0.5 * (at + kMostPress_mm));
-        } else {
-            const double a = std::sqrt(low_n), b = std::sqrt(high_n), f = std::sqrt(force_n);
-            at = low + (high - low) * std::clamp((f - a) / std::max(b - a, 1e-9), 0.05, 0.95);
-        }
-    }
-    return at;
+    return impl_->probe->press_mm_for(pose, force_n, start_mm);
 }
 
 Point3 Renderer::at_rest(Point3 now) const {
-    if (!press().pressed) return now;
-    const Rigid& pose = impl_->probe->pose();
-    return pose * impl_->probe->field().pull_back(inverse(pose) * now);
+    return impl_->probe ? impl_->probe->at_rest(now) : now;
 }
 
 Point3 Renderer::now_at(Point3 rest) const {
-    if (!press().pressed) return rest;
-    const Rigid& pose = impl_->probe->pose();
-    return pose * impl_->probe->field().push_forward(inverse(pose) * rest);
+    return impl_->probe ? impl_->probe->now_at(rest) : rest;
 }
 
 bool Renderer::shut(Point3 rest) const {
-    if (!press().pressed) return false;
-    return impl_->probe->field().closed(inverse(impl_->probe->pose()) * rest);
+    return impl_->probe && impl_->probe->shut(rest);
 }
 
 std::span<const EffectCost> Renderer::costs() const {

@@ -39,6 +39,11 @@ class Renderer {
     // 512 x 512 pixels; the reference renderer takes seconds.
     FrameStatus render(const FrameInput& input, std::span<std::uint8_t> pixels);
 
+    // Presses the probe as render() of this input will, so that at_rest(), now_at(), shut() and
+    // press() already speak of that frame: a needle finds its layers before it is drawn. render()
+    // does not solve again. A pose that is not rigid changes nothing.
+    void settle(const FrameInput& input);
+
     // Of the last frame: one per effect of the model, in order of execution.
     std::span<const EffectCost> costs() const;
 

@@ -2,6 +2,9 @@
 
 #include "runtime/needle/needle_shift.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "formats/base/falling_exponential.h"
 
 namespace sonocase::runtime {
@@ -17,6 +20,22 @@ Vector3 zone_shift(const NeedleZone& zone, double strength_mm, Point3 p) {
 
 Vector3 needle_shift(double tent_mm, double drag_mm, Point3 needle) {
     return zone_shift(kTentZone, tent_mm, needle) + zone_shift(kDragZone, drag_mm, needle);
+}
+
+NeedleDent bounded_dent(Point3 tip, Vector3 axis, double tent_mm, double drag_mm) {
+    if (!std::isfinite(tent_mm) || !std::isfinite(drag_mm)) return {tip, axis};
+    return {tip, axis, std::clamp(tent_mm, 0.0, kMostTent_mm),
+            std::clamp(drag_mm, -kMostDrag_mm, kMostDrag_mm)};
+}
+
+Vector3 dent_shift(const NeedleDent& dent, Point3 p) {
+    const Vector3 q = p - dent.tip;
+    if (!(dot(q, q) < kDentReach_mm * kDentReach_mm)) return {};
+    const double along = dot(q, dent.axis);
+    const Vector3 beside = q - along * dent.axis;
+    const double rho = norm(beside);
+    const Vector3 u = needle_shift(dent.tent_mm, dent.drag_mm, {rho, 0, along});
+    return rho > 0 ? u.z * dent.axis + (u.x / rho) * beside : u.z * dent.axis;
 }
 
 }  // namespace sonocase::runtime

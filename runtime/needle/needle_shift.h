@@ -33,4 +33,21 @@ Vector3 zone_shift(const NeedleZone& zone, double strength_mm, Point3 needle);
 // Shift of the tissue that is now at a point: it lay at rest at the point less this.
 Vector3 needle_shift(double tent_mm, double drag_mm, Point3 needle);
 
+// A needle that moves tissue, in any frame.
+struct NeedleDent {
+    Point3 tip;
+    Vector3 axis;  // unit, from hub to tip
+    double tent_mm = 0, drag_mm = 0;
+    bool moves() const { return tent_mm != 0 || drag_mm != 0; }
+};
+
+// With what is not finite as nothing, and the rest within its limits.
+NeedleDent bounded_dent(Point3 tip, Vector3 axis, double tent_mm, double drag_mm);
+
+// Nothing moves further from the tip than this, by more than 0.002 mm.
+inline constexpr double kDentReach_mm = 16;
+
+// Shift of the tissue that is now at a point of the dent's frame.
+Vector3 dent_shift(const NeedleDent& dent, Point3 p);
+
 }  // namespace sonocase::runtime

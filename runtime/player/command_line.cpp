@@ -22,6 +22,96 @@ std::vector<std::string> split(const std::string& list) {
     return names;
 }
 
+// The options of the Doppler modes.
+struct DopplerOptions {
+    void add(CLI::App& app, PlayerArguments& arguments) {
+        DopplerSettings& doppler = arguments.doppler;
+        app.add_option("--mode", mode,
+                       "What is shown: b, colour, power, pw (spectral) or m (M-mode)")
+            ->check(CLI::IsMember({"b", "colour", "power", "pw", "m", "mmode"}))
+            ->group("Doppler");
+        app.add_option(
+               "--box", box,
+               "Colour box LEFT,RIGHT,TOP,BOTTOM: parts of the face and depths in mm; default: "
+               "round the widest vessel of the first frame")
+            ->expected(4)
+            ->delimiter(',')
+            ->group("Doppler");
+        app.add_option(
+               "--gate", gate,
+               "Spectral gate or M-line LINE,DEPTH,LENGTH: part of the face, mm; default: the "
+               "widest vessel of the first frame, with the cursor along it")
+            ->expected(3)
+            ->delimiter(',')
+            ->group("Doppler");
+        angle = app.add_option("--angle", doppler.angle_deg,
+                               "Angle cursor, degrees; default: along the vessel of the gate")
+                    ->check(CLI::Range(-80.0, 80.0))
+                    ->group("Doppler");
+        steer = app.add_option("--steer", doppler.steer_deg,
+                               "Steering of a linear probe's lines, degrees; default: 20 to the "
+                               "side where the vessel's angle is least")
+                    ->check(CLI::Range(-30.0, 30.0))
+                    ->group("Doppler");
+        app.add_option("--scale", doppler.scale_cm_s, "Nyquist velocity of the colour box, cm/s")
+            ->check(CLI::Range(1.0, 500.0))
+            ->group("Doppler");
+        app.add_option("--spectral-scale", doppler.spectral_scale_cm_s,
+                       "Nyquist velocity of the spectrum, cm/s")
+            ->check(CLI::Range(1.0, 1000.0))
+            ->group("Doppler");
+        app.add_option("--baseline", doppler.baseline, "Shift of velocity 0, part of the scale")
+            ->check(CLI::Range(-0.9, 0.9))
+            ->group("Doppler");
+        app.add_option("--wall-filter", doppler.wall_filter, "Cut-off, part of the scale")
+            ->check(CLI::Range(0.0, 0.5))
+            ->group("Doppler");
+        app.add_option("--doppler-gain", doppler.gain_db, "dB")
+            ->check(CLI::Range(-30.0, 30.0))
+            ->group("Doppler");
+        app.add_option("--priority", doppler.priority, "Grey above this part of white stays grey")
+            ->check(CLI::Range(0.0, 1.0))
+            ->group("Doppler");
+        app.add_option("--ensemble", doppler.ensemble, "Pulses of a colour line")
+            ->check(CLI::Range(4, 16))
+            ->group("Doppler");
+        app.add_option("--diameter", doppler.diameter_mm,
+                       "Of the vessel as measured, mm, for volume flow")
+            ->check(CLI::Range(0.1, 60.0))
+            ->group("Doppler");
+        app.add_option("--sound", arguments.sound,
+                       "Headless: WAV file for the sound of the spectrum")
+            ->group("Doppler");
+    }
+    void take(PlayerArguments& arguments) const {
+        DopplerSettings& doppler = arguments.doppler;
+        doppler.mode = mode == "colour"  ? DopplerMode::colour
+                       : mode == "power" ? DopplerMode::power
+                       : mode == "pw"    ? DopplerMode::spectral
+                       : mode == "b"     ? DopplerMode::off
+                                         : DopplerMode::m_mode;
+        arguments.box_given = box.size() == 4;
+        if (arguments.box_given) {
+            doppler.box_left = box[0];
+            doppler.box_right = box[1];
+            doppler.box_top_mm = box[2];
+            doppler.box_bottom_mm = box[3];
+        }
+        arguments.gate_given = gate.size() == 3;
+        arguments.angle_given = angle->count() > 0;
+        arguments.steer_given = steer->count() > 0;
+        if (arguments.gate_given) {
+            doppler.gate_line = gate[0];
+            doppler.gate_depth_mm = gate[1];
+            doppler.gate_mm = gate[2];
+        }
+    }
+
+    std::string mode = "b";
+    std::vector<double> box, gate;
+    CLI::Option *angle = nullptr, *steer = nullptr;
+};
+
 }  // namespace
 
 int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exit_now) {
@@ -93,6 +183,8 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
                    "exercise's")
         ->check(CLI::Range(0.0, 40.0))
         ->group("Picture");
+    DopplerOptions doppler;
+    doppler.add(app, arguments);
     app.add_option("--threads", arguments.threads, "Rendering threads")
         ->check(CLI::Range(1, 256))
         ->group("Picture");
@@ -100,6 +192,12 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         "--serve", arguments.serve,
         "OpenIGTLink server [ADDRESS:]PORT that sends IMAGE and TRANSFORM; loopback unless "
         "an address is given");
+    app.add_option("--serve-poses", arguments.serve_poses,
+                   "WebSocket server [ADDRESS:]PORT that sends probe and needle to pages; its "
+                   "address, with a token, is printed. Loopback unless an address is given");
+    app.add_flag("--instructor", arguments.instructor,
+                 "A second window for the instructor: target, names, marks and tracker, in exams "
+                 "too");
     app.add_option("--ui-scale", arguments.ui_scale, "Size of text and controls; 1 is for 1280x720")
         ->check(CLI::Range(0.75, 4.0));
     app.add_option("--screenshot", arguments.screenshot, "Save the window's last picture as PNG")
@@ -131,6 +229,7 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         arguments.height_px = h;
     }
     arguments.effects = split(effects);
+    doppler.take(arguments);
     return 0;
 }
 

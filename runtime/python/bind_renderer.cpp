@@ -3,18 +3,17 @@
 #include <pybind11/stl.h>
 
 #include <atomic>
-#include <limits>
 #include <optional>
 
 #include "bindings.h"
+#include "doppler_values.h"
 #include "formats/files/machine_file.h"
+#include "frame_arguments.h"
 #include "frame_renderer.h"
 #include "truth_values.h"
 
 namespace sonocase::python {
 namespace {
-
-using Bytes = py::array_t<std::uint8_t, py::array::c_style>;
 
 // One at a time: raises where another thread is inside.
 class Turn {
@@ -41,17 +40,26 @@ class PyRenderer {
     py::ssize_t width() const { return renderer_->options().width_px; }
     py::ssize_t height() const { return renderer_->options().height_px; }
     bool contact() const { return contact_; }
+    py::dict press() const { return press_of(press_); }
 
     py::object render(py::handle pose,
                       py::handle needle,
                       double time_s,
                       std::int64_t frame,
                       double gain_db,
-                      const py::object& out) {
+                      double press_mm,
+                      py::handle dent,
+                      const py::object& out,
+                      const std::string& mode,
+                      const py::dict& doppler) {
         FrameTask task;
         task.input.mannequin_from_probe = rigid_from(pose, "pose");
         set_needle(needle, task.input);
         set_scalars(time_s, frame, gain_db, task.input);
+        set_press(press_mm, task.input);
+        set_dent(dent, task.input, "dent");
+        mode_ = doppler_mode(mode);
+        if (mode_ != runtime::DopplerMode::off) return render_doppler(task, doppler, out);
         py::object picture = out.is_none() ? py::object(Bytes({height(), width()}))
                                            : checked_out(out, {height(), width()});
         task.pixels = {static_cast<Bytes&>(picture).mutable_data(),
@@ -64,8 +72,23 @@ class PyRenderer {
         }
         check(usable(renderer_->opened()));
         contact_ = task.status != runtime::FrameStatus::no_contact;
+        press_ = task.press;
         last_ = task.input;
         return picture;
+    }
+
+    // Box, gate and cursor on the widest vessel of a plane.
+    py::dict aimed(py::handle pose) {
+        const Turn turn(busy_);
+        check(usable(renderer_->opened()));
+        check(renderer_->prepare_doppler());
+        return aim_of(renderer_->aimed(rigid_from(pose, "pose"), {}, true));
+    }
+
+    py::dict doppler() const {
+        if (mode_ == runtime::DopplerMode::off)
+            throw std::runtime_error("renderer: the last frame was of no Doppler mode");
+        return measures_of(renderer_->doppler(), mode_, renderer_->opened().bundle->labels);
     }
 
     // The last frame's: (planes, facts).
@@ -91,11 +114,15 @@ class PyRenderer {
                             py::handle times_s,
                             std::int64_t first_frame,
                             double gain_db,
+                            const py::object& press_mm,
+                            py::handle dents,
                             const py::object& out,
                             int threads,
                             const std::optional<std::vector<std::string>>& truth) {
         if (threads < 1 || threads > 256) throw py::value_error("threads: give 1 to 256");
         std::vector<FrameTask> tasks = batch_tasks(poses, needles, times_s, first_frame, gain_db);
+        press_batch(press_mm, tasks);
+        dent_batch(dents, tasks);
         const auto count = static_cast<py::ssize_t>(tasks.size());
         py::object pictures = out.is_none() ? py::object(Bytes({count, height(), width()}))
                                             : checked_out(out, {count, height(), width()});
@@ -121,6 +148,7 @@ class PyRenderer {
         if (!value_of(*whole)) throw py::error_already_set();  // Ctrl-C, as Python's own exception
         check(usable(renderer_->opened()));
         if (!tasks.empty()) last_ = tasks.back().input;
+        if (!tasks.empty()) press_ = tasks.back().press;
         if (!truth) return pictures;
         py::list facts;
         for (const FrameTask& task : tasks)
@@ -135,72 +163,47 @@ class PyRenderer {
     }
 
   private:
-    static void set_scalars(double time_s,
-                            std::int64_t frame,
-                            double gain_db,
-                            runtime::FrameInput& input) {
-        if (!std::isfinite(time_s)) throw py::value_error("time_s: not finite");
-        if (!std::isfinite(gain_db)) throw py::value_error("gain_db: not finite");
-        if (frame < 0 || frame > std::numeric_limits<std::uint32_t>::max())
-            throw py::value_error("frame: give 0 to 2^32 - 1");
-        input.time_s = time_s;
-        input.frame = static_cast<std::uint32_t>(frame);
-        input.settings.gain_db = gain_db;
-    }
-
-    static py::object checked_out(const py::object& out, const std::vector<py::ssize_t>& shape) {
-        if (!py::isinstance<Bytes>(out))
-            throw py::type_error("out: give a C-contiguous array of dtype uint8");
-        const Bytes a = py::reinterpret_borrow<Bytes>(out);
-        bool fits = a.ndim() == static_cast<py::ssize_t>(shape.size());
-        std::string wanted;
-        for (std::size_t i = 0; i < shape.size(); ++i) {
-            fits = fits && a.shape(static_cast<py::ssize_t>(i)) == shape[i];
-            wanted += (i > 0 ? ", " : "") + std::to_string(shape[i]);
+    py::object render_doppler(FrameTask& task, const py::dict& given, const py::object& out) {
+        runtime::DopplerSettings& settings = task.input.settings.doppler;
+        const Turn turn(busy_);
+        check(usable(renderer_->opened()));
+        check(renderer_->prepare_doppler());
+        apply_doppler(given, settings);
+        const runtime::DopplerSettings aim = renderer_->aimed(
+            task.input.mannequin_from_probe, settings, !given.contains("steer_deg"));
+        py::dict places = aim_of(aim);
+        for (const auto& key : {"box_left", "box_right", "box_top_mm", "box_bottom_mm"})
+            if (gives_box(given)) places.attr("pop")(key);
+        for (const auto& key : {"gate_line", "gate_depth_mm", "gate_mm", "angle_deg"})
+            if (gives_gate(given)) places.attr("pop")(key);
+        apply_doppler(places, settings);
+        apply_doppler(given, settings);
+        settings.mode = mode_;
+        if (last_) runtime::add_probe_motion(*last_, task.input);
+        const py::ssize_t rows = runtime::doppler_rows(mode_, static_cast<int>(height()));
+        py::object picture = out.is_none() ? py::object(Bytes({rows, width(), py::ssize_t{3}}))
+                                           : checked_out(out, {rows, width(), 3});
+        std::vector<std::uint8_t> grey(static_cast<std::size_t>(width() * height()));
+        task.pixels = grey;
+        const std::span<std::uint8_t> rgb(static_cast<Bytes&>(picture).mutable_data(),
+                                          static_cast<std::size_t>(3 * width() * rows));
+        {
+            const py::gil_scoped_release free_to_run;
+            renderer_->render(task);
+            renderer_->show_doppler(task, rgb);
         }
-        if (!fits) throw py::value_error("out: give an array of shape (" + wanted + ")");
-        if (!a.writeable()) throw py::value_error("out: the array is read-only");
-        return out;
-    }
-
-    std::vector<FrameTask> batch_tasks(py::handle poses,
-                                       py::handle needles,
-                                       py::handle times_s,
-                                       std::int64_t first_frame,
-                                       double gain_db) const {
-        using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
-        const py::array a = numbers_from(poses, "poses");
-        if (a.ndim() != 3 || a.shape(1) != 4 || a.shape(2) != 4)
-            throw py::value_error("poses: give an array of shape (n, 4, 4), rigid motions in mm");
-        const Doubles rows(a);
-        std::vector<FrameTask> tasks(static_cast<std::size_t>(rows.shape(0)));
-        std::optional<Doubles> times;
-        if (!times_s.is_none()) {
-            times = Doubles(numbers_from(times_s, "times_s"));
-            if (times->ndim() != 1 || times->shape(0) != rows.shape(0))
-                throw py::value_error("times_s: give one number per pose");
-        }
-        py::sequence needle_of;
-        if (!needles.is_none()) {
-            needle_of = py::reinterpret_borrow<py::sequence>(needles);
-            if (!PySequence_Check(needles.ptr()) ||
-                py::len(needle_of) != static_cast<std::size_t>(rows.shape(0)))
-                throw py::value_error("needles: give one per pose; None for no needle");
-        }
-        for (std::size_t n = 0; n < tasks.size(); ++n) {
-            runtime::FrameInput& input = tasks[n].input;
-            input.mannequin_from_probe = rigid_from(rows.data(static_cast<py::ssize_t>(n)),
-                                                    "poses[" + std::to_string(n) + "]");
-            if (!needles.is_none()) set_needle(py::object(needle_of[n]), input);
-            set_scalars(times ? times->at(static_cast<py::ssize_t>(n)) : 0,
-                        first_frame + static_cast<std::int64_t>(n), gain_db, input);
-        }
-        return tasks;
+        check(usable(renderer_->opened()));
+        contact_ = task.status != runtime::FrameStatus::no_contact;
+        press_ = task.press;
+        last_ = task.input;
+        return picture;
     }
 
     std::unique_ptr<FrameRenderer> renderer_;
     std::atomic<bool> busy_{false};
     bool contact_ = true;
+    runtime::DopplerMode mode_ = runtime::DopplerMode::off;  // of the last frame
+    runtime::PressReport press_;
     std::optional<runtime::FrameInput> last_;
 };
 
@@ -259,16 +262,32 @@ void bind_renderer(py::module_& module) {
              "exercise's; model, machine, effects: as on sonoplay's command line, by default the "
              "exercise's; size: (width, height) in pixels; seed: of the noise.")
         .def("render", &PyRenderer::render, "pose"_a, "needle"_a = py::none(), "time_s"_a = 0.0,
-             py::kw_only(), "frame"_a = 0, "gain_db"_a = 0.0, "out"_a = py::none(),
+             py::kw_only(), "frame"_a = 0, "gain_db"_a = 0.0, "press_mm"_a = 0.0,
+             "dent"_a = py::none(), "out"_a = py::none(), "mode"_a = "b", "doppler"_a = py::dict(),
              "One frame: uint8 array (height, width). pose: mannequin_from_probe, 4 x 4, mm. "
              "needle: None, mannequin_from_needle (4 x 4; tip at the origin, z from hub to tip), "
              "or (tip, direction). time_s: drives breathing and pulse. frame: seeds the noise; "
-             "sonoplay counts 0, 1, 2, ... out: written to instead of a new array.")
+             "sonoplay counts 0, 1, 2, ... press_mm: how much deeper than its pose the probe is "
+             "pressed, 0 to 40. dent: (tent_mm, drag_mm), by which the needle pushes the layer "
+             "before its tip and drags tissue along its shaft; a player's needle has them from its "
+             "past, and its truth says them (`dent_mm`). out: written to instead of a new array. "
+             "mode: b, or colour, power, pw (spectral), m (M-mode): then an array (rows, width, 3) "
+             "of colours, with the strip of pw and m below the picture. doppler: settings of the "
+             "console by name; where box or gate are not given, they lie on the widest vessel that "
+             "the plane cuts.")
+        .def("aimed", &PyRenderer::aimed, "pose"_a,
+             "Box, gate and angle cursor on the widest vessel that a plane cuts, as `doppler` of "
+             "render() takes them: to keep them from frame to frame.")
+        .def_property_readonly("doppler", &PyRenderer::doppler,
+                               "Of the last frame's mode: a dict of what was measured in a "
+                               "spectrum and what was true there, or of a colour box's cells.")
         .def("render_batch", &PyRenderer::render_batch, "poses"_a, "needles"_a = py::none(),
              "times_s"_a = py::none(), py::kw_only(), "first_frame"_a = 0, "gain_db"_a = 0.0,
-             "out"_a = py::none(), "threads"_a = 1, "truth"_a = py::none(),
+             "press_mm"_a = 0.0, "dents"_a = py::none(), "out"_a = py::none(), "threads"_a = 1,
+             "truth"_a = py::none(),
              "Many frames: uint8 array (n, height, width). poses: (n, 4, 4). needles: a sequence "
-             "of what render() takes. Frame i has number first_frame + i. The pixels do not "
+             "of what render() takes. Frame i has number first_frame + i. press_mm: one number, or "
+             "one per pose; dents: None, or one dent or None per pose. The pixels do not "
              "depend on `threads`. truth: names of planes; then (pictures, TruthPlanes, list of "
              "facts) is returned. Ctrl-C raises KeyboardInterrupt after the frames in hand.")
         .def("truth", &PyRenderer::truth,
@@ -277,6 +296,10 @@ void bind_renderer(py::module_& module) {
              "with their areas, `targets` with their distances, the needle's `tip`, `contact`.")
         .def_property_readonly("contact", &PyRenderer::contact,
                                "Whether the probe of the last render() touched the skin.")
+        .def_property_readonly("press", &PyRenderer::press,
+                               "What the probe of the last frame did to the tissue: a dict of "
+                               "`pressed`, `force_n`, `pressure_kpa`, `deepest_mm`, `excess_mm` "
+                               "(by how much bone held it back) and `vein_open`.")
         .def_property_readonly(
             "size", [](const PyRenderer& r) { return py::make_tuple(r.width(), r.height()); })
         .def_property_readonly("exercise", [](const PyRenderer& r) { return r.inner().exercise(); })

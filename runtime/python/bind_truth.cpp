@@ -73,6 +73,14 @@ runtime::TruthPlanes TruthArrays::planes(std::size_t n, std::size_t area) const 
             plane_of<std::uint8_t>(shadowed, n, area), plane_of<float>(skin_depth_mm, n, area)};
 }
 
+py::dict press_of(const runtime::PressReport& press) {
+    return py::dict("pressed"_a = press.pressed, "force_n"_a = press.force_n,
+                    "pressure_kpa"_a = press.pressure_kpa, "deepest_mm"_a = press.deepest_mm,
+                    "excess_mm"_a = press.excess_mm,
+                    "vein_open"_a = press.vein_open >= 0 ? py::object(py::float_(press.vein_open))
+                                                         : py::object(py::none()));
+}
+
 py::dict facts_of(const runtime::FrameTruth& truth,
                   const std::vector<Label>& labels,
                   const Exercise& exercise) {
@@ -80,11 +88,12 @@ py::dict facts_of(const runtime::FrameTruth& truth,
         "time_s"_a = truth.time_s, "mannequin_from_probe"_a = array_of(truth.mannequin_from_probe),
         "contact"_a = truth.beams > 0 ? static_cast<double>(truth.beams_touching) / truth.beams : 0,
         "visible"_a = organs_of(truth, labels), "targets"_a = targets_of(truth, exercise),
-        "tip"_a = py::none());
+        "press"_a = press_of(truth.press), "tip"_a = py::none());
     if (truth.has_needle) {
         facts["tip"] =
             py::dict("probe_mm"_a = array_of(truth.tip_probe), "in_plane"_a = truth.tip_in_plane,
-                     "label"_a = truth.tip_label, "shaft_in_image_mm"_a = truth.needle_in_image_mm);
+                     "label"_a = truth.tip_label, "shaft_in_image_mm"_a = truth.needle_in_image_mm,
+                     "dent_mm"_a = py::make_tuple(truth.needle.tent_mm, truth.needle.drag_mm));
     }
     return facts;
 }

@@ -46,10 +46,33 @@ Status FrameRenderer::prepare_truth() {
     return add_truth(*workers_.front());
 }
 
+Status FrameRenderer::prepare_doppler() {
+    if (doppler_ != nullptr) return Done{};
+    auto view = runtime::DopplerView::create(opened_->bundle, exercise_, options_);
+    if (!view) return view.error();
+    doppler_ = std::make_unique<runtime::DopplerView>(std::move(*view));
+    return Done{};
+}
+
+runtime::DopplerSettings FrameRenderer::aimed(const Rigid& pose,
+                                              const runtime::DopplerSettings& settings,
+                                              bool steers) const {
+    runtime::FrameInput input;
+    input.mannequin_from_probe = pose;
+    return doppler_->aimed(input, settings, steers);
+}
+
+void FrameRenderer::show_doppler(const FrameTask& task, std::span<std::uint8_t> rgb) {
+    doppler_->frame(task.input, workers_.front()->engine.renderer(), task.pixels);
+    runtime::draw_doppler(*doppler_, task.input.settings.doppler.mode, task.pixels,
+                          options_.width_px, options_.height_px, rgb);
+}
+
 void FrameRenderer::render_with(Worker& worker, FrameTask& task) {
     runtime::FrameRecord record;
     record.input = task.input;
     task.status = worker.engine.frame_again(record, task.pixels);
+    task.press = worker.engine.renderer().press();
     if (task.wants_truth) task.truth = worker.truth->render(task.input, task.planes);
 }
 

@@ -12,6 +12,7 @@
 
 #include "opened_case.h"
 #include "runtime/engine/scan_engine.h"
+#include "runtime/imaging/doppler/view/doppler_picture.h"
 #include "runtime/imaging/truth/frame_truth.h"
 
 namespace sonocase::python {
@@ -21,6 +22,7 @@ struct FrameTask {
     runtime::FrameInput input;
     std::span<std::uint8_t> pixels;  // # width * height
     runtime::FrameStatus status = runtime::FrameStatus::rendered;
+    runtime::PressReport press;
     // Where truth is asked for.
     bool wants_truth = false;
     runtime::TruthPlanes planes;
@@ -47,6 +49,17 @@ class FrameRenderer {
                             int threads,
                             const std::function<bool()>& interrupted);
 
+    // Before the first frame of a Doppler mode. Errors: those of DopplerView::create.
+    Status prepare_doppler();
+    // Settings with box, gate and cursor on the widest vessel that this plane cuts, as sonoplay
+    // places them; after prepare_doppler().
+    runtime::DopplerSettings aimed(const Rigid& pose,
+                                   const runtime::DopplerSettings& settings,
+                                   bool steers) const;
+    // The mode of a frame that was just rendered, in colour: rgb # 3 * width * doppler_rows().
+    void show_doppler(const FrameTask& task, std::span<std::uint8_t> rgb);
+    const runtime::DopplerView& doppler() const { return *doppler_; }
+
     const OpenedCase& opened() const { return *opened_; }
     const Exercise& exercise() const { return exercise_; }
     const runtime::RenderOptions& options() const { return options_; }
@@ -70,7 +83,8 @@ class FrameRenderer {
     std::shared_ptr<OpenedCase> opened_;
     Exercise exercise_;
     runtime::RenderOptions options_;
-    std::vector<std::unique_ptr<Worker>> workers_;  // at least one
+    std::vector<std::unique_ptr<Worker>> workers_;   // at least one
+    std::unique_ptr<runtime::DopplerView> doppler_;  // of the first; null until asked for
 };
 
 }  // namespace sonocase::python

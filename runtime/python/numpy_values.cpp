@@ -105,6 +105,18 @@ void set_needle(py::handle needle, runtime::FrameInput& input) {
     input.needle.direction = pose.rotation.column(2);
 }
 
+void set_dent(py::handle dent, runtime::FrameInput& input, const char* name) {
+    if (dent.is_none()) return;
+    const py::array a = numbers_from(dent, name);
+    if (a.ndim() != 1 || a.shape(0) != 2)
+        throw py::value_error(std::string(name) + ": give two numbers, tent_mm and drag_mm");
+    const Doubles mm(a);
+    if (!std::isfinite(mm.at(0)) || !std::isfinite(mm.at(1)))
+        throw py::value_error(std::string(name) + ": not finite");
+    input.needle.tent_mm = mm.at(0);
+    input.needle.drag_mm = mm.at(1);
+}
+
 py::array_t<double> array_of(const Rigid& pose) {
     py::array_t<double> a({4, 4});
     auto m = a.mutable_unchecked<2>();

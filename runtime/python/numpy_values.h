@@ -46,6 +46,8 @@ Vector3 vector_from(py::handle value, const char* name);        // 3, not zero
 // None: no needle. 4 x 4 mannequin_from_needle (origin at the tip, z from hub to tip), or a pair
 // (tip, direction) of three numbers each.
 void set_needle(py::handle needle, runtime::FrameInput& input);
+// None: the needle moves no tissue. A pair (tent_mm, drag_mm), limited as in needle_shift.h.
+void set_dent(py::handle dent, runtime::FrameInput& input, const char* name);
 
 py::array_t<double> array_of(const Rigid& pose);  // 4 x 4
 py::array_t<double> array_of(Point3 p);

@@ -27,6 +27,9 @@ struct TruthArrays {
     runtime::TruthPlanes planes(std::size_t n, std::size_t area) const;
 };
 
+// What the probe does to the tissue; `vein_open` is None where there is no vein.
+py::dict press_of(const runtime::PressReport& press);
+
 // What is said about a frame as a whole.
 py::dict facts_of(const runtime::FrameTruth& truth,
                   const std::vector<Label>& labels,

@@ -12,6 +12,7 @@
 
 #include "formats/files/growing_sequence.h"
 #include "formats/files/recording_file.h"
+#include "formats/text/number_text.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -33,6 +34,7 @@ struct Picture {
     double time_s = 0;
     const char* why = "";
     int width_px = 0, height_px = 0;
+    Renderer::Layout layout;
     std::vector<std::uint8_t> pixels;
 };
 
@@ -92,6 +94,25 @@ struct SessionRecorder::Impl {
         state.frames_dropped = dropped.load();
     }
 
+    DopplerSample sample_of(const DopplerReport& report) const {
+        const auto name = [&](int label) {
+            return label >= 0 && label < static_cast<int>(labels.size())
+                       ? labels[static_cast<std::size_t>(label)].name
+                       : std::string();
+        };
+        DopplerSample sample;
+        for (const int label : report.coloured)
+            if (!name(label).empty()) sample.coloured.push_back(name(label));
+        sample.gate = name(report.gate_label);
+        sample.gate_fill = report.gate_fill;
+        sample.angle_deg = report.angle_deg;
+        sample.cursor_deg = report.cursor_deg;
+        sample.psv_cm_s = report.psv_cm_s;
+        sample.true_psv_cm_s = report.true_psv_cm_s;
+        sample.beats = report.beats;
+        return sample;
+    }
+
     SequenceFrame frame_of(const Record& record) const {
         const RecordedFrame& f = record.frame;
         SessionSample sample;
@@ -104,6 +125,8 @@ struct SessionRecorder::Impl {
         sample.mannequin_from_drawn = f.mannequin_from_drawn;
         sample.has_press = f.has_press;
         sample.press = f.press;
+        sample.has_doppler = f.doppler.on;
+        sample.doppler = sample_of(f.doppler);
         sample.settings.assign(f.settings.data(), ::strnlen(f.settings.data(), f.settings.size()));
         std::vector<SessionEvent> events;
         for (std::size_t i = 0; i < record.event_count; ++i) {
@@ -123,6 +146,12 @@ struct SessionRecorder::Impl {
             frame.number = picture.frame;
             frame.timestamp_s = frame.unfiltered_timestamp_s = picture.time_s;
             frame.fields = {{"Event", picture.why}};
+            if (picture.layout.mm_per_px > 0) {  // what lets a viewer measure in it
+                const Renderer::Layout& layout = picture.layout;
+                frame.fields.push_back({"MmPerPx", number_text(layout.mm_per_px)});
+                frame.fields.push_back({"OriginXPx", number_text(layout.origin_x_px)});
+                frame.fields.push_back({"OriginYPx", number_text(layout.origin_y_px)});
+            }
             pictures.frames.push_back(std::move(frame));
             const std::size_t bytes = static_cast<std::size_t>(picture.width_px) *
                                       static_cast<std::size_t>(picture.height_px);
@@ -210,7 +239,8 @@ void SessionRecorder::push_picture(std::int64_t frame,
                                    const char* why,
                                    int width_px,
                                    int height_px,
-                                   std::span<const std::uint8_t> pixels) {
+                                   std::span<const std::uint8_t> pixels,
+                                   const Renderer::Layout& layout) {
     Picture& picture = impl_->picture;
     if (picture.full.load(std::memory_order_acquire) || pixels.size() > picture.pixels.size())
         return;
@@ -219,6 +249,7 @@ void SessionRecorder::push_picture(std::int64_t frame,
     picture.why = why;
     picture.width_px = width_px;
     picture.height_px = height_px;
+    picture.layout = layout;
     std::copy(pixels.begin(), pixels.end(), picture.pixels.begin());
     picture.full.store(true, std::memory_order_release);
 }

@@ -19,6 +19,8 @@
 #include "formats/recording/session.h"
 #include "formats/scoring/session_monitor.h"
 #include "formats/volume/label_volume.h"
+#include "runtime/imaging/frame/doppler_report.h"
+#include "runtime/imaging/renderer.h"
 
 namespace sonocase::runtime {
 
@@ -30,8 +32,9 @@ struct RecordedFrame {
     Rigid mannequin_from_probe, mannequin_from_needle, mannequin_from_drawn;
     bool has_press = false;
     PressSample press;
+    DopplerReport doppler;
     // The console's settings as text (settings_text.h) where they changed; empty otherwise.
-    std::array<char, 224> settings{};
+    std::array<char, 640> settings{};
 };
 
 struct RecorderStatus {
@@ -61,7 +64,8 @@ class SessionRecorder {
                       const char* why,
                       int width_px,
                       int height_px,
-                      std::span<const std::uint8_t> pixels);
+                      std::span<const std::uint8_t> pixels,
+                      const Renderer::Layout& layout = {});
 
     // Returns when there is room for frames and a picture: for runs faster than real time, which
     // may wait.

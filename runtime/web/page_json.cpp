@@ -17,6 +17,12 @@ Json json_of_exercise(const Exercise& exercise) {
     out["description"] = exercise.description;
     out["kind"] = exercise.kind;
     out["difficulty"] = exercise.difficulty;
+    out["mode"] = exercise.mode == ExerciseMode::exam ? "exam" : "practice";
+    out["hints"] = exercise.hints;
+    // Whether an attempt draws targets or start anew, for which the whole case is needed.
+    bool drawn = exercise.start_spread_mm > 0;
+    for (const Target& target : exercise.targets) drawn = drawn || target.spread_mm > 0;
+    out["drawn"] = drawn;
     Json targets = Json::array();
     for (const Target& target : exercise.targets) targets.push_back(target.name);
     out["targets"] = std::move(targets);

@@ -9,7 +9,8 @@
 
 namespace sonocase::runtime {
 
-// {"case_name", "exercises": [{"name", "title", "description", "kind", "difficulty", "targets":
+// {"case_name", "exercises": [{"name", "title", "description", "kind", "difficulty", "mode":
+// "practice" or "exam", "hints": [texts], "targets":
 // [names], "pass_marks": [{"metric", "at_most", "at_least"}]}], "labels": [names], "warnings":
 // [texts]}; a limit that does not exist is null.
 std::string case_json(const PagePlayer& player);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 
+#include "runtime/engine/tool_sample.h"
 #include "runtime/recording/event_words.h"
 #include "runtime/recording/session_header.h"
 #include "runtime/recording/settings_text.h"
@@ -17,7 +18,7 @@ constexpr std::size_t kWords = 6;
 bool same(const ImageSettings& a, const ImageSettings& b) {
     return a.gain_db == b.gain_db && a.dynamic_range_db == b.dynamic_range_db &&
            a.tgc_db == b.tgc_db && a.press_mm == b.press_mm &&
-           a.flip_left_right == b.flip_left_right;
+           a.flip_left_right == b.flip_left_right && a.doppler == b.doppler;
 }
 
 }  // namespace
@@ -25,30 +26,24 @@ bool same(const ImageSettings& a, const ImageSettings& b) {
 PageSession::PageSession(const CaseBundle& bundle,
                          const ScanEngine& engine,
                          const std::string& trainee,
-                         const std::string& started)
+                         const std::string& started,
+                         std::uint64_t seed)
     : bundle_(bundle),
       exercise_(engine.exercise()),
       first_anatomy_(engine.anatomy()),
       anatomy_(first_anatomy_),
       monitor_(exercise_, first_anatomy_.get(), bundle.labels) {
     session_.header = session_header(bundle, exercise_, engine.render_options(), trainee, started);
+    if (seed != 0) session_.header.attempt = "seed=" + std::to_string(seed);
 }
 
 void PageSession::observe(const FrameRecord& record) {
     const FrameInput& input = record.input;
     SessionSample sample;
-    sample.time_s = input.time_s;
-    sample.frame = input.frame;
-    sample.probe_ok = record.tools.has_probe;
-    sample.needle_ok = record.tools.has_needle;
-    sample.mannequin_from_probe = record.tools.mannequin_from_probe;
-    sample.mannequin_from_needle = record.tools.mannequin_from_needle;
-    sample.mannequin_from_drawn = record.needle.mannequin_from_drawn;
+    fill_sample(record, sample);
     if (session_.samples.empty() || !same(settings_, input.settings))
         sample.settings = settings_text(input.settings);
     settings_ = input.settings;
-    sample.has_press = record.press.solved;
-    sample.press = {record.press.force_n, record.press.pressure_kpa, record.press.vein_open};
     monitor_.update(sample.time_s, sample.frame, sample.probe_ok, sample.mannequin_from_probe,
                     sample.needle_ok, sample.mannequin_from_drawn);
     report_punctures(record.puncture, monitor_);

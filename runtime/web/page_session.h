@@ -24,11 +24,12 @@ struct FinishedSession {
 
 class PageSession {
   public:
-    // The bundle must outlive the session.
+    // The bundle must outlive the session. seed: of the attempt; 0: as written.
     PageSession(const CaseBundle& bundle,
                 const ScanEngine& engine,
                 const std::string& trainee,
-                const std::string& started);
+                const std::string& started,
+                std::uint64_t seed = 0);
 
     // Another engine of the same exercise goes on.
     void use(const ScanEngine& engine) { anatomy_ = engine.anatomy(); }

@@ -68,7 +68,9 @@ class ImageFormation {
 
 // A model before it is created.
 struct ImageModelInfo {
-    int scanlines, samples;                // full accuracy, unless the options say otherwise
+    // Full accuracy, unless the options say otherwise.
+    int scanlines;
+    int (*samples)(const Exercise& exercise, const RenderOptions& options);
     std::span<const char* const> effects;  // names, in order of execution
     // Thickness of the slab in which the needle shows, mm; 0: the needle's own.
     double (*needle_slab_mm)(const Exercise& exercise);

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "formats/base/geometry.h"
+#include "runtime/imaging/frame/doppler_settings.h"
 
 namespace sonocase::runtime {
 
@@ -20,12 +21,18 @@ struct ImageSettings {
     // By which the probe presses deeper than its pose says, [0, 40] mm: on a rigid mannequin
     // nobody can press. Without effect deformation it does nothing.
     double press_mm = 0;
+    DopplerSettings doppler;
+
+    friend bool operator==(const ImageSettings&, const ImageSettings&) = default;
 };
 
 // A straight needle as drawn: after calibration and bend constraint.
 struct NeedlePose {
     Point3 tip;         // `mannequin` frame
     Vector3 direction;  // unit, hub to tip
+    // By which it pushes the layer before its tip, and drags tissue along its shaft
+    // (runtime/needle/needle_shift.h). Drawn with effect deformation.
+    double tent_mm = 0, drag_mm = 0;
 };
 
 struct FrameInput {
@@ -35,6 +42,9 @@ struct FrameInput {
     double time_s = 0;        // injected; drives breathing and pulsation
     std::uint32_t frame = 0;  // seeds the noise
     ImageSettings settings;
+    // Motion of the probe since the frame before, frame `mannequin`: of the middle of its face, and
+    // its rotation. Only Doppler modes ask for it; what moves in the picture flashes in them.
+    Vector3 probe_mm_s, probe_rad_s;
 };
 
 enum class FrameStatus : std::uint8_t {
@@ -46,7 +56,8 @@ enum class FrameStatus : std::uint8_t {
 // What the probe does to the tissue under it (effect deformation).
 struct PressReport {
     bool solved = false;  // the effect is on
-    // Height of the draining lumens under the face over that at rest; negative: there are none, or
+    // Area of the draining lumens under the face, in the scan plane and less what a picture shows
+    // shut (walls that touch), over that at rest; negative: there are none, or
     // nothing is pressed.
     double vein_open = -1;
     bool pressed = false;       // else all is 0

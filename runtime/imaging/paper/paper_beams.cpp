@@ -21,6 +21,16 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr int kPrefetchStep = 8;  // samples: shorter than a brick
 
+// The bits that any lane has.
+template <class D>
+std::uint32_t bits_of_any_lane(D d, hn::Vec<D> v) {
+    HWY_ALIGN std::int32_t all[HWY_MAX_BYTES / 4];
+    hn::StoreU(v, d, all);
+    std::uint32_t bits = 0;
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) bits |= static_cast<std::uint32_t>(all[i]);
+    return bits;
+}
+
 // Material and grey of one block of beams; see sample_paper_block().
 template <bool kTexture, bool kInside>
 std::uint32_t sample_block_as(const PaperBlock& b) {
@@ -109,11 +119,7 @@ std::uint32_t sample_block_as(const PaperBlock& b) {
             z = hn::Add(z, dz);
         }
     }
-    HWY_ALIGN std::int32_t all[HWY_MAX_BYTES / 4];
-    hn::StoreU(met, d, all);
-    std::uint32_t bits = 0;
-    for (int v = 0; v < lanes; ++v) bits |= static_cast<std::uint32_t>(all[v]);
-    return bits;
+    return bits_of_any_lane(d, met);
 }
 
 // The same where tissue is pressed: each sample lies where its tissue is at rest.
@@ -134,19 +140,22 @@ std::uint32_t sample_pressed(const PaperBlock& b) {
     for (int v = 0; v < kPaperBlock; v += lanes) {
         const auto load = [&](const std::int32_t* p, int axis)
                               HWY_ATTR { return hn::LoadU(d, p + axis * b.lines + v); };
+        bool moves = false;
         for (int k = 0; k < b.samples; ++k) {
-            const bool moves = k < b.press->active;
-            if (moves && k % press::kPressRows == 0)
-                press::HWY_NAMESPACE::press_chunk(df, *b.press, b.first_line, v, k,
-                                                  std::min(press::kPressRows, b.samples - k),
-                                                  chunk);
+            if (k % press::kPressRows == 0) {
+                const int rows = std::min(press::kPressRows, b.samples - k);
+                moves = b.press->moves(b.first_line, k, rows);
+                if (moves)
+                    press::HWY_NAMESPACE::press_chunk(df, *b.press, b.first_line, v, k, rows,
+                                                      chunk);
+            }
             auto along = hn::Zero(df), side = hn::Zero(df);
             auto shut = hn::Zero(d);
             if (moves) {
-                const int at = k % press::kPressRows * press::kPressBeams + v;
-                along = hn::Load(df, chunk.along + at);
-                side = hn::Load(df, chunk.side + at);
-                shut = hn::Load(d, chunk.closed + at);
+                along = hn::Load(df, chunk.along_row(k) + v);
+                side = hn::Load(df, chunk.side_row(k) + v);
+                if (chunk.any_closed)
+                    shut = hn::Load(d, chunk.closed + (k - chunk.first) * press::kPressBeams + v);
             }
             const auto count = hn::Set(d, k);
             // Shift in 1/65536 of a voxel, or of a texture's period.
@@ -201,11 +210,7 @@ std::uint32_t sample_pressed(const PaperBlock& b) {
             hn::StoreU(hn::DemoteTo(d16, value), d16, b.stage + k * kPaperBlock + v);
         }
     }
-    HWY_ALIGN std::int32_t all[HWY_MAX_BYTES / 4];
-    hn::StoreU(met, d, all);
-    std::uint32_t bits = 0;
-    for (int v = 0; v < lanes; ++v) bits |= static_cast<std::uint32_t>(all[v]);
-    return bits;
+    return bits_of_any_lane(d, met);
 }
 
 std::uint32_t sample_block(const PaperBlock& b) {

@@ -282,7 +282,7 @@ void PaperFast::render(const PaperFrame& frame,
     };
     PassTimer timer(context_.clock);
     set_rows(frame);
-    if (frame.press != nullptr) press_.show(*frame.press);
+    if (frame.press != nullptr) press_.show(context_.simd, *frame.press);
     time_of(Pass::needle) = sample_beams(frame, keep_all);
     time_of(Pass::beams) = std::max(timer.lap_ms() - time_of(Pass::needle), 0.0);
     blur_rows(frame);

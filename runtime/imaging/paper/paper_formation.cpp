@@ -102,7 +102,7 @@ constexpr auto kEffectNames = effect_names_of(kPaperEffects);
 
 }  // namespace
 
-const ImageModelInfo kPaperModel{512, 512, kEffectNames, [](const Exercise&) { return 0.0; },
-                                 create};
+const ImageModelInfo kPaperModel{512, [](const Exercise&, const RenderOptions&) { return 512; },
+                                 kEffectNames, [](const Exercise&) { return 0.0; }, create};
 
 }  // namespace sonocase::runtime

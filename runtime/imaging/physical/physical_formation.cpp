@@ -16,9 +16,12 @@
 namespace sonocase::runtime {
 namespace {
 
+Machine chosen_machine(const Exercise& exercise, const RenderOptions& options) {
+    return options.machine ? *options.machine : physical::default_machine(exercise.probe);
+}
+
 Machine machine_of(const FormationInput& input) {
-    Machine machine = input.options.machine ? *input.options.machine
-                                            : physical::default_machine(input.exercise.probe);
+    Machine machine = chosen_machine(input.exercise, input.options);
     if (input.options.looks > 0)
         machine.looks.count = machine.looks.near_count = input.options.looks;
     return machine;
@@ -77,7 +80,7 @@ class PhysicalFormation final : public ImageFormation {
         const PhysicalFrame frame = frame_of(request);
         if (blocks_ != nullptr) {
             const double shift_mm = norm(frame.motion.breathing_mm) +
-                                    (frame.press != nullptr ? frame.press->state().farthest_mm : 0);
+                                    (frame.press != nullptr ? frame.press->farthest_mm() : 0);
             if (ahead_) ahead_->frame(at.reach, frame.volume_from_probe, shift_mm);
             at.reach.ensure_loaded(*blocks_, scene_.grid, frame.volume_from_probe, shift_mm);
             at.reach.ensure_loaded(scene_.words, scene_.grid, frame.volume_from_probe, shift_mm);
@@ -170,6 +173,10 @@ double needle_slab_mm(const Exercise& exercise) {
     return exercise.probe.elevation_mm;
 }
 
+int samples(const Exercise& exercise, const RenderOptions& options) {
+    return physical::samples_along(exercise.probe, chosen_machine(exercise, options));
+}
+
 constexpr auto kEffectNames = effect_names_of(kPhysicalEffects);
 
 }  // namespace
@@ -178,6 +185,6 @@ std::shared_ptr<const PhysicalTextures> shared_physical_textures() {
     return std::make_shared<const PhysicalTextures>(physical_textures());
 }
 
-const ImageModelInfo kPhysicalModel{192, 512, kEffectNames, needle_slab_mm, create};
+const ImageModelInfo kPhysicalModel{192, samples, kEffectNames, needle_slab_mm, create};
 
 }  // namespace sonocase::runtime

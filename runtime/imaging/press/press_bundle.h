@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/bundle/case_bundle.h"
+#include "runtime/imaging/press/brick_lines.h"
 #include "runtime/imaging/press/press_scene.h"
 
 namespace sonocase::runtime::press {
@@ -14,6 +15,7 @@ namespace sonocase::runtime::press {
 struct PressBundleOptions {
     // Veins are as stiff as this pressure makes them, > 0; 8 mmHg is what the table is for.
     double venous_pressure_mmhg = 8;
+    SimdTarget simd = available_simd_targets().front();  // of the look-ups
 };
 
 class PressBundle {
@@ -31,15 +33,15 @@ class PressBundle {
 
   private:
     static void along(const void* context,
-                      Point3 from,
-                      Vector3 direction,
+                      std::span<const PressLine> lines,
                       std::span<const float> depth_mm,
                       std::uint8_t* tissue);
-    std::uint8_t voxel(double x, double y, double z) const;
 
     const CaseBundle* bundle_;
     std::vector<PressTissue> tissues_;
-    Int3 bricks_;
+    SimdTarget simd_;
+    std::vector<std::int32_t> uniform_;  // labels of uniform bricks, as words
+    BrickLines bricks_;
     Rigid mannequin_from_probe_;
 };
 

@@ -18,6 +18,9 @@ struct PressClosed {
     std::array<std::int32_t, kTableRows * kStride> node{};
     std::array<bool, kTableRows> row{};  // some node of the row
     bool any = false;
+    // Area of the draining lumens under the face that a picture shows open over that at rest;
+    // negative: there is less of them than 4 mm^2.
+    double open = -1;
 
     std::int32_t* row_of(int m) { return node.data() + m * kStride + kMargin; }
     const std::int32_t* row_of(int m) const { return node.data() + m * kStride + kMargin; }
@@ -26,6 +29,10 @@ struct PressClosed {
 
 // A part of a row is shut where a lumen fills at least half of it and its stretch is below
 // kClosed. Cost: nothing where there is no lumen, 5 us where there is.
-void mark_closed(const PressSamples& samples, const PressColumns& columns, PressClosed& out);
+void mark_closed(std::span<const PressTissue> tissues,
+                 const PressFace& face,
+                 const PressSamples& samples,
+                 const PressColumns& columns,
+                 PressClosed& out);
 
 }  // namespace sonocase::runtime::press

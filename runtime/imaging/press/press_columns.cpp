@@ -22,17 +22,21 @@ using Each = std::array<float, kColumns>;
 
 constexpr int kNewtonSteps = 3;
 
-// Stretch of part j of the columns from i on, and how fast it falls as the stresses grow by a
-// factor.
+// Stretch of part j of the columns from i on, how fast it falls as the stresses grow by a factor,
+// and the stretch of what drains in it.
+template <class V>
+struct PartLanes {
+    V l, slope, lumen;
+};
 template <class D, class V>
-HWY_INLINE StretchLanes<V> part_stretch(
+HWY_INLINE PartLanes<V> part_stretch(
     D d, const PressSamples& s, const PressElastic& e, int j, int i, V factor) {
     const auto strain = hn::Mul(hn::LoadU(d, e.stress_kpa.row(j / kParts) + i),
                                 hn::LoadU(d, e.compliance.row(j) + i));
     const auto stress = hn::Mul(strain, factor);
     auto part = tissue_stretch(d, stress);
     part.slope = hn::Mul(part.slope, strain);
-    if (!s.lumen[static_cast<std::size_t>(j)]) return part;
+    if (!s.lumen[static_cast<std::size_t>(j)]) return {part.l, part.slope, part.l};
     const auto gain = hn::Set(d, static_cast<float>(kLumenGain));
     const auto growth = hn::Set(d, static_cast<float>(kLumenGrowth));
     // Only what is pressed grows: a lumen in tension is as it is.
@@ -41,9 +45,11 @@ HWY_INLINE StretchLanes<V> part_stretch(
     const auto pressed = hn::Gt(stress, hn::Zero(d));
     const auto lumen = lumen_stretch(d, hn::IfThenElse(pressed, more, stress));
     const auto share = hn::LoadU(d, s.drains.row(j) + i);
+    const auto closed = closing(d, lumen.l);
     return {
-        mix(d, part.l, closing(d, lumen.l), share),
-        mix(d, part.slope, hn::Mul(lumen.slope, hn::IfThenElse(pressed, steeper, strain)), share)};
+        mix(d, part.l, closed, share),
+        mix(d, part.slope, hn::Mul(lumen.slope, hn::IfThenElse(pressed, steeper, strain)), share),
+        closed};
 }
 
 // Newton's steps for the factor of each column; 1 where the face does not touch.
@@ -88,6 +94,8 @@ void stretch(const PressSamples& s, const PressElastic& e, PressColumns& out) {
             const auto soft = hn::Lt(edge, hn::LoadU(d, s.bone_mm.data() + i));
             const auto part = part_stretch(d, s, e, j, i, hn::LoadU(d, out.factor.data() + i));
             hn::StoreU(hn::IfThenElse(soft, part.l, one), d, out.stretch.row(j) + i);
+            if (s.lumen[static_cast<std::size_t>(j)])
+                hn::StoreU(part.lumen, d, out.lumen.row(j) + i);
             hn::StoreU(hn::Add(hn::LoadU(d, length.data() + i),
                                hn::IfThenElseZero(soft, hn::Mul(part.l, height))),
                        d, length.data() + i);
@@ -109,6 +117,10 @@ void stretch(const PressSamples& s, const PressElastic& e, PressColumns& out) {
             auto l = hn::LoadU(d, out.stretch.row(j) + i);
             l = hn::IfThenElse(soft, hn::Mul(l, hn::LoadU(d, scale.data() + i)), l);
             hn::StoreU(l, d, out.stretch.row(j) + i);
+            if (s.lumen[static_cast<std::size_t>(j)])
+                hn::StoreU(
+                    hn::Mul(hn::LoadU(d, out.lumen.row(j) + i), hn::LoadU(d, scale.data() + i)), d,
+                    out.lumen.row(j) + i);
             hn::StoreU(hn::Sub(hn::LoadU(d, out.pressed_mm.row(j + 1) + i), hn::Mul(l, height)), d,
                        out.pressed_mm.row(j) + i);
         });

@@ -8,8 +8,9 @@
 namespace sonocase::runtime::press {
 
 struct PressColumns {
-    Plane<kFineRows> stretch;              // pressed height over resting height of each part, > 0
-    Plane<kFineRows + 1> pressed_mm;       // depth from the face of each part's upper edge
+    Plane<kFineRows> stretch;         // pressed height over resting height of each part, > 0
+    Plane<kFineRows> lumen;           // of what drains in it; rows of PressSamples::lumen alone
+    Plane<kFineRows + 1> pressed_mm;  // depth from the face of each part's upper edge
     std::array<float, kColumns> factor{};  // that the stresses were multiplied by
     double force_n = 0;
 };

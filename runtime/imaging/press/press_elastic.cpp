@@ -127,32 +127,27 @@ void set_moduli(const PressSamples& s, const PressFace& face, PressElastic& w) {
         });
 }
 
-// out = A v; returns v . A v.
-float apply(const PressElastic& w, const Plane<kRows + 1>& v, Plane<kRows>& out) {
-    const Lanes d;
-    std::array<float, kColumns> each{};
+// Row k of A v, and v . A v of each column.
+template <class D>
+HWY_INLINE void apply_row(
+    D d, const PressElastic& w, const Plane<kRows + 1>& v, int k, Plane<kRows>& out, float* each) {
     for_columns(d, [&](int i) HWY_ATTR {
-        auto sum = hn::Zero(d);
-        for (int k = 0; k < kRows; ++k) {
-            const float* row = v.row(k) + i;
-            const auto here = hn::LoadU(d, row);
-            const auto right =
-                hn::Mul(hn::LoadU(d, w.right.row(k) + i), hn::Sub(here, hn::LoadU(d, row + 1)));
-            const auto left =
-                hn::Mul(hn::LoadU(d, w.right.row(k) + i - 1), hn::Sub(here, hn::LoadU(d, row - 1)));
-            const auto down = hn::Mul(hn::LoadU(d, w.down.row(k) + i),
-                                      hn::Sub(here, hn::LoadU(d, v.row(k + 1) + i)));
-            auto force = hn::Add(hn::Add(right, left),
-                                 hn::Add(down, hn::Mul(hn::LoadU(d, w.ground.row(k) + i), here)));
-            if (k > 0)
-                force = hn::Add(force, hn::Mul(hn::LoadU(d, w.down.row(k - 1) + i),
-                                               hn::Sub(here, hn::LoadU(d, v.row(k - 1) + i))));
-            hn::StoreU(force, d, out.row(k) + i);
-            sum = hn::Add(sum, hn::Mul(force, here));
-        }
-        hn::StoreU(sum, d, each.data() + i);
+        const float* row = v.row(k) + i;
+        const auto here = hn::LoadU(d, row);
+        const auto right =
+            hn::Mul(hn::LoadU(d, w.right.row(k) + i), hn::Sub(here, hn::LoadU(d, row + 1)));
+        const auto left =
+            hn::Mul(hn::LoadU(d, w.right.row(k) + i - 1), hn::Sub(here, hn::LoadU(d, row - 1)));
+        const auto down =
+            hn::Mul(hn::LoadU(d, w.down.row(k) + i), hn::Sub(here, hn::LoadU(d, v.row(k + 1) + i)));
+        auto force = hn::Add(hn::Add(right, left),
+                             hn::Add(down, hn::Mul(hn::LoadU(d, w.ground.row(k) + i), here)));
+        if (k > 0)
+            force = hn::Add(force, hn::Mul(hn::LoadU(d, w.down.row(k - 1) + i),
+                                           hn::Sub(here, hn::LoadU(d, v.row(k - 1) + i))));
+        hn::StoreU(force, d, out.row(k) + i);
+        hn::StoreU(hn::Add(hn::LoadU(d, each + i), hn::Mul(force, here)), d, each + i);
     });
-    return sum_columns(each);
 }
 
 // Takes `step` times the product off the residual, then relaxed = the residual with every column
@@ -188,22 +183,36 @@ float relax(float step, PressElastic& w) {
     return sum_columns(each);
 }
 
-// shift += step * search, then search = relaxed + keep * search
-void turn(float step, float keep, PressElastic& w) {
+// Row k: shift += step * search, then search = relaxed + keep * search.
+template <class D, class V>
+HWY_INLINE void turn_row(D d, V step, V keep, int k, PressElastic& w) {
+    for_columns(d, [&](int i) HWY_ATTR {
+        const auto search = hn::LoadU(d, w.search.row(k) + i);
+        hn::StoreU(hn::Add(hn::LoadU(d, w.shift.row(k) + i), hn::Mul(step, search)), d,
+                   w.shift.row(k) + i);
+        hn::StoreU(hn::Add(hn::LoadU(d, w.relaxed.row(k) + i), hn::Mul(keep, search)), d,
+                   w.search.row(k) + i);
+    });
+}
+
+// The turn of every row, with the new search's product one row behind: the planes are more than the
+// nearest cache holds, and are gone through once. Returns search . A search.
+float turn_and_apply(float step, float keep, PressElastic& w) {
     const Lanes d;
     const auto s = hn::Set(d, step), kept = hn::Set(d, keep);
-    for (int k = 0; k < kRows; ++k)
-        for_columns(d, [&](int i) HWY_ATTR {
-            const auto search = hn::LoadU(d, w.search.row(k) + i);
-            hn::StoreU(hn::Add(hn::LoadU(d, w.shift.row(k) + i), hn::Mul(s, search)), d,
-                       w.shift.row(k) + i);
-            hn::StoreU(hn::Add(hn::LoadU(d, w.relaxed.row(k) + i), hn::Mul(kept, search)), d,
-                       w.search.row(k) + i);
-        });
+    std::array<float, kColumns> each{};
+    for (int k = 0; k < kRows; ++k) {
+        turn_row(d, s, kept, k, w);
+        if (k > 0) apply_row(d, w, w.search, k - 1, w.product, each.data());
+    }
+    apply_row(d, w, w.search, kRows - 1, w.product, each.data());
+    return sum_columns(each);
 }
 
 void solve_increment(int iterations, PressElastic& w) {
-    (void)apply(w, w.shift, w.product);
+    const Lanes d;
+    std::array<float, kColumns> each{};
+    for (int k = 0; k < kRows; ++k) apply_row(d, w, w.shift, k, w.product, each.data());
     w.residual.values.fill(0);
     w.search.values.fill(0);
     float before = 1, step = 1;  // the first residual is 0 - A shift
@@ -211,15 +220,15 @@ void solve_increment(int iterations, PressElastic& w) {
         const float now = relax(step, w);
         if (n == 0) step = 0;
         if (!(now > 1e-12f)) break;
-        turn(step, n == 0 ? 0.0f : now / before, w);
+        const float curvature = turn_and_apply(step, n == 0 ? 0.0f : now / before, w);
         before = now;
         step = 0;
-        const float curvature = apply(w, w.search, w.product);
         if (!(curvature > 0)) return;
         step = now / curvature;
         ++w.iterations_done;
     }
-    turn(step, 0, w);
+    const auto s = hn::Set(d, step);
+    for (int k = 0; k < kRows; ++k) turn_row(d, s, hn::Zero(d), k, w);
 }
 
 // The stress that the increment's strain adds at the moduli it was solved with.

@@ -19,6 +19,16 @@ PressBeam press_beam(const PressFace& face, double lateral_mm) {
     return {{face.radius_mm * s, 0, face.radius_mm * (c - 1)}, {s, 0, c}};
 }
 
+PressBeams::PressBeams(const PressFace& face) {
+    for (std::size_t i = 0; i < kColumns; ++i) {
+        const double lateral = column_lateral_mm(face, static_cast<double>(i));
+        const double quarter = 0.25 * column_width_mm(face);
+        middle[i] = press_beam(face, lateral);
+        left[i] = press_beam(face, lateral - quarter);
+        right[i] = press_beam(face, lateral + quarter);
+    }
+}
+
 Point3 probe_point(const PressFace& face, BeamPoint b, double y) {
     const PressBeam beam = press_beam(face, b.lateral_mm);
     const Point3 p = beam.origin + b.depth_mm * beam.direction;

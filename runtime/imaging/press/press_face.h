@@ -4,6 +4,8 @@
 // face, fanning out below a curved one.
 #pragma once
 
+#include <array>
+
 #include "formats/base/geometry.h"
 #include "runtime/imaging/press/press_rows.h"
 
@@ -36,5 +38,12 @@ struct PressBeam {
     Vector3 direction;
 };
 PressBeam press_beam(const PressFace& face, double lateral_mm);
+
+// Those of the columns, and a quarter of a column to the left and to the right of them.
+using ColumnBeams = std::array<PressBeam, kColumns>;
+struct PressBeams {
+    ColumnBeams middle, left, right;
+    explicit PressBeams(const PressFace& face);
+};
 
 }  // namespace sonocase::runtime::press

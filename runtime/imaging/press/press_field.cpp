@@ -36,24 +36,35 @@ struct Shift {
     double tilt = 0;  // of depth_mm per mm along the face
 };
 
-Shift shift_at(const PressFace& face, const PressTable& table, BeamPoint p) {
-    const double row = p.depth_mm / kTableStep_mm;
-    const double column = column_of(face, p.lateral_mm);
-    // Beside the columns and below the table the shift fades.
+// Beside the columns and below the table the shift fades.
+double fade_at(const PressFace& face, double column, double row) {
     const double past =
         std::max(std::abs(column - (kColumns - 1) / 2.0) - (kColumns - 1) / 2.0, 0.0);
     const double beyond = std::max(0.0, row - (kTableRows - 1)) * kTableStep_mm;
-    const double share = std::max(0.0, 1 - past * column_width_mm(face) / kTableFade_mm) *
-                         std::max(0.0, 1 - beyond / kTableFade_mm);
+    return std::max(0.0, 1 - past * column_width_mm(face) / kTableFade_mm) *
+           std::max(0.0, 1 - beyond / kTableFade_mm);
+}
+
+// The sideways shift alone: from where tissue lies at rest to where it shows.
+double bulge_at(const PressFace& face, const PressTable& table, BeamPoint p) {
+    const double row = p.depth_mm / kTableStep_mm, column = column_of(face, p.lateral_mm);
+    return fade_at(face, column, row) * between(table.bulge_mm, column, row / kBulgeEvery);
+}
+
+Shift shift_at(const PressFace& face, const PressTable& table, BeamPoint p) {
+    const double row = p.depth_mm / kTableStep_mm;
+    const double column = column_of(face, p.lateral_mm);
+    const double share = fade_at(face, column, row);
     const double lateral = -share * between(table.bulge_mm, column, row / kBulgeEvery);
     const double there = column_of(face, p.lateral_mm + lateral);
     const double depth = std::clamp(row, 0.0, kTableRows - 1.0) * kTableStep_mm;
+    // Between the two columns beside it, each at this depth: their difference is the slope.
     const double left = std::floor(std::clamp(there, 0.0, kColumns - 2.0));
-    const double rest = between(table.rest_mm, there, row);
-    const double slope =
-        (between(table.rest_mm, left + 1, row) - between(table.rest_mm, left, row)) /
-        column_width_mm(face);
-    return {lateral, share * (rest - depth), share * slope};
+    const double before = between(table.rest_mm, left, row),
+                 after = between(table.rest_mm, left + 1, row);
+    const double part = std::clamp(there - left, 0.0, 1.0);
+    const double rest = before + part * (after - before);
+    return {lateral, share * (rest - depth), share * (after - before) / column_width_mm(face)};
 }
 
 // Depth of the resting skin from the face.
@@ -65,37 +76,27 @@ double skin_mm(const PressFace& face, const PressSamples& samples, double latera
     return -(left + (x - static_cast<double>(i)) * (right - left));
 }
 
-// Height of the draining lumens under the face over their height at rest; -1 where there are none
-// to speak of.
-double lumen_height(const PressSamples& samples, const PressColumns& columns, double width_mm) {
-    constexpr double kLeast_mm2 = 4;
-    double rest = 0, pressed = 0;
-    for (int j = 0; j < kFineRows; ++j) {
-        if (!samples.lumen[static_cast<std::size_t>(j)]) continue;
-        for (int i = kSideColumns; i < kSideColumns + kFaceColumns; ++i) {
-            const double share = double{samples.drains.row(j)[i]};
-            if (share < 0.5) continue;
-            rest += fine_height(j);
-            pressed += fine_height(j) * double{columns.stretch.row(j)[i]};
-        }
-    }
-    return rest * width_mm < kLeast_mm2 ? -1 : pressed / rest;
-}
-
 }  // namespace
 
-PressField::PressField(const PressFace& face) : face_(face), work_(std::make_unique<Work>()) {
+PressField::PressField(const PressFace& face)
+    : face_(face), beams_(face), work_(std::make_unique<Work>()) {
     assert(face.half_width_mm > 0 && face.half_height_mm > 0 && face.radius_mm >= 0);
 }
 
 void PressField::lift() {
     state_ = {};
+    ++version_;
+}
+
+double PressField::farthest_mm() const {
+    return state_.farthest_mm + std::abs(dent_.tent_mm) + std::abs(dent_.drag_mm);
 }
 
 bool PressField::press(SimdTarget simd, const PressScene& scene, const PressOptions& options) {
     assert(options.solve.increments >= 1 && options.stiffness_scale > 0);
     state_ = {};
-    sample_tissue(scene, face_, options.stiffness_scale, work_->samples);
+    ++version_;
+    sample_tissue(simd, scene, face_, beams_, options.stiffness_scale, work_->samples);
     const PressSamples& samples = work_->samples;
     state_.excess_mm = std::max(0.0, samples.excess_mm);
     state_.out_of_reach = samples.out_of_reach;
@@ -103,7 +104,7 @@ bool PressField::press(SimdTarget simd, const PressScene& scene, const PressOpti
     solve_press(simd, samples, face_, options.solve, work_->elastic);
     stretch_columns(simd, samples, face_, work_->elastic, work_->columns);
     build_table(simd, samples, face_, work_->columns, work_->table);
-    mark_closed(samples, work_->columns, work_->closed);
+    mark_closed(scene.tissues, face_, samples, work_->columns, work_->closed);
     int touching = 0;
     for (std::size_t i = 0; i < kColumns; ++i) {
         if (!samples.touching[i]) continue;
@@ -115,24 +116,43 @@ bool PressField::press(SimdTarget simd, const PressScene& scene, const PressOpti
     const double area_mm2 = touching * column_width_mm(face_) * 2 * face_.half_height_mm;
     state_.pressure_kpa = 1e3 * state_.force_n / area_mm2;
     state_.least_determinant = work_->table.least_determinant;
-    state_.vein_open = lumen_height(samples, work_->columns, column_width_mm(face_));
+    state_.vein_open = work_->closed.open;
     float sideways = 0;
     for (const float v : work_->table.bulge_mm.values) sideways = std::max(sideways, std::abs(v));
     state_.farthest_mm = state_.deepest_mm + double{sideways};
     return true;
 }
 
-RestPlace PressField::rest_in_plane(BeamPoint shown) const {
+// Where the tissue was before the needle moved it.
+BeamPoint PressField::before_dent(BeamPoint shown) const {
+    const Point3 p = probe_point(face_, shown, 0);
+    const Vector3 u = dent_shift(dent_, p);
+    if (u.x == 0 && u.z == 0) return shown;
+    return beam_point(face_, {p.x - u.x, 0, p.z - u.z});
+}
+
+RestPlace PressField::pressed_in_plane(BeamPoint shown) const {
+    if (!state_.pressed) return {shown.lateral_mm, shown.depth_mm, 0};
     const Shift shift = shift_at(face_, work_->table, shown);
     return {shown.lateral_mm + shift.lateral_mm, shown.depth_mm + shift.depth_mm, shift.tilt};
 }
 
-BeamPoint PressField::shown_in_plane(BeamPoint rest) const {
+RestPlace PressField::rest_in_plane(BeamPoint shown) const {
+    return pressed_in_plane(dent_.moves() ? before_dent(shown) : shown);
+}
+
+BeamPoint PressField::shown_before_dent(BeamPoint rest) const {
+    if (!state_.pressed) return rest;
     // The rest depth rises down the column of `rest`: the row by halving, then the sideways shift
     // of that row.
     const PressTable& table = work_->table;
     const double column = column_of(face_, rest.lateral_mm);
-    const auto depth_at = [&](double row) { return between(table.rest_mm, column, row); };
+    const double x = std::clamp(column, 0.0, kColumns - 1.0);
+    const int i = std::min(static_cast<int>(x), kColumns - 2);
+    const auto depth_at = [&](int row) {
+        const float* at = table.rest_mm.row(row) + i;
+        return at[0] + (x - i) * (double{at[1]} - at[0]);
+    };
     double shown = rest.depth_mm;
     int low = 0, high = kTableRows - 1;
     if (rest.depth_mm < depth_at(low)) {
@@ -146,20 +166,39 @@ BeamPoint PressField::shown_in_plane(BeamPoint rest) const {
         shown = (low + (rest.depth_mm - above) / (below - above)) * kTableStep_mm;
     }
     double lateral = rest.lateral_mm;
-    for (int step = 0; step < 8; ++step)
-        lateral = rest.lateral_mm - shift_at(face_, table, {lateral, shown}).lateral_mm;
+    for (int step = 0; step < 8; ++step) {
+        const double next = rest.lateral_mm + bulge_at(face_, table, {lateral, shown});
+        const bool settled = std::abs(next - lateral) < 1e-4;
+        lateral = next;
+        if (settled) break;
+    }
     return {lateral, shown};
 }
 
+BeamPoint PressField::shown_in_plane(BeamPoint rest) const {
+    const BeamPoint before = shown_before_dent(rest);
+    if (!dent_.moves()) return before;
+    // A needle moves tissue by less per millimetre than a millimetre: each step comes nearer.
+    const Point3 p = probe_point(face_, before, 0);
+    Point3 at = p;
+    for (int step = 0; step < 12; ++step) {
+        const Vector3 u = dent_shift(dent_, at);
+        at = {p.x + u.x, 0, p.z + u.z};
+    }
+    return beam_point(face_, at);
+}
+
 double PressField::skin_now_mm(double lateral_mm) const {
+    assert(state_.pressed);
     const double column = std::clamp(column_of(face_, lateral_mm), 0.0, kColumns - 1.0);
     return std::max(0.0, between(work_->columns.pressed_mm, column, 0));
 }
 
 bool PressField::closed_in_plane(BeamPoint shown) const {
     const PressClosed& nodes = work_->closed;
-    if (!nodes.any) return false;
-    const RestPlace rest = rest_in_plane(shown);
+    if (!state_.pressed || !nodes.any) return false;
+    if (dent_.moves()) shown = before_dent(shown);
+    const RestPlace rest = pressed_in_plane(shown);
     const double column = std::clamp(column_of(face_, rest.lateral_mm), 0.0, kColumns - 1.0);
     const double row = std::clamp(shown.depth_mm / kTableStep_mm, 0.0, kTableRows - 1.0);
     return nodes.at(static_cast<int>(row + 0.5), static_cast<int>(column + 0.5)) != 0;
@@ -208,8 +247,8 @@ bool PressField::closed(Point3 rest) const {
     const double below = p.depth_mm - skin_mm(face_, work_->samples, p.lateral_mm);
     const auto part = std::upper_bound(kFineEdge.begin(), kFineEdge.end(), below);
     const int j = std::clamp(static_cast<int>(part - kFineEdge.begin()) - 1, 0, kFineRows - 1);
-    // A round lumen reaches less far up and down beside its middle: look two parts around.
-    constexpr int kAround = 2;
+    // A round lumen reaches less far up and down beside its middle: look half a row around.
+    constexpr int kAround = kParts / 2;
     const int i = std::min(static_cast<int>(column), kColumns - 2);
     for (int n = std::max(0, j - kAround); n <= std::min(kFineRows - 1, j + kAround); ++n)
         for (int c = i; c <= i + 1; ++c) {

@@ -15,6 +15,7 @@
 
 #include "runtime/imaging/press/press_closed.h"
 #include "runtime/imaging/press/press_table.h"
+#include "runtime/needle/needle_shift.h"
 
 namespace sonocase::runtime::press {
 
@@ -24,14 +25,14 @@ struct PressOptions {
 };
 
 struct PressState {
-    bool pressed = false;       // else nothing moves, and the field is the identity
-    double force_n = 0;         // on the whole face
-    double pressure_kpa = 0;    // over the part of it that touches
-    double excess_mm = 0;       // by how much bone held the probe back, along z
-    double deepest_mm = 0;      // greatest pressed depth, after the excess
-    double farthest_mm = 0;     // no tissue of the plane moves further
-    double vein_open = -1;      // height of the lumens under the face over that at rest; < 0: none
-    bool out_of_reach = false;  // more than 30 mm inside the body: as if 30
+    bool pressed = false;         // else nothing moves, and the field is the identity
+    double force_n = 0;           // on the whole face
+    double pressure_kpa = 0;      // over the part of it that touches
+    double excess_mm = 0;         // by how much bone held the probe back, along z
+    double deepest_mm = 0;        // greatest pressed depth, after the excess
+    double farthest_mm = 0;       // no tissue of the plane moves further
+    double vein_open = -1;        // open area of the lumens over that at rest; < 0: none
+    bool out_of_reach = false;    // more than 30 mm inside the body: as if 30
     float least_determinant = 1;  // of the map from the picture to the tissue: never 0 or less
 };
 
@@ -49,6 +50,16 @@ class PressField {
     // the skin and the columns.
     bool press(SimdTarget simd, const PressScene& scene, const PressOptions& options = {});
     void lift();  // nothing is pressed
+    // A needle that moves tissue as well, in the frame of the pose, relative to the face where bone
+    // holds it. Pictures show it (the functions for the scan plane); pull_back and push_forward, by
+    // which the needle itself finds its layers, leave it out.
+    void dent(const NeedleDent& needle) { dent_ = needle; }
+    const NeedleDent& needle() const { return dent_; }
+    bool moves() const { return state_.pressed || dent_.moves(); }
+    // No tissue of the plane moves further.
+    double farthest_mm() const;
+    // Another number after each change of what is pressed.
+    std::uint32_t version() const { return version_; }
 
     const PressState& state() const { return state_; }
     const PressFace& face() const { return face_; }
@@ -64,8 +75,11 @@ class PressField {
     Point3 push_forward(Point3 rest) const;
 
     // The same in the scan plane alone, as renderers ask for it: relative to the face where bone
-    // holds it, state().excess_mm behind the pose. Only while something is pressed. Cost: 20 ns.
+    // holds it, state().excess_mm behind the pose; first where the needle, then where the probe
+    // moved the tissue from. Cost: 20 ns.
     RestPlace rest_in_plane(BeamPoint shown) const;
+    // What the probe alone does to it.
+    RestPlace pressed_in_plane(BeamPoint shown) const;
     BeamPoint shown_in_plane(BeamPoint rest) const;  // the inverse
     // Depth of the pressed skin below the face: 0 where it touches.
     double skin_now_mm(double lateral_mm) const;
@@ -86,8 +100,14 @@ class PressField {
         PressClosed closed;
     };
     PressFace face_;
+    PressBeams beams_;
+    BeamPoint before_dent(BeamPoint shown) const;
+    BeamPoint shown_before_dent(BeamPoint rest) const;
+
     std::unique_ptr<Work> work_;
     PressState state_;
+    NeedleDent dent_;
+    std::uint32_t version_ = 0;
 };
 
 }  // namespace sonocase::runtime::press

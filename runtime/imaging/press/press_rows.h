@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The grid of the press field: 48 columns along the beams, 32 of them over the face, and 40 rows of
-// depth below each column's own resting skin. Each row is halved twice where stretches are worked
+// depth below each column's own resting skin. Each row is halved where stretches are worked
 // out, so that a small lumen is cut where its wall is and not where a row ends.
 //
 // Rows: 30 of 1.25 mm, then each 1.22 times as high as the last, 7 mm at most, 71.6 mm in all.
@@ -13,7 +13,7 @@ namespace sonocase::runtime::press {
 
 inline constexpr int kColumns = 48, kFaceColumns = 32, kSideColumns = 8;
 inline constexpr int kRows = 40;
-inline constexpr int kParts = 4;  // of a row
+inline constexpr int kParts = 2;  // of a row
 inline constexpr int kFineRows = kRows * kParts;
 // Beside the columns of a row, so that a look to the left or right needs no test; always zero.
 inline constexpr int kMargin = 8, kStride = kColumns + 2 * kMargin;

@@ -3,16 +3,118 @@
 #include "runtime/imaging/press/press_samples.h"
 
 #include <algorithm>
+#include <bit>
+#include <cassert>
 
-#include "runtime/imaging/press/press_law.h"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "press_samples.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// After them: included again for each instruction set.
+#include "runtime/imaging/press/press_law-inl.h"
 
+#ifndef SONOCASE_PRESS_SAMPLES_ONCE
+#define SONOCASE_PRESS_SAMPLES_ONCE
 namespace sonocase::runtime::press {
+
+// What a tissue counts for, as one word: its stiffness, whose four lowest bits (a millionth of it)
+// say the rest.
+inline constexpr std::int32_t kDrainsBit = 1, kRigidBit = 2, kOutsideBit = 4, kMembraneBit = 8;
+using FigureTable = std::array<std::int32_t, kMaxPressTissues>;
+
+}  // namespace sonocase::runtime::press
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace sonocase::runtime::press::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Lanes = hn::CappedTag<float, 16>;
+
+// The means of every cell from the tissues that were looked up: two places in the plane, and one
+// each in front of it and behind it.
+void average(const FigureTable& figures, PressSamples& out) {
+    const Lanes d;
+    const hn::RebindToSigned<Lanes> di;
+    const hn::Rebind<std::uint8_t, Lanes> d8;
+    const auto one = hn::Set(d, 1.0f), quarter = hn::Set(d, 0.25f);
+    const auto stiff = hn::Set(di, ~15), once = hn::Set(di, 1);
+    const auto membrane = hn::Set(d, static_cast<float>(kMembrane));
+    const auto look = [&](std::size_t which, int row, int i) HWY_ATTR {
+        const std::uint8_t* tissue = out.tissue[which].data() + row * kColumns + i;
+        return hn::GatherIndex(di, figures.data(), hn::PromoteTo(di, hn::LoadU(d8, tissue)));
+    };
+    std::array<std::int32_t, kColumns> bone{};
+    bone.fill(kFineRows);
+    for_columns(d, [&](int i) HWY_ATTR {
+        auto first_bone = hn::Set(di, kFineRows);
+        for (int k = 0; k < kRows; ++k) {
+            auto along_skin = hn::Zero(d);
+            auto drains = hn::Zero(di), rigid = hn::Zero(di);
+            for (int part = 0; part < kParts; ++part) {
+                const int j = k * kParts + part;
+                auto sum = hn::Zero(d);
+                drains = hn::Zero(di);
+                rigid = hn::Zero(di);
+                for (std::size_t s = 0; s < 2; ++s) {
+                    const auto here = look(s, j, i), beside = look(2 + s, j, i);
+                    const auto there =
+                        hn::IfThenElse(hn::TestBit(beside, hn::Set(di, kOutsideBit)), here, beside);
+                    rigid = hn::Or(rigid, here);
+                    for (const auto figure : {here, there}) {
+                        const auto kpa = hn::BitCast(d, hn::And(figure, stiff));
+                        sum = hn::Add(sum, kpa);
+                        const auto skin = hn::TestBit(figure, hn::Set(di, kMembraneBit));
+                        along_skin = hn::Add(
+                            along_skin,
+                            hn::IfThenElse(hn::RebindMask(d, skin), hn::Mul(kpa, membrane), kpa));
+                        drains = hn::Add(drains, hn::And(figure, once));
+                    }
+                }
+                hn::StoreU(hn::Mul(quarter, sum), d, out.stiffness_kpa.row(j) + i);
+                const auto tissue = hn::Sub(one, hn::Mul(quarter, hn::ConvertTo(d, drains)));
+                hn::StoreU(hn::Sub(one, hn::Mul(tissue, tissue)), d, out.drains.row(j) + i);
+                if (!hn::AllTrue(di, hn::Eq(drains, hn::Zero(di))))
+                    out.lumen[static_cast<std::size_t>(j)] = true;
+                const auto hard = hn::TestBit(rigid, hn::Set(di, kRigidBit));
+                first_bone = hn::IfThenElse(hard, hn::Min(first_bone, hn::Set(di, j)), first_bone);
+            }
+            hn::StoreU(hn::Mul(along_skin, hn::Set(d, 0.25f / kParts)), d,
+                       out.lateral_kpa.row(k) + i);
+        }
+        hn::StoreU(first_bone, di, bone.data() + i);
+    });
+    for (std::size_t i = 0; i < kColumns; ++i) {
+        out.bone_part[i] = bone[i];
+        out.fixed_row[i] = (bone[i] + kParts - 1) / kParts;
+        out.bone_mm[i] = static_cast<float>(kFineEdge[static_cast<std::size_t>(bone[i])]);
+    }
+}
+
+}  // namespace sonocase::runtime::press::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace sonocase::runtime::press {
+
+HWY_EXPORT(average);
+
 namespace {
 
 constexpr double kSkinStep_mm = 2;  // no part of a body that is pressed is thinner
 constexpr int kSkinSteps = static_cast<int>((kReach_mm + kSearch_mm) / kSkinStep_mm) + 1;
-constexpr int kHalvings = 10;       // of such a step: 0.002 mm
+constexpr int kFinerSteps = 8;      // of such a step,
+constexpr int kFinerLevels = 4;     // again and again: 0.0005 mm
 constexpr double kSidePlane = 1.5;  // times half the face's height
+
+template <std::size_t kCount>
+constexpr std::array<float, kCount> evenly(double first, double step) {
+    std::array<float, kCount> t{};
+    for (std::size_t n = 0; n < kCount; ++n)
+        t[n] = static_cast<float>(first + static_cast<double>(n) * step);
+    return t;
+}
+constexpr auto kSkinDepth_mm = evenly<kSkinSteps>(-kReach_mm, kSkinStep_mm);
 
 constexpr std::array<float, kFineRows> part_middles() {
     std::array<float, kFineRows> t{};
@@ -22,150 +124,147 @@ constexpr std::array<float, kFineRows> part_middles() {
 }
 constexpr std::array<float, kFineRows> kPartMiddle = part_middles();
 
-constexpr int kSideRows = kRows * 2;
-constexpr std::array<float, kSideRows> half_middles() {
-    std::array<float, kSideRows> t{};
-    for (int k = 0; k < kRows; ++k)
-        for (int half = 0; half < 2; ++half)
-            t[static_cast<std::size_t>(2 * k + half)] = static_cast<float>(
-                kRowEdge[static_cast<std::size_t>(k)] + row_height(k) * (0.25 + 0.5 * half));
-    return t;
-}
-constexpr std::array<float, kSideRows> kHalfMiddle = half_middles();
-
-constexpr std::array<float, kSkinSteps> skin_steps() {
-    std::array<float, kSkinSteps> t{};
-    for (int n = 0; n < kSkinSteps; ++n)
-        t[static_cast<std::size_t>(n)] = static_cast<float>(n * kSkinStep_mm - kReach_mm);
-    return t;
-}
-constexpr std::array<float, kSkinSteps> kSkinSteps_mm = skin_steps();
-
-// A tissue as the means take it; four numbers side by side, so that they are added at once.
-struct alignas(16) Figures {
-    std::array<float, 4> value{};  // stiffness, stiffness along the skin, drains, rigid
-};
-using FigureTable = std::array<Figures, kMaxPressTissues>;
-
 void set_figures(std::span<const PressTissue> tissues, float scale, FigureTable& table) {
     for (std::size_t n = 0; n < tissues.size() && n < table.size(); ++n) {
         const PressTissue& t = tissues[n];
-        const float stiffness = scale * t.stiffness_kpa;
-        const float along = t.membrane ? static_cast<float>(kMembrane) : 1.0f;
-        table[n].value = {stiffness, stiffness * along, t.drains ? 1.0f : 0.0f,
-                          t.rigid ? 1.0f : 0.0f};
+        const auto bits = std::bit_cast<std::int32_t>(scale * t.stiffness_kpa) & ~15;
+        table[n] = bits | (t.drains ? kDrainsBit : 0) | (t.rigid ? kRigidBit : 0) |
+                   (t.outside ? kOutsideBit : 0) | (t.membrane ? kMembraneBit : 0);
     }
 }
+
+using Lines = std::array<PressLine, kColumns>;
 
 struct Looker {
     const PressScene& scene;
-    const FigureTable& figures;
     Vector3 shift;  // of the face, for a probe that bone has stopped
 
-    void along(Point3 from,
-               Vector3 direction,
-               std::span<const float> depth,
-               std::uint8_t* out) const {
-        scene.lookup.along(scene.lookup.context, from + shift, direction, depth, out);
+    void along(Lines lines, std::span<const float> depth, std::uint8_t* out) const {
+        for (PressLine& line : lines) line.from = line.from + shift;
+        scene.lookup.along(scene.lookup.context, lines, depth, out);
     }
-    bool inside(Point3 from, Vector3 direction, float depth) const {
-        std::uint8_t tissue = 0;
-        along(from, direction, {&depth, 1}, &tissue);
-        return !scene.tissues[tissue].outside;
-    }
+    bool outside(std::uint8_t tissue) const { return scene.tissues[tissue].outside; }
 };
 
+Lines lines_of(const ColumnBeams& beams) {
+    Lines lines;
+    for (std::size_t i = 0; i < kColumns; ++i) lines[i] = {beams[i].origin, beams[i].direction};
+    return lines;
+}
+
+using SkinDepths = std::array<double, kColumns>;
+
 // Depth of the skin from the face, negative behind it: the first step that lies in the body, then
-// halved. kSearch_mm where there is none.
-double find_skin(const Looker& look, const PressBeam& beam, bool& out_of_reach) {
-    std::array<std::uint8_t, kSkinSteps> tissue{};
-    look.along(beam.origin, beam.direction, kSkinSteps_mm, tissue.data());
-    for (std::size_t n = 0; n < kSkinSteps; ++n) {
-        if (look.scene.tissues[tissue[n]].outside) continue;
-        float in = kSkinSteps_mm[n];
-        if (n == 0) {
-            out_of_reach = true;
-            return in;
+// the first of its parts. kSearch_mm where there is none.
+void find_skin(const Looker& look, const Lines& lines, SkinDepths& skin, bool& out_of_reach) {
+    std::array<std::uint8_t, std::size_t{kSkinSteps} * kColumns> tissue{};
+    const auto first_inside = [&](std::size_t steps, std::size_t column) {
+        std::size_t n = 0;
+        while (n < steps && look.outside(tissue[n * kColumns + column])) ++n;
+        return n;
+    };
+    std::array<bool, kColumns> settled{};
+    // Some steps at a time: most columns meet the body long before the last one.
+    constexpr std::size_t kTogether = 9;
+    static_assert(kSkinSteps % kTogether == 0);
+    std::array<std::size_t, kColumns> met{};
+    for (std::size_t from = 0; from < kSkinSteps; from += kTogether) {
+        look.along(lines, std::span(kSkinDepth_mm).subspan(from, kTogether),
+                   tissue.data() + from * kColumns);
+        bool all = true;
+        for (std::size_t i = 0; i < kColumns; ++i) {
+            while (met[i] < from + kTogether && look.outside(tissue[met[i] * kColumns + i]))
+                ++met[i];
+            all = all && met[i] < from + kTogether;
         }
-        float out = kSkinSteps_mm[n - 1];
-        for (int halving = 0; halving < kHalvings; ++halving) {
-            const float middle = (in + out) / 2;
-            (look.inside(beam.origin, beam.direction, middle) ? in : out) = middle;
-        }
-        return in;
+        if (all) break;
     }
-    return kSearch_mm;
+    for (std::size_t i = 0; i < kColumns; ++i) {
+        const std::size_t n = met[i];
+        settled[i] = n == 0 || n == kSkinSteps;
+        out_of_reach = out_of_reach || n == 0;
+        skin[i] = n == kSkinSteps ? kSearch_mm : static_cast<double>(kSkinDepth_mm[n]);
+    }
+    double step = kSkinStep_mm;
+    for (int level = 0; level < kFinerLevels; ++level) {
+        // From the last place that is known to lie outside; the end of the step is known to be in.
+        Lines from = lines;
+        for (std::size_t i = 0; i < kColumns; ++i)
+            from[i].from = from[i].from + (skin[i] - step) * from[i].direction;
+        const double finer = step / kFinerSteps;
+        const auto depth = evenly<kFinerSteps - 1>(finer, finer);
+        look.along(from, depth, tissue.data());
+        for (std::size_t i = 0; i < kColumns; ++i) {
+            if (settled[i]) continue;
+            const std::size_t n = first_inside(depth.size(), i);
+            skin[i] += static_cast<double>(n + 1) * finer - step;
+        }
+        step = finer;
+    }
 }
 
 // Whether the body lies at the face anywhere: all that a frame costs while nothing is pressed.
-bool touches(const Looker& look, const PressFace& face) {
-    for (int i = kSideColumns; i < kSideColumns + kFaceColumns; ++i) {
-        const PressBeam beam = press_beam(face, column_lateral_mm(face, i));
-        if (look.inside(beam.origin, beam.direction, 0)) return true;
-    }
-    return false;
+bool touches(const Looker& look, const Lines& lines) {
+    std::array<std::uint8_t, kFaceColumns> tissue{};
+    constexpr float kFace = 0;
+    look.scene.lookup.along(look.scene.lookup.context,
+                            std::span(lines).subspan(kSideColumns, kFaceColumns), {&kFace, 1},
+                            tissue.data());
+    return std::any_of(tissue.begin(), tissue.end(),
+                       [&](std::uint8_t t) { return !look.outside(t); });
 }
 
-void sample_column(
-    const Looker& look, const PressFace& face, double skin_mm, int i, PressSamples& out) {
-    const double lateral = column_lateral_mm(face, i), width = column_width_mm(face);
-    std::array<std::array<std::uint8_t, kFineRows>, 2> plane{};
-    std::array<std::array<std::uint8_t, kSideRows>, 2> side{};
-    for (int s = 0; s < 2; ++s) {
-        const PressBeam beam = press_beam(face, lateral + (s - 0.5) * 0.5 * width);
-        look.along(beam.origin + skin_mm * beam.direction, beam.direction, kPartMiddle,
-                   plane[static_cast<std::size_t>(s)].data());
-        PressBeam beside = press_beam(face, lateral);
-        beside.origin.y = (2 * s - 1) * kSidePlane * face.half_height_mm;
-        look.along(beside.origin + skin_mm * beside.direction, beside.direction, kHalfMiddle,
-                   side[static_cast<std::size_t>(s)].data());
-    }
-    const auto at = static_cast<std::size_t>(i);
-    out.bone_part[at] = kFineRows;
-    for (int k = 0; k < kRows; ++k) {
-        float along_skin = 0;
-        for (int part = 0; part < kParts; ++part) {
-            const int j = k * kParts + part;
-            const auto row = static_cast<std::size_t>(j), half = static_cast<std::size_t>(j / 2);
-            Figures sum;
-            float rigid = 0;
-            for (std::size_t s = 0; s < 2; ++s) {
-                const std::uint8_t here = plane[s][row], there = side[s][half];
-                const Figures& a = look.figures[here];
-                const Figures& b = look.figures[look.scene.tissues[there].outside ? here : there];
-                for (std::size_t n = 0; n < 4; ++n) sum.value[n] += a.value[n] + b.value[n];
-                rigid += a.value[3];
-            }
-            if (rigid > 0 && j < out.bone_part[at]) out.bone_part[at] = j;
-            out.stiffness_kpa.row(j)[i] = 0.25f * sum.value[0];
-            const float tissue = 1 - 0.25f * sum.value[2];
-            out.drains.row(j)[i] = 1 - tissue * tissue;
-            out.lumen[row] = out.lumen[row] || sum.value[2] > 0;
-            along_skin += sum.value[1];
-        }
-        out.lateral_kpa.row(k)[i] = along_skin * (0.25f / kParts);
-    }
-    out.fixed_row[at] = (out.bone_part[at] + kParts - 1) / kParts;
-    out.bone_mm[at] = static_cast<float>(kFineEdge[static_cast<std::size_t>(out.bone_part[at])]);
-}
-
-// By how much the face lies deeper than bone lets it.
-double excess_of(const PressSamples& s) {
+// By how much the face lies deeper than bone lets it; of the scan plane's tissue alone. Only parts
+// that are near enough to stop it are looked at.
+double excess_of(const FigureTable& figures, const PressSamples& s) {
     double excess = 0;
-    for (std::size_t i = kSideColumns; i < kSideColumns + kFaceColumns; ++i)
-        excess = std::max(excess, static_cast<double>(s.pressed_mm[i]) -
-                                      kGreatestShare * static_cast<double>(s.bone_mm[i]));
+    for (std::size_t i = kSideColumns; i < kSideColumns + kFaceColumns; ++i) {
+        const auto pressed = static_cast<double>(s.pressed_mm[i]);
+        for (std::size_t j = 0; j < kFineRows; ++j) {
+            const double beyond = pressed - kGreatestShare * kFineEdge[j];
+            if (beyond <= excess) break;
+            const std::size_t at = j * kColumns + i;
+            if (((figures[s.tissue[0][at]] | figures[s.tissue[1][at]]) & kRigidBit) == 0) continue;
+            excess = beyond;
+            break;
+        }
+    }
     return excess;
 }
 
-void sample_at(const Looker& look, const PressFace& face, PressSamples& out) {
-    out.lumen.fill(false);
-    for (int i = 0; i < kColumns; ++i) {
-        const PressBeam beam = press_beam(face, column_lateral_mm(face, i));
-        const double skin = find_skin(look, beam, out.out_of_reach);
-        out.pressed_mm[static_cast<std::size_t>(i)] = static_cast<float>(-skin);
-        sample_column(look, face, skin, i, out);
+// Skin and the tissue of the scan plane.
+void sample_plane(const Looker& look,
+                  const PressBeams& beams,
+                  SkinDepths& skin,
+                  PressSamples& out) {
+    find_skin(look, lines_of(beams.middle), skin, out.out_of_reach);
+    for (std::size_t i = 0; i < kColumns; ++i) out.pressed_mm[i] = static_cast<float>(-skin[i]);
+    for (std::size_t s = 0; s < 2; ++s) {
+        Lines plane = lines_of(s == 0 ? beams.left : beams.right);
+        for (std::size_t i = 0; i < kColumns; ++i)
+            plane[i].from = plane[i].from + skin[i] * plane[i].direction;
+        look.along(plane, kPartMiddle, out.tissue[s].data());
     }
+}
+
+// The tissue beside the plane, then the means.
+void sample_beside(SimdTarget simd,
+                   const Looker& look,
+                   const PressFace& face,
+                   const PressBeams& beams,
+                   const SkinDepths& skin,
+                   const FigureTable& figures,
+                   PressSamples& out) {
+    for (std::size_t s = 0; s < 2; ++s) {
+        Lines beside = lines_of(beams.middle);
+        for (std::size_t i = 0; i < kColumns; ++i) {
+            beside[i].from = beside[i].from + skin[i] * beside[i].direction;
+            beside[i].from.y = (s == 0 ? -kSidePlane : kSidePlane) * face.half_height_mm;
+        }
+        look.along(beside, kPartMiddle, out.tissue[2 + s].data());
+    }
+    out.lumen.fill(false);
+    HWY_DISPATCH_TABLE(average)[simd.index](figures, out);
 }
 
 // Distance to where the pressed depth passes zero between columns, or to the end of the face.
@@ -199,23 +298,30 @@ void measure_edges(const PressFace& face, PressSamples& s) {
 
 }  // namespace
 
-void sample_tissue(const PressScene& scene,
+void sample_tissue(SimdTarget simd,
+                   const PressScene& scene,
                    const PressFace& face,
+                   const PressBeams& beams,
                    double stiffness_scale,
                    PressSamples& out) {
     FigureTable figures{};
     set_figures(scene.tissues, static_cast<float>(stiffness_scale), figures);
-    Looker look{scene, figures, {}};
+    Looker look{scene, {}};
     out.out_of_reach = out.any_touch = false;
     out.excess_mm = 0;
-    if (!touches(look, face)) return;
-    sample_at(look, face, out);
-    out.excess_mm = excess_of(out);
-    if (out.excess_mm > 0 && face.radius_mm > 0) {
+    if (!touches(look, lines_of(beams.middle))) return;
+    SkinDepths skin{};
+    sample_plane(look, beams, skin, out);
+    out.excess_mm = excess_of(figures, out);
+    const bool again = out.excess_mm > 0 && face.radius_mm > 0;
+    if (again) {
         // The beams of a curved face have moved over the body as well. What the bone under them
         // still lacks is small, and is taken from the pressed depth alone.
         look.shift = {0, 0, -out.excess_mm};
-        sample_at(look, face, out);
+        sample_plane(look, beams, skin, out);
+    }
+    sample_beside(simd, look, face, beams, skin, figures, out);
+    if (again) {
         for (std::size_t i = kSideColumns; i < kSideColumns + kFaceColumns; ++i)
             out.pressed_mm[i] =
                 std::min(out.pressed_mm[i], static_cast<float>(kGreatestShare) * out.bone_mm[i]);
@@ -233,3 +339,4 @@ void sample_tissue(const PressScene& scene,
 }
 
 }  // namespace sonocase::runtime::press
+#endif

@@ -9,6 +9,7 @@
 #include "runtime/imaging/press/press_face.h"
 #include "runtime/imaging/press/press_rows.h"
 #include "runtime/imaging/press/press_scene.h"
+#include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime::press {
 
@@ -26,24 +27,29 @@ struct PressSamples {
     Plane<kRows> lateral_kpa;             // stiffness along the skin
     std::array<bool, kFineRows> lumen{};  // some column drains there
 
+    std::array<std::uint8_t, static_cast<std::size_t>(kFineRows) * kColumns>
+        tissue[4]{};  // looked up
+
     // The probe was stopped by bone: everything is relative to a face drawn back by this along z.
     double excess_mm = 0;
     bool out_of_reach = false;  // more than 30 mm inside: the skin is taken to be there
     bool any_touch = false;
 };
 
-// Skin and stiffness under `face` at its pose. The mean of a cell is over two places side by side
-// in the plane (weight 1/2) and one each at 1.5 times half the face's height in front of and behind
-// it (1/4); places outside the body count as the tissue in the plane beside them. A cell of which a
-// share d is a draining lumen yields as one to a share of 1 - (1 - d)^2: the wall follows its
-// lumen.
+// Skin and stiffness under `face` at its pose; beams: of the face. The mean of a cell is over two
+// places side by side in the plane (weight 1/2) and one each at 1.5 times half the face's height in
+// front of and behind it (1/4); places outside the body count as the tissue in the plane beside
+// them. A cell of which a share d is a draining lumen yields as one to a share of 1 - (1 - d)^2:
+// the wall follows its lumen.
 //
 // Hard cases: nobody there (no touch); bone (the face is drawn back until no column is pressed by
 // more than 0.7 of its depth to bone); a face deep inside (30 mm at most); air pockets, which yield
-// as gas does. Cost: 32 look-ups where nothing is touched; about 25,000 where something is, 2,000
-// of them for the skin, and twice as many where bone stops a curved face.
-void sample_tissue(const PressScene& scene,
+// as gas does. Cost: 32 look-ups where nothing is touched; about 18,000 where something is, 3,000
+// of them at most for the skin, and 10,000 more where bone stops a curved face.
+void sample_tissue(SimdTarget simd,
+                   const PressScene& scene,
                    const PressFace& face,
+                   const PressBeams& beams,
                    double stiffness_scale,
                    PressSamples& out);
 

@@ -22,14 +22,19 @@ struct PressTissue {
 
 inline constexpr int kMaxPressTissues = 256;
 
-// The tissues at depths along a line: from + depth * direction. Called some hundred times a frame
-// with about a hundred depths each. Neither allocates nor throws; `tissue` has depth_mm.size()
-// places.
+struct PressLine {
+    Point3 from;
+    Vector3 direction;  // unit
+};
+
+// The tissues at the same depths along some lines: from + depth * direction. Called some ten times
+// a frame, with kMostPressLines lines at most. Neither allocates nor throws; `tissue` has # depths
+// x # lines places, the lines of a depth side by side.
+inline constexpr int kMostPressLines = 64;
 struct TissueLookup {
     const void* context = nullptr;
     void (*along)(const void* context,
-                  Point3 from,
-                  Vector3 direction,
+                  std::span<const PressLine> lines,
                   std::span<const float> depth_mm,
                   std::uint8_t* tissue) = nullptr;
 };
@@ -43,12 +48,13 @@ struct PressScene {
 // refers to `at`, which must outlive it.
 template <class At>
 TissueLookup lookup_of(const At& at) {
-    return {&at, [](const void* context, Point3 from, Vector3 direction,
+    return {&at, [](const void* context, std::span<const PressLine> lines,
                     std::span<const float> depth_mm, std::uint8_t* tissue) {
                 const At& look = *static_cast<const At*>(context);
                 for (const float depth : depth_mm)
-                    *tissue++ = static_cast<std::uint8_t>(
-                        look(from + static_cast<double>(depth) * direction));
+                    for (const PressLine& line : lines)
+                        *tissue++ = static_cast<std::uint8_t>(
+                            look(line.from + static_cast<double>(depth) * line.direction));
             }};
 }
 

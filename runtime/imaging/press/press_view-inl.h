@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The press field along a stretch of a block of beams, in lanes. Included once per instruction set.
+// What yields along a stretch of a block of beams, in lanes. Included once per instruction set.
 #include <hwy/highway.h>
 
 #include "runtime/imaging/press/press_view.h"
+#include "runtime/imaging/simd/simd_math-inl.h"
 
 #if defined(SONOCASE_PRESS_VIEW_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SONOCASE_PRESS_VIEW_INL_H
@@ -15,57 +16,184 @@
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::press::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace math = sonocase::runtime::HWY_NAMESPACE;
 
-// Sample k of the beams of a vector: PlaneShift, and the place at rest in columns.
+// The numbers of a vector of beams, between those of the nodes around them.
 template <class D>
-struct PressLanes {
-    hn::Vec<D> along, side, tilt, column;
+class BetweenNodes {
+  public:
+    // line: of the picture, the vector's first.
+    HWY_INLINE BetweenNodes(D d, const PressView& v, int line)
+        : d_(d),
+          first_(line >> v.every_log2),
+          node_(hn::SetTableIndices(d, v.node_of + (line & (v.every - 1)))),
+          part_(hn::LoadU(d, v.part_of + (line & (v.every - 1)))) {}
+    // row: of a plane of nodes
+    HWY_INLINE hn::Vec<D> operator()(const float* row) const {
+        const auto before = hn::TableLookupLanes(hn::LoadU(d_, row + first_), node_),
+                   after = hn::TableLookupLanes(hn::LoadU(d_, row + first_ + 1), node_);
+        return hn::Add(before, hn::Mul(part_, hn::Sub(after, before)));
+    }
+
+  private:
+    D d_;
+    int first_;
+    decltype(hn::SetTableIndices(D(), static_cast<const std::int32_t*>(nullptr))) node_;
+    hn::Vec<D> part_;
 };
 
-// beam: of the picture, the vector's first.
+// PlaneShift::tilt of sample k; line: the vector's first.
 template <class D>
-HWY_INLINE PressLanes<D> press_lanes(D d, const PressView& v, int beam, int k) {
-    const hn::RebindToSigned<D> di;
-    constexpr float kPerRow = static_cast<float>(1 / (kBulgeEvery * kTableStep_mm));
-    const float r = (static_cast<float>(k) + 0.5f) * v.step_mm;
-    const float at = std::min(r * kPerRow, kBulgeRows - 1.0f);
-    const int n = std::min(static_cast<int>(at), kBulgeRows - 2);
-    const auto part = hn::Set(d, at - static_cast<float>(n));
-    const float* node = v.bulge.data() + static_cast<std::ptrdiff_t>(n) * v.lines + beam;
-    const auto above = hn::LoadU(d, node), below = hn::LoadU(d, node + v.lines);
-    const auto sideways = hn::Mul(hn::Add(above, hn::Mul(part, hn::Sub(below, above))),
-                                  hn::Set(d, v.share[static_cast<std::size_t>(k)]));
-    const auto per_mm = hn::Set(d, v.columns_per_mm);
-    const auto column =
-        hn::Min(hn::Max(hn::Add(hn::LoadU(d, v.column.data() + beam), hn::Mul(sideways, per_mm)),
-                        hn::Zero(d)),
-                hn::Set(d, kColumns - 1.0f));
-    const auto i = hn::Min(hn::ConvertTo(di, column), hn::Set(di, kColumns - 2));
-    const auto left = hn::GatherIndex(d, v.shift_row(k), i),
-               right = hn::GatherIndex(d, v.shift_row(k) + 1, i);
-    const auto slope = hn::Sub(right, left);
-    const auto deeper = hn::Add(left, hn::Mul(hn::Sub(column, hn::ConvertTo(d, i)), slope));
-    const auto per_radius = hn::Set(d, v.per_radius_mm);
-    const auto grow =
-        hn::Add(hn::Set(d, 1.0f), hn::Mul(hn::Add(hn::Set(d, r), deeper), per_radius));
-    const auto side = hn::Mul(sideways, grow);
-    const auto turned = hn::Mul(hn::Mul(hn::Mul(hn::Set(d, 0.5f), sideways), per_radius), side);
-    return {hn::Sub(deeper, turned), side, hn::Mul(slope, per_mm), column};
+HWY_INLINE hn::Vec<D> press_tilt(D d, const PressView& v, int line, int k) {
+    if (!v.pressed) return hn::Zero(d);
+    return BetweenNodes<D>(d, v,
+                           line)(v.tilt.data() + static_cast<std::ptrdiff_t>(k) * v.node_stride);
 }
 
-// Phased arrays, whose beams cross columns: sample by sample.
-inline void press_crossing(const PressView& v, int beam, int lanes, int k, float* out) {
-    for (int lane = 0; lane < lanes; ++lane) {
-        const ScanGeometry& g = *v.geometry;
-        const int line = std::min(beam + lane, g.scanlines - 1);
-        const ScanGeometry::Beam& of = g.beams[static_cast<std::size_t>(line)];
-        const double r = (k + 0.5) * g.step_mm;
-        const PlaneShift s = plane_shift(*v.field, g, of, line, r);
-        const BeamPoint shown{of.origin.x + r * of.direction.x, of.origin.z + r * of.direction.z};
-        out[lane] = static_cast<float>(s.along_mm);
-        out[kPressBeams + lane] = static_cast<float>(s.side_mm);
-        out[2 * kPressBeams + lane] = v.field->closed_in_plane(shown) ? 1.0f : 0.0f;
+// Places of the scan plane, the directions of their beams, and where they lie among beams.
+template <class D>
+struct PlaceLanes {
+    hn::Vec<D> x, z, dx, dz;
+    hn::Vec<D> line, r;
+};
+template <class D>
+HWY_INLINE PlaceLanes<D> places_of_beams(D d, const PressView& v, int line, int k) {
+    const auto r = hn::Set(d, (static_cast<float>(k) + 0.5f) * v.step_mm);
+    const auto dx = hn::LoadU(d, v.beam_row(2) + line), dz = hn::LoadU(d, v.beam_row(3) + line);
+    return {hn::Add(hn::LoadU(d, v.beam_row(0) + line), hn::Mul(r, dx)),
+            hn::Add(hn::LoadU(d, v.beam_row(1) + line), hn::Mul(r, dz)),
+            dx,
+            dz,
+            hn::Iota(d, static_cast<float>(line)),
+            r};
+}
+
+// needle_shift.h, in lanes: zone_shift at rho^2 and z of the needle's frame, as factors of the axis
+// and of what points away from it.
+template <class D, class V>
+HWY_INLINE void add_zone(
+    D d, const NeedleZone& zone, double strength_mm, V rho2, V z, V& along_axis, V& outward) {
+    const double w2 = 2 * zone.width_mm * zone.width_mm, b2 = 2 * zone.length_mm * zone.length_mm;
+    constexpr double kLog2E = 1.4426950408889634;
+    const auto from = hn::Sub(z, hn::Set(d, static_cast<float>(zone.middle_mm)));
+    const auto wide = hn::Mul(rho2, hn::Set(d, static_cast<float>(1 / w2)));
+    const auto q =
+        hn::Add(wide, hn::Mul(hn::Mul(from, from), hn::Set(d, static_cast<float>(1 / b2))));
+    const auto g =
+        hn::Mul(hn::Set(d, static_cast<float>(strength_mm)),
+                math::exp2_fading(d, hn::Mul(q, hn::Set(d, static_cast<float>(-kLog2E)))));
+    along_axis = hn::Add(along_axis, hn::Mul(g, hn::Sub(hn::Set(d, 1.0f), wide)));
+    outward = hn::Add(outward, hn::Mul(g, hn::Mul(from, hn::Set(d, static_cast<float>(1 / b2)))));
+}
+
+// A number of a plane of nodes at a fraction of a sample and of a node.
+template <class D, class V>
+HWY_INLINE V at_place(D d, const PressView& v, const std::vector<float>& plane, V node, V sample) {
+    const hn::RebindToSigned<D> di;
+    const auto bounded = [&](V x, int last) HWY_ATTR {
+        return hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, static_cast<float>(last)));
+    };
+    const auto n = bounded(node, v.node_stride - 1), k = bounded(sample, v.active - 1);
+    const auto ni = hn::Min(hn::ConvertTo(di, n), hn::Set(di, v.node_stride - 2)),
+               ki = hn::Min(hn::ConvertTo(di, k), hn::Set(di, std::max(v.active - 2, 0)));
+    const auto across = hn::Sub(n, hn::ConvertTo(d, ni)), down = hn::Sub(k, hn::ConvertTo(d, ki));
+    const auto place = hn::Add(hn::Mul(ki, hn::Set(di, v.node_stride)), ni);
+    const auto row = [&](const float* from) HWY_ATTR {
+        const auto left = hn::GatherIndex(d, from, place),
+                   right = hn::GatherIndex(d, from + 1, place);
+        return hn::Add(left, hn::Mul(across, hn::Sub(right, left)));
+    };
+    const auto above = row(plane.data()), below = row(plane.data() + v.node_stride);
+    return hn::Add(above, hn::Mul(down, hn::Sub(below, above)));
+}
+
+// The shift by a needle, along the beams and beside them; false where it reaches none of the
+// places.
+template <class D, class V>
+HWY_INLINE bool needle_lanes(D d, const PressView& v, const PlaceLanes<D>& p, V& by, V& aside) {
+    const NeedleDent& needle = v.field->needle();
+    const auto number = [&](double x) HWY_ATTR { return hn::Set(d, static_cast<float>(x)); };
+    const auto qx = hn::Sub(p.x, number(needle.tip.x)), qz = hn::Sub(p.z, number(needle.tip.z));
+    const auto qy = number(-needle.tip.y);
+    const auto distance2 = hn::Add(hn::Add(hn::Mul(qx, qx), hn::Mul(qz, qz)), hn::Mul(qy, qy));
+    const auto near = hn::Lt(distance2, number(kDentReach_mm * kDentReach_mm));
+    if (hn::AllFalse(d, near)) return false;
+    const auto ax = number(needle.axis.x), ay = number(needle.axis.y), az = number(needle.axis.z);
+    const auto z = hn::Add(hn::Add(hn::Mul(qx, ax), hn::Mul(qz, az)), hn::Mul(qy, ay));
+    const auto rho2 = hn::Max(hn::Sub(distance2, hn::Mul(z, z)), hn::Zero(d));
+    auto along_axis = hn::Zero(d), outward = hn::Zero(d);
+    add_zone(d, kTentZone, needle.tent_mm, rho2, z, along_axis, outward);
+    add_zone(d, kDragZone, needle.drag_mm, rho2, z, along_axis, outward);
+    const auto u = [&](V q, V axis) HWY_ATTR {
+        const auto beside = hn::Sub(q, hn::Mul(z, axis));
+        return hn::IfThenElseZero(near,
+                                  hn::Add(hn::Mul(along_axis, axis), hn::Mul(outward, beside)));
+    };
+    const auto ux = u(qx, ax), uz = u(qz, az);
+    by = hn::Add(hn::Mul(ux, p.dx), hn::Mul(uz, p.dz));
+    aside = hn::Sub(hn::Mul(ux, p.dz), hn::Mul(uz, p.dx));
+    return true;
+}
+
+// PlaneShift of places anywhere: first back by the needle, then by the probe from there.
+template <class D>
+struct ShiftLanes {
+    hn::Vec<D> along, side;
+};
+template <class D>
+HWY_INLINE ShiftLanes<D> shift_lanes(D d, const PressView& v, const PlaceLanes<D>& p) {
+    auto by = hn::Zero(d), aside = hn::Zero(d);
+    if (v.field->needle().moves()) (void)needle_lanes(d, v, p, by, aside);
+    if (!v.pressed) return {hn::Neg(by), hn::Neg(aside)};
+    const ScanGeometry& g = *v.geometry;
+    const auto number = [&](double x) HWY_ATTR { return hn::Set(d, static_cast<float>(x)); };
+    const auto pitch_mm = g.fan ? hn::Mul(hn::Max(hn::Add(p.r, number(g.radius_mm)), number(1e-3)),
+                                          number(g.line_step))
+                                : number(g.line_step);
+    const auto node = hn::Mul(hn::Sub(p.line, hn::Div(aside, pitch_mm)), number(1.0 / v.every));
+    const auto sample = hn::Sub(hn::Mul(hn::Sub(p.r, by), number(1 / g.step_mm)), number(0.5));
+    return {hn::Sub(at_place(d, v, v.along, node, sample), by),
+            hn::Sub(at_place(d, v, v.side, node, sample), aside)};
+}
+
+// 1 where places, shifted like this, lie in a lumen that is shut.
+template <class D>
+HWY_INLINE hn::Vec<hn::RebindToSigned<D>> closed_lanes(D d,
+                                                       const PressView& v,
+                                                       const PlaceLanes<D>& p,
+                                                       const ShiftLanes<D>& shift) {
+    const hn::RebindToSigned<D> di;
+    const PressClosed& nodes = v.field->closed_nodes();
+    constexpr float kPerStep = static_cast<float>(1 / kTableStep_mm);
+    const auto half = hn::Set(d, 0.5f), per_mm = hn::Set(d, v.columns_per_mm);
+    const auto nearest = [&](auto x, float last) HWY_ATTR {
+        return hn::ConvertTo(di, hn::Add(hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, last)), half));
+    };
+    auto column = hn::Zero(d), depth = p.r;
+    if (v.columns_follow_beams) {
+        const auto grow = hn::Add(hn::Set(d, 1.0f),
+                                  hn::Mul(hn::Add(p.r, shift.along), hn::Set(d, v.per_radius_mm)));
+        column = hn::Add(
+            hn::Add(hn::Set(d, v.first_column), hn::Mul(p.line, hn::Set(d, v.columns_per_line))),
+            hn::Mul(hn::Div(shift.side, grow), per_mm));
+    } else {
+        const auto x = hn::Add(p.x, hn::Add(hn::Mul(shift.along, p.dx), hn::Mul(shift.side, p.dz)));
+        column = hn::Add(hn::Mul(x, per_mm), hn::Set(d, (kColumns - 1) / 2.0f));
+        depth = p.z;
     }
+    const auto m = nearest(hn::Mul(depth, hn::Set(d, kPerStep)), kTableRows - 1.0f);
+    return hn::GatherIndex(
+        di, nodes.row_of(0),
+        hn::Add(hn::Mul(m, hn::Set(di, kStride)), nearest(column, kColumns - 1.0f)));
+}
+
+// False where no sample of a row can lie in a lumen that is shut.
+inline bool may_close(const PressView& v, int k) {
+    if (!v.columns_follow_beams) return true;
+    constexpr float kPerStep = static_cast<float>(1 / kTableStep_mm);
+    const float r = (static_cast<float>(k) + 0.5f) * v.step_mm;
+    const int m = static_cast<int>(std::min(r * kPerStep, kTableRows - 1.0f) + 0.5f);
+    return v.field->closed_nodes().row[static_cast<std::size_t>(m)];
 }
 
 // Fills the lanes of one vector of beams. first_beam: of the block; beam: the vector's first within
@@ -74,39 +202,39 @@ template <class D>
 HWY_NOINLINE void press_chunk(
     D d, const PressView& v, int first_beam, int beam, int first, int rows, PressChunk& out) {
     const hn::RebindToSigned<D> di;
-    const int lanes = static_cast<int>(hn::Lanes(d)), line = first_beam + beam;
-    const PressClosed& nodes = v.field->closed_nodes();
+    const int line = first_beam + beam;
+    const BetweenNodes<D> between(d, v, line);
+    const bool dents = v.dents(first_beam, first, rows);
     out.first = first;
-    out.any_closed = false;
-    alignas(64) float crossing[3 * kPressBeams];
-    const auto at = [&](int k) HWY_ATTR {
-        if (v.columns_follow_beams) return press_lanes(d, v, line, k);
-        press_crossing(v, line, lanes, k, crossing);
-        return PressLanes<D>{hn::LoadU(d, crossing), hn::LoadU(d, crossing + kPressBeams),
-                             hn::Zero(d), hn::LoadU(d, crossing + 2 * kPressBeams)};
-    };
-    const auto per_step = hn::Set(d, 1 / v.step_mm), one = hn::Set(d, 1.0f);
-    auto before = at(first > 0 ? first - 1 : 0).along;
-    for (int row = 0; row < rows; ++row) {
-        const int k = first + row, to = row * kPressBeams + beam;
-        const PressLanes<D> p = at(k);
-        hn::Store(p.along, d, out.along + to);
-        hn::Store(p.side, d, out.side + to);
-        hn::Store(p.tilt, d, out.tilt + to);
-        hn::Store(hn::Add(one, hn::Mul(hn::Sub(p.along, before), per_step)), d, out.rise + to);
-        before = p.along;
-        auto closed = hn::Zero(di);
-        if (!v.columns_follow_beams) {
-            closed = hn::ConvertTo(di, p.column);
-        } else if (nodes.any) {
-            const float r = (static_cast<float>(k) + 0.5f) * v.step_mm;
-            constexpr float kPerStep = static_cast<float>(1 / kTableStep_mm);
-            const int m = static_cast<int>(std::min(r * kPerStep, kTableRows - 1.0f) + 0.5f);
-            if (nodes.row[static_cast<std::size_t>(m)])
-                closed = hn::GatherIndex(di, nodes.row_of(m),
-                                         hn::ConvertTo(di, hn::Add(p.column, hn::Set(d, 0.5f))));
+    for (int row = -1; row < rows; ++row) {
+        const int k = std::max(first + row, 0);
+        const std::ptrdiff_t nodes = static_cast<std::ptrdiff_t>(k) * v.node_stride;
+        auto along = hn::Zero(d), side = hn::Zero(d);
+        if (v.pressed) {
+            along = between(v.along.data() + nodes);
+            if (row >= 0) side = between(v.side.data() + nodes);
         }
-        hn::Store(closed, di, out.closed + to);
+        if (dents) {
+            const PlaceLanes<D> places = places_of_beams(d, v, line, k);
+            auto by = hn::Zero(d), aside = hn::Zero(d);
+            if (needle_lanes(d, v, places, by, aside)) {
+                const ShiftLanes<D> shift = shift_lanes(d, v, places);
+                along = shift.along;
+                side = shift.side;
+            }
+        }
+        hn::Store(along, d, out.along + (row + 1) * kPressBeams + beam);
+        if (row >= 0) hn::Store(side, d, out.side + row * kPressBeams + beam);
+    }
+    out.any_closed = false;
+    if (!v.pressed || !v.field->closed_nodes().any) return;
+    for (int row = 0; row < rows; ++row) {
+        const auto along = hn::Load(d, out.along + (row + 1) * kPressBeams + beam),
+                   side = hn::Load(d, out.side + row * kPressBeams + beam);
+        auto closed = hn::Zero(di);
+        if (may_close(v, first + row))
+            closed = closed_lanes(d, v, places_of_beams(d, v, line, first + row), {along, side});
+        hn::Store(closed, di, out.closed + row * kPressBeams + beam);
         out.any_closed = out.any_closed || !hn::AllTrue(di, hn::Eq(closed, hn::Zero(di)));
     }
 }

@@ -2,28 +2,34 @@
 
 // The press field laid out for the beams and samples of one level of a renderer, and a stretch of a
 // block of beams as the kernels read it.
+//
+// What the probe does is worked out for every few beams (nodes, at most 0.7 columns of the field
+// apart) at every sample, and is linear between nodes: straight rows without look-ups. What a
+// needle does is narrower, and is added sample by sample near its tip.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "runtime/imaging/press/press_plane.h"
+#include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime::press {
 
-inline constexpr int kPressBeams = 16;  // of a block
-inline constexpr int kPressRows = 32;   // of a stretch
+inline constexpr int kPressBeams = 16;      // of a block
+inline constexpr int kPressRows = 32;       // of a stretch
+inline constexpr float kStill_mm = 0.002f;  // less is drawn as if nothing moved
 
 // Filled by press_chunk() (press_view-inl.h): rows of kPressBeams numbers for samples from `first`.
 struct PressChunk {
     int first = 0;
-    bool any_closed = false;
-    alignas(64) float along[kPressRows * kPressBeams];  // mm, see PlaneShift
+    bool any_closed = false;  // else `closed` is not filled in
+    // mm, see PlaneShift; the first row is the sample's before `first`, or its own where first is 0
+    alignas(64) float along[(kPressRows + 1) * kPressBeams];
     alignas(64) float side[kPressRows * kPressBeams];
-    alignas(64) float tilt[kPressRows * kPressBeams];
-    alignas(64) float rise[kPressRows * kPressBeams];  // of the rest depth per mm along the beam
     alignas(64) std::int32_t closed[kPressRows * kPressBeams];  // 1: in a lumen that is shut
-    const float* row(const float* of, int k) const { return of + (k - first) * kPressBeams; }
+    const float* along_row(int k) const { return along + (k - first + 1) * kPressBeams; }
+    const float* side_row(int k) const { return side + (k - first) * kPressBeams; }
 };
 
 class PressView {
@@ -31,28 +37,65 @@ class PressView {
     // Allocates; the rest of the class does not.
     PressView(const ScanGeometry& geometry, const PressFace& face);
 
-    // Takes over what is pressed; the field must stay as it is until the frame is drawn. Cost: 25
-    // us.
-    void show(const PressField& field);
+    // Takes over what moves; the field must stay as it is until the frame is drawn. Cost: 25 us;
+    // nothing where the field is still as it was.
+    void show(SimdTarget simd, const PressField& field);
 
-    // The shift of one sample, k < active.
+    // False where nothing moves in the samples [first, first + rows) of the beams [line, line +
+    // kPressBeams).
+    bool moves(int line, int first, int rows) const {
+        return first < active && (pressed || dents(line, first, rows));
+    }
+    bool dents(int line, int first, int rows) const;
+
+    // The shift of one sample, k < active; line <= lines. by_probe: what the probe alone does.
     struct Shift {
         float along_mm = 0, side_mm = 0;
     };
     Shift at(int line, int k) const;
+    Shift by_probe(int line, int k) const {
+        if (!pressed) return {};
+        const std::ptrdiff_t node =
+            static_cast<std::ptrdiff_t>(k) * node_stride + (line >> every_log2);
+        const float part = part_of[line & (every - 1)];
+        const float *a = along.data() + node, *s = side.data() + node;
+        return {a[0] + part * (a[1] - a[0]), s[0] + part * (s[1] - s[0])};
+    }
 
     // What press_chunk() reads.
     const PressField* field = nullptr;
     const ScanGeometry* geometry = nullptr;
+    bool pressed = false;  // by the probe
     bool columns_follow_beams = true;
-    int samples = 0, lines = 0;
-    int active = 0;  // samples from here on do not move; a whole number of stretches
+    int lines = 0;
+    // Samples of the planes: below them nothing ever moves. A whole number of stretches.
+    int capacity = 0;
+    int active = 0;  // of the field shown: samples from here on move by less than kStill_mm
     float step_mm = 1, columns_per_mm = 1, per_radius_mm = 0;
-    std::vector<float> column;  // of each beam
-    std::vector<float> shift;   // # active x kStride: depth at rest less depth shown, mm
-    std::vector<float> bulge;   // # kBulgeRows x lines: sideways shift to the place at rest, mm
-    std::vector<float> share;   // # samples: 1, fading below the table
-    const float* shift_row(int k) const { return shift.data() + k * kStride + kMargin; }
+    int every = 1, every_log2 = 0;         // beams between nodes: 1, 2 or 4
+    int node_stride = 0;                   // of the three planes below
+    std::vector<float> along, side, tilt;  // # capacity x node_stride, mm; tilt: see PlaneShift
+    // Of beam n beyond a node: the node before it, and its part of the way to the next.
+    alignas(64) std::int32_t node_of[kPressBeams + 4];
+    alignas(64) float part_of[kPressBeams + 4];
+    std::vector<float> beams;                      // origin x, z, direction x, z: # lines each
+    float first_column = 0, columns_per_line = 0;  // where the beams themselves lie
+    const float* beam_row(int number) const {
+        return beams.data() + static_cast<std::ptrdiff_t>(number) * lines;
+    }
+
+    // Of the nodes, for laying out.
+    std::vector<float> column;  // # node_stride
+    std::vector<float> bulge;   // # kBulgeRows x node_stride: sideways shift to rest, mm
+    std::vector<float> share;   // # capacity: 1, fading below the table
+    int nodes = 0;              // in use; the others of node_stride pad the rows
+    int moving = 0;             // samples that the probe moves by kStill_mm or more, from the face
+
+  private:
+    void cross_columns();
+
+    const PressField* shown_ = nullptr;
+    std::uint32_t version_ = 0;
 };
 
 }  // namespace sonocase::runtime::press

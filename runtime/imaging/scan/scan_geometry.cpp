@@ -83,31 +83,16 @@ ScanConversionTable conversion_of_rows(const ScanGeometry& g, int stride, int be
     const auto parts = [](double part) {
         return std::min(static_cast<int>(part * 256 + 0.5), 255);
     };
-    for (int row = begin; row < end; ++row) {
-        bool open = false;
-        for (int column = 0; column < g.width_px; ++column) {
-            double line = 0, sample = 0;
-            if (!g.locate(g.pixel_centre(column, row), line, sample)) {
-                open = false;
-                continue;
-            }
-            if (!open) {
-                table.runs.push_back(
-                    {row, column, column, static_cast<std::uint32_t>(table.offset.size())});
-                open = true;
-            }
-            table.runs.back().end = column + 1;
-            line = std::clamp(line, 0.0, g.scanlines - 1.0);
-            sample = std::clamp(sample, 0.0, g.samples - 1.0);
-            const int l = static_cast<int>(line), k = static_cast<int>(sample);
-            // One byte each: the error is at most 1/256 of the step between neighbours.
-            table.offset.push_back(static_cast<std::uint32_t>(k) *
-                                       static_cast<std::uint32_t>(stride) +
-                                   static_cast<std::uint32_t>(l));
-            table.weight.push_back(
-                static_cast<std::uint16_t>(parts(line - l) | parts(sample - k) << 8));
-        }
-    }
+    visit_scanned_pixels(g, begin, end, table.runs, [&](double line, double sample) {
+        line = std::clamp(line, 0.0, g.scanlines - 1.0);
+        sample = std::clamp(sample, 0.0, g.samples - 1.0);
+        const int l = static_cast<int>(line), k = static_cast<int>(sample);
+        // One byte each: the error is at most 1/256 of the step between neighbours.
+        table.offset.push_back(static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(stride) +
+                               static_cast<std::uint32_t>(l));
+        table.weight.push_back(
+            static_cast<std::uint16_t>(parts(line - l) | parts(sample - k) << 8));
+    });
     return table;
 }
 

@@ -55,6 +55,30 @@ struct PixelRun {
     std::uint32_t entry = 0;
 };
 
+// Appends the runs of rows [row_begin, row_end), whose entries count from 0, and calls
+// visit(line, sample) for each of their pixels in the same order.
+template <class Visit>
+void visit_scanned_pixels(const ScanGeometry& g,
+                          int row_begin,
+                          int row_end,
+                          std::vector<PixelRun>& runs,
+                          const Visit& visit) {
+    std::uint32_t entry = 0;
+    for (int row = row_begin; row < row_end; ++row) {
+        bool open = false;
+        for (int column = 0; column < g.width_px; ++column) {
+            double line = 0, sample = 0;
+            const bool inside = g.locate(g.pixel_centre(column, row), line, sample);
+            if (inside && !open) runs.push_back({row, column, column, entry});
+            open = inside;
+            if (!inside) continue;
+            runs.back().end = column + 1;
+            ++entry;
+            visit(line, sample);
+        }
+    }
+}
+
 // Per pixel inside the scanned area: the beam sample at its upper left, and bilinear weights / 256.
 struct ScanConversionTable {
     std::vector<PixelRun> runs;         // by row, then from the left

@@ -117,6 +117,22 @@ HWY_INLINE I pool_byte(DI di, const std::int32_t* pool, I address) {
     return hn::BitCast(di, hn::Shr(hn::BitCast(du, word), hn::BitCast(du, bits)));
 }
 
+// The normal of a boundary record, times 127: the octahedron is unfolded as in
+// formats/volume/boundary_record.cpp.
+template <class D>
+struct OctahedralNormal {
+    hn::Vec<D> x, y, z;
+};
+template <class D, class I>
+HWY_INLINE OctahedralNormal<D> octahedral_normal(D d, I record) {
+    const auto full = hn::Set(d, 127.0f);
+    const auto u = signed_byte<2>(d, record), v = signed_byte<3>(d, record);
+    const auto z = hn::Sub(hn::Sub(full, hn::Abs(u)), hn::Abs(v));
+    const auto fold = hn::Lt(z, hn::Zero(d));
+    return {hn::IfThenElse(fold, hn::CopySign(hn::Sub(full, hn::Abs(v)), u), u),
+            hn::IfThenElse(fold, hn::CopySign(hn::Sub(full, hn::Abs(u)), v), v), z};
+}
+
 }  // namespace sonocase::runtime::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

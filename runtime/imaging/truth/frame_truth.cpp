@@ -9,20 +9,16 @@
 #include <limits>
 #include <string>
 
-#include "formats/scoring/anatomy.h"
-#include "formats/scoring/image_region.h"
 #include "runtime/imaging/formation/effect_choice.h"
 #include "runtime/imaging/paper/paper_formation.h"
 #include "runtime/imaging/physical/physical_formation.h"
-#include "runtime/imaging/truth/plane_look_up.h"
-#include "runtime/imaging/truth/truth_planes.h"
-#include "runtime/imaging/truth/truth_voxels.h"
+#include "runtime/imaging/press/closed_label.h"
+#include "runtime/imaging/truth/truth_state.h"
 
 namespace sonocase::runtime {
 namespace {
 
 constexpr float kNoHardMm = 1e9f;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 bool valid_pose(const Rigid& t) {
     return is_finite(t) && orthonormality_error(t.rotation) < 1e-3 && determinant(t.rotation) > 0;
@@ -36,91 +32,48 @@ bool near_enough(const Grid& grid, const Rigid& pose, const ScanGeometry& g) {
     return most + reach_mm / grid.spacing_mm.x < 1e5;
 }
 
-// Which of an image model's effects move tissue.
-struct Moves {
-    bool contact = false, breathing = false, pulsation = false;
-};
-
-Result<Moves> moves_of(const RenderOptions& options) {
-    Moves moves;
-    const bool physical = options.model == ImageModel::physical;
-    const auto own = physical ? kPhysicalModel.effects : kPaperModel.effects;
-    const auto others = physical ? kPaperModel.effects : kPhysicalModel.effects;
-    const Result<EffectChoice> choice = choose_effects(options.effects, own, others);
-    if (!choice) return choice.error();
-    if (!physical) return moves;
-    for (std::size_t i = 0; i < own.size(); ++i) {
-        const std::string name = own[i];
-        if (name == "contact") moves.contact = choice->on[i];
-        if (name == "breathing") moves.breathing = choice->on[i];
-        if (name == "pulsation") moves.pulsation = choice->on[i];
-    }
-    return moves;
-}
-
-ScanGeometry geometry_of(const Exercise& exercise, const RenderOptions& o) {
-    const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
-    return make_scan_geometry(exercise.probe, o.scanlines > 0 ? o.scanlines : info.scanlines,
-                              o.samples > 0 ? o.samples : info.samples, o.width_px, o.height_px);
-}
-
-template <class T>
-void flip_rows(std::span<T> plane, std::size_t width) {
-    for (std::size_t at = 0; at < plane.size(); at += width)
-        std::reverse(plane.begin() + static_cast<std::ptrdiff_t>(at),
-                     plane.begin() + static_cast<std::ptrdiff_t>(at + width));
-}
-
 }  // namespace
 
-struct TruthRenderer::Impl {
-    Impl(CaseView view, const Exercise& e, const RenderOptions& o, const Moves& moves, SimdTarget s)
-        : bundle(view),
-          exercise(e),
-          options(o),
-          simd(s),
-          geometry(geometry_of(e, o)),
-          pixels(geometry),
-          look_up(view,
-                  exercise,
-                  moves.contact,
-                  moves.breathing,
-                  moves.pulsation,
-                  geometry,
-                  pixels.rays()),
-          anatomy(view, moves.breathing ? e.breathing : BreathingMotion{}),
-          needle(e.needle),
-          voxels(*view, o.model == ImageModel::physical),
-          first_hard_mm(static_cast<std::size_t>(pixels.rays())) {
-        const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
-        if (!(needle.slab_mm > 0)) needle.slab_mm = info.needle_slab_mm(exercise);
-        truth.targets.resize(exercise.targets.size());
+TruthRenderer::Impl::Impl(CaseView view,
+                          const Exercise& e,
+                          const RenderOptions& o,
+                          const MovingEffects& moves,
+                          SimdTarget s)
+    : bundle(view),
+      exercise(e),
+      options(o),
+      simd(s),
+      geometry(shown_geometry(e, o)),
+      pixels(geometry),
+      look_up(
+          view, exercise, moves.contact, moves.breathing, moves.pulsation, geometry, pixels.rays()),
+      anatomy(view, moves.breathing ? e.breathing : BreathingMotion{}),
+      needle(e.needle),
+      voxels(*view, o.model == ImageModel::physical),
+      first_hard_mm(static_cast<std::size_t>(pixels.rays())) {
+    const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
+    if (!(needle.slab_mm > 0)) needle.slab_mm = info.needle_slab_mm(exercise);
+    truth.targets.resize(exercise.targets.size());
+    if (!moves.deformation) return;
+    probe = std::make_unique<press::ProbePress>(*view, exercise, simd);
+    press_view = std::make_unique<press::PressView>(geometry, press::press_face(e.probe));
+    closed_label = press::closed_labels(*view);
+}
+
+void TruthRenderer::Impl::press(FrameInput& input, bool wants_entry) {
+    pressed = nullptr;
+    if (probe) {
+        input.mannequin_from_probe = probe->at(input.mannequin_from_probe, input.settings.press_mm);
+        truth.press = probe->report();
+        NeedleShape s;
+        const NeedlePose& in = input.needle;
+        probe->dent(needle_shape_of(input, s) ? bounded_dent(s.tip, s.axis, in.tent_mm, in.drag_mm)
+                                              : NeedleDent{});
+        pressed = probe->moving();
+        if (pressed != nullptr) press_view->show(simd, *pressed);
     }
-
-    // Blocks of the bundle that the plane meets, for bundles that are unpacked on demand.
-    void ensure_loaded(const Rigid& pose);
-    void lay_out_rows(const Rigid& pose);
-    void planes_of(const FrameInput& input, const TruthPlanes& planes);
-    void shadows(const TruthPlanes& planes);
-    void facts(const FrameInput& input);
-    void needle_facts(const FrameInput& input);
-    void target_facts();
-    bool needle_shape_of(const FrameInput& input, NeedleShape& shape) const;
-
-    CaseView bundle;
-    Exercise exercise;
-    RenderOptions options;
-    SimdTarget simd;
-    ScanGeometry geometry;
-    TruthPixels pixels;
-    PlaneLookUp look_up;
-    CaseAnatomy anatomy;
-    NeedleModel needle;
-    TruthVoxels voxels;
-    std::vector<float> first_hard_mm;
-    TruthFrameRows rows{};
-    FrameTruth truth;
-};
+    look_up.begin(input.mannequin_from_probe, input.time_s, wants_entry, pressed);
+}
 
 void TruthRenderer::Impl::ensure_loaded(const Rigid& pose) {
     VoxelBlocks* blocks = bundle.blocks();
@@ -136,7 +89,8 @@ void TruthRenderer::Impl::ensure_loaded(const Rigid& pose) {
     const double across = geometry.fan ? (radius + geometry.depth_mm) : geometry.half_extent;
     const double middle_z = 0.5 * geometry.depth_mm;
     const double seen_mm = std::hypot(across, 0.5 * geometry.depth_mm + radius) +
-                           25;  // a gap is closed by this at most
+                           25 +  // a gap is closed by this at most
+                           (pressed != nullptr ? pressed->farthest_mm() : 0);
     blocks->ensure_loaded([&](Int3 lower) {
         const Point3 centre =
             bundle->grid.point_from_voxel({lower.x + half, lower.y + half, lower.z + half});
@@ -170,6 +124,9 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
     f.mm_per_px = static_cast<float>(px);
     f.origin_x_px = static_cast<float>(geometry.origin_x_px);
     f.origin_y_px = static_cast<float>(geometry.origin_y_px);
+    f.press = pressed != nullptr ? press_view.get() : nullptr;
+    f.closed_label = closed_label.data();
+    f.lines_per_ray = static_cast<float>(geometry.scanlines) / static_cast<float>(pixels.rays());
     const BreathingLattice* lattice = look_up.breathing();
     f.weight = lattice != nullptr ? lattice->weight.data() : nullptr;
     if (lattice == nullptr) return;
@@ -182,22 +139,42 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
 
 void TruthRenderer::Impl::shadows(const TruthPlanes& planes) {
     std::fill(planes.shadowed.begin(), planes.shadowed.end(), std::uint8_t{0});
-    const bool any = std::any_of(first_hard_mm.begin(), first_hard_mm.end(),
-                                 [](float r) { return r < kNoHardMm; });
-    if (!any) return;
-    // The face itself is lit: what lies a pixel behind it is not.
-    for (float& r : first_hard_mm) r += static_cast<float>(geometry.mm_per_px);
+    std::size_t first = first_hard_mm.size(), end = 0;  // rays that any hard tissue darkens
+    for (std::size_t ray = 0; ray < first_hard_mm.size(); ++ray) {
+        if (!(first_hard_mm[ray] < kNoHardMm)) continue;
+        first = std::min(first, ray);
+        end = ray + 1;
+        // The face itself is lit: what lies a pixel behind it is not.
+        first_hard_mm[ray] += static_cast<float>(geometry.mm_per_px);
+    }
+    if (first >= end) return;
     pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
-        truth_shadows(simd, run, first_hard_mm.data(), planes.shadowed.data() + at);
+        // Rays ascend along a row.
+        const std::uint16_t* low = std::lower_bound(run.ray, run.ray + run.count, first);
+        const std::uint16_t* high = std::lower_bound(low, run.ray + run.count, end);
+        const auto skip = low - run.ray;
+        const TruthRun dark{run.row, run.begin + static_cast<int>(skip),
+                            static_cast<int>(high - low), low, run.r_mm + skip};
+        truth_shadows(simd, dark, first_hard_mm.data(),
+                      planes.shadowed.data() + at + static_cast<std::size_t>(skip));
     });
-    if (planes.labels.empty()) return;
-    for (std::size_t n = 0; n < planes.shadowed.size();) {
-        std::uint64_t eight = 0;
+    if (!planes.labels.empty()) count_shadowed(planes);
+}
+
+void TruthRenderer::Impl::count_shadowed(const TruthPlanes& planes) {
+    constexpr std::uint64_t kEach = 0x0101010101010101u;
+    for (std::size_t n = 0; n < planes.shadowed.size(); n += 8) {
+        std::uint64_t dark = 0, labels = 0;
         const std::size_t left = std::min<std::size_t>(8, planes.shadowed.size() - n);
-        std::memcpy(&eight, planes.shadowed.data() + n, left);
-        for (std::size_t i = n; eight != 0 && i < n + left; ++i)
+        std::memcpy(&dark, planes.shadowed.data() + n, left);
+        if (dark == 0) continue;
+        std::memcpy(&labels, planes.labels.data() + n, left);
+        if (dark == kEach && labels == kEach * planes.labels[n]) {  // as nearly everywhere
+            truth.shadowed_pixels_of_label[planes.labels[n]] += 8;
+            continue;
+        }
+        for (std::size_t i = n; i < n + left; ++i)
             truth.shadowed_pixels_of_label[planes.labels[i]] += planes.shadowed[i];
-        n += left;
     }
 }
 
@@ -211,7 +188,7 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
     (void)area;
     if (!planes.labels.empty()) {
         ensure_loaded(input.mannequin_from_probe);
-        std::fill(planes.labels.begin(), planes.labels.end(), std::uint8_t{0});
+        pixels.set_outside(planes.labels, std::uint8_t{0});
         std::span<float> dark;
         if (!planes.shadowed.empty()) dark = first_hard_mm;
         std::fill(dark.begin(), dark.end(), kNoHardMm);
@@ -219,6 +196,7 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
         pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
             if (!near) {
                 truth.pixels_of_label[0] += static_cast<std::uint32_t>(run.count);
+                std::fill_n(planes.labels.data() + at, run.count, std::uint8_t{0});
                 return;
             }
             truth_labels(simd, rows, run, planes.labels.data() + at, truth.pixels_of_label.data(),
@@ -227,8 +205,7 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
         if (!planes.shadowed.empty()) shadows(planes);
     }
     if (!planes.skin_depth_mm.empty()) {
-        std::fill(planes.skin_depth_mm.begin(), planes.skin_depth_mm.end(),
-                  std::numeric_limits<float>::quiet_NaN());
+        pixels.set_outside(planes.skin_depth_mm, std::numeric_limits<float>::quiet_NaN());
         pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
             truth_depths(simd, rows, run, look_up.contact().entry_mm.data(),
                          planes.skin_depth_mm.data() + at);
@@ -249,66 +226,6 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
     }
 }
 
-bool TruthRenderer::Impl::needle_shape_of(const FrameInput& input, NeedleShape& shape) const {
-    const Vector3 d = input.needle.direction;
-    const Point3 tip = input.needle.tip;
-    const bool finite = std::isfinite(tip.x) && std::isfinite(tip.y) && std::isfinite(tip.z) &&
-                        std::isfinite(d.x) && std::isfinite(d.y) && std::isfinite(d.z);
-    if (!input.has_needle || !finite || !(norm(d) > 0.5)) return false;
-    const Rigid probe_from_mannequin = inverse(input.mannequin_from_probe);
-    shape = needle_shape(needle, probe_from_mannequin * tip, normalized(probe_from_mannequin * d));
-    return shape.radius_mm > 0 && std::isfinite(shape.slab_mm);
-}
-
-void TruthRenderer::Impl::needle_facts(const FrameInput& input) {
-    NeedleShape shape;
-    truth.has_needle = needle_shape_of(input, shape);
-    truth.tip_in_plane = false;
-    truth.needle_in_image_mm = 0;
-    truth.tip_label = 0;
-    if (!truth.has_needle) return;
-    truth.needle = {input.needle.tip, normalized(input.needle.direction)};
-    truth.tip_probe = shape.tip;
-    const double half_slab = 0.5 * shape.slab_mm;
-    truth.tip_in_plane =
-        std::abs(shape.tip.y) <= half_slab && in_image(exercise.probe, shape.tip.x, shape.tip.z);
-    truth.needle_in_image_mm = length_in_image(
-        exercise.probe, shape.tip - shape.length_mm * shape.axis, shape.tip, half_slab);
-    truth.tip_label = anatomy.label(anatomy.at_rest(input.needle.tip, truth.time_s));
-}
-
-void TruthRenderer::Impl::target_facts() {
-    const Rigid probe_from_mannequin = inverse(truth.mannequin_from_probe);
-    truth.nearest_target = -1;
-    double nearest = INFINITY;
-    for (std::size_t i = 0; i < truth.targets.size(); ++i) {
-        const Target& target = exercise.targets[i];
-        TargetTruth& out = truth.targets[i];
-        out.centre = anatomy.moved(target.centre, truth.time_s);
-        const Point3 p = probe_from_mannequin * out.centre;
-        out.plane_mm = p.y;
-        const double cut = target.radius_mm * target.radius_mm - p.y * p.y;
-        out.in_image =
-            cut > 0 && distance_to_image(exercise.probe, p.x, p.z) < std::sqrt(std::max(cut, 0.0));
-        out.tip_mm = truth.has_needle ? distance(truth.needle.tip, out.centre) : kNaN;
-        if (out.tip_mm < nearest) {
-            nearest = out.tip_mm;
-            truth.nearest_target = static_cast<int>(i);
-        }
-    }
-}
-
-void TruthRenderer::Impl::facts(const FrameInput& input) {
-    truth.posed = true;
-    truth.mannequin_from_probe = input.mannequin_from_probe;
-    truth.time_s = std::isfinite(input.time_s) ? input.time_s : 0;
-    truth.mm2_per_px = geometry.mm_per_px * geometry.mm_per_px;
-    truth.beams = geometry.scanlines;
-    truth.beams_touching = look_up.contact().touching;
-    needle_facts(input);
-    target_facts();
-}
-
 TruthRenderer::TruthRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 TruthRenderer::~TruthRenderer() = default;
 TruthRenderer::TruthRenderer(TruthRenderer&&) noexcept = default;
@@ -318,7 +235,7 @@ Result<TruthRenderer> TruthRenderer::create(CaseView bundle,
                                             const Exercise& exercise,
                                             const RenderOptions& options) {
     if (bundle->labels.empty()) return Error{"the bundle has no labels", "", "cook it again"};
-    const Result<Moves> moves = moves_of(options);
+    const Result<MovingEffects> moves = moving_effects(options);
     if (!moves) return moves.error();
     SimdTarget simd = available_simd_targets().front();
     for (const SimdTarget& target : available_simd_targets()) {
@@ -327,21 +244,23 @@ Result<TruthRenderer> TruthRenderer::create(CaseView bundle,
     return TruthRenderer(std::make_unique<Impl>(bundle, exercise, options, *moves, simd));
 }
 
-const FrameTruth& TruthRenderer::render(const FrameInput& input, const TruthPlanes& planes) {
+const FrameTruth& TruthRenderer::render(const FrameInput& frame, const TruthPlanes& planes) {
     Impl& m = *impl_;
+    FrameInput input = frame;
     m.truth.posed = valid_pose(input.mannequin_from_probe);
     m.truth.pixels_of_label.fill(0);
     m.truth.shadowed_pixels_of_label.fill(0);
     if (!m.truth.posed) return m.truth;
-    m.look_up.begin(input.mannequin_from_probe, input.time_s, !planes.skin_depth_mm.empty());
+    m.press(input, !planes.skin_depth_mm.empty());
     m.lay_out_rows(input.mannequin_from_probe);
     m.planes_of(input, planes);
     m.facts(input);
     return m.truth;
 }
 
-PixelTruth TruthRenderer::at(const FrameInput& input, int column, int row) {
+PixelTruth TruthRenderer::at(const FrameInput& frame, int column, int row) {
     Impl& m = *impl_;
+    FrameInput input = frame;
     PixelTruth pixel;
     if (!valid_pose(input.mannequin_from_probe)) return pixel;
     if (input.settings.flip_left_right) column = m.geometry.width_px - 1 - column;
@@ -349,12 +268,14 @@ PixelTruth TruthRenderer::at(const FrameInput& input, int column, int row) {
     double line = 0, sample = 0;
     pixel.scanned = m.geometry.locate(p, line, sample);
     if (!pixel.scanned) return pixel;
-    m.look_up.begin(input.mannequin_from_probe, input.time_s, true);
+    m.press(input, true);
     const double ray = m.look_up.ray_of(line), gap = m.look_up.gap_at(ray);
     pixel.shown = m.look_up.shown(p, gap);
-    pixel.rest = m.look_up.rest(pixel.shown);
-    pixel.label = gap < 0 ? 0 : m.anatomy.label(pixel.rest);
     const double r = (sample + 0.5) * m.geometry.step_mm;
+    pixel.rest = m.look_up.rest(p, line, r, gap);
+    pixel.label = gap < 0 ? 0 : m.anatomy.label(pixel.rest);
+    if (m.look_up.shut(p, line, r))
+        pixel.label = m.closed_label[static_cast<std::size_t>(pixel.label)];
     pixel.skin_depth_mm = r + std::max(gap, 0.0) * std::exp(-r / m.look_up.contact_reach_mm()) -
                           m.look_up.entry_at(ray);
     return pixel;

@@ -6,10 +6,10 @@
 //     truth->render(input, planes);                    // the FrameInput of the frame
 //
 // A pixel shows the tissue at its place in the middle of the scan plane, after the contact that
-// closes a gap to the skin and the breathing that moves the tissue (model `physical`, where these
-// effects are on), and on the side of the surface in its voxel where that place lies. What makes
-// the picture uneven is left out: the beam's thickness, the roughness of surfaces, the point
-// spread.
+// closes a gap to the skin, the probe and the needle that press it and the breathing that moves it
+// (where these effects are on), and on the side of the surface in its voxel where that place lies.
+// What makes the picture uneven is left out: the beam's thickness, the roughness of surfaces, the
+// point spread.
 //
 // Part of the portable core: no files, no clock, no thread; render() neither throws nor allocates.
 // Source and limits: docs/python.md.
@@ -48,8 +48,9 @@ struct TargetTruth {
 };
 
 struct FrameTruth {
-    bool posed = false;  // false: the pose was not rigid, and everything else is empty
-    Rigid mannequin_from_probe;
+    bool posed = false;          // false: the pose was not rigid, and everything else is empty
+    Rigid mannequin_from_probe;  // pressed, and where bone holds it
+    PressReport press;
     double time_s = 0;
     std::array<std::uint32_t, 256> pixels_of_label{};           // in the scanned area
     std::array<std::uint32_t, 256> shadowed_pixels_of_label{};  // 0 without the plane `shadowed`
@@ -57,7 +58,7 @@ struct FrameTruth {
     int beams_touching = 0, beams = 0;  // model `physical`, effect contact on; else all touch
 
     bool has_needle = false;
-    NeedlePose needle;          // as drawn
+    NeedlePose needle;          // as drawn; its dent is 0 without effect deformation
     Point3 tip_probe;           // frame `probe`: y is the distance to the scan plane
     bool tip_in_plane = false;  // inside the slab that the needle shows in, and the scanned area
     double needle_in_image_mm = 0;     // length of the shaft that the slab shows

@@ -21,14 +21,20 @@ BreathingLattice lattice_of(const CaseBundle& bundle, const BreathingField& fiel
     const Int3 n = brick_count(bundle.grid.size);
     BreathingLattice lattice;
     for (int axis = 0; axis < 3; ++axis) {
-        lattice.size[axis] = (n[axis] + 1) / 2;
-        lattice.first_vx[axis] = 0.5f * (kCell - 1);
+        lattice.size[axis] = (n[axis] + 1) / 2 + 2;  // with the rim
+        lattice.first_vx[axis] = 0.5f * (kCell - 1) - kCell;
     }
     lattice.per_voxel = 1.0f / kCell;
-    const double first = 0.5 * (kCell - 1);
+    const double first = 0.5 * (kCell - 1) - kCell;
     for (int k = 0; k < lattice.size.z; ++k) {
         for (int j = 0; j < lattice.size.y; ++j) {
             for (int i = 0; i < lattice.size.x; ++i) {
+                const bool rim = i == 0 || j == 0 || k == 0 || i + 1 == lattice.size.x ||
+                                 j + 1 == lattice.size.y || k + 1 == lattice.size.z;
+                if (rim) {
+                    lattice.weight.push_back(0);
+                    continue;
+                }
                 const Point3 voxel{first + kCell * i, first + kCell * j, first + kCell * k};
                 lattice.weight.push_back(
                     static_cast<float>(field.weight(bundle.grid.point_from_voxel(voxel))));
@@ -64,13 +70,18 @@ PlaneLookUp::PlaneLookUp(CaseView bundle,
     gaps_ = raw_;
 }
 
-void PlaneLookUp::begin(const Rigid& mannequin_from_probe, double time_s, bool wants_entry) {
+void PlaneLookUp::begin(const Rigid& mannequin_from_probe,
+                        double time_s,
+                        bool wants_entry,
+                        const press::PressField* press) {
     pose_ = mannequin_from_probe;
+    press_ = press;
     motion_ = motion_at(breathing_motion_, pulsation_, std::isfinite(time_s) ? time_s : 0);
     contact_.any_gap = false;
     contact_.touching = geometry_.scanlines;
     if (contact_on_) find_gaps_of_rays();
     if (wants_entry) find_entries();
+    if (wants_entry && press_ != nullptr && press_->state().pressed) press_entries();
 }
 
 void PlaneLookUp::find_gaps_of_rays() {
@@ -84,6 +95,7 @@ void PlaneLookUp::find_gaps_of_rays() {
     frame.volume_from_probe = pose_;
     find_gaps(scene, geometry_, frame, 0, geometry_.scanlines, raw_);
     contact_.touching = smooth_gaps(geometry_.scanlines, raw_, gaps_);
+    if (press_ != nullptr) press_gaps(*press_, geometry_, gaps_);
     const auto rays = contact_.gap_mm.size();
     for (std::size_t i = 0; i < rays; ++i) {
         const double line =
@@ -158,6 +170,19 @@ void PlaneLookUp::find_entries() {
     }
 }
 
+// Beams enter pressed tissue at the skin as it is now.
+void PlaneLookUp::press_entries() {
+    const auto rays = static_cast<double>(contact_.entry_mm.size());
+    for (std::size_t i = 0; i < contact_.entry_mm.size(); ++i) {
+        if (std::isnan(contact_.entry_mm[i])) continue;
+        const double line = (static_cast<double>(i) + 0.5) * geometry_.scanlines / rays - 0.5;
+        const double lateral = press::follows_columns(geometry_)
+                                   ? press::lateral_of_line(geometry_, line)
+                                   : geometry_.beam_origin(line).x;
+        contact_.entry_mm[i] = static_cast<float>(press_->skin_now_mm(lateral));
+    }
+}
+
 double PlaneLookUp::contact_reach_mm() const {
     return physical::kGapReachMm;
 }
@@ -189,9 +214,29 @@ Point3 PlaneLookUp::shown(PlanePoint p, double gap_mm) const {
     return pose_ * Point3{p.x + shift * d.x, 0, p.z + shift * d.z};
 }
 
-Point3 PlaneLookUp::rest(Point3 shown) const {
-    if (field_.empty() || !motion_.breathes()) return shown;
-    return shown - field_.weight(shown) * motion_.breathing_mm;
+Point3 PlaneLookUp::rest(PlanePoint p, double line, double r_mm, double gap_mm) const {
+    Point3 at = shown(p, gap_mm);
+    if (press_ != nullptr) {
+        const ScanGeometry::Beam beam{geometry_.beam_origin(line), geometry_.beam_direction(line)};
+        const press::PlaneShift shift = press::plane_shift(*press_, geometry_, beam, line, r_mm);
+        const PlanePoint d = beam.direction, n = press::beside(d);
+        at = at + pose_.rotation * Vector3{shift.along_mm * d.x + shift.side_mm * n.x, 0,
+                                           shift.along_mm * d.z + shift.side_mm * n.z};
+    }
+    return without_breathing(at);
+}
+
+Point3 PlaneLookUp::without_breathing(Point3 now) const {
+    if (field_.empty() || !motion_.breathes()) return now;
+    return now - field_.weight(now) * motion_.breathing_mm;
+}
+
+bool PlaneLookUp::shut(PlanePoint p, double line, double r_mm) const {
+    if (press_ == nullptr) return false;
+    return press_->closed_in_plane(
+        press::follows_columns(geometry_)
+            ? press::BeamPoint{press::lateral_of_line(geometry_, line), r_mm}
+            : press::BeamPoint{p.x, p.z});
 }
 
 }  // namespace sonocase::runtime

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Where a point of the scan plane is looked up in the anatomy: the one place that knows how contact
-// and breathing move tissue from where it lies at rest to where the picture shows it.
+// Where a point of the scan plane is looked up in the anatomy: the one place that knows how
+// contact, pressing and breathing move tissue from where it lies at rest to where the picture shows
+// it.
 #pragma once
 
 #include <optional>
@@ -11,6 +12,7 @@
 #include "formats/bundle/streamed_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "formats/exercise/motion.h"
+#include "runtime/imaging/press/press_plane.h"
 #include "runtime/imaging/renderer.h"
 #include "runtime/imaging/scan/scan_geometry.h"
 
@@ -26,7 +28,7 @@ struct RayContact {
 };
 
 // The breathing weight on a lattice of its own, for vector look-ups: the values of BreathingField
-// at the middles of its cells.
+// at the middles of its cells, and a rim of zeros around them.
 struct BreathingLattice {
     Int3 size{0, 0, 0};
     float first_vx[3] = {0, 0, 0};  // voxel coordinates of its first point
@@ -44,8 +46,12 @@ class PlaneLookUp {
                 const ScanGeometry& geometry,
                 int rays);
 
-    // Begins a frame: where the beams touch, and how the tissue stands.
-    void begin(const Rigid& mannequin_from_probe, double time_s, bool wants_entry);
+    // Begins a frame: where the beams touch, and how the tissue stands. press: what yields to probe
+    // and needle, as for the picture; null: nothing does. The pose is where bone holds the face.
+    void begin(const Rigid& mannequin_from_probe,
+               double time_s,
+               bool wants_entry,
+               const press::PressField* press);
 
     const RayContact& contact() const { return contact_; }
     const MotionState& motion() const { return motion_; }
@@ -57,7 +63,12 @@ class PlaneLookUp {
     // Where the tissue that the plane's point p shows is now, and where it lies at rest. gap_mm:
     // of its beam.
     Point3 shown(PlanePoint p, double gap_mm) const;
-    Point3 rest(Point3 shown) const;
+    // line, r_mm: of p.
+    Point3 rest(PlanePoint p, double line, double r_mm, double gap_mm) const;
+    // A place less the breathing that carries its tissue.
+    Point3 without_breathing(Point3 now) const;
+    // p lies in a lumen that is pressed shut: the picture shows what is around it.
+    bool shut(PlanePoint p, double line, double r_mm) const;
     // Fraction of the ray of a beam's position across the face.
     double ray_of(double line) const;
     double gap_at(double ray) const;
@@ -66,6 +77,7 @@ class PlaneLookUp {
   private:
     void find_gaps_of_rays();
     void find_entries();
+    void press_entries();
     double entry_along(PlanePoint origin, PlanePoint direction) const;
     bool body_at(Point3 mannequin) const;
 
@@ -79,6 +91,7 @@ class PlaneLookUp {
     Rigid pose_;
     MotionState motion_;
     RayContact contact_;
+    const press::PressField* press_ = nullptr;
     std::vector<float> raw_, gaps_;  // # scanlines
 };
 

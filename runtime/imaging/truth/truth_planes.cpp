@@ -22,24 +22,11 @@ TruthPixels::TruthPixels(const ScanGeometry& g) : width_px_(g.width_px), rays_(r
     const double ray_step = 2 * g.half_extent / rays_;  // rad or mm
     rays_per_px_at_face_ = static_cast<float>(
         g.mm_per_px / (g.fan ? std::max(g.radius_mm, 1e-3) * ray_step : ray_step));
-    for (int row = 0; row < g.height_px; ++row) {
-        bool open = false;
-        for (int column = 0; column < g.width_px; ++column) {
-            double line = 0, sample = 0;
-            if (!g.locate(g.pixel_centre(column, row), line, sample)) {
-                open = false;
-                continue;
-            }
-            if (!open)
-                runs_.push_back({row, column, column, static_cast<std::uint32_t>(ray_.size())});
-            open = true;
-            runs_.back().end = column + 1;
-            const double ray = (line + 0.5) / g.scanlines * rays_;
-            ray_.push_back(
-                static_cast<std::uint16_t>(std::clamp(static_cast<int>(ray), 0, rays_ - 1)));
-            r_mm_.push_back(static_cast<float>((sample + 0.5) * g.step_mm));
-        }
-    }
+    visit_scanned_pixels(g, 0, g.height_px, runs_, [&](double line, double sample) {
+        const double ray = (line + 0.5) / g.scanlines * rays_;
+        ray_.push_back(static_cast<std::uint16_t>(std::clamp(static_cast<int>(ray), 0, rays_ - 1)));
+        r_mm_.push_back(static_cast<float>((sample + 0.5) * g.step_mm));
+    });
     ray_.resize(ray_.size() + kVectorSlack, 0);
     r_mm_.resize(r_mm_.size() + kVectorSlack, 0.0f);
 }

@@ -4,6 +4,7 @@
 // each pixel's ray and depth. And the needle's plane.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -31,6 +32,16 @@ class TruthPixels {
         }
     }
     bool scanned(int column, int row) const;
+    // Sets the pixels outside the scanned area, which no run visits.
+    template <class T>
+    void set_outside(std::span<T> plane, T value) const {
+        std::size_t at = 0;
+        for_each_run([&](const TruthRun& run, std::size_t begin) {
+            std::fill(plane.data() + at, plane.data() + begin, value);
+            at = begin + static_cast<std::size_t>(run.count);
+        });
+        std::fill(plane.data() + at, plane.data() + plane.size(), value);
+    }
 
   private:
     int width_px_ = 0, rays_ = 0;
@@ -46,5 +57,13 @@ void needle_plane(const ScanGeometry& geometry,
                   const NeedleShape& needle,
                   double tip_mm,
                   std::span<std::uint8_t> plane);
+
+// Mirrors each row of a plane; an empty one stays so.
+template <class T>
+void flip_rows(std::span<T> plane, std::size_t width) {
+    for (std::size_t at = 0; at < plane.size(); at += width)
+        std::reverse(plane.begin() + static_cast<std::ptrdiff_t>(at),
+                     plane.begin() + static_cast<std::ptrdiff_t>(at + width));
+}
 
 }  // namespace sonocase::runtime

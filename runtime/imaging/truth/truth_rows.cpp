@@ -11,6 +11,7 @@
 //
 #include "formats/volume/boundary_record.h"
 #include "formats/volume/brick_volume.h"
+#include "runtime/imaging/press/press_view-inl.h"
 #include "runtime/imaging/simd/simd_math-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -61,40 +62,70 @@ HWY_INLINE void close_gap(
     p = {moved(p.x, 0), moved(p.y, 1), moved(p.z, 2)};
 }
 
-// Breathing: back by the shift times the weight, trilinear in its lattice and 0 outside.
+// Pressing: back to where the tissue lies at rest. shut: 1 where a lumen is.
+template <class D, class V, class I>
+HWY_NOINLINE void press_back(
+    D d, const TruthFrameRows& f, const TruthRun& run, int first, V column, Places<D>& p, I& shut) {
+    namespace lanes = press::HWY_NAMESPACE;
+    const hn::RebindToSigned<D> di;
+    const auto r = hn::LoadU(d, run.r_mm + first);
+    const auto half = hn::Set(d, 0.5f);
+    const auto ray = hn::Add(hn::ConvertTo(d, rays_of(d, run, first)), half);
+    const auto x = hn::Mul(hn::Sub(column, hn::Set(d, f.origin_x_px)), hn::Set(d, f.mm_per_px));
+    const auto z = hn::Set(d, (static_cast<float>(run.row) - f.origin_y_px) * f.mm_per_px);
+    auto dx = hn::Zero(d), dz = hn::Set(d, 1.0f);
+    if (f.fan) {
+        const auto radius = hn::Set(d, f.radius_mm);
+        const auto away = hn::Max(hn::Add(r, radius), hn::Set(d, 1e-3f));
+        dx = hn::Div(x, away);
+        dz = hn::Div(hn::Add(z, radius), away);
+    }
+    const auto line = hn::Sub(hn::Mul(ray, hn::Set(d, f.lines_per_ray)), half);
+    const lanes::PlaceLanes<D> place{x, z, dx, dz, line, r};
+    const lanes::ShiftLanes<D> shift = lanes::shift_lanes(d, *f.press, place);
+    const auto move_x = hn::Add(hn::Mul(shift.along, dx), hn::Mul(shift.side, dz));
+    const auto move_z = hn::Sub(hn::Mul(shift.along, dz), hn::Mul(shift.side, dx));
+    const auto moved = [&](V v, int axis) HWY_ATTR {
+        return hn::Add(v, hn::Add(hn::Mul(move_x, hn::Set(d, f.beam_x[axis])),
+                                  hn::Mul(move_z, hn::Set(d, f.beam_z[axis]))));
+    };
+    p = {moved(p.x, 0), moved(p.y, 1), moved(p.z, 2)};
+    shut = hn::Zero(di);
+    if (f.press->pressed && f.press->field->closed_nodes().any)
+        shut = lanes::closed_lanes(d, *f.press, place, shift);
+}
+
+// Breathing: back by the shift times the weight, trilinear in its lattice, whose rim holds 0.
 template <class D>
 HWY_INLINE void breathe_back(D d, const TruthFrameRows& f, Places<D>& p) {
     const hn::RebindToSigned<D> di;
     using V = hn::Vec<D>;
-    const V at[3] = {hn::Mul(hn::Sub(p.x, hn::Set(d, f.first_vx[0])), hn::Set(d, f.per_voxel)),
-                     hn::Mul(hn::Sub(p.y, hn::Set(d, f.first_vx[1])), hn::Set(d, f.per_voxel)),
-                     hn::Mul(hn::Sub(p.z, hn::Set(d, f.first_vx[2])), hn::Set(d, f.per_voxel))};
-    const V bounded[3] = {hn::Min(hn::Max(at[0], hn::Set(d, -2.0f)), hn::Set(d, 1e6f)),
-                          hn::Min(hn::Max(at[1], hn::Set(d, -2.0f)), hn::Set(d, 1e6f)),
-                          hn::Min(hn::Max(at[2], hn::Set(d, -2.0f)), hn::Set(d, 1e6f))};
-    const V low[3] = {hn::Floor(bounded[0]), hn::Floor(bounded[1]), hn::Floor(bounded[2])};
-    V part[3];
+    const V one = hn::Set(d, 1.0f);
+    const V voxel[3] = {p.x, p.y, p.z};
+    V share[3][2];
     IntOf<D> cell[3];
     for (int a = 0; a < 3; ++a) {
-        part[a] = hn::Sub(bounded[a], low[a]);
-        cell[a] = hn::ConvertTo(di, low[a]);
+        const V at = hn::Mul(hn::Sub(voxel[a], hn::Set(d, f.first_vx[a])), hn::Set(d, f.per_voxel));
+        const V last = hn::Set(d, static_cast<float>(f.lattice[a] - 1));
+        const V bounded = hn::Min(hn::Max(at, hn::Zero(d)), last);
+        const V low = hn::Min(hn::Floor(bounded), hn::Sub(last, one));
+        share[a][1] = hn::Sub(bounded, low);
+        share[a][0] = hn::Sub(one, share[a][1]);
+        cell[a] = hn::ConvertTo(di, low);
     }
-    const auto one = hn::Set(d, 1.0f);
+    const std::ptrdiff_t row = f.lattice[0], plane = row * f.lattice[1];
+    const auto rows = hn::Add(hn::Mul(cell[2], hn::Set(di, f.lattice[1])), cell[1]);
+    const auto index = hn::Add(hn::Mul(rows, hn::Set(di, f.lattice[0])), cell[0]);
     V sum = hn::Zero(d);
-    for (int corner = 0; corner < 8; ++corner) {
-        auto index = hn::Zero(di);
-        auto inside = hn::Eq(index, index);
-        V share = one;
-        for (int a = 2; a >= 0; --a) {
-            const bool upper = (corner >> a & 1) != 0;
-            const auto c = upper ? hn::Add(cell[a], hn::Set(di, 1)) : cell[a];
-            inside = hn::And(
-                inside, hn::And(hn::Gt(c, hn::Set(di, -1)), hn::Lt(c, hn::Set(di, f.lattice[a]))));
-            index = hn::Add(hn::Mul(index, hn::Set(di, f.lattice[a])), c);
-            share = hn::Mul(share, upper ? part[a] : hn::Sub(one, part[a]));
+    for (int z = 0; z < 2; ++z) {
+        for (int y = 0; y < 2; ++y) {
+            const V across = hn::Mul(share[2][z], share[1][y]);
+            const float* from = f.weight + z * plane + y * row;
+            for (int x = 0; x < 2; ++x) {
+                const V weight = hn::GatherIndex(d, from + x, index);
+                sum = hn::Add(sum, hn::Mul(hn::Mul(across, share[0][x]), weight));
+            }
         }
-        const auto weight = hn::GatherIndex(d, f.weight, hn::IfThenElseZero(inside, index));
-        sum = hn::Add(sum, hn::IfThenElseZero(hn::RebindMask(d, inside), hn::Mul(share, weight)));
     }
     p.x = hn::Sub(p.x, hn::Mul(sum, hn::Set(d, f.shift_vx[0])));
     p.y = hn::Sub(p.y, hn::Mul(sum, hn::Set(d, f.shift_vx[1])));
@@ -108,15 +139,7 @@ HWY_INLINE I side_of_surface(D d, const TruthFrameRows& f, I record, I own, cons
     const auto second = hn::And(record, hn::Set(di, 0xFF));
     const auto near = hn::Lt(second, hn::Set(di, f.label_count));
     if (hn::AllFalse(di, near)) return own;
-    // The normal is unfolded as in formats/volume/boundary_record.cpp, times 127.
-    const auto full = hn::Set(d, 127.0f), zero = hn::Zero(d);
-    auto nu = signed_byte<2>(d, record), nv = signed_byte<3>(d, record);
-    const auto nz = hn::Sub(hn::Sub(full, hn::Abs(nu)), hn::Abs(nv));
-    const auto fold = hn::Lt(nz, zero);
-    const auto fu = hn::CopySign(hn::Sub(full, hn::Abs(nv)), nu);
-    const auto fv = hn::CopySign(hn::Sub(full, hn::Abs(nu)), nv);
-    nu = hn::IfThenElse(fold, fu, nu);
-    nv = hn::IfThenElse(fold, fv, nv);
+    const auto [nu, nv, nz] = octahedral_normal(d, record);
     const auto square = hn::Add(hn::Add(hn::Mul(nu, nu), hn::Mul(nv, nv)), hn::Mul(nz, nz));
     const auto along = hn::Add(hn::Mul(nu, off.x), hn::Add(hn::Mul(nv, off.y), hn::Mul(nz, off.z)));
     auto side = hn::Add(hn::Mul(signed_byte<1>(d, record), hn::Set(d, 1.0f / 48)),
@@ -130,7 +153,7 @@ HWY_INLINE I side_of_surface(D d, const TruthFrameRows& f, I record, I own, cons
         side = hn::Add(side, hn::IfThenElseZero(hn::RebindMask(d, swells), pulse));
         side = hn::Sub(side, hn::IfThenElseZero(hn::RebindMask(d, yields), pulse));
     }
-    const auto beyond = hn::And(near, hn::RebindMask(di, hn::Lt(side, zero)));
+    const auto beyond = hn::And(near, hn::RebindMask(di, hn::Lt(side, hn::Zero(d))));
     return hn::IfThenElse(beyond, second, own);
 }
 
@@ -154,33 +177,38 @@ HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) 
         inside, hn::Add(hn::ShiftRight<2>(i),
                         hn::Add(hn::Mul(hn::ShiftRight<2>(j), hn::Set(di, f.bricks_x)),
                                 hn::Mul(hn::ShiftRight<2>(k), hn::Set(di, f.bricks_xy)))));
+    const I word = hn::GatherIndex(di, f.bricks, brick);
+    const I own = hn::And(word, hn::Set(di, 0xFF));
+    const auto mixed = hn::Not(hn::Lt(word, hn::Zero(di)));
     // Bricks of one label and no surface: most of a body.
-    const I whole = hn::And(pool_byte(di, f.brick_label, brick), hn::Set(di, 0xFF));
-    if (hn::AllFalse(di, hn::And(inside, hn::Eq(whole, hn::Set(di, 0xFF)))))
-        return hn::IfThenElseZero(inside, whole);
+    const auto plain = hn::AndNot(
+        mixed,
+        hn::Eq(hn::And(word, hn::Set(di, static_cast<std::int32_t>(kHasSurface))), hn::Zero(di)));
+    if (hn::AllFalse(di, hn::AndNot(plain, inside))) return hn::IfThenElseZero(inside, own);
     const I cell = hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
                                                     hn::ShiftLeft<4>(hn::And(k, three))));
-    const I low = hn::Set(di, 0x7FFFFFFF);
-    const I entry = hn::GatherIndex(di, f.label_table, brick);
-    const auto uniform = hn::Lt(entry, hn::Zero(di));
-    I label =
-        hn::GatherIndex(di, f.label_uniform, hn::IfThenElseZero(uniform, hn::And(entry, low)));
-    if (!hn::AllTrue(di, uniform)) {
-        const I at = hn::IfThenZeroElse(uniform, hn::Or(hn::ShiftLeft<6>(entry), cell));
-        label = hn::IfThenElse(uniform, label,
-                               hn::And(pool_byte(di, f.label_pool, at), hn::Set(di, 0xFF)));
+    I label = own;
+    if (!hn::AllFalse(di, mixed)) {
+        const I at = hn::IfThenElseZero(mixed, hn::Or(hn::ShiftLeft<6>(word), cell));
+        label =
+            hn::IfThenElse(mixed, hn::And(pool_byte(di, f.label_pool, at), hn::Set(di, 0xFF)), own);
     }
     label = hn::IfThenElseZero(inside, label);
     if (f.boundary_table == nullptr) return label;
-    const I word = hn::GatherIndex(di, f.boundary_table, brick);
-    const auto alike = hn::Lt(word, hn::Zero(di));
-    I record =
-        hn::GatherIndex(di, f.boundary_uniform, hn::IfThenElseZero(alike, hn::And(word, low)));
-    if (!hn::AllTrue(di, alike)) {
-        const I at = hn::IfThenZeroElse(alike, hn::Or(hn::ShiftLeft<6>(word), cell));
-        record = hn::IfThenElse(alike, record, hn::GatherIndex(di, f.boundary_pool, at));
+    const I entry = hn::GatherIndex(di, f.boundary_table, brick);
+    const auto alike = hn::Lt(entry, hn::Zero(di));
+    const I none = hn::Set(di, static_cast<std::int32_t>(kNoBoundary));
+    I record = none;
+    if (f.boundary_uniform != nullptr) {
+        const I low = hn::And(entry, hn::Set(di, 0x7FFFFFFF));
+        record = hn::GatherIndex(di, f.boundary_uniform, hn::IfThenElseZero(alike, low));
     }
-    record = hn::IfThenElse(inside, record, hn::Set(di, static_cast<std::int32_t>(kNoBoundary)));
+    const auto stored = hn::AndNot(alike, inside);
+    if (!hn::AllFalse(di, stored)) {
+        const I at = hn::IfThenElseZero(stored, hn::Or(hn::ShiftLeft<6>(entry), cell));
+        record = hn::IfThenElse(stored, hn::GatherIndex(di, f.boundary_pool, at), record);
+    }
+    record = hn::IfThenElse(inside, record, none);
     return side_of_surface(
         d, f, record, label,
         Places<D>{hn::Sub(p.x, hn::Sub(hx, shift)), hn::Sub(p.y, hn::Sub(hy, shift)),
@@ -199,7 +227,6 @@ HWY_INLINE void darken(D,
                        std::span<float> first_hard_mm) {
     const hn::RebindToSigned<D> di;
     const I hard = hn::GatherIndex(di, f.hard, label);
-    if (hn::AllFalse(di, hn::Gt(hard, hn::Zero(di)))) return;
     HWY_ALIGN std::int32_t is_hard[kMostLanes];
     hn::Store(hard, di, is_hard);
     const int rays = static_cast<int>(first_hard_mm.size());
@@ -246,19 +273,32 @@ void labels_of_run(const TruthFrameRows& f,
             const auto column = hn::Add(n, hn::Set(d, static_cast<float>(run.begin)));
             close_gap(d, f, run, first, column, air, p);
         }
+        auto shut = hn::Zero(di);
+        if (f.press != nullptr) {
+            const auto column = hn::Add(n, hn::Set(d, static_cast<float>(run.begin)));
+            press_back(d, f, run, first, column, p, shut);
+        }
         if (f.weight != nullptr) breathe_back(d, f, p);
         auto label = labels_at(d, f, p);
+        const auto is_shut = hn::Gt(shut, hn::Zero(di));
+        if (!hn::AllFalse(di, is_shut))
+            label = hn::IfThenElse(is_shut, hn::GatherIndex(di, f.closed_label, label), label);
         label = hn::IfThenElseZero(hn::RebindMask(di, hn::Ge(air, hn::Zero(d))), label);
         const int used = std::min(lanes, run.count - first);
         HWY_ALIGN std::uint8_t bytes[kMostLanes];
         hn::Store(hn::DemoteTo(d8, label), d8, bytes);
         std::copy_n(bytes, used, labels + first);
-        if (used == lanes && hn::AllTrue(di, hn::Eq(label, hn::Set(di, bytes[0])))) {
-            count_of_label[bytes[0]] += static_cast<std::uint32_t>(lanes);
-            if (f.hard[bytes[0]] == 0) continue;
-        } else {
-            for (int lane = 0; lane < used; ++lane) ++count_of_label[bytes[lane]];
-        }
+        // Few labels meet in a vector: each is counted at once.
+        auto left = hn::FirstN(di, static_cast<std::size_t>(used));
+        std::int32_t any_hard = 0;
+        do {
+            const std::uint8_t value = bytes[hn::FindKnownFirstTrue(di, left)];
+            const auto same = hn::And(left, hn::Eq(label, hn::Set(di, value)));
+            count_of_label[value] += static_cast<std::uint32_t>(hn::CountTrue(di, same));
+            any_hard |= f.hard[value];
+            left = hn::AndNot(same, left);
+        } while (!hn::AllFalse(di, left));
+        if (any_hard == 0) continue;
         if (!first_hard_mm.empty())
             darken(d, f, run, first, used, label, rays_per_px_at_face, first_hard_mm);
     }

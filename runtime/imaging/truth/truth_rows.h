@@ -7,9 +7,12 @@
 #include <cstdint>
 #include <span>
 
+#include "runtime/imaging/press/press_view.h"
 #include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime {
+
+inline constexpr std::uint32_t kOneLabel = 0x80000000u, kHasSurface = 0x100u;
 
 // What all rows of a frame share. Coordinates are voxels of the bundle's grid.
 struct TruthFrameRows {
@@ -17,12 +20,11 @@ struct TruthFrameRows {
     double origin[3], across[3], down[3];
     std::int32_t size[3];
 
-    // Voxels of the bundle: BrickVolume's tables and pools, and the values of uniform bricks as
-    // words. Null boundary_table: no surfaces.
-    const std::int32_t *label_table, *label_pool, *label_uniform;
+    // Voxels of the bundle. bricks: one word each, an entry of the labels' table where the brick
+    // holds several labels, else kOneLabel | kHasSurface | label. The others are BrickVolume's;
+    // null boundary_table: no surfaces; null boundary_uniform: each of its values is kNoBoundary.
+    const std::int32_t *bricks, *label_pool;
     const std::int32_t *boundary_table, *boundary_pool, *boundary_uniform;
-    // One byte per brick: its label, or 255 where it holds several labels or a surface.
-    const std::int32_t* brick_label;
     std::int32_t bricks_x, bricks_xy;
     std::int32_t label_count;
     float pulse_vx = 0;          // outward shift of arterial walls
@@ -35,6 +37,11 @@ struct TruthFrameRows {
     float beam_x[3], beam_z[3];  // voxels per mm along the probe's x and z
     bool fan = true;
     float radius_mm = 0, mm_per_px = 0, origin_x_px = 0, origin_y_px = 0;
+
+    // What yields to probe and needle; null: nothing does.
+    const press::PressView* press = nullptr;
+    const std::int32_t* closed_label = nullptr;  // # labels: shown of a lumen that is shut
+    float lines_per_ray = 1;
 
     // Breathing; null weight: none.
     const float* weight = nullptr;

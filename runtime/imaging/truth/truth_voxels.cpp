@@ -6,7 +6,6 @@
 
 #include "formats/volume/boundary_record.h"
 #include "formats/volume/brick_volume.h"
-#include "runtime/imaging/simd/gather_slack.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -25,9 +24,6 @@ const std::int32_t* words_of(const T& values) {
 TruthVoxels::TruthVoxels(const CaseBundle& bundle, bool physical) : bundle_(&bundle) {
     // A palette has 255 entries at most; 256 let a look-up of any byte stay inside.
     constexpr std::size_t kBytes = 256;
-    label_uniform_.assign(kBytes, 0);
-    for (std::size_t i = 0; i < bundle.label_bricks.uniform.size() && i < kBytes; ++i)
-        label_uniform_[i] = bundle.label_bricks.uniform[i];
     // At least one, so that a vector in which no brick is uniform has something to read.
     boundary_uniform_.assign(bundle.boundary.uniform.begin(), bundle.boundary.uniform.end());
     boundary_uniform_.push_back(kNoBoundary);
@@ -46,29 +42,34 @@ TruthVoxels::TruthVoxels(const CaseBundle& bundle, bool physical) : bundle_(&bun
 void TruthVoxels::summarise_bricks() {
     const auto& labels = bundle_->label_bricks;
     const auto& surfaces = bundle_->boundary;
-    brick_label_.assign(labels.table.size() + kGatherSlack, 255);
-    for (std::size_t n = 0; n < labels.table.size(); ++n) {
+    for (const std::uint32_t record : surfaces.uniform)
+        plain_boundaries_ = plain_boundaries_ && record == kNoBoundary;
+    bricks_.resize(labels.table.size());
+    for (std::size_t n = 0; n < bricks_.size(); ++n) {
         const std::uint32_t entry = labels.table[n];
-        if (!(entry & kUniformBrick)) continue;
-        if (!surfaces.table.empty()) {
-            const std::uint32_t word = surfaces.table[n];
-            if (!(word & kUniformBrick) || surfaces.uniform[word & ~kUniformBrick] != kNoBoundary)
-                continue;
+        if (!(entry & kUniformBrick)) {
+            bricks_[n] = static_cast<std::int32_t>(entry);
+            continue;
         }
-        brick_label_[n] = labels.uniform[entry & ~kUniformBrick];
+        std::uint32_t word = kOneLabel | labels.uniform[entry & ~kUniformBrick];
+        if (!surfaces.table.empty()) {
+            const std::uint32_t record = surfaces.table[n];
+            if (!(record & kUniformBrick) ||
+                surfaces.uniform[record & ~kUniformBrick] != kNoBoundary)
+                word |= kHasSurface;
+        }
+        bricks_[n] = static_cast<std::int32_t>(word);
     }
 }
 
 void TruthVoxels::fill(TruthFrameRows& f) const {
     const CaseBundle& b = *bundle_;
-    f.brick_label = words_of(brick_label_);
-    f.label_table = words_of(b.label_bricks.table);
+    f.bricks = bricks_.data();
     f.label_pool = words_of(b.label_bricks.pool);
-    f.label_uniform = label_uniform_.data();
     const bool surfaces = !b.boundary.table.empty();
     f.boundary_table = surfaces ? words_of(b.boundary.table) : nullptr;
     f.boundary_pool = surfaces ? words_of(b.boundary.pool) : nullptr;
-    f.boundary_uniform = surfaces ? words_of(boundary_uniform_) : nullptr;
+    f.boundary_uniform = plain_boundaries_ ? nullptr : words_of(boundary_uniform_);
     const Int3 bricks = brick_count(b.grid.size);
     f.bricks_x = bricks.x;
     f.bricks_xy = bricks.x * bricks.y;

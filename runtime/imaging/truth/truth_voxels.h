@@ -22,9 +22,10 @@ class TruthVoxels {
     void summarise_bricks();
 
     const CaseBundle* bundle_;
-    std::vector<std::int32_t> label_uniform_, swells_, hard_;
+    std::vector<std::int32_t> swells_, hard_;
     std::vector<std::uint32_t> boundary_uniform_;
-    std::vector<std::uint8_t> brick_label_;
+    std::vector<std::int32_t> bricks_;
+    bool plain_boundaries_ = true;
 };
 
 }  // namespace sonocase::runtime

@@ -17,15 +17,25 @@ void step_cine(ScanState& scan, int frames, int kept);
 // Once per picture: the next frame of a cine loop that plays.
 void advance_cine(ScanState& scan, int kept, double now_s);
 
-// path: of the recording; empty: a new file in the user's sessions folder. Does nothing while an
-// attempt runs or no case is open.
-void start_attempt(App& app, const std::string& path);
-// Ends the recording and shows the scores. Does nothing unless an attempt runs.
+// path: of the recording; empty: a new file in the user's sessions folder. exam: gives no help even
+// where the exercise would. Does nothing while an attempt runs or no case is open.
+void start_attempt(App& app, const std::string& path, bool exam = false);
+// Ends the recording, scores it and shows the page after the attempt. Does nothing unless an
+// attempt runs.
 void finish_attempt(App& app);
 void toggle_attempt(App& app);
 // True if nothing would be lost by leaving: no attempt runs, or the user was asked in the last 4 s
-// and insists. Else asks, in a notice. key: that was pressed, as in "F5".
+// and insists by the same key. Else asks, in a notice. key: that was pressed, as in "F5".
 bool may_leave_attempt(App& app, const std::string& key);
+// Plays the last attempt again in the window, at any speed; end_replay() goes back to the tracker
+// that was in use. Both do nothing where there is nothing to play or to end.
+void start_replay(App& app);
+void end_replay(App& app);
+inline bool replays(const ScanState& scan) {
+    return !scan.replayed_over.empty();
+}
+// Makes the review page of the last attempt and opens it. Needs the program sonocase.
+void open_review(App& app);
 // Practice: the exercise's next hint; after the last of them the targets are shown.
 void show_next_hint(App& app);
 // False while an attempt runs that does not show where the targets are: an exam, or practice

@@ -6,10 +6,11 @@
 #include <cmath>
 #include <filesystem>
 
+#include "formats/bundle/attribution.h"
 #include "formats/files/calibration_file.h"
 #include "runtime/player/app/attempt_steps.h"
+#include "runtime/player/app/kept/user_folders.h"
 #include "runtime/player/app/tracker_steps.h"
-#include "runtime/player/app/user_folders.h"
 #include "runtime/player/session/calibration_set.h"
 #include "runtime/player/session/clock.h"
 
@@ -22,6 +23,22 @@ std::vector<Point3> CaseState::target_centres() const {
         centres.push_back(anatomy ? anatomy->moved(target.centre, time_s) : target.centre);
     return centres;
 }
+
+namespace {
+
+// Of that engine; null while no mode is on.
+std::unique_ptr<DopplerView> make_doppler(App& app, const ScanEngine& engine) {
+    if (app.scan.controls.settings.doppler.mode == DopplerMode::off) return nullptr;
+    auto view =
+        DopplerView::create(app.loaded.open->bundle, engine.exercise(), engine.render_options());
+    if (!view) {
+        app.view.notices.error(view.error().message());
+        return nullptr;
+    }
+    return std::make_unique<DopplerView>(std::move(*view));
+}
+
+}  // namespace
 
 void rebuild_engine(App& app, bool keep_session) {
     CaseState& loaded = app.loaded;
@@ -45,17 +62,25 @@ void rebuild_engine(App& app, bool keep_session) {
     app.scan.controls.cine_back = 0;
     loaded.scan->set_controls(app.scan.controls);
     loaded.anatomy = engine->anatomy();
-    loaded.scan->set_engine(std::make_unique<ScanEngine>(std::move(*engine)), keep_session);
+    ++loaded.engine_number;
+    auto doppler = make_doppler(app, *engine);
+    loaded.scan->set_engine(std::make_unique<ScanEngine>(std::move(*engine)), keep_session,
+                            std::move(doppler));
 }
 
 void close_bundle(App& app) {
     CaseState& loaded = app.loaded;
     if (loaded.scan) {
         finish_attempt(app);
+        app.scan.replayed_over.clear();
         loaded.scan->set_tracker(nullptr);
         loaded.scan->set_engine(nullptr);
     }
     loaded.guide.reset();
+    app.view.look = {};
+    if (app.view.small_view.view) app.view.small_view.view->leave_case();
+    app.scan.guide.reset();
+    app.scan.clip.reset();
     forget_tracker(app.scan.tracker);
     loaded.anatomy.reset();
     loaded.drawn.reset();
@@ -81,6 +106,8 @@ bool open_bundle(App& app, const std::string& given_path, const std::string& exe
     loaded.open = std::move(*opened);
     loaded.damage_reported = false;
     for (const std::string& warning : loaded.open->warnings) notices.warning(warning);
+    if (const std::string credits = attribution_of(*loaded.open->bundle); !credits.empty())
+        notices.news(credits);
     loaded.skin = std::make_unique<Skin>(*loaded.open->bundle);
     app.view.small_view.view->set_case(*loaded.open->bundle);
     app.view.page = Page::scan;
@@ -92,24 +119,32 @@ bool open_bundle(App& app, const std::string& given_path, const std::string& exe
 
 void show_bundles(const PlayerState& player, ViewState& view) {
     view.chooser.bundles = find_bundles(player.settings.recent);
+    view.chooser.asked = false;
+    view.dialog = Dialog::none;
     view.page = Page::bundles;
 }
 
 void choose_exercise(App& app, int index) {
     finish_attempt(app);
+    end_replay(app);
+    app.scan.exam_set = {};
     app.scan.score.reset();
+    app.scan.result.reset();
     CaseState& loaded = app.loaded;
     const int count = static_cast<int>(loaded.open->exercises.size());
     loaded.exercise_index = (index % count + count) % count;
     loaded.drawn.reset();
     const Exercise& exercise = loaded.exercise();
-    const int side_px = loaded.image.width_px;
+    const int width_px = loaded.image.width_px, height_px = loaded.image.height_px;
     loaded.image = initial_image(app.player.arguments, exercise);
-    loaded.image.width_px = loaded.image.height_px = side_px;
+    loaded.image.width_px = width_px;
+    loaded.image.height_px = height_px;
     loaded.image.depth_mm = exercise.probe.depth_mm;
     loaded.image.focus_mm = exercise.probe.focus_mm;
     app.scan.targets_reached.assign(exercise.targets.size(), false);
     app.view.measurements.clear();
+    app.scan.controls.settings.doppler = app.player.arguments.doppler;
+    app.view.doppler_aimed = app.player.arguments.box_given || app.player.arguments.gate_given;
     app.view.small_view.view->set_exercise(exercise);
     loaded.scan->set_tracker(nullptr);
     rebuild_engine(app, false);
@@ -119,6 +154,43 @@ void choose_exercise(App& app, int index) {
 void choose_model(App& app, const std::string& model) {
     app.loaded.image.model = model;
     rebuild_engine(app);
+}
+
+void choose_mode(App& app, DopplerMode mode) {
+    DopplerSettings& doppler = app.scan.controls.settings.doppler;
+    if (!app.loaded.open || mode == doppler.mode) return;
+    const bool first = doppler.mode == DopplerMode::off;
+    doppler.mode = mode;
+    if (mode == DopplerMode::off || !first) return;
+    std::unique_ptr<DopplerView> view;
+    app.loaded.scan->with_engine([&](ScanEngine& engine) { view = make_doppler(app, engine); });
+    if (!view) {
+        doppler.mode = DopplerMode::off;
+        return;
+    }
+    if (!view->has_flow() && mode != DopplerMode::m_mode)
+        app.view.notices.warning(
+            "This case says nothing about the flow of blood, so that Doppler modes show none.");
+    if (!app.view.doppler_aimed) {
+        FrameInput input;
+        input.mannequin_from_probe = app.loaded.frame().record.tools.mannequin_from_probe;
+        doppler = view->aimed(input, doppler);
+        app.view.doppler_aimed = true;
+    }
+    app.loaded.scan->set_doppler(std::move(view));
+}
+
+void aim_doppler(App& app) {
+    DopplerSettings& doppler = app.scan.controls.settings.doppler;
+    if (!app.loaded.open || doppler.mode == DopplerMode::off) return;
+    std::unique_ptr<DopplerView> view;
+    app.loaded.scan->with_engine([&](ScanEngine& engine) { view = make_doppler(app, engine); });
+    if (!view) return;
+    FrameInput input;
+    input.mannequin_from_probe = app.loaded.frame().record.tools.mannequin_from_probe;
+    const DopplerSettings aimed = view->aimed(input, doppler);
+    if (aimed == doppler) app.view.notices.news("The picture's plane cuts no vessel.");
+    doppler = aimed;
 }
 
 void change_depth(App& app, double by_mm) {
@@ -139,11 +211,54 @@ void change_focus(App& app, double by_mm) {
     rebuild_engine(app);
 }
 
-void fit_image(App& app, int side_px) {
+void fit_image(App& app, int width_px, int height_px) {
     ImageChoice& image = app.loaded.image;
-    if (side_px == image.width_px || app.player.arguments.width_px != 0) return;
-    image.width_px = image.height_px = side_px;
+    const bool same = width_px == image.width_px && height_px == image.height_px;
+    if (same) return;
+    image.width_px = width_px;
+    image.height_px = height_px;
     rebuild_engine(app);
+}
+
+void choose_preset(App& app, const ImagePreset& preset) {
+    app.loaded.image.depth_mm = preset.depth_mm;
+    app.loaded.image.focus_mm = preset.focus_mm;
+    rebuild_engine(app);
+}
+
+void adjust_gain(App& app) {
+    const ScanFrame& frame = app.loaded.frame();
+    ImageSettings& image = app.scan.controls.settings;
+    if (frame.width_px <= 0 || frame.status != FrameStatus::rendered) return;
+    // Means of the eight depths where there is an echo at all; a level of 255 is the whole range.
+    std::array<double, 8> sum{}, count{};
+    for (int y = 0; y < frame.height_px; ++y) {
+        const double depth = (y - frame.layout.origin_y_px) * frame.layout.mm_per_px;
+        const int row = static_cast<int>(8 * depth / std::max(frame.depth_mm, 1.0));
+        if (depth < 0 || row > 7) continue;
+        for (int x = frame.width_px / 3; x < 2 * frame.width_px / 3; ++x) {
+            const int level = frame.pixels[static_cast<std::size_t>(y) * frame.width_px + x];
+            if (level < 6) continue;
+            sum[static_cast<std::size_t>(row)] += level;
+            count[static_cast<std::size_t>(row)] += 1;
+        }
+    }
+    constexpr double kWanted = 95;
+    const double db_per_level = image.dynamic_range_db / 255;
+    double all = 0, n = 0;
+    for (std::size_t i = 0; i < 8; ++i) {
+        all += sum[i];
+        n += count[i];
+    }
+    if (n < 1) return;
+    const double middle = all / n;
+    image.gain_db =
+        std::clamp(image.gain_db + std::round((kWanted - middle) * db_per_level), -30.0, 30.0);
+    for (std::size_t i = 0; i < 8; ++i) {
+        if (count[i] < 50) continue;
+        const double by = (middle - sum[i] / count[i]) * db_per_level;
+        image.tgc_db[i] = std::clamp(std::round(image.tgc_db[i] + 0.5 * by), -20.0, 20.0);
+    }
 }
 
 void check_bundle(CaseState& loaded, Notices& notices) {

@@ -26,8 +26,28 @@ void choose_model(App& app, const std::string& model);
 // Steps of the console: the depth moves in steps of 10 mm, the focus of 5 mm.
 void change_depth(App& app, double by_mm);
 void change_focus(App& app, double by_mm);
-// The side of the square picture, where the command line gives none.
-void fit_image(App& app, int side_px);
+// Grey picture, colour, power, spectral Doppler or M-mode. The first time in an exercise, box and
+// gate go to the widest vessel of the plane.
+void choose_mode(App& app, DopplerMode mode);
+// Box, gate and angle cursor to the widest vessel of the plane.
+void aim_doppler(App& app);
+// The size of the picture, as its place on the screen has room for it.
+void fit_image(App& app, int width_px, int height_px);
+
+// Depth, focus and gain for an organ, as a machine's presets set them.
+struct ImagePreset {
+    const char *name, *tip;  // English keys of the catalogue
+    double depth_mm, focus_mm;
+};
+inline constexpr ImagePreset kPresets[] = {
+    {"Liver", "Depth 16 cm, focus 8 cm", 160, 80},
+    {"Kidney", "Depth 12 cm, focus 6 cm", 120, 60},
+    {"Vessel", "Depth 5 cm, focus 2 cm", 50, 20},
+    {"Deep", "Depth 22 cm, focus 12 cm", 220, 120},
+};
+void choose_preset(App& app, const ImagePreset& preset);
+// Sets gain and depth gain once so that the picture shown has a middling brightness at all depths.
+void adjust_gain(App& app);
 
 // Makes a new engine for loaded.image. keep_session: session clock and frame numbers continue.
 void rebuild_engine(App& app, bool keep_session = true);

@@ -8,7 +8,7 @@
 namespace sonocase::runtime {
 namespace {
 
-constexpr std::size_t kMostStanding = 4;
+constexpr std::size_t kMostStanding = 4, kMostKept = 40;
 
 double life_s(Notice::Kind kind) {
     switch (kind) {
@@ -35,6 +35,8 @@ void Notices::dismiss(std::size_t i) {
 
 void Notices::add(Notice::Kind kind, const std::string& sentence) {
     if (kind != Notice::Kind::news) std::fprintf(stderr, "sonoplay: %s\n", sentence.c_str());
+    kept_.push_back({kind, sentence, now_s_});
+    if (kept_.size() > kMostKept) kept_.erase(kept_.begin());
     for (Notice& notice : standing_) {
         if (notice.text == sentence) {
             notice.since_s = now_s_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the player has to report: sentences that stand at the foot of the window for some seconds.
+// What the player has to report: sentences that stand at the top of the window for some seconds,
+// and can be read again later.
 // Warnings and errors also go to standard error, for users who started the player from a terminal.
 #pragma once
 
@@ -29,13 +30,15 @@ class Notices {
 
     // At most four, oldest first.
     const std::vector<Notice>& standing() const { return standing_; }
+    // The last forty, oldest first, whether they stand or not.
+    const std::vector<Notice>& kept() const { return kept_; }
     void dismiss(std::size_t i);
 
   private:
     void add(Notice::Kind kind, const std::string& sentence);
 
     double now_s_ = 0;
-    std::vector<Notice> standing_;
+    std::vector<Notice> standing_, kept_;
 };
 
 }  // namespace sonocase::runtime

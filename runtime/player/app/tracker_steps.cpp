@@ -106,4 +106,18 @@ void check_device(TrackerInUse& tracker,
         notices.warning(warning);
 }
 
+void note_readings(TrackerInUse& tracker, const CaseState& loaded, bool frozen, double now_s) {
+    constexpr double kSilentS = 0.3;
+    const bool own =
+        tracker.mouse || tracker.paced || !loaded.open || frozen || tracker.spec == "null";
+    const std::uint64_t newest = own ? 0 : loaded.frame().reading.sequence;
+    if (own || newest != tracker.last_sequence) {
+        tracker.last_sequence = newest;
+        tracker.last_reading_s = now_s;
+        tracker.lost_since_s = -1;
+        return;
+    }
+    if (now_s - tracker.last_reading_s > kSilentS) tracker.lost_since_s = tracker.last_reading_s;
+}
+
 }  // namespace sonocase::runtime

@@ -33,4 +33,8 @@ void check_device(TrackerInUse& tracker,
                   const CaseState& loaded,
                   Notices& notices);
 
+// Once per picture: since when no reading has arrived. frozen: the frame shown is an older one and
+// says nothing about that.
+void note_readings(TrackerInUse& tracker, const CaseState& loaded, bool frozen, double now_s);
+
 }  // namespace sonocase::runtime

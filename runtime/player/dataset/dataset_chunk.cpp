@@ -12,7 +12,7 @@
 #include "runtime/player/dataset/array_file.h"
 #include "runtime/player/headless/truth_files.h"
 #include "runtime/player/session/case_set_up.h"
-#include "runtime/player/session/png_file.h"
+#include "runtime/player/session/pictures/png_file.h"
 
 namespace sonocase::runtime {
 namespace {

@@ -11,6 +11,8 @@
 
 #include "formats/attempt/draw_attempt.h"
 #include "formats/base/event.h"
+#include "formats/bundle/attribution.h"
+#include "runtime/player/headless/doppler_run.h"
 #include "runtime/player/headless/frame_files.h"
 #include "runtime/player/headless/truth_files.h"
 #include "runtime/player/session/calibration_set.h"
@@ -101,6 +103,8 @@ class HeadlessRun {
     std::unique_ptr<TruthFiles> truth_;    // --truth
     std::unique_ptr<SessionRun> session_;  // --record
     std::unique_ptr<IgtlServer> server_;   // --serve
+    std::unique_ptr<PoseServer> poses_;    // --serve-poses
+    std::optional<DopplerRun> doppler_;    // from the first frame of a Doppler mode on
     FrameStats stats_;
     TimeHistogram pose_to_pixel_;
 };
@@ -148,6 +152,7 @@ Status HeadlessRun::set_up_case() {
     engine_->set_calibrations(calibrations_);
     settings_.press_mm =
         arguments_.press_mm >= 0 ? arguments_.press_mm : exercise_->deformation.press_offset_mm;
+    settings_.doppler = arguments_.doppler;
     stats_.set_effects(engine_->renderer().costs());
     return Done{};
 }
@@ -171,6 +176,7 @@ Status HeadlessRun::set_up_outputs() {
         auto files = FrameFiles::in(arguments_.out);
         if (!files) return files.error();
         files_ = std::move(*files);
+        files_->set_copyright(attribution_of(*open_->bundle));
         files_->begin(frames_, width_px_, height_px_);
     }
     if (!arguments_.truth.empty()) {
@@ -188,6 +194,13 @@ Status HeadlessRun::set_up_outputs() {
         auto server = IgtlServer::start(arguments_.serve);
         if (!server) return server.error();
         server_ = std::move(*server);
+    }
+    if (!arguments_.serve_poses.empty()) {
+        auto server = PoseServer::start(arguments_.serve_poses);
+        if (!server) return server.error();
+        poses_ = std::move(*server);
+        std::printf("poses for pages: %s\n", poses_->url().c_str());
+        std::fflush(stdout);
     }
     return Done{};
 }
@@ -229,6 +242,18 @@ Status HeadlessRun::render(int i, double now_s) {
     const bool device = tracker_->is_device();
     if (replay_ && static_cast<std::size_t>(i) < replay_->settings.size())
         apply_settings_text(replay_->settings[static_cast<std::size_t>(i)], settings_);
+    if (settings_.doppler.mode != DopplerMode::off && !doppler_) {
+        auto run = DopplerRun::create(open_->bundle, *engine_);
+        if (!run) return run.error();
+        doppler_.emplace(std::move(*run));
+        if (!doppler_->has_flow() && settings_.doppler.mode != DopplerMode::m_mode)
+            warn("The bundle has no flow, so that Doppler modes show none; cook the case again.");
+        if (!replay_)
+            doppler_->aim(tool_poses(reading_, calibrations_, {}).mannequin_from_probe,
+                          {!arguments_.box_given, !arguments_.gate_given, !arguments_.angle_given,
+                           !arguments_.steer_given},
+                          settings_.doppler);
+    }
     const double before_s = steady_seconds();
     const FrameStatus status = engine_->frame(now_s, settings_, pixels_);
     const double after_s = steady_seconds();
@@ -237,18 +262,33 @@ Status HeadlessRun::render(int i, double now_s) {
     stats_.count_unfitted(engine_->last().skin_not_fitted);
     stats_.set_press(engine_->renderer().press());
     if (device) pose_to_pixel_.add((clock_() - reading_.time_s) * 1e3);
-    if (session_) session_->observe(engine_->last(), pixels_, !device);
+    if (doppler_) doppler_->frame(*engine_, pixels_);
+    if (session_) {
+        FrameRecord record = engine_->last();
+        if (doppler_) record.doppler = doppler_->report();
+        session_->observe(record, pixels_, !device);
+    }
     if (server_) {
         serve_frame(*server_, engine_->last(), engine_->renderer().layout(), width_px_, height_px_,
                     unix_seconds(), pixels_);
+    }
+    if (poses_) serve_poses(*poses_, engine_->last());
+    if (server_ || poses_) {
         // Clients follow in real time; without them a headless run is as fast as it can be.
         if (!device) std::this_thread::sleep_for(std::chrono::duration<double>(1 / kFrameRate));
     }
     if (i == 0) stats_.set_first_frame_ms((after_s - start_s_) * 1e3);
     if (truth_) {
-        if (Status added = truth_->add(i, engine_->last().input, status); !added) return added;
+        double ms = 0;
+        if (Status added = truth_->add(i, engine_->last().input, status, ms); !added) return added;
+        stats_.add_truth(ms);
     }
-    return files_ ? files_->add(i, pixels_) : Status(Done{});
+    if (!files_) return Done{};
+    const std::string caption =
+        FrameFiles::caption(now_s, engine_->last().input.mannequin_from_probe);
+    if (settings_.doppler.mode == DopplerMode::off) return files_->add(i, pixels_, caption);
+    return files_->add_colour(i, pixels_, doppler_->picture(pixels_, width_px_, height_px_),
+                              caption);
 }
 
 Status HeadlessRun::render_frames() {
@@ -262,7 +302,15 @@ Status HeadlessRun::render_frames() {
 
 Status HeadlessRun::finish() {
     if (files_) {
-        if (Status written = files_->finish(); !written) return written;
+        const Renderer::Layout layout = engine_->renderer().layout();
+        const FrameFiles::About about{open_->bundle->manifest.case_name,
+                                      exercise_->name,
+                                      "sonoplay",
+                                      layout.mm_per_px,
+                                      layout.origin_x_px,
+                                      layout.origin_y_px,
+                                      kFrameRate};
+        if (Status written = files_->finish(about); !written) return written;
     }
     if (truth_) {
         if (Status written = truth_->finish(); !written) return written;
@@ -273,8 +321,12 @@ Status HeadlessRun::finish() {
         if (!score) return score.error();
         metrics = score_json(*score, *exercise_);
     }
+    if (doppler_ && !arguments_.sound.empty()) {
+        if (Status written = doppler_->write_sound(arguments_.sound); !written) return written;
+    }
     if (arguments_.stats.empty()) return Done{};
-    return write_text_output(arguments_.stats, stats_.json(metrics, &pose_to_pixel_));
+    const std::string doppler = doppler_ ? doppler_->json() : std::string();
+    return write_text_output(arguments_.stats, stats_.json(metrics, &pose_to_pixel_, doppler));
 }
 
 }  // namespace

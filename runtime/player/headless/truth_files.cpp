@@ -9,7 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/files/atomic_file.h"
-#include "runtime/player/session/png_file.h"
+#include "runtime/player/session/clock.h"
+#include "runtime/player/session/pictures/png_file.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -80,13 +81,22 @@ std::string truth_json(const FrameTruth& truth,
     line["mannequin_from_needle"] = truth.has_needle ? needle_json(truth.needle) : Json();
     line["contact"] =
         truth.beams > 0 ? static_cast<double>(truth.beams_touching) / truth.beams : 0.0;
+    if (truth.press.pressed) {
+        line["press"] = {
+            {"force_n", truth.press.force_n},
+            {"pressure_kpa", truth.press.pressure_kpa},
+            {"deepest_mm", truth.press.deepest_mm},
+            {"excess_mm", truth.press.excess_mm},
+            {"vein_open", truth.press.vein_open >= 0 ? Json(truth.press.vein_open) : Json()}};
+    }
     if (truth.has_needle) {
         const int tip = truth.tip_label;
         line["tip"] = {{"probe_mm", point_json(truth.tip_probe)},
                        {"in_plane", truth.tip_in_plane},
                        {"label", tip},
                        {"name", labels[static_cast<std::size_t>(tip)].name},
-                       {"shaft_in_image_mm", truth.needle_in_image_mm}};
+                       {"shaft_in_image_mm", truth.needle_in_image_mm},
+                       {"dent_mm", {truth.needle.tent_mm, truth.needle.drag_mm}}};
     }
     line["visible"] = organs_json(truth, labels);
     Json targets = Json::array();
@@ -148,8 +158,10 @@ Result<std::unique_ptr<TruthFiles>> TruthFiles::in(const std::string& folder,
     return std::unique_ptr<TruthFiles>(new TruthFiles(folder, bundle, std::move(*truth), engine));
 }
 
-Status TruthFiles::add(int frame, const FrameInput& input, FrameStatus status) {
+Status TruthFiles::add(int frame, const FrameInput& input, FrameStatus status, double& ms) {
+    const double before_s = steady_seconds();
     const FrameTruth& truth = truth_.render(input, buffers_.planes());
+    ms = (steady_seconds() - before_s) * 1e3;
     lines_ += truth_json(truth, frame, status, bundle_->labels, engine_.exercise()) + "\n";
     if (!truth.posed) return Done{};
     char name[16];

@@ -42,7 +42,8 @@ class TruthFiles {
                                                   CaseView bundle,
                                                   const ScanEngine& engine);
 
-    Status add(int frame, const FrameInput& input, FrameStatus status);
+    // ms: time of the truth alone, without its files.
+    Status add(int frame, const FrameInput& input, FrameStatus status, double& ms);
     Status finish();  // writes truth.jsonl
 
   private:

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "runtime/imaging/frame/doppler_settings.h"
+
 namespace sonocase::runtime {
 
 struct PlayerArguments {
@@ -29,16 +31,22 @@ struct PlayerArguments {
     std::vector<std::string> effects;  // empty: the exercise's
     std::string machine;               // name or file; empty: by the probe's shape
     std::string renderer = "fast";     // "fast", "reference"
-    double press_mm = -1;              // that the probe is pressed in; negative: the exercise's
+    DopplerSettings doppler;           // mode and controls that the run begins with
+    // Else in the widest vessel of the first frame, along its flow.
+    bool box_given = false, gate_given = false, angle_given = false, steer_given = false;
+    std::string sound;     // WAV of the spectral mode; empty: none
+    double press_mm = -1;  // that the probe is pressed in; negative: the exercise's
     int threads = 1;
     int scanlines = 0, samples = 0;         // 0: the model's own
     int looks = 0;                          // 0: the machine's
     double frame_budget_ms = 15;            // window: time per frame; 0: full accuracy always
     std::vector<std::string> calibrations;  // files
     std::string serve;                      // [ADDRESS:]PORT of the OpenIGTLink server; empty: none
-    double ui_scale = 0;                    // 0: from the settings, else from the monitor
-    std::string screenshot;                 // window: file for its last picture; empty: none
-    std::string script;                     // window: input events to play, for tests
+    std::string serve_poses;  // [ADDRESS:]PORT of the pose server for pages; empty: none
+    bool instructor = false;  // window: a second one for the instructor
+    double ui_scale = 0;      // 0: from the settings, else from the monitor
+    std::string screenshot;   // window: file for its last picture; empty: none
+    std::string script;       // window: input events to play, for tests
 };
 
 }  // namespace sonocase::runtime

@@ -28,4 +28,11 @@ void serve_frame(IgtlServer& server,
     server.publish();
 }
 
+void serve_poses(PoseServer& server, const FrameRecord& record) {
+    ServedPoses& out = server.slot();
+    out = {record.input.time_s, record.tools.has_probe, record.tools.has_needle,
+           record.tools.mannequin_from_probe, record.tools.mannequin_from_needle};
+    server.publish();
+}
+
 }  // namespace sonocase::runtime

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Hands rendered frames to the OpenIGTLink server.
+// Hands rendered frames to the OpenIGTLink server, and their poses to the server for pages.
 #pragma once
 
 #include <span>
 
 #include "runtime/engine/scan_engine.h"
 #include "runtime/tracking/igtl/igtl_server.h"
+#include "runtime/tracking/websocket/pose_server.h"
 
 namespace sonocase::runtime {
 
@@ -19,5 +20,8 @@ void serve_frame(IgtlServer& server,
                  int height_px,
                  double unix_time_s,
                  std::span<const std::uint8_t> pixels);
+
+// The tools of the frame as they were tracked: the page bends the needle itself.
+void serve_poses(PoseServer& server, const FrameRecord& record);
 
 }  // namespace sonocase::runtime

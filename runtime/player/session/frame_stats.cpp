@@ -119,6 +119,10 @@ std::string FrameStats::json(const std::string& score_json,
         out["pose_to_pixel_ms"]["median"] = rounded(pose_to_pixel_ms->quantile(0.5));
         out["pose_to_pixel_ms"]["p99"] = rounded(pose_to_pixel_ms->quantile(0.99));
     }
+    if (truth_ms_.count() > 0) {
+        out["truth_ms"]["median"] = rounded(truth_ms_.quantile(0.5));
+        out["truth_ms"]["p99"] = rounded(truth_ms_.quantile(0.99));
+    }
     for (const std::string& more : {window_json, score_json}) {
         const auto object = nlohmann::ordered_json::parse(more, nullptr, false);
         if (object.is_object()) out.update(object);

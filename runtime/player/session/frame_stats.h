@@ -56,6 +56,8 @@ class FrameStats {
     // Of the frame just added, effect deformation.
     void set_press(const PressReport& press);
     void set_first_frame_ms(double ms) { first_frame_ms_ = ms; }
+    // Time of the truth planes and facts of a frame, without writing them.
+    void add_truth(double ms) { truth_ms_.add(ms); }
 
     const TimeHistogram& frame_ms() const { return frame_ms_; }
     // The JSON of --stats.
@@ -73,7 +75,7 @@ class FrameStats {
         std::uint64_t skipped = 0;
         const char* last_reason = "";
     };
-    TimeHistogram frame_ms_;
+    TimeHistogram frame_ms_, truth_ms_;
     double first_frame_ms_ = 0;
     double force_sum_n_ = 0, force_max_n_ = 0;
     Renderer::Accuracy accuracy_;

@@ -2,6 +2,8 @@
 
 #include "runtime/player/session/open_case.h"
 
+#include <algorithm>
+#include <filesystem>
 #include <utility>
 
 #include "formats/base/digest.h"
@@ -11,6 +13,23 @@
 #include "formats/scoring/anatomy.h"
 
 namespace sonocase::runtime {
+namespace {
+
+void add_own_exercises(OpenCase& open) {
+    std::error_code failed;
+    std::vector<std::string> files;
+    for (std::filesystem::directory_iterator it(open.path + ".exercises", failed), end;
+         !failed && it != end; it.increment(failed)) {
+        if (it->path().extension() == ".toml") files.push_back(it->path().string());
+    }
+    std::sort(files.begin(), files.end());
+    for (const std::string& file : files) {
+        if (const auto added = choose_or_load_exercise(open, file); !added)
+            open.warnings.push_back(added.error().message() + ".");
+    }
+}
+
+}  // namespace
 
 Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
     Result<StreamedBundle> bundle = open_bundle(path);
@@ -22,6 +41,7 @@ Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
     open->exercises = std::move(found.exercises);
     open->warnings = std::move(found.warnings);
     open->exercise_digests = std::move(found.digests);
+    add_own_exercises(*open);
     return open;
 }
 
@@ -67,6 +87,8 @@ Result<int> choose_or_load_exercise(OpenCase& open, const std::string& name_or_f
     open.exercise_digests.resize(open.exercises.size());
     open.exercises[at] = std::move(*exercise);
     open.exercise_digests[at] = digest_of(*text);
+    open.exercise_files.resize(std::max(open.exercise_files.size(), at + 1));
+    open.exercise_files[at] = file;
     return static_cast<int>(at);
 }
 

@@ -18,12 +18,15 @@ struct OpenCase {
     StreamedBundle bundle;
     std::vector<Exercise> exercises;                   // at least one: without any, a free scan
     std::vector<std::string> exercise_digests;         // of their TOML; may be shorter
+    std::vector<std::string> exercise_files;           // empty name: in the bundle; may be shorter
     std::shared_ptr<const PhysicalTextures> textures;  // null: each renderer makes its own
     std::vector<std::string> warnings;                 // whole sentences
 };
 
-// Exercises that do not parse are left out and named in `warnings`. On the heap, because renderer
-// and skin point into it. Errors: a file that cannot be read or is not a bundle.
+// With the exercises of the bundle come those of the folder FILE.exercises beside it, where
+// educators keep their own. Exercises that do not parse are left out and named in `warnings`. On
+// the heap, because renderer and skin point into it. Errors: a file that cannot be read or is not a
+// bundle.
 Result<std::unique_ptr<OpenCase>> open_case(const std::string& path);
 
 // An Error after a part of the bundle that a frame needed turned out to be damaged. Constant time,

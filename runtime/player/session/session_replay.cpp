@@ -13,7 +13,10 @@ std::optional<SessionReplay> session_replay(const std::string& path) {
     if (!session || session->header.program.empty()) return {};
     SessionReplay replay;
     replay.header = session->header;
-    for (const SessionSample& sample : session->samples) replay.settings.push_back(sample.settings);
+    for (const SessionSample& sample : session->samples) {
+        replay.settings.push_back(sample.settings);
+        replay.times_s.push_back(sample.time_s - session->samples.front().time_s);
+    }
     return replay;
 }
 

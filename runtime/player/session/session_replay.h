@@ -16,6 +16,7 @@ struct SessionReplay {
     // The console's settings as text (runtime/recording/settings_text.h), # frames; empty: as in
     // the frame before.
     std::vector<std::string> settings;
+    std::vector<double> times_s;  // # frames, from the first
 };
 // Nothing if the file is not a recording of this player.
 std::optional<SessionReplay> session_replay(const std::string& path);

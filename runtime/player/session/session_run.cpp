@@ -10,6 +10,7 @@
 #include "formats/files/recording_file.h"
 #include "formats/progress_book/progress_book.h"
 #include "formats/threads/thread_jobs.h"
+#include "runtime/engine/tool_sample.h"
 #include "runtime/recording/session_header.h"
 #include "runtime/recording/settings_text.h"
 
@@ -40,6 +41,7 @@ SessionRun::SessionRun(const OpenCase& open, const ScanEngine& engine, std::stri
       anatomy_(engine.anatomy()),
       width_px_(engine.render_options().width_px),
       height_px_(engine.render_options().height_px),
+      layout_(engine.renderer().layout()),
       exercise_(engine.exercise()),
       path_(std::move(path)),
       monitor_(exercise_, anatomy_.get(), open.bundle->labels) {}
@@ -74,33 +76,28 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
     if (may_wait) recorder_->wait_for_room();
     const FrameInput& input = record.input;
     RecordedFrame frame;
-    frame.time_s = input.time_s;
-    frame.frame = input.frame;
-    frame.probe_ok = record.tools.has_probe;
-    frame.needle_ok = record.tools.has_needle;
-    frame.mannequin_from_probe = record.tools.mannequin_from_probe;
-    frame.mannequin_from_needle = record.tools.mannequin_from_needle;
-    frame.mannequin_from_drawn = record.needle.mannequin_from_drawn;
+    fill_sample(record, frame);
     const ImageSettings& s = input.settings;
     const bool changed = first_ || s.gain_db != settings_.gain_db ||
                          s.dynamic_range_db != settings_.dynamic_range_db ||
                          s.tgc_db != settings_.tgc_db || s.press_mm != settings_.press_mm ||
-                         s.flip_left_right != settings_.flip_left_right;
+                         s.flip_left_right != settings_.flip_left_right ||
+                         s.doppler != settings_.doppler;
     if (changed) {
         const std::string text = settings_text(s);  // short, and only while a setting changes
         std::strncpy(frame.settings.data(), text.c_str(), frame.settings.size() - 1);
         settings_ = s;
     }
     first_ = false;
-    frame.has_press = record.press.solved;
-    frame.press = {record.press.force_n, record.press.pressure_kpa, record.press.vein_open};
+    frame.doppler = record.doppler;
     monitor_.update(frame.time_s, frame.frame, frame.probe_ok, frame.mannequin_from_probe,
                     frame.needle_ok, frame.mannequin_from_drawn);
     report_punctures(record.puncture, monitor_);
     const auto events = monitor_.events();
     recorder_->push(frame, events);
     if (const char* why = picture_reason(events)) {
-        recorder_->push_picture(frame.frame, frame.time_s, why, width_px_, height_px_, pixels);
+        recorder_->push_picture(frame.frame, frame.time_s, why, width_px_, height_px_, pixels,
+                                layout_);
     }
     last_ = record;
     return events;

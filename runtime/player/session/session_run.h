@@ -35,10 +35,11 @@ class SessionRun {
     std::span<const LiveEvent> observe(const FrameRecord& record,
                                        std::span<const std::uint8_t> pixels,
                                        bool may_wait = false);
-    // To be called when the size of the pictures changes.
-    void set_picture_size(int width_px, int height_px) {
+    // To be called when the size or scale of the pictures changes.
+    void set_picture(int width_px, int height_px, const Renderer::Layout& layout) {
         width_px_ = width_px;
         height_px_ = height_px;
+        layout_ = layout;
     }
 
     // Live values for the screen.
@@ -56,6 +57,7 @@ class SessionRun {
     const OpenCase& open_;
     std::shared_ptr<const Anatomy> anatomy_;
     int width_px_, height_px_;
+    Renderer::Layout layout_;
     Exercise exercise_;
     std::string path_;
     SessionMonitor monitor_;

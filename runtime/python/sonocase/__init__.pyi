@@ -96,6 +96,7 @@ class TruthPlanes:
 class Renderer:
     size: tuple[int, int]
     contact: bool
+    press: dict[str, Any]
     exercise: Exercise
     mm_per_px: float
     origin_px: tuple[float, float]
@@ -104,12 +105,19 @@ class Renderer:
                  effects: Union[str, Sequence[str], None] = ..., size: tuple[int, int] = ...,
                  seed: int = ..., renderer: str = ...) -> None: ...
     def render(self, pose: PoseArray, needle: NeedleArray = ..., time_s: float = ..., *,
-               frame: int = ..., gain_db: float = ...,
-               out: Optional[npt.NDArray[np.uint8]] = ...) -> npt.NDArray[np.uint8]: ...
+               frame: int = ..., gain_db: float = ..., press_mm: float = ...,
+               dent: Optional[npt.ArrayLike] = ...,
+               out: Optional[npt.NDArray[np.uint8]] = ..., mode: str = ...,
+               doppler: dict[str, Any] = ...) -> npt.NDArray[np.uint8]: ...
+    def aimed(self, pose: PoseArray) -> dict[str, float]: ...
+    @property
+    def doppler(self) -> dict[str, Any]: ...
     # With truth: (pictures, TruthPlanes, list of facts).
     def render_batch(self, poses: npt.ArrayLike, needles: Optional[Sequence[NeedleArray]] = ...,
                      times_s: Optional[npt.ArrayLike] = ..., *, first_frame: int = ...,
-                     gain_db: float = ..., out: Optional[npt.NDArray[np.uint8]] = ...,
+                     gain_db: float = ..., press_mm: npt.ArrayLike = ...,
+                     dents: Optional[Sequence[Optional[npt.ArrayLike]]] = ...,
+                     out: Optional[npt.NDArray[np.uint8]] = ...,
                      threads: int = ..., truth: Optional[Sequence[str]] = ...) -> Any: ...
     def truth(self, planes: Iterable[str] = ...) -> tuple[TruthPlanes, dict[str, Any]]: ...
 

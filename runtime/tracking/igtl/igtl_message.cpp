@@ -78,8 +78,8 @@ std::optional<Rigid> quaternion_at(std::span<const std::uint8_t> b,
 }
 
 bool is_ours(const std::string& type) {
-    return type == "TRANSFORM" || type == "TDATA" || type == "QTDATA" || type == "POSITION" ||
-           type == "QTRANS";
+    return type == "TRANSFORM" || type == "SENSOR" || type == "TDATA" || type == "QTDATA" ||
+           type == "POSITION" || type == "QTRANS";
 }
 
 }  // namespace
@@ -114,14 +114,31 @@ std::optional<Header> parse_header(std::span<const std::uint8_t> bytes) {
     return h;
 }
 
+namespace {
+
+// Versions 2 and 3 put an extended header before the content and metadata after it. Empty where
+// that does not fit.
+std::span<const std::uint8_t> content_of(const Header& header, std::span<const std::uint8_t> body) {
+    if (header.version < 2) return body;
+    if (body.size() < 12) return {};
+    const std::size_t extended = big(body, 0, 2), meta = big(body, 2, 2) + big(body, 4, 4);
+    if (extended < 12 || extended + meta > body.size()) return {};
+    return body.subspan(extended, body.size() - extended - meta);
+}
+
+}  // namespace
+
+std::optional<double> parse_force_n(const Header& header, std::span<const std::uint8_t> body) {
+    if (header.type != "SENSOR" || header.device != "ProbeForce") return {};
+    body = content_of(header, body);
+    if (body.size() < 18 || body[0] < 1 || body.size() != 10 + 8 * std::size_t{body[0]}) return {};
+    const double newtons = std::bit_cast<double>(big(body, 10, 8));
+    if (!(newtons >= 0 && newtons <= kGreatestForceN)) return {};
+    return newtons;
+}
+
 std::vector<NamedPose> parse_poses(const Header& header, std::span<const std::uint8_t> body) {
-    // Versions 2 and 3 put an extended header before the content and metadata after it.
-    if (header.version >= 2) {
-        if (body.size() < 12) return {};
-        const std::size_t extended = big(body, 0, 2), meta = big(body, 2, 2) + big(body, 4, 4);
-        if (extended < 12 || extended + meta > body.size()) return {};
-        body = body.subspan(extended, body.size() - extended - meta);
-    }
+    body = content_of(header, body);
     std::vector<NamedPose> poses;
     const auto add = [&](const std::string& name, const std::optional<Rigid>& pose) {
         if (pose) poses.push_back({name, *pose});

@@ -46,6 +46,12 @@ struct NamedPose {
 // name. Empty: the body does not fit its type, or holds no rigid motion.
 std::vector<NamedPose> parse_poses(const Header& header, std::span<const std::uint8_t> body);
 
+// Newtons on the probe's face: the first number of a SENSOR body of device ProbeForce, in
+// newtons whatever unit it says. Nothing where the body does not fit its type or the number lies
+// beyond [0, kGreatestForceN].
+inline constexpr double kGreatestForceN = 500;
+std::optional<double> parse_force_n(const Header& header, std::span<const std::uint8_t> body);
+
 std::vector<std::uint8_t> encode(std::string_view type,
                                  std::string_view device,
                                  double time_s,

@@ -31,7 +31,11 @@ std::vector<std::uint8_t> messages_of(const ServedFrame& frame) {
         add(igtl::encode_transform("NeedleToMannequin", frame.unix_time_s,
                                    frame.mannequin_from_needle));
     }
-    if (frame.width_px > 0) {
+    // Pixels of another size, as while a picture's size changes, would make a message that nobody
+    // can unpack.
+    const auto pixels =
+        static_cast<std::size_t>(frame.width_px) * static_cast<std::size_t>(frame.height_px);
+    if (frame.width_px > 0 && frame.height_px > 0 && frame.pixels.size() == pixels) {
         // The picture's x is the probe's x and its y the probe's z; the message places the middle
         // of the picture.
         const Matrix3 probe_from_image = Matrix3::from_columns({1, 0, 0}, {0, 0, 1}, {0, -1, 0});

@@ -136,9 +136,12 @@ void IgtlTracker::converse(Socket socket) {
                 case igtl::MessageReader::Event::need_more: more = false; break;
                 case igtl::MessageReader::Event::message: {
                     const auto poses = igtl::parse_poses(reader.header(), reader.body());
-                    if (!poses.empty()) {
+                    // Handed on with the next pose.
+                    if (const auto force = igtl::parse_force_n(reader.header(), reader.body())) {
+                        reading_.force_n = *force;
+                    } else if (!poses.empty()) {
                         take(poses, reader.header().time_s);
-                    } else if (!reader.body().empty()) {
+                    } else if (!reader.body().empty() && reader.header().type != "SENSOR") {
                         const std::lock_guard lock(mutex_);
                         ++health_.bad_frames;
                     }

@@ -29,7 +29,9 @@ struct IgtlTrackerOptions {
 
 // A device's name says which tool it is: one that begins with Probe, Transducer or Image is the
 // probe, one that begins with Needle or Stylus the needle; others take the next free sensors in
-// order. The pose of a name that ends in ToMannequin is that of the tool in `mannequin`.
+// order. The pose of a name that ends in ToMannequin is that of the tool in `mannequin`. A SENSOR
+// message of device ProbeForce gives the newtons on the probe's face, which come with the next
+// pose.
 class IgtlTracker final : public Tracker {
   public:
     static Result<std::unique_ptr<Tracker>> start(const IgtlTrackerOptions& options,

@@ -2,9 +2,11 @@
 
 // The pages and the ways between them: cases, scanning, after an attempt, scores.
 import {Core, PlainError, has_simd} from './core.js';
-import {download, file_name, keep_attempt, kept_attempts, remove_attempts, send_statements, set_trainee, statement, trainee} from './results.js';
-import {ScanPage, minutes} from './scan.js';
-import {inside_page, load_list, open_bytes, open_entry} from './source.js';
+import {download, file_name, keep_attempt, kept_attempts, minutes, remove_attempts, send_statements, set_trainee, statement, trainee} from './results.js';
+import {PoseSource} from './poses.js';
+import {ScanPage} from './scan.js';
+import {ArrivingCase} from './arriving.js';
+import {inside_page, load_list, open_bytes} from './source.js';
 
 const $ = (id) => document.getElementById(id);
 const kPages = ['start', 'scan', 'after', 'scores'];
@@ -49,25 +51,22 @@ class App {
     async start() {
         $('drop').hidden = false;
         const asked = new URLSearchParams(location.search);
+        if (asked.get('poses')) this.scan.poses = new PoseSource(asked.get('poses'), (words) => this.scan.tracker_says(words));
         const program = this.program();
         program.catch(() => {});  // said below
         try {
             this.list = await load_list();
-            this.show_cases();
         } catch (error) {
             this.list = {cases: []};
             this.say(error);
         }
-        try {
-            await program;
-            this.ready = true;
-        } catch (error) {
-            this.say(error);
-            return;
-        }
+        const ready = program.then(() => { this.ready = true; }, (error) => this.say(error));
         const wanted = this.list.cases.find((one) => one.name === asked.get('case'));
+        if (!wanted) this.show_cases();
         if (asked.get('case') && !wanted) this.say(new PlainError(`This site has no case named ${asked.get('case')}.`));
         if (wanted) await this.open(wanted, asked.get('exercise'));
+        if (wanted) this.show_cases();  // its pictures need not come before that of the case
+        await ready;
     }
 
     // The program, compiled while it arrives; once for all cases.
@@ -120,16 +119,50 @@ class App {
     }
 
     async open(entry, exercise = null) {
-        await this.load(entry.title, (core, progress, signal) => open_entry(core, entry, progress, signal), exercise);
+        await this.load(entry.title, (program, progress, signal) => this.open_entry(program, entry, progress, signal), exercise);
+    }
+    // Opens a case of the site as soon as what a picture needs first is there; the rest follows behind.
+    async open_entry(program, entry, progress, signal) {
+        const inside = inside_page(`case-${entry.name}`);
+        if (inside) return open_bytes(await program, inside, entry.title);
+        const arriving = new ArrivingCase(program, entry, () => this.scan.touched());
+        signal.addEventListener('abort', () => arriving.stop());
+        await arriving.begin(progress);
+        const description = arriving.core.open(entry.title);
+        this.arriving_case = arriving;
+        return description;
+    }
+    // The case's last parts are still on their way.
+    arriving() { return Boolean(this.arriving_case?.busy); }
+    arriving_words() {
+        const arriving = this.arriving_case, {missing, segments_left} = this.scan.values;
+        if (!arriving || !segments_left) return '';
+        if (arriving.trouble) return arriving.trouble;
+        const part = `${Math.floor(100 * arriving.part)} %`;
+        return missing ? `Loading this part of the case: less structure until then (${part})` : `Loading the case: ${part}`;
+    }
+    // False: the trainee would rather go on, or the case cannot be loaded.
+    async whole_case(words) {
+        if (!this.scan.values.segments_left) return true;
+        $('wait-words').textContent = words;
+        $('wait').showModal();
+        this.scan.held = true;
+        const back = new Promise((done) => { $('wait-back').onclick = $('wait').oncancel = () => done(false); });
+        const failed = (error) => { this.scan.notice(error.message); return false; };
+        const whole = await Promise.race([back, this.arriving_case.whole.then(() => true, failed)]);
+        this.scan.held = false;
+        $('wait').close();
+        return whole;
     }
     async open_file(file) {
         if (!file) return;
-        await this.load(file.name, async (core) => open_bytes(core, new Uint8Array(await file.arrayBuffer()), file.name), null);
+        await this.load(file.name, async (program) => open_bytes(await program, new Uint8Array(await file.arrayBuffer()), file.name), null);
         $('file').value = '';
     }
-    // how(core, progress, signal) gives the description of the opened case.
+    // how(program, progress, signal) gives the description of the opened case.
     async load(title, how, exercise) {
         this.loading?.abort();
+        this.arriving_case = null;
         const loading = this.loading = new AbortController();
         $('notice').textContent = '';
         $('loading').hidden = false;
@@ -139,8 +172,9 @@ class App {
         };
         progress(0);
         try {
-            const core = this.core = await this.program();
-            const description = await how(core, progress, loading.signal);
+            const program = this.program();
+            const description = await how(program, progress, loading.signal);
+            this.core = await program;
             if (loading.signal.aborted) return;
             this.description = description;
             const index = description.exercises.findIndex((one) => one.name === exercise);
@@ -194,10 +228,22 @@ class App {
         });
     }
 
-    start_attempt() {
+    // The targets lie elsewhere in each attempt, drawn from a seed that the recording keeps.
+    async start_attempt() {
+        const {drawn} = this.description.exercises[this.exercise];
+        if (drawn && !await this.whole_case('A new place of the target needs the whole case, which is still loading.')) return;
+        const asked = Number(new URLSearchParams(location.search).get('seed'));
+        const seed = !drawn ? 0 : asked > 0 ? asked : 1 + crypto.getRandomValues(new Uint32Array(1))[0] % 1e9;
         this.started = new Date().toISOString().replace(/\.\d+Z$/, 'Z');
-        this.core.start_attempt($('trainee').value.trim(), this.started, performance.now() / 1000);
+        try {
+            this.core.start_attempt($('trainee').value.trim(), this.started, performance.now() / 1000, seed);
+        } catch (error) {
+            this.scan.notice(error.message);
+            return;
+        }
         this.scan.freeze(false);
+        this.scan.hints = 0;
+        this.scan.say_hint();
         const {exercises, case_name} = this.description;
         this.send([['attempted', {started: this.started, trainee: $('trainee').value.trim(), case_name,
             exercise: exercises[this.exercise].name, title: exercises[this.exercise].title}, null]]);
@@ -213,6 +259,7 @@ class App {
         await this.score_attempt();
     }
     async score_attempt() {
+        if (!await this.whole_case('Scores need the whole case, which is still loading. The attempt stands still.')) return;
         const exercise = this.description.exercises[this.exercise];
         let finished;
         try {
@@ -222,7 +269,7 @@ class App {
             return;
         }
         this.attempt = {started: this.started, trainee: $('trainee').value.trim(), case_name: this.description.case_name,
-            exercise: exercise.name, title: exercise.title || exercise.name, passed: finished.score.passed,
+            exercise: exercise.name, title: exercise.title || exercise.name, passed: finished.score.passed, exam: this.scan.exam(),
             recording: finished.recording, score_text: finished.score_text};
         this.show_after(finished.score);
         const kept = await keep_attempt(this.attempt);
@@ -272,7 +319,7 @@ class App {
             endpoint ? `This site sends results to the learning record store at ${endpoint}.` : ''].filter((words) => words).join(' ');
         $('scores-remove').hidden = !attempts?.length;
         $('attempts').replaceChildren(...(attempts ?? []).reverse().map((attempt) => {
-            const line = row([attempt.started.replace('T', ' ').replace('Z', ''), attempt.case_name, attempt.title,
+            const line = row([attempt.started.replace('T', ' ').replace('Z', ''), attempt.case_name, attempt.exam ? `${attempt.title} (exam)` : attempt.title,
                 attempt.passed ? '✓ Passed' : '✗ Not passed yet', '']);
             for (const [what, words] of [['recording', 'Recording'], ['scores', 'Scores']]) {
                 const button = element('button', words, {type: 'button'});
@@ -288,7 +335,17 @@ class App {
         await remove_attempts();
         await this.show_scores();
     }
-    frame_shown() {}
+    frame_shown() {
+        this.arriving_case?.pump();
+        if (this.scan.complete) this.work_offline();
+    }
+    // The service worker fetches page and program again: not before the first picture is there.
+    work_offline() {
+        const waits = this.scan.shown() && !this.scan.complete;
+        if (waits || this.registered || !('serviceWorker' in navigator) || !location.protocol.startsWith('http') || !isSecureContext) return;
+        this.registered = true;
+        navigator.serviceWorker.register('worker.js').catch(() => {});  // without it the page works online
+    }
 }
 
 function row(cells, last_class = '') {
@@ -313,6 +370,4 @@ globalThis.sonoplay = {
     // The last picture: {side, pixels: Uint8Array of grey}.
     frame: () => ({side: app.scan.values.side, pixels: app.core.pixels().slice()}),
 };
-if ('serviceWorker' in navigator && location.protocol.startsWith('http') && isSecureContext)
-    navigator.serviceWorker.register('worker.js').catch(() => {});  // without it the page works online
-app.start();
+app.start().finally(() => app.work_offline());

@@ -7,7 +7,8 @@
 export const kValues = [
     'side', 'mm_per_px', 'origin_x', 'origin_y', 'depth_mm', 'focus_mm', 'model_paper', 'has_needle',
     'needle_depth_mm', 'in_contact', 'press_mm', 'kept', 'attempt', 'seconds', 'insertions',
-    'targets_hit', 'tip_to_target_mm', 'tip_in_view', 'in_no_go', 'damaged', 'frame_number'];
+    'targets_hit', 'tip_to_target_mm', 'tip_in_view', 'in_no_go', 'damaged', 'frame_number',
+    'missing', 'segments_left'];
 
 export const kFrameStatus = ['rendered', 'held_bad_pose', 'no_contact'];
 
@@ -71,8 +72,8 @@ export class Core {
     }
     text() { return this.words(this.calls.text(), this.calls.text_bytes()); }
     set_text(text) {
-        const bytes = new TextEncoder().encode(text);
-        new Uint8Array(this.memory.buffer).set(bytes, this.calls.reserve_text(bytes.length));
+        const bytes = new TextEncoder().encode(text), at = this.calls.reserve_text(bytes.length);
+        new Uint8Array(this.memory.buffer).set(bytes, at);  // after the call: memory may have grown
     }
     // Throws the program's own sentence where a call failed.
     check(done) {
@@ -89,6 +90,18 @@ export class Core {
         this.calls.digest(this.case_at + at, count);
         return this.text();
     }
+    // A case that arrives in segments: after reserve(). hashes: eight bytes for each.
+    begin_segments(segment_bytes, hashes) {
+        const at = this.calls.begin_segments(segment_bytes);
+        new Uint8Array(this.memory.buffer).set(hashes, at);
+    }
+    look_again() { this.check(this.calls.look_again()); }
+    // What to fetch next: [{first, count}] of segments.
+    next_runs(most) {
+        const count = this.calls.next_runs(most);
+        const pairs = new Uint32Array(this.memory.buffer, this.calls.runs(), 2 * count).slice();
+        return Array.from({length: count}, (unused, n) => ({first: pairs[2 * n], count: pairs[2 * n + 1]}));
+    }
     // Returns the description of page_json.h.
     open(name) {
         this.set_text(name);
@@ -104,7 +117,7 @@ export class Core {
         tgc_db.forEach((db, n) => this.calls.set_tgc(n, db));
     }
     values() {
-        const from = new Float64Array(this.memory.buffer, this.calls.values(), kValues.length);
+        const at = this.calls.values(), from = new Float64Array(this.memory.buffer, at, kValues.length);
         return Object.fromEntries(kValues.map((name, n) => [name, from[n]]));
     }
     // A view of the program's memory, valid until the next call.
@@ -114,14 +127,26 @@ export class Core {
     }
     // probe, needle: 16 numbers, rows of mannequin_from_...; needle may be null.
     put_tools(now_s, probe, needle) {
-        const to = new Float64Array(this.memory.buffer, this.calls.poses(), 32);
+        const at = this.calls.poses(), to = new Float64Array(this.memory.buffer, at, 32);
         to.set(probe);
         if (needle) to.set(needle, 16);
         this.calls.put_tools(now_s, needle ? 1 : 0);
     }
-    start_attempt(trainee, started, now_s) {
+    // seed: that targets and start are drawn with; 0: as written.
+    start_attempt(trainee, started, now_s, seed = 0) {
         this.set_text(`${trainee.replaceAll('\n', ' ')}\n${started}`);
-        this.calls.start_attempt(now_s);
+        this.check(this.calls.start_attempt(now_s, seed));
+    }
+    // Of the last picture, mm in the probe's frame: y is the distance to the plane.
+    targets() {
+        const count = this.calls.target_count();
+        const from = new Float64Array(this.memory.buffer, this.calls.targets(), 4 * count);
+        return Array.from({length: count}, (unused, n) => ({x: from[4 * n], y: from[4 * n + 1], z: from[4 * n + 2], radius: from[4 * n + 3]}));
+    }
+    // The name of what a pixel of the last picture shows.
+    name_at(column, row) {
+        this.calls.name_at(column, row);
+        return this.text();
     }
     attempt_words() {
         this.calls.attempt_words();

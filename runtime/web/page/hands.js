@@ -23,6 +23,7 @@ export class Hands {
         on('pointerdown', (e) => this.down(e));
         on('pointermove', (e) => this.move(e));
         for (const type of ['pointerup', 'pointercancel', 'lostpointercapture']) on(type, (e) => this.up(e));
+        on('pointerleave', () => this.hover(null));
         on('wheel', (e) => this.wheel(e));
         on('contextmenu', (e) => e.preventDefault());
         addEventListener('keydown', (e) => this.key(e, true));
@@ -53,7 +54,13 @@ export class Hands {
         this.pointers.delete(e.pointerId);
         clearTimeout(this.long_press);
     }
+    // Where a mouse or pen points without pressing; a finger covers what it points at.
+    hover(at) {
+        this.pointer = at;
+        this.scan.touched();
+    }
     move(e) {
+        this.hover(e.pointerType !== 'touch' && !this.pointers.size ? {x: e.clientX, y: e.clientY} : null);
         const before = this.pointers.get(e.pointerId);
         if (!before || this.scan.measuring) return;
         if (Math.hypot(e.clientX - before.from_x, e.clientY - before.from_y) > kStillPx) clearTimeout(this.long_press);

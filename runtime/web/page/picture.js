@@ -49,7 +49,8 @@ export class Picture {
                 z: ((client_y - rect.top) * px - values.origin_y) * values.mm_per_px};
     }
 
-    draw_over(values, flip, measures, first) {
+    // targets: in the probe's frame, those that may be shown; name: what lies under the pointer, or null
+    draw_over(values, flip, measures, first, targets, name) {
         const to = this.overlay.getContext('2d'), ratio = devicePixelRatio;
         to.setTransform(ratio, 0, 0, ratio, 0, 0);
         const height = this.overlay.height / ratio;
@@ -80,14 +81,40 @@ export class Picture {
         for (let cm = 0; cm * 10 <= values.depth_mm + 0.5; ++cm) {
             const y = y_of(10 * cm), is_fifth = cm % 5 === 0;
             line(scale_x, y, scale_x + (is_fifth ? 10 : 5), y);
-            if (is_fifth && cm > 0) say(String(cm), scale_x + 14, y + 4);
+            if (is_fifth) say(String(cm), scale_x + 14, y + 4);
         }
-        say('S', x_of(flip * -0.22 * values.depth_mm), top + 14);
+        // The side of the probe's mark, as on machines: a letter in a ring.
+        const mark_x = x_of(flip * -0.22 * values.depth_mm), mark_y = Math.max(top + 14, y_of(0) - 14);
+        say('S', mark_x - 4, mark_y + 5);
+        to.strokeStyle = kWhite;
+        to.lineWidth = 1.5;
+        to.beginPath();
+        to.arc(mark_x, mark_y, 10, 0, 2 * Math.PI);
+        to.stroke();
         measures.forEach(([a, b], n) => {
             line(x_of(flip * a.x), y_of(a.z), x_of(flip * b.x), y_of(b.z));
             const mm = Math.hypot(a.x - b.x, a.z - b.z);
             say(`${n + 1}: ${mm.toFixed(1)} mm`, left + 8, top + this.css_side - 10 - 18 * (measures.length - 1 - n));
         });
+        for (const {x, y, z, radius} of targets) {
+            if (z <= 0) continue;
+            const off = Math.abs(y), cut = off < radius;
+            to.setLineDash(cut ? [] : [2, 5]);
+            for (const [style, thick] of [['#000', 4], [kWhite, 2]]) {
+                to.strokeStyle = style;
+                to.lineWidth = thick;
+                to.beginPath();
+                to.arc(x_of(flip * x), y_of(z), per_mm * (cut ? Math.sqrt(radius ** 2 - off ** 2) : radius), 0, 2 * Math.PI);
+                to.stroke();
+            }
+            to.setLineDash([]);
+            if (!cut) say(`${off.toFixed(0)} mm off the plane`, x_of(flip * x) + per_mm * radius + 6, y_of(z) + 4);
+        }
+        if (name) {
+            const rect = this.box.getBoundingClientRect();
+            const wide = to.measureText(name.words).width;
+            say(name.words, Math.min(name.x - rect.left + 16, rect.width - wide - 4), Math.min(name.y - rect.top + 24, height - 6));
+        }
         if (first) line(x_of(flip * first.x) - 5, y_of(first.z), x_of(flip * first.x) + 5, y_of(first.z));
     }
 }

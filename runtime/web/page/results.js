@@ -124,3 +124,8 @@ export async function send_statements(endpoint, statements) {
         return false;
     }
 }
+
+export function minutes(seconds) {
+    const whole = Math.floor(seconds);
+    return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, '0')}`;
+}

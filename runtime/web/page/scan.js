@@ -3,6 +3,7 @@
 // The scanning page: picture, console, cine and attempts.
 import {Hands} from './hands.js';
 import {Picture} from './picture.js';
+import {minutes} from './results.js';
 
 const kIdleRate = 40;  // pictures per second while nothing moves: tissue breathes, noise changes
 const kSliders = 8;
@@ -43,6 +44,8 @@ export class ScanPage {
         click('needle-across', () => this.toggle_needle(false));
         click('probe-home', () => { this.core.calls.probe_home(); this.touched(); });
         click('attempt', () => this.toggle_attempt());
+        click('next-hint', () => this.next_hint());
+        $('mode').addEventListener('change', () => this.touched());
         click('level', () => this.level());
         click('flip', () => this.flip());
         click('measure', () => this.measure(!this.measuring));
@@ -82,6 +85,9 @@ export class ScanPage {
         $('exercise').value = exercise;
         $('case-title').textContent = description.case_name;
         $('task-words').textContent = description.exercises[exercise].description;
+        this.hints = 0;
+        this.say_hint();
+        $('mode').value = description.exercises[exercise].mode;
         this.core.set_console(this.console);
         this.values = core.values();
         this.fit();
@@ -121,11 +127,25 @@ export class ScanPage {
         this.last_s = now_s;
         if (!document.querySelector('dialog[open]')) this.hands.step(seconds);
         if (this.hands.held.size) this.moved = true;
+        if (!this.frozen && !this.held) this.take_pose(now_s);
         if (this.playing) this.play(now_s);
-        if (this.frozen ? !this.moved : !this.moved && now_s - this.drawn_s < 0.98 / kIdleRate) return;
+        if (this.held) return;
+        const rests = this.frozen || Math.abs(now_s - this.drawn_s) < 0.98 / kIdleRate;
+        if (rests && !this.moved) return;
         this.draw(now_s);
     }
     touched() { this.moved = true; }
+    // A tracker's newest pose moves the tools; hands move them again from there on.
+    take_pose(now_s) {
+        const poses = this.poses?.take();
+        if (!poses) return;
+        this.core.put_tools(now_s, poses.probe, poses.needle);
+        this.moved = true;
+    }
+    tracker_says(words) {
+        if (words || this.tracker_said) this.notice(words);
+        this.tracker_said = words;
+    }
 
     draw(now_s) {
         this.moved = false;
@@ -135,9 +155,14 @@ export class ScanPage {
         this.values = this.core.values();
         this.picture.show(this.core.pixels());
         this.frame_ms = performance.now() - before;
-        this.picture.draw_over(this.values, this.flip_sign(), this.measures, this.first_point);
+        this.picture.draw_over(this.values, this.flip_sign(), this.measures, this.first_point,
+            this.shows_targets() ? this.core.targets() : [], this.name_there());
         this.say();
         if (++this.frames === 1) performance.mark('first-picture');
+        if (!this.complete && !this.values.missing) {
+            this.complete = true;
+            performance.mark('complete-picture');
+        }
         this.page.frame_shown();
     }
 
@@ -145,11 +170,15 @@ export class ScanPage {
         const v = this.values, number = (x, digits, unit) => Number.isFinite(x) ? `${x.toFixed(digits)} ${unit}` : '–';
         const put = (id, text) => { if ($(id).textContent !== text) $(id).textContent = text; };
         const attempt = v.attempt === 1;
+        put('arriving', this.page.arriving_words());
         put('value-time', attempt ? minutes(v.seconds) : '–');
-        put('value-tip', attempt && v.has_needle ? number(v.tip_to_target_mm, 1, 'mm') : '–');
+        put('value-tip', attempt && v.has_needle && !this.exam() ? number(v.tip_to_target_mm, 1, 'mm') : '–');
         put('value-view', attempt && v.has_needle ? (v.tip_in_view ? 'Yes' : 'No') : '–');
         put('value-punctures', attempt ? String(v.insertions) : '–');
         put('value-depth', v.has_needle ? number(Math.max(v.needle_depth_mm, 0), 0, 'mm') : '–');
+        $('mode').disabled = attempt;
+        $('task-words').hidden = attempt;  // read before; its room is for the events
+        $('next-hint').disabled = this.exam();
         put('attempt', attempt ? 'Finish attempt' : 'Start attempt');
         put('needle', v.has_needle ? 'Withdraw' : 'Needle');
         $('needle-across').disabled = v.has_needle === 1;
@@ -179,6 +208,29 @@ export class ScanPage {
         [...$('tgc').children].forEach((slider, n) => { slider.value = this.console.tgc_db[n]; });
         $('flip').setAttribute('aria-pressed', String(this.console.flip));
     }
+    exercise() { return this.description.exercises[Number($('exercise').value)]; }
+    exam() { return $('mode').value === 'exam'; }
+    next_hint() {
+        if (this.exam()) return;
+        this.hints = this.hints % (this.exercise().hints.length + 1) + 1;
+        this.say_hint();
+        this.touched();
+    }
+    // After the last hint the targets themselves.
+    shows_targets() { return !this.exam() && this.hints > this.exercise().hints.length; }
+    // What lies under the pointer; nothing in an exam, and while something is dragged.
+    name_there() {
+        const at = this.hands.pointer;
+        if (!at || this.exam() || this.measuring) return null;
+        const rect = $('picture').getBoundingClientRect(), px = this.values.side / rect.width;
+        const name = this.core.name_at(Math.floor((at.x - rect.left) * px), Math.floor((at.y - rect.top) * px));
+        return name && {...at, words: name[0].toUpperCase() + name.slice(1).replaceAll('_', ' ')};
+    }
+    say_hint() {
+        const {hints} = this.exercise(), said = this.hints > 0;
+        $('hint').hidden = !said;
+        $('hint').textContent = !said ? '' : this.hints > hints.length ? 'The target is shown.' : `Hint ${this.hints} of ${hints.length}: ${hints[this.hints - 1]}`;
+    }
     notice(text) { $('bar-notice').textContent = text; }
 
     set_image(change) {
@@ -190,10 +242,21 @@ export class ScanPage {
             this.core.set_image(image);
         } catch (error) {
             this.notice(error.message);
+            if (change.model_paper && v.segments_left) this.later_paper();
         }
         this.freeze(false);
         this.values = this.core.values();
         this.say_console();
+    }
+    // The textures of the plain picture come late.
+    later_paper() {
+        this.notice('The plain picture is shown as soon as the case has loaded.');
+        const core = this.core, description = this.description;
+        this.page.arriving_case.whole.then(() => {
+            if (this.core !== core || this.description !== description) return;
+            this.notice('');
+            this.choose_model(true);
+        }, () => {});
     }
     choose_model(paper) { this.set_image({model_paper: paper}); }
     set_console(change) {
@@ -308,6 +371,7 @@ export class ScanPage {
             KeyC: () => this.clear(),
             KeyF: () => this.flip(),
             KeyB: () => this.toggle_attempt(),
+            KeyH: () => this.next_hint(),
             Home: () => { this.core.calls.probe_home(); this.touched(); },
             Digit0: () => this.level(),
             F1: () => this.page.help(),
@@ -331,9 +395,4 @@ export class ScanPage {
             this.set_tgc(n, this.console.tgc_db[n] + 12 * by * seconds);
         }
     }
-}
-
-export function minutes(seconds) {
-    const whole = Math.floor(seconds);
-    return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, '0')}`;
 }

@@ -3,10 +3,12 @@
 // What the page calls: plain functions over one PagePlayer. Texts and bytes come back through
 // text() and bytes(), numbers that the page shows through values(). Functions that can fail return
 // 0 and leave the reason in text(). page/core.js is the other side.
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,18 +46,24 @@ enum Value {
     kInNoGo,
     kDamaged,
     kFrameNumber,
+    kMissing,  // blocks
+    kSegmentsLeft,
     kValueCount
 };
 
 // The page is single and so is its player: this file plays the part of main().
 struct Page {
     RawVector<std::uint8_t> incoming;
+    std::optional<Arrivals> arrivals;  // of incoming; the player's own once it is open
+    std::vector<std::uint64_t> segment_hashes;
+    std::vector<SegmentRun> runs;
     std::unique_ptr<PagePlayer> player;
     ImageSettings settings;
     std::string text;
     std::vector<std::uint8_t> bytes;
     std::array<double, kValueCount> values{};
     std::array<double, 32> poses{};
+    std::vector<double> targets;
 };
 Page page;
 
@@ -92,6 +100,9 @@ void fill_values() {
     v[kKept] = p.kept();
     v[kDamaged] = p.bundle().blocks() && p.bundle().blocks()->damaged();
     v[kFrameNumber] = engine.last().input.frame;
+    v[kMissing] = p.missing_blocks();
+    if (p.bundle().arrivals())
+        v[kSegmentsLeft] = static_cast<double>(p.bundle().arrivals()->left());
     if (const PageSession* attempt = p.attempt()) {
         const SessionMonitor& monitor = attempt->monitor();
         v[kAttempt] = 1;
@@ -128,6 +139,7 @@ SONOCASE_EXPORT(value_count) int value_count() {
 
 // Room for the next case's bytes; the page writes them there and calls open_case().
 SONOCASE_EXPORT(reserve) std::uint8_t* reserve(std::size_t count) {
+    page.arrivals.reset();
     page.incoming = {};
     page.incoming.resize(count);
     return page.incoming.data();
@@ -145,12 +157,55 @@ SONOCASE_EXPORT(digest) void digest(const std::uint8_t* from, std::size_t count)
 // text(): name of the case, for errors; on success its description (page_json.h).
 SONOCASE_EXPORT(open_case) int open_case() {
     const std::string name = page.text;
-    auto opened = PagePlayer::open(std::move(page.incoming), name);
+    auto opened = page.arrivals ? PagePlayer::open_in_parts(std::move(page.incoming),
+                                                            std::move(*page.arrivals), name)
+                                : PagePlayer::open(std::move(page.incoming), name);
     page.incoming = {};
+    page.arrivals.reset();
     if (!opened) return answer(opened.error());
     page.player = std::move(*opened);
     page.text = case_json(*page.player);
     return 1;
+}
+
+// A case that arrives in segments: after reserve(), room for XXH3-64 of each segment. Bytes go
+// where reserve() said, before and after open_case().
+SONOCASE_EXPORT(begin_segments) std::uint64_t* begin_segments(std::size_t segment_bytes) {
+    page.arrivals.emplace(page.incoming.size(), segment_bytes);
+    page.segment_hashes.assign(page.arrivals->segments(), 0);
+    return page.segment_hashes.data();
+}
+// The segment's bytes have been written. 0: they are not those of the case.
+SONOCASE_EXPORT(arrive) int arrive(std::size_t segment) {
+    const Arrivals& arrivals = page.arrivals ? *page.arrivals : *page.player->bundle().arrivals();
+    const std::span<const std::uint8_t> bytes =
+        page.arrivals ? std::span<const std::uint8_t>(page.incoming) : page.player->bytes();
+    const ByteRange range = arrivals.range(segment);
+    if (hash_of(bytes.subspan(range.at, range.count)) != page.segment_hashes[segment]) return 0;
+    if (page.arrivals) {
+        page.arrivals->add(segment);
+    } else {
+        page.player->arrived(segment);
+    }
+    return 1;
+}
+SONOCASE_EXPORT(look_again) int look_again() {
+    return answer(page.player->look_again());
+}
+// Returns how many runs there are: pairs of first segment and count, at runs().
+SONOCASE_EXPORT(next_runs) std::size_t next_runs(std::size_t most) {
+    page.runs = page.player->next_runs(most);
+    return page.runs.size();
+}
+SONOCASE_EXPORT(runs) const SegmentRun* runs() {
+    return page.runs.data();
+}
+SONOCASE_EXPORT(ask_again) void ask_again(std::uint32_t first, std::uint32_t count) {
+    page.player->ask_again({first, count});
+}
+// Work that every case needs, to be done while one is on its way.
+SONOCASE_EXPORT(prepare) void prepare() {
+    PagePlayer::prepare();
 }
 SONOCASE_EXPORT(close_case) void close_case() {
     page.player.reset();
@@ -247,10 +302,29 @@ SONOCASE_EXPORT(put_tools) void put_tools(double now_s, int has_needle) {
     page.player->put_tools(now_s, reading);
 }
 
-// text(): trainee, a line break, start as ISO 8601.
-SONOCASE_EXPORT(start_attempt) void start_attempt(double now_s) {
+// text(): trainee, a line break, start as ISO 8601. seed: that targets and start are drawn with.
+SONOCASE_EXPORT(start_attempt) int start_attempt(double now_s, double seed) {
     const std::size_t end = page.text.find('\n');
-    page.player->start_attempt(page.text.substr(0, end), page.text.substr(end + 1), now_s);
+    const std::string trainee = page.text.substr(0, end), started = page.text.substr(end + 1);
+    return answer(
+        page.player->start_attempt(trainee, started, now_s, static_cast<std::uint64_t>(seed)));
+}
+// Four numbers for each target at targets(): its middle in the `probe` frame and its radius.
+SONOCASE_EXPORT(target_count) int target_count() {
+    const std::vector<Target>& targets = page.player->exercise().targets;
+    page.targets.clear();
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+        const Point3 at = page.player->target_in_probe(i);
+        page.targets.insert(page.targets.end(), {at.x, at.y, at.z, targets[i].radius_mm});
+    }
+    return static_cast<int>(targets.size());
+}
+SONOCASE_EXPORT(targets) const double* targets() {
+    return page.targets.data();
+}
+// text(): the label that a pixel of the last picture shows.
+SONOCASE_EXPORT(name_at) void name_at(int column, int row) {
+    page.text = page.player->name_at(column, row);
 }
 SONOCASE_EXPORT(drop_attempt) void drop_attempt() {
     page.player->drop_attempt();

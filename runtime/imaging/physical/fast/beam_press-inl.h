@@ -39,9 +39,12 @@ HWY_INLINE void press_surface(
     const auto one = hn::Set(d, 1.0f);
     const auto along = along_axes(kBeam, 1),
                beside = along_axes(kSideways + kVoxelPerMm, b.voxel_mm);
-    const auto steep = hn::Mul(along, hn::Load(d, b.press->row(b.press->rise, k) + beam));
-    const auto tilted =
-        hn::Add(beside, hn::Mul(along, hn::Load(d, b.press->row(b.press->tilt, k) + beam)));
+    const float* here = b.press->along_row(k) + beam;
+    const auto deeper = hn::Sub(hn::Load(d, here), hn::Load(d, here - press::kPressBeams));
+    const auto rise = hn::Add(one, hn::Mul(deeper, hn::Set(d, 1 / b.step_mm)));
+    const auto steep = hn::Mul(along, rise);
+    const auto tilt = press::HWY_NAMESPACE::press_tilt(d, *b.press_view, b.first_beam + beam, k);
+    const auto tilted = hn::Add(beside, hn::Mul(along, tilt));
     const auto square = [&](auto x) HWY_ATTR { return hn::Mul(x, x); };
     const auto left = hn::Max(hn::Sub(hn::Sub(one, square(along)), square(beside)), hn::Zero(d));
     const auto length2 = hn::Min(

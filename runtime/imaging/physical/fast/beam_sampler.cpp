@@ -62,7 +62,9 @@ void sample_beams_as(PhysicalBlock& b) {
             c.first = k;
             c.rows = std::min(kChunkRows, b.samples - k);
             c.surfaces = c.refracts = false;
-            b.press = b.press_view != nullptr && k < b.press_view->active ? &pressed : nullptr;
+            b.press = b.press_view != nullptr && b.press_view->moves(b.first_beam, k, c.rows)
+                          ? &pressed
+                          : nullptr;
             if (b.press != nullptr) press_stretch(d, b, c);
             place_chunk(d, b, c);
             entry_chunk(d, b, c);

@@ -63,7 +63,8 @@ constexpr float kParenchymaOffset = static_cast<float>(
 // Fibres, septa and parenchyma, 1/16 dB. Label by label (mostly a single one), so that no lane
 // depends on its neighbours.
 template <class D>
-HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) {
+HWY_INLINE auto fine_offset(
+    D d, PhysicalBlock& b, const BeamChunk& c, const BeamPoint<D>& place, int row) {
     static_assert(physical::kFineEdge == 64);
     const hn::RebindToSigned<D> di;
     const auto fine = hn::TestBit(hn::Load(di, c.look.row(row)), hn::Set(di, kLookFine));
@@ -73,19 +74,25 @@ HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) 
     while (!hn::AllFalse(di, left)) {
         const std::int32_t label = labels[hn::FindFirstTrue(di, left)];
         const auto mine = hn::And(left, hn::Eq(hn::Load(di, labels), hn::Set(di, label)));
-        const float* m = b.fine_frames + 10 * label;
-        const auto coordinate = [&](int r) HWY_ATTR {
-            const auto term = [&](const float* p, int axis) HWY_ATTR {
-                return hn::Mul(hn::Load(d, p), hn::Set(d, m[3 * r + axis]));
-            };
-            const auto u = hn::Add(hn::Add(term(c.x.row(row), 0), term(c.y.row(row), 1)),
-                                   term(c.z.row(row), 2));
-            return hn::And(rounded_bits(d, u), hn::Set(di, physical::kFineEdge - 1));
+        const float* m = b.fine_frames + kFineNumbers * label;
+        const auto coordinate = [&](int r, std::int32_t most) HWY_ATTR {
+            const auto term = [&](auto p, int axis)
+                                  HWY_ATTR { return hn::Mul(p, hn::Set(d, m[3 * r + axis])); };
+            const auto u = hn::Add(hn::Add(term(place.x, 0), term(place.y, 1)), term(place.z, 2));
+            return hn::And(rounded_bits(d, u), hn::Set(di, most));
         };
-        const auto place = hn::Or(coordinate(0), hn::Or(hn::ShiftLeft<6>(coordinate(1)),
-                                                        hn::ShiftLeft<12>(coordinate(2))));
+        // physical::fine_index()
+        const auto low = hn::Set(di, 3);
+        const auto u0 = coordinate(1, physical::kFineEdge - 1),
+                   u1 = coordinate(2, physical::kFineEdge - 1),
+                   u2 = coordinate(0, static_cast<std::int32_t>(m[10]));
+        const auto in_block = hn::Or(hn::And(u0, low), hn::Or(hn::ShiftLeft<2>(hn::And(u1, low)),
+                                                              hn::ShiftLeft<4>(hn::And(u2, low))));
+        const auto block = hn::Or(
+            hn::ShiftLeft<4>(hn::AndNot(low, u0)),
+            hn::Or(hn::ShiftLeft<8>(hn::AndNot(low, u1)), hn::ShiftLeft<12>(hn::AndNot(low, u2))));
         const auto cube = hn::Set(di, static_cast<std::int32_t>(m[9]));
-        at = hn::IfThenElse(mine, hn::Add(place, cube), at);
+        at = hn::IfThenElse(mine, hn::Add(hn::Or(in_block, block), cube), at);
         left = hn::AndNot(mine, left);
         (m[9] == kParenchymaOffset ? b.parenchyma_met : b.fine_met) = true;
     }
@@ -98,9 +105,10 @@ HWY_INLINE auto fine_offset(D d, PhysicalBlock& b, const BeamChunk& c, int row) 
 template <class D>
 HWY_NOINLINE void fine_chunk(D d, PhysicalBlock& b, BeamChunk& c) {
     const hn::RebindToSigned<D> di;
+    const auto walk = beam_walk(d, b, c.beam, kVoxelOrigin, kVoxelPerMm, b.shift_voxel);
     for (int row = 0; row < c.rows; ++row) {
         std::int32_t* offset = c.structure.row(row);
-        auto sum = fine_offset(d, b, c, row);
+        auto sum = fine_offset(d, b, c, walk.at(d, b, c.beam, c.first + row), row);
         if (c.offsets) sum = hn::Add(sum, hn::Load(di, offset));
         hn::Store(sum, di, offset);
     }

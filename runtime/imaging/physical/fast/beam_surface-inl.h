@@ -83,7 +83,6 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     const auto zero = hn::Zero(d);
     const auto labels = hn::Set(di, b.label_count), byte = hn::Set(di, 0xFF);
     const auto reach = hn::Set(di, static_cast<std::int32_t>(48 * physical::kSurfaceReachVx) + 1);
-    const auto full = hn::Set(d, 127.0f);
     const auto rough_mm = hn::Set(d, static_cast<float>(physical::kRoughnessMm) / 32);
     for (int row = 0; row < c.rows; ++row) {
         const auto record = hn::Load(di, c.record.row(row));
@@ -95,14 +94,7 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
             continue;
         }
         c.surfaces = true;
-        // Normal: the octahedron is unfolded as in formats/volume/boundary_record.cpp, times 127.
-        auto nu = signed_byte<2>(d, record), nv = signed_byte<3>(d, record);
-        const auto nz = hn::Sub(hn::Sub(full, hn::Abs(nu)), hn::Abs(nv));
-        const auto fold = hn::Lt(nz, zero);
-        const auto fu = hn::CopySign(hn::Sub(full, hn::Abs(nv)), nu);
-        const auto fv = hn::CopySign(hn::Sub(full, hn::Abs(nu)), nv);
-        nu = hn::IfThenElse(fold, fu, nu);
-        nv = hn::IfThenElse(fold, fv, nv);
+        const auto [nu, nv, nz] = octahedral_normal(d, record);
         const auto square = hn::Add(hn::Add(hn::Mul(nu, nu), hn::Mul(nv, nv)), hn::Mul(nz, nz));
         const auto inverse =
             hn::Mul(inverse_root(d, hn::Mul(square, hn::Set(d, 1.0f / (127 * 127)))),

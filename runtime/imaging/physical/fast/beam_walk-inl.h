@@ -40,11 +40,11 @@ struct BeamWalk {
 
     HWY_INLINE BeamPoint<D> at(D d, const PhysicalBlock& b, int beam, int k) const {
         auto s = hn::Add(hn::Set(d, b.r[k]), hn::Mul(gap, hn::Set(d, b.contact[k])));
-        if (b.press != nullptr) s = hn::Add(s, hn::Load(d, b.press->row(b.press->along, k) + beam));
+        if (b.press != nullptr) s = hn::Add(s, hn::Load(d, b.press->along_row(k) + beam));
         BeamPoint<D> p{hn::Add(ox, hn::Mul(vx, s)), hn::Add(oy, hn::Mul(vy, s)),
                        hn::Add(oz, hn::Mul(vz, s))};
         if (b.press != nullptr) {
-            const auto side = hn::Load(d, b.press->row(b.press->side, k) + beam);
+            const auto side = hn::Load(d, b.press->side_row(k) + beam);
             p.x = hn::Add(p.x, hn::Mul(side, hn::LoadU(d, sideways)));
             p.y = hn::Add(p.y, hn::Mul(side, hn::LoadU(d, sideways + b.lines)));
             p.z = hn::Add(p.z, hn::Mul(side, hn::LoadU(d, sideways + 2 * b.lines)));

@@ -83,8 +83,13 @@ void PhysicalFast::weigh_breathing(const PhysicalFrame& f,
             const double gap =
                 static_cast<double>(std::max(gaps_[static_cast<std::size_t>(line)], 0.0f));
             const double contact = tables_.rows[static_cast<std::size_t>(k)].contact;
-            const auto right =
-                static_cast<float>(breathing.weight(point_on_beam(g, f, line, r, gap * contact)));
+            press::PlaneShift shift;
+            if (f.press != nullptr && k < press_.active) {
+                const press::PressView::Shift at = press_.at(line, k);
+                shift = {static_cast<double>(at.along_mm), static_cast<double>(at.side_mm), 0};
+            }
+            const Point3 at = point_on_beam(g, f, line, r, gap * contact, shift);
+            const auto right = static_cast<float>(breathing.weight(at));
             if (l > 0) {
                 for (int j = 0; j < kEvery; ++j)
                     row[l - kEvery + j] = left + (right - left) * static_cast<float>(j) / kEvery;
@@ -306,7 +311,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     }
     choose_targets(f, keep_all);
     choose_looks(f);
-    if (f.press != nullptr) press_.show(*f.press);
+    if (f.press != nullptr) press_.show(context_.simd, *f.press);
     slice_ = speckle_slice(f.volume_from_probe.rotation * Vector3{0, 1, 0}, tables_.cell_mm);
     const PhysicalBlock base = block_of_frame(f, keep_all);
     const bool breathes = f.effects.breathing && f.motion.breathes() && !breathing.empty();

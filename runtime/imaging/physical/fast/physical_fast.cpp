@@ -81,16 +81,17 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     dim_off_.assign(256, 1.0f);
     for (const std::int32_t look : looks_)
         dim_.push_back(static_cast<float>(std::exp2(-(look & 0xFFFF) / 4096.0 * geometry.step_mm)));
-    fine_frames_.assign(10 * 256, 0.0f);
+    fine_frames_.assign(kFineNumbers * 256, 0.0f);
     for (std::size_t l = 0; l < scene.fine.frames.size() && l < 256; ++l) {
         const FineFrame& frame = scene.fine.frames[l];
         if (frame.cube < 0) continue;
         looks_[l] |= kLookFine;
         looks_wall_[l] |= kLookFine;
         std::copy(frame.cube_from_voxel.begin(), frame.cube_from_voxel.end(),
-                  fine_frames_.begin() + static_cast<std::ptrdiff_t>(10 * l));
-        fine_frames_[10 * l + 9] =
+                  fine_frames_.begin() + static_cast<std::ptrdiff_t>(kFineNumbers * l));
+        fine_frames_[kFineNumbers * l + 9] =
             static_cast<float>(frame.cube * kFineEdge * kFineEdge * kFineEdge);
+        fine_frames_[kFineNumbers * l + 10] = static_cast<float>(kFineLayers[frame.cube] - 1);
     }
     for (const TargetBall& t : scene.targets) {
         targets_.push_back({static_cast<float>(t.centre_vx.x), static_cast<float>(t.centre_vx.y),

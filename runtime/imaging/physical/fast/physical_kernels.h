@@ -85,6 +85,8 @@ struct SpeckleCut {
     float shift[3] = {0, 0, 0};  // of breathing at weight 1: height, u, v
 };
 
+inline constexpr int kFineNumbers = 11;  // of a label's frame
+
 struct PhysicalBlock {
     const float* beams = nullptr;
     int lines = 0, samples = 0;
@@ -108,7 +110,7 @@ struct PhysicalBlock {
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
     const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr;
     const std::int8_t* fine = nullptr;   // null: off. Four cubes
-    const float* fine_frames = nullptr;  // ten per label: rows of the frame, offset of its cube
+    const float* fine_frames = nullptr;  // per label: rows of the frame, offset and last layer
     const PhysicalWall* wall = nullptr;  // null: off
     const float* face_mm = nullptr;      // per beam, of gas; null: not known
     const float *face_peak = nullptr, *cosine = nullptr;

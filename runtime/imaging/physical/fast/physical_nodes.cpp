@@ -49,21 +49,26 @@ void PhysicalFast::prepare_nodes(const Tables& tables) {
 // Moves nodes to where their tissue lies at rest: n.x, n.y, n.z already hold where the beams run.
 void PhysicalFast::press_nodes(int first, int end) {
     NodeLattice& n = nodes_;
-    for (int row = 0; row < n.rows; ++row) {
-        const int k = row * n.spacing.samples;
-        if (k >= press_.active) break;
-        for (int node = first; node < end; ++node) {
-            const int line = n.spacing.line(node);
-            const press::PressView::Shift shift = press_.at(line, k);
-            const auto side = [&](int axis) {
-                return beams_[static_cast<std::size_t>(kSideways + kVoxelPerMm + axis) *
-                                  static_cast<std::size_t>(lines_) +
-                              static_cast<std::size_t>(line)];
-            };
-            const std::size_t at = n.at(row, node), beam = static_cast<std::size_t>(node);
-            n.x[at] += n.per_mm[0][beam] * shift.along_mm + side(0) * shift.side_mm;
-            n.y[at] += n.per_mm[1][beam] * shift.along_mm + side(1) * shift.side_mm;
-            n.z[at] += n.per_mm[2][beam] * shift.along_mm + side(2) * shift.side_mm;
+    const bool dents = press_.field->needle().moves();
+    for (int node = first; node < end; ++node) {
+        const int line = n.spacing.line(node);
+        const auto beam = static_cast<std::size_t>(node);
+        float along[3], side[3];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            along[axis] = n.per_mm[axis][beam];
+            side[axis] = beams_[(static_cast<std::size_t>(kSideways + kVoxelPerMm) + axis) *
+                                    static_cast<std::size_t>(lines_) +
+                                static_cast<std::size_t>(line)];
+        }
+        for (int row = 0; row < n.rows; ++row) {
+            const int k = row * n.spacing.samples;
+            if (k >= press_.active) break;
+            const press::PressView::Shift shift =
+                dents ? press_.at(line, k) : press_.by_probe(line, k);
+            const std::size_t at = n.at(row, node);
+            n.x[at] += along[0] * shift.along_mm + side[0] * shift.side_mm;
+            n.y[at] += along[1] * shift.along_mm + side[1] * shift.side_mm;
+            n.z[at] += along[2] * shift.along_mm + side[2] * shift.side_mm;
         }
     }
 }

@@ -51,6 +51,7 @@ PhysicalNoise make_physical_noise(std::span<const double> levels,
 }
 
 void press_gaps(const press::PressField& field, const ScanGeometry& g, std::span<float> gaps) {
+    if (!field.state().pressed) return;
     for (int l = 0; l < g.scanlines; ++l) {
         float& gap = gaps[static_cast<std::size_t>(l)];
         if (gap < 0) continue;
@@ -60,22 +61,33 @@ void press_gaps(const press::PressField& field, const ScanGeometry& g, std::span
     }
 }
 
+namespace {
+
+ScanGeometry::Beam beam_of(const ScanGeometry& g, int line) {
+    if (line < g.scanlines) return g.beams[static_cast<std::size_t>(line)];
+    return {g.beam_origin(line), g.beam_direction(line)};
+}
+
+}  // namespace
+
+Point3 point_on_beam(const ScanGeometry& g,
+                     const PhysicalFrame& f,
+                     int line,
+                     double r,
+                     double gap_mm,
+                     const press::PlaneShift& shift) {
+    const auto& [o, d] = beam_of(g, line);
+    const PlanePoint n = press::beside(d);
+    const double s = r + gap_mm + shift.along_mm;
+    return f.volume_from_probe *
+           Point3{o.x + s * d.x + shift.side_mm * n.x, 0, o.z + s * d.z + shift.side_mm * n.z};
+}
+
 Point3 point_on_beam(
     const ScanGeometry& g, const PhysicalFrame& f, int line, double r, double gap_mm) {
-    const bool beyond = line >= g.scanlines;
-    const ScanGeometry::Beam beam =
-        beyond ? ScanGeometry::Beam{g.beam_origin(line), g.beam_direction(line)}
-               : g.beams[static_cast<std::size_t>(line)];
-    const PlanePoint o = beam.origin, d = beam.direction;
-    double s = r + gap_mm, beside = 0;
-    if (f.press != nullptr) {
-        const press::PlaneShift shift = press::plane_shift(*f.press, g, beam, line, r);
-        s += shift.along_mm;
-        beside = shift.side_mm;
-    }
-    const PlanePoint n = press::beside(d);
-    return f.volume_from_probe *
-           Point3{o.x + s * d.x + beside * n.x, 0, o.z + s * d.z + beside * n.z};
+    press::PlaneShift shift;
+    if (f.press != nullptr) shift = press::plane_shift(*f.press, g, beam_of(g, line), line, r);
+    return point_on_beam(g, f, line, r, gap_mm, shift);
 }
 
 int label_at(const PhysicalScene& s, int i, int j, int k) {

@@ -80,6 +80,13 @@ void press_gaps(const press::PressField& field,
 // to the skin moves the sample along the beam.
 Point3 point_on_beam(
     const ScanGeometry& geometry, const PhysicalFrame& frame, int line, double r_mm, double gap_mm);
+// The same where the shift of what yields is known.
+Point3 point_on_beam(const ScanGeometry& geometry,
+                     const PhysicalFrame& frame,
+                     int line,
+                     double r_mm,
+                     double gap_mm,
+                     const press::PlaneShift& shift);
 
 // Label of a voxel; 0, the outside, beyond the volume.
 int label_at(const PhysicalScene& scene, int i, int j, int k);

@@ -97,6 +97,9 @@ inline constexpr double kParenchymaMm = 1.3;
 // Nerves: a fourth cube, bundles of kNerveBundle voxels across, straight along the nerve.
 inline constexpr int kNerveCube = 3;
 inline constexpr int kNerveBundle = 8;
+// Layers of each cube that are looked up along its strands, which hardly change on the way: small
+// enough for a second-level cache, where most of the time of fine structure goes.
+inline constexpr int kFineLayers[] = {16, 32, 64, 4};
 // Plates in organs, and the diaphragm: deviation of their thickness (streak_plates.h, gas_faces.h).
 inline constexpr double kStreakMm = 0.25, kDomeMm = 1.5;
 

@@ -92,6 +92,10 @@ double power_of_taps(const auto& taps, double step) {
     return power;
 }
 
+double frequency_of(const MachineBeam& beam, const Probe& probe) {
+    return beam.frequency_mhz > 0 ? beam.frequency_mhz : probe.frequency_mhz;
+}
+
 // Widths of the point spread, full at half height.
 double axial_width(const MachineBeam& beam, double frequency_mhz) {
     if (beam.axial_mm > 0) return beam.axial_mm * beam.reference_mhz / frequency_mhz;
@@ -182,11 +186,19 @@ Machine default_machine(const Probe& probe) {
     return *built_in_machine("modern-linear");
 }
 
+int samples_along(const Probe& probe, const Machine& machine) {
+    constexpr int kLeast = 384, kMost = 512, kStretch = 32;
+    const double width_mm = axial_width(machine.beam, frequency_of(machine.beam, probe));
+    const double needed = 2 * probe.depth_mm / width_mm;
+    const long stretches = std::lround(std::clamp(needed, 1.0, double{kMost}) / kStretch);
+    return std::max(static_cast<int>(stretches) * kStretch, kLeast);
+}
+
 Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometry& g) {
     Tables t;
     t.machine = machine;
     const MachineBeam& beam = machine.beam;
-    const double frequency = beam.frequency_mhz > 0 ? beam.frequency_mhz : probe.frequency_mhz;
+    const double frequency = frequency_of(beam, probe);
     const double elevation_mm = beam.elevation_mm > 0 ? beam.elevation_mm : probe.elevation_mm;
     t.frequency_mhz = frequency;
     const double axial_fwhm = axial_width(beam, frequency);

@@ -112,6 +112,10 @@ inline double face_clutter(const Row& row, const PhysicalEffects& on) {
 // The machine that an exercise's probe is drawn with where none is named.
 Machine default_machine(const Probe& probe);
 
+// Samples along a beam that the machine's point spread needs: two to its width along the beam, in
+// steps of a stretch; at least three for four pixels of a picture 512 high, at most one each.
+int samples_along(const Probe& probe, const Machine& machine);
+
 // Cost: 0.1 ms.
 Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometry& geometry);
 

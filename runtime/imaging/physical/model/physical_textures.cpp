@@ -53,7 +53,10 @@ void store(const RawVector<float>& db, std::int8_t* out) {
     for (std::size_t i = 0; i < db.size(); ++i) {
         constexpr float kAbove = 127.5f;  // makes the number positive, so that the cast rounds it
         const float quarters = std::clamp(4 * (db[i] - mean), -127.0f, 127.0f);
-        out[i] = static_cast<std::int8_t>(static_cast<int>(quarters + kAbove) - 127);
+        const auto at = static_cast<int>(i);
+        constexpr int kIn = kFineEdge - 1;
+        out[fine_index(at & kIn, at / kFineEdge & kIn, at / (kFineEdge * kFineEdge))] =
+            static_cast<std::int8_t>(static_cast<int>(quarters + kAbove) - 127);
     }
 }
 

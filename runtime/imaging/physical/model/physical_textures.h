@@ -4,17 +4,30 @@
 // seed.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 namespace sonocase::runtime {
+
+namespace physical {
+
+// Place of a voxel in a cube of kFineEdge^3: blocks of 4 x 4 x 4, a cache line each, so that a
+// slice in any direction meets few lines. along: of the strands; slowest, so that the first layers
+// of a cube lie together.
+inline std::size_t fine_index(int along, int i, int j) {
+    const int in_block = (i & 3) | (j & 3) << 2 | (along & 3) << 4;
+    return static_cast<std::size_t>(in_block | (i & ~3) << 4 | (j & ~3) << 8 | (along & ~3) << 12);
+}
+
+}  // namespace physical
 
 struct PhysicalTextures {
     // Roughness and glint of surfaces, kRoughEdge^3, x fastest: byte 0 roughness (/ 32), byte 1
     // log2 of the glint (/ 32), bytes 2 and 3 cosine and sine of its phase (/ 127); all signed.
     std::vector<std::uint32_t> rough;
     // Strands of muscle, septa of fat, the echo of parenchyma, nerves: four cubes of kFineEdge^3
-    // echo offsets, quarter dB, and slack for look-ups of four bytes.
+    // echo offsets, quarter dB, in the order of fine_index(), and slack for look-ups of four bytes.
     std::vector<std::int8_t> fine;
     std::vector<double> normal_levels;  // for tiles of noise
 };

@@ -49,6 +49,7 @@ struct Search {
     Rigid probe_from_volume;
     double thickest_mm = 0;  // of the slab: deviation at the face or at the far end
     double pressed_mm = 0;   // tissue shows so much nearer to the face than it lies at rest
+    double turned = 0;       // by pressing: sine of the most that the beam at a place turns
     int found = 0;
 
     // The label that holds plates there; negative: none.
@@ -158,7 +159,16 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     if (frame.press != nullptr) {
         // Pressing moves nothing across the plane, and costs most for plates that are too far.
         const double off = p.y / (2.9 * std::sqrt(thickest_mm * thickest_mm + own * own));
-        if (bump(off * off) < 0.1) return;
+        const double in_slab = bump(off * off);
+        if (in_slab < 0.1) return;
+        double r_at_rest = 0;
+        const PlanePoint at_rest = beam_at({p.x, p.z}, r_at_rest);
+        const Vector3 n = probe_from_volume.rotation * normal;
+        const double along = n.x * at_rest.x + n.z * at_rest.z;
+        const double away =
+            std::max(std::sqrt(std::max(1 - along * along / dot(n, n), 0.0)) - turned, 0.0) /
+            kind.face_sin;
+        if (in_slab * bump(away * away) < 0.1) return;
         p = pressed(p);
     }
     double r = 0;
@@ -268,7 +278,11 @@ int find_streaks(const PhysicalScene& scene,
                   out,
                   inverse(f.volume_from_probe),
                   std::max(tables.rows.front().elevation_mm, tables.rows.back().elevation_mm)};
-    if (f.press != nullptr) search.pressed_mm = f.press->state().farthest_mm;
+    if (f.press != nullptr) {
+        search.pressed_mm = f.press->farthest_mm();
+        const double aside_mm = search.pressed_mm - f.press->state().deepest_mm;
+        if (g.fan) search.turned = std::min(aside_mm / std::max(g.radius_mm, 10.0), 1.0);
+    }
     const double shift_mm = norm(f.motion.breathing_mm);
     // Columns of cells along the axis that the plane's normal follows most.
     const Vector3 normal = f.volume_from_probe.rotation * Vector3{0, 1, 0};

@@ -7,10 +7,10 @@
 #include <cmath>
 
 #include "runtime/imaging/physical/model/gas_faces.h"
-#include "runtime/imaging/physical/model/pressed_surface.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
-#include "runtime/imaging/physical/reference/reference_place.h"
+#include "runtime/imaging/physical/reference/reference_press.h"
 #include "runtime/imaging/physical/reference/reference_speckle.h"
+#include "runtime/imaging/physical/reference/reference_surface.h"
 #include "runtime/imaging/physical/reference/reference_wall.h"
 
 namespace sonocase::runtime {
@@ -36,84 +36,6 @@ struct BeamLight {
         needle_tail *= std::exp(-step_mm / kNeedleTailMm);
     }
 };
-
-// A sample on its way through the effects.
-struct Sample {
-    const Row& row;
-    Vector3 from_origin{};    // of the volume, mm, before the slab's random step
-    Point3 v{}, looked_up{};  // voxel coordinates: the sample, and the voxel that is asked
-    Place place{};
-    const TargetBall* ball = nullptr;  // whose surface is near
-    double ball_mm = 0, ball_cosine = 0;
-    int look_index = 0;
-    double re = 0, im = 0;                                 // echo of surfaces
-    std::array<double, kMaxLooks> field_re{}, field_im{};  // of scatterers, one per look
-    double facing = 1;  // how squarely the beam meets the surface, 1 where there is none
-    double loss = 0;    // log2 of amplitude that this sample takes
-    double here = 0;    // amplitude of the light that arrives
-};
-
-// log2 of amplitude that a beam loses in one sample where it grazes a wall of fluid.
-double graze_loss(double cosine, double distance_mm, double step_mm) {
-    const double graze = std::max(1 - cosine / kEdgeCos, 0.0);
-    const double near = std::max(1 - std::abs(distance_mm) / kEdgeReachMm, 0.0);
-    return kEdgeLossLog2PerMm * graze * graze * near * step_mm;
-}
-
-// The surface between two labels: its echo, and what it takes.
-void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p) {
-    const Place& place = p.place;
-    if (place.second < 0) return;
-    const PairEcho& pair =
-        in.scene.pairs[static_cast<std::size_t>(place.own * in.scene.labels() + place.second)];
-    const double cosine = std::abs(dot(place.normal, beam));
-    p.facing = pair.hard ? 0.25 * cosine + 0.75 * std::pow(cosine, 6)
-                         : 0.08 * cosine + 0.92 * std::pow(cosine, 10);
-    if (in.frame.effects.interfaces && pair.amplitude > 0) {
-        const double u =
-            (std::abs(place.distance_mm) - pair.split_mm) / blurred_mm(in.tables, pair.sigma_mm);
-        const double i = pair.amplitude * p.facing * std::exp2(place.rough.log2_glint) *
-                         std::exp(-0.5 * u * u) * p.row.interface_scale;
-        p.re += i * place.rough.re;
-        p.im += i * place.rough.im;
-    }
-    if (in.frame.effects.edge_shadow && pair.refracts)
-        p.loss += graze_loss(cosine, place.distance_mm, in.geometry.step_mm);
-}
-
-// The target whose surface is near, if any: the last one that is. Soft tissue alone gives way to
-// it.
-void find_target(const ReferenceInput& in, Vector3 beam, Sample& p) {
-    const PhysicalScene& s = in.scene;
-    for (const TargetBall& t : s.targets) {
-        const Vector3 from_centre = s.voxel_mm * (p.v - t.centre_vx);
-        const double away = norm(from_centre);
-        if (away - t.radius_mm > kTargetReachMm ||
-            s.looks[static_cast<std::size_t>(p.place.label)].kind != TissueKind::soft)
-            continue;
-        p.ball = &t;
-        p.ball_mm = away - t.radius_mm + kRoughnessMm * roughness_at(s, p.v).shift;
-        p.ball_cosine = std::abs(dot(from_centre, beam)) / std::max(away, 1e-3);
-        if (p.ball_mm < 0) p.look_index = t.look;
-    }
-}
-
-// The surface of a target.
-void meet_target(const ReferenceInput& in, Sample& p) {
-    if (p.ball == nullptr) return;
-    const Roughness rough = roughness_at(in.scene, p.v);
-    if (in.frame.effects.interfaces) {
-        const double u = p.ball_mm / 0.16;
-        const double c2 = p.ball_cosine * p.ball_cosine;
-        const double i = p.ball->wall * (0.08 * p.ball_cosine + 0.92 * c2 * c2 * c2) *
-                         std::exp2(rough.log2_glint) * std::exp(-0.5 * u * u) *
-                         p.row.interface_scale;
-        p.re += i * rough.re;
-        p.im += i * rough.im;
-    }
-    if (in.frame.effects.edge_shadow && p.ball->fluid)
-        p.loss += graze_loss(p.ball_cosine, p.ball_mm, in.geometry.step_mm);
-}
 
 // A beam's face of gas, and the diaphragm on it; kNoFace: none.
 struct Face {
@@ -253,7 +175,7 @@ class Beams {
                 out.light[at] = 0;
                 continue;
             }
-            Sample p = place_sample(k, l, d, beam);
+            Sample p = place_sample(k, l, beam);
             if (in_.frame.effects.targets) find_target(in_, beam, p);
             const AcousticProperties& look =
                 in_.scene.looks[static_cast<std::size_t>(p.look_index)];
@@ -347,30 +269,8 @@ class Beams {
         return wall_echo(in_, voxel(r - half), voxel(r), voxel(r + half), 2 * half);
     }
 
-    // The surface near a sample turns with pressed tissue, and a lumen that is shut shows what is
-    // around it.
-    void press_place(int k, int l, PlanePoint d, Vector3 beam, Place& place) const {
-        const ScanGeometry& g = in_.geometry;
-        const PhysicalFrame& f = in_.frame;
-        const ScanGeometry::Beam& of = g.beams[static_cast<std::size_t>(l)];
-        const double r = in_.row(k).r_mm;
-        const press::PlaneShift here = press::plane_shift(*f.press, g, of, l, r);
-        const press::PlaneShift above =
-            k > 0 ? press::plane_shift(*f.press, g, of, l, in_.row(k - 1).r_mm) : here;
-        const PlanePoint n = press::beside(d);
-        if (place.second >= 0)
-            press_surface(beam, f.volume_from_probe.rotation * Vector3{n.x, 0, n.z},
-                          1 + (here.along_mm - above.along_mm) / g.step_mm, here.tilt, place.normal,
-                          place.distance_mm);
-        const double lateral =
-            press::follows_columns(g) ? press::lateral_of_line(g, l) : of.origin.x + r * d.x;
-        const double depth = press::follows_columns(g) ? r : of.origin.z + r * d.z;
-        if (f.press->closed_in_plane({lateral, depth}))
-            place.label = in_.scene.closed_label[static_cast<std::size_t>(place.label)];
-    }
-
     // Where sample k of beam l lies, and what is there.
-    Sample place_sample(int k, int l, PlanePoint d, Vector3 beam) const {
+    Sample place_sample(int k, int l, Vector3 beam) const {
         const PhysicalScene& s = in_.scene;
         const PhysicalFrame& f = in_.frame;
         Sample p{in_.row(k)};
@@ -386,7 +286,7 @@ class Beams {
         p.looked_up = s.grid.voxel_from_point(slab + (kLookupJitter * s.voxel_mm) *
                                                          (jitter2 * sideways + jitter * beam));
         p.place = place_at(s, f, p.v, p.looked_up);
-        if (f.press != nullptr) press_place(k, l, d, beam, p.place);
+        if (f.press != nullptr) press_place(in_, k, l, beam, p.place);
         p.look_index = p.place.label;
         return p;
     }
@@ -404,7 +304,9 @@ class Beams {
                 const double baked = echo_offset_db(in_.scene, p.looked_up);
                 echo_db += in_wall ? std::min(baked, kWallStructureDb) : baked;
             }
-            echo_db += fine_offset_db(in_.scene, on, p.place.label, p.v);
+            echo_db += fine_offset_db(
+                in_.scene, on, p.place.label,
+                in_.scene.grid.voxel_from_point(in_.scene.grid.origin_mm + p.from_origin));
         }
         if (dome > 0)
             echo_db +=

@@ -3,6 +3,7 @@
 #include "runtime/imaging/physical/reference/reference_place.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "formats/volume/boundary_record.h"
@@ -25,16 +26,17 @@ double fine_offset_db(const PhysicalScene& s, const PhysicalEffects& on, int lab
     if (label >= static_cast<int>(s.fine.frames.size())) return 0;
     const FineFrame& f = s.fine.frames[static_cast<std::size_t>(label)];
     if (f.cube < 0 || !(f.cube == kParenchymaCube ? on.parenchyma : on.fine_structure)) return 0;
-    std::size_t cell = 0;
-    for (int r = 2; r >= 0; --r) {
+    std::array<int, 3> cell{};
+    for (int r = 0; r < 3; ++r) {
         const auto m = [&](int c) {
             return static_cast<double>(f.cube_from_voxel[static_cast<std::size_t>(3 * r + c)]);
         };
         const double u = m(0) * v.x + m(1) * v.y + m(2) * v.z;
-        cell = cell * kFineEdge + static_cast<std::size_t>(nearest_integer(u) & (kFineEdge - 1));
+        cell[static_cast<std::size_t>(r)] =
+            nearest_integer(u) & ((r == 0 ? kFineLayers[f.cube] : kFineEdge) - 1);
     }
-    return s.textures
-               ->fine[cell + static_cast<std::size_t>(f.cube) * kFineEdge * kFineEdge * kFineEdge] /
+    return s.textures->fine[fine_index(cell[0], cell[1], cell[2]) +
+                            static_cast<std::size_t>(f.cube) * kFineEdge * kFineEdge * kFineEdge] /
            4.0;
 }
 

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/player/ui/picture/doppler_marks.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "runtime/display/theme.h"
+#include "runtime/imaging/doppler/colour_box.h"
+#include "runtime/imaging/doppler/doppler_colours.h"
+#include "runtime/imaging/doppler/m_mode.h"
+#include "runtime/player/words/words.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using doppler::ColourBox;
+using doppler::kColourLines;
+using doppler::kColourRows;
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr float kReach = 14;  // u, from the mouse to what it takes hold of
+
+// Part of the face and depth, as the settings have them.
+struct FacePoint {
+    double line = 0, depth_mm = 0;
+};
+
+ImVec2 screen(const ImagePlace& place, PlanePoint p, bool flipped) {
+    return {static_cast<float>(place.origin_x + (flipped ? -p.x : p.x) / place.mm_per_screen_px),
+            static_cast<float>(place.origin_y + p.z / place.mm_per_screen_px)};
+}
+
+PlanePoint plane_point(const ColourBox& box, FacePoint at) {
+    return box.point(at.line * kColourLines - 0.5, at.depth_mm / box.row_mm - 0.5);
+}
+
+FacePoint face_point(const ImagePlace& place,
+                     const ScanGeometry& geometry,
+                     double steer_tan,
+                     bool flipped,
+                     float x,
+                     float y) {
+    PlanePoint p{(x - place.origin_x) * place.mm_per_screen_px,
+                 (y - place.origin_y) * place.mm_per_screen_px};
+    if (flipped) p.x = -p.x;
+    p.x -= p.z * steer_tan;  // 0 for a fan
+    double line = 0, sample = 0;
+    geometry.locate(p, line, sample);
+    return {(line + 0.5) / geometry.scanlines, (sample + 0.5) * geometry.step_mm};
+}
+
+void outline(const std::vector<ImVec2>& points, bool closed, float s) {
+    ImDrawList* draw = ImGui::GetWindowDrawList();
+    const int count = static_cast<int>(points.size());
+    const ImDrawFlags flags = closed ? ImDrawFlags_Closed : ImDrawFlags_None;
+    draw->AddPolyline(points.data(), count, colour::rgba(0, 0, 0, 160), flags, 3 * s);
+    draw->AddPolyline(points.data(), count, colour::kMeasure, flags, 1.3f * s);
+}
+
+void draw_box(const ImagePlace& place,
+              const ColourBox& box,
+              const DopplerSettings& d,
+              bool flipped,
+              float s) {
+    constexpr int kSteps = 12;  // along the arcs of a fan
+    std::vector<ImVec2> points;
+    for (int i = 0; i <= kSteps; ++i)
+        points.push_back(screen(
+            place,
+            plane_point(box, {d.box_left + (d.box_right - d.box_left) * i / kSteps, d.box_top_mm}),
+            flipped));
+    for (int i = kSteps; i >= 0; --i)
+        points.push_back(screen(
+            place,
+            plane_point(box,
+                        {d.box_left + (d.box_right - d.box_left) * i / kSteps, d.box_bottom_mm}),
+            flipped));
+    outline(points, true, s);
+}
+
+void draw_gate(const ImagePlace& place,
+               const ScanGeometry& geometry,
+               const ColourBox& box,
+               const DopplerSettings& d,
+               bool flipped,
+               float s) {
+    const ImVec2 face = screen(place, plane_point(box, {d.gate_line, 0}), flipped),
+                 end = screen(place, plane_point(box, {d.gate_line, geometry.depth_mm}), flipped);
+    ImDrawList* draw = ImGui::GetWindowDrawList();
+    const float dx = end.x - face.x, dy = end.y - face.y;
+    const float length = std::max(std::hypot(dx, dy), 1.0f);
+    for (float t = 0; t < length; t += 9 * s) {
+        const float u = t / length, v = std::min((t + 3 * s) / length, 1.0f);
+        draw->AddLine({face.x + u * dx, face.y + u * dy}, {face.x + v * dx, face.y + v * dy},
+                      colour::kMeasure, 1.2f * s);
+    }
+    if (d.mode != DopplerMode::spectral) return;
+    // The gate: two strokes across the line, and the cursor along the vessel.
+    const ImVec2 unit{dx / length, dy / length}, across{-unit.y, unit.x};
+    for (const double half : {-0.5, 0.5}) {
+        const ImVec2 p = screen(
+            place, plane_point(box, {d.gate_line, d.gate_depth_mm + half * d.gate_mm}), flipped);
+        outline({{p.x - 11 * s * across.x, p.y - 11 * s * across.y},
+                 {p.x + 11 * s * across.x, p.y + 11 * s * across.y}},
+                false, s);
+    }
+    const ImVec2 middle = screen(place, plane_point(box, {d.gate_line, d.gate_depth_mm}), flipped);
+    const double angle = (flipped ? -1 : 1) * d.angle_deg * kPi / 180;
+    const auto c = static_cast<float>(std::cos(angle)), n = static_cast<float>(std::sin(angle));
+    const ImVec2 along{c * unit.x - n * unit.y, n * unit.x + c * unit.y};
+    for (const float side : {-1.0f, 1.0f})
+        outline({{middle.x + side * 8 * s * along.x, middle.y + side * 8 * s * along.y},
+                 {middle.x + side * 34 * s * along.x, middle.y + side * 34 * s * along.y}},
+                false, s);
+}
+
+// Velocities beside the strip: the ends of the scale and 0.
+void draw_velocities(Ui& ui, const Box& box, const DopplerSettings& d) {
+    const double zero = 0.5 + 0.5 * std::clamp(d.baseline, -0.9, 0.9);  // from the top
+    const double most = d.spectral_scale_cm_s * (1 + d.baseline),
+                 least = -d.spectral_scale_cm_s * (1 - d.baseline);
+    const float x = box.right() - 52;
+    const auto label = [&](double share, double cm_s) {
+        const float y = box.y + static_cast<float>(share) * box.h;
+        ui.line(box.right() - 58, y, box.right() - 54, y, colour::kDim);
+        const Box words{x, std::clamp(y - 9, box.y, box.bottom() - 18), 50, 18};
+        ui.text(words, std::to_string(static_cast<int>(std::lround(d.invert ? -cm_s : cm_s))),
+                Type::small, colour::kImageText, Align::left, true);
+    };
+    label(0, most);
+    label(zero, 0);
+    label(1, least);
+}
+
+void draw_measures(Ui& ui, const Box& box, const ScanFrame& frame) {
+    const doppler::SpectralMeasures& m = frame.doppler.measures;
+    char words[160];
+    if (m.beats > 0) {
+        std::snprintf(words, sizeof words, tr("PSV %.1f  EDV %.1f cm/s  RI %.2f  flow %.0f ml/min"),
+                      m.psv_cm_s, m.edv_cm_s, m.resistive_index, m.flow_ml_min);
+    } else {
+        std::snprintf(words, sizeof words, "%s", tr("PSV, EDV and RI after one beat"));
+    }
+    ui.text(box, words, Type::small, colour::kImageText, Align::left, true);
+}
+
+}  // namespace
+
+ScanGeometry picture_geometry(const ScanFrame& frame, const Probe& probe) {
+    Probe shown = probe;
+    shown.depth_mm = frame.depth_mm;
+    return make_scan_geometry(shown, kColourLines, kColourRows, std::max(frame.width_px, 1),
+                              std::max(frame.height_px, 1));
+}
+
+void draw_doppler_marks(Ui& ui,
+                        const ImagePlace& place,
+                        const ScanGeometry& geometry,
+                        const DopplerSettings& settings,
+                        bool flipped) {
+    if (settings.mode == DopplerMode::off) return;
+    const ColourBox box = doppler::colour_box(geometry, settings);
+    if (has_strip(settings.mode)) {
+        draw_gate(place, geometry, box, settings, flipped, ui.scale());
+    } else {
+        draw_box(place, box, settings, flipped, ui.scale());
+    }
+}
+
+void draw_colour_bar(Ui& ui, const Box& area, const DopplerSettings& settings) {
+    const float high = std::min(110.0f, 0.25f * area.h);
+    const Box bar{area.x + 12, area.bottom() - 16 - high, 9, high};
+    const auto& palette = doppler::palette(settings.mode);
+    constexpr int kSteps = 48;
+    for (int i = 0; i < kSteps; ++i) {
+        int index = 1 + (kSteps - 1 - i) * 254 / (kSteps - 1);
+        if (settings.invert && settings.mode == DopplerMode::colour) index = 256 - index;
+        const doppler::Rgb& c = palette[static_cast<std::size_t>(std::clamp(index, 1, 255))];
+        ui.fill(
+            {bar.x, bar.y + bar.h * static_cast<float>(i) / kSteps, bar.w, bar.h / kSteps + 0.6f},
+            colour::rgba(c[0], c[1], c[2]));
+    }
+    ui.outline(bar, colour::kFaint, 1);
+    if (settings.mode != DopplerMode::colour) return;
+    const int most = static_cast<int>(std::lround(settings.scale_cm_s));
+    const std::string ends[] = {(settings.invert ? "-" : "+") + std::to_string(most) + " cm/s",
+                                (settings.invert ? "+" : "-") + std::to_string(most)};
+    ui.text({bar.right() + 5, bar.y - 3, 80, 18}, ends[0], Type::small, colour::kImageText,
+            Align::left, true);
+    ui.text({bar.right() + 5, bar.bottom() - 15, 60, 18}, ends[1], Type::small, colour::kImageText,
+            Align::left, true);
+}
+
+bool has_strip(DopplerMode mode) {
+    return mode == DopplerMode::spectral || mode == DopplerMode::m_mode;
+}
+
+Box strip_box(const Box& area) {
+    Box rest = area;
+    return rest.take_bottom(std::round(0.34f * area.h));
+}
+
+void draw_strip(Ui& ui,
+                const Box& box,
+                const ScanFrame& frame,
+                const DopplerSettings& settings,
+                void* texture) {
+    ui.fill(box, colour::kPicture);
+    ui.line(box.x, box.y, box.right(), box.y, colour::kLine);
+    Box rest = box;
+    rest.take_top(4);
+    const Box words = rest.take_top(18, 2);
+    rest.take_left(8);
+    Box strip = rest;
+    strip.take_right(60);
+    if (texture && !frame.doppler.strip.empty()) ui.image(texture, strip);
+    ui.outline(strip, colour::kFaint, 1);
+    const bool spectral = settings.mode == DopplerMode::spectral;
+    const double shown_s =
+        spectral ? kStripSeconds : double(doppler::MMode::kColumns) / doppler::MMode::kPerSecond;
+    for (int second = 1; second < shown_s; ++second) {
+        const float x = strip.right() - strip.w * static_cast<float>(second / shown_s);
+        ui.line(x, strip.bottom() - 5, x, strip.bottom(), colour::kImageText);
+    }
+    const Box above{words.x + 12, words.y, words.w - 24, words.h};
+    if (spectral) {
+        draw_velocities(ui, rest, settings);
+        draw_measures(ui, above, frame);
+        return;
+    }
+    ui.text(above, tr("Depth over time; a tick per second"), Type::small, colour::kImageText,
+            Align::left, true);
+    constexpr float kLine = 20;
+    int step_cm = 1;
+    while (strip.h * static_cast<float>(step_cm * 10 / std::max(frame.depth_mm, 1.0)) < kLine)
+        step_cm += step_cm == 1 ? 1 : step_cm == 2 ? 3 : 5;
+    for (int cm = step_cm; cm * 10 < frame.depth_mm; cm += step_cm) {
+        const float y = strip.y + strip.h * static_cast<float>(cm * 10 / frame.depth_mm);
+        ui.line(strip.right(), y, strip.right() + 4, y, colour::kDim);
+        if (y + 9 > strip.bottom()) break;
+        ui.text({strip.right() + 8, std::max(y - 9, strip.y), 40, 18}, std::to_string(cm),
+                Type::small, colour::kImageText, Align::left, true);
+    }
+}
+
+DopplerDrag doppler_hold(const ImagePlace& place,
+                         const ScanGeometry& geometry,
+                         const DopplerSettings& d,
+                         bool flipped,
+                         float x,
+                         float y,
+                         float scale) {
+    if (d.mode == DopplerMode::off) return DopplerDrag::none;
+    const ColourBox box = doppler::colour_box(geometry, d);
+    const auto near = [&](FacePoint at, float reach) {
+        const ImVec2 p = screen(place, plane_point(box, at), flipped);
+        return std::hypot(p.x - x, p.y - y) <= reach * scale;
+    };
+    const FacePoint mouse = face_point(place, geometry, box.steer_tan, flipped, x, y);
+    if (d.mode == DopplerMode::m_mode)
+        return near({d.gate_line, mouse.depth_mm}, kReach) ? DopplerDrag::gate : DopplerDrag::none;
+    if (d.mode == DopplerMode::spectral)
+        return near({d.gate_line, d.gate_depth_mm}, 2 * kReach) ? DopplerDrag::gate
+                                                                : DopplerDrag::none;
+    if (near({d.box_right, d.box_bottom_mm}, kReach)) return DopplerDrag::corner;
+    const bool inside = mouse.line >= d.box_left && mouse.line <= d.box_right &&
+                        mouse.depth_mm >= d.box_top_mm && mouse.depth_mm <= d.box_bottom_mm;
+    return inside ? DopplerDrag::box : DopplerDrag::none;
+}
+
+void drag_doppler(const ImagePlace& place,
+                  const ScanGeometry& geometry,
+                  DopplerDrag held,
+                  bool flipped,
+                  float from_x,
+                  float from_y,
+                  float to_x,
+                  float to_y,
+                  DopplerSettings& d) {
+    constexpr double kLeastLine = 0.08, kLeastMm = 5;
+    const double steer_tan = doppler::colour_box(geometry, d).steer_tan;
+    const FacePoint from = face_point(place, geometry, steer_tan, flipped, from_x, from_y),
+                    to = face_point(place, geometry, steer_tan, flipped, to_x, to_y);
+    const double depth = geometry.depth_mm;
+    switch (held) {
+        case DopplerDrag::none: return;
+        case DopplerDrag::gate:
+            d.gate_line = std::clamp(to.line, 0.0, 1.0);
+            if (d.mode == DopplerMode::spectral)
+                d.gate_depth_mm = std::clamp(to.depth_mm, 1.0, depth);
+            return;
+        case DopplerDrag::corner:
+            d.box_right = std::clamp(to.line, std::min(d.box_left + kLeastLine, 1.0), 1.0);
+            d.box_bottom_mm =
+                std::clamp(to.depth_mm, std::min(d.box_top_mm + kLeastMm, depth), depth);
+            return;
+        case DopplerDrag::box: break;
+    }
+    const double by_line = std::clamp(to.line - from.line, -d.box_left, 1 - d.box_right);
+    const double by_mm = std::clamp(to.depth_mm - from.depth_mm, std::min(1 - d.box_top_mm, 0.0),
+                                    std::max(depth - d.box_bottom_mm, 0.0));
+    d.box_left += by_line;
+    d.box_right += by_line;
+    d.box_top_mm += by_mm;
+    d.box_bottom_mm += by_mm;
+}
+
+}  // namespace sonocase::runtime
