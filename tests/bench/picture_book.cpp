@@ -13,7 +13,7 @@
 #include "formats/bundle/case_bundle.h"
 #include "formats/files/bundle_file.h"
 #include "runtime/imaging/renderer.h"
-#include "runtime/player/session/png_file.h"
+#include "runtime/player/session/pictures/png_file.h"
 
 namespace sonocase {
 namespace {
@@ -111,7 +111,7 @@ struct Picture {
 struct Shot {
     const char* view = "liver";
     bool needle = false, target = false;
-    double lift_mm = 0, breathing_mm = 0, pulse_mm = 0;
+    double lift_mm = 0, breathing_mm = 0, pulse_mm = 0, press_mm = 0;
 };
 
 Picture draw(const Body& body,
@@ -137,6 +137,7 @@ Picture draw(const Body& body,
     runtime::FrameInput input;
     input.mannequin_from_probe = pose;
     input.frame = 3;
+    input.settings.press_mm = shot.press_mm;
     if (shot.breathing_mm > 0) {
         e.breathing.amplitude_mm = shot.breathing_mm;
         e.breathing.direction = -1.0 * body.head;
@@ -218,6 +219,24 @@ bool effect_pictures(const Body& body, const std::string& folder) {
     return true;
 }
 
+// The femoral vessels under a probe that presses more and more, in both models.
+bool press_series(const Body& body, const std::string& path) {
+    constexpr int kWidth = 240, kHeight = 330, kGap = 4;
+    const std::vector<double> depths_mm{0, 4, 8, 12, 18};
+    Picture row(static_cast<int>(depths_mm.size()) * (kWidth + kGap) - kGap, 2 * kHeight + kGap,
+                90);
+    int at = 0;
+    for (const double press_mm : depths_mm) {
+        Shot shot;
+        shot.view = "vessel";
+        shot.press_mm = press_mm;
+        const int x = at++ * (kWidth + kGap);
+        row.put(draw(body, shot, ImageModel::physical, {"auto"}, kWidth, kHeight), x, 0);
+        row.put(draw(body, shot, ImageModel::paper, {"auto"}, kWidth, kHeight), x, kHeight + kGap);
+    }
+    return save(path, row);
+}
+
 // Four views a row, the first `physical` rows in that model.
 bool sheet_of(const Body& body,
               const std::vector<std::vector<const char*>>& rows,
@@ -257,6 +276,7 @@ int run(const std::string& path, const std::string& folder) {
     const std::vector<const char*> fan{"liver", "kidney", "aorta", "gas"},
         linear{"bladder", "rib", "muscle", "vessel"}, paper{"kidney", "aorta", "bladder", "muscle"};
     return effect_pictures(body, folder + "/effects") &&
+                   press_series(body, folder + "/effects/press-series.png") &&
                    sheet_of(body, {fan, linear, paper}, 2, folder + "/realism.png") &&
                    sheet_of(body, {fan, linear}, 2, folder + "/readme.png")
                ? 0

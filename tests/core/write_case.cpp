@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// core_write_case BUNDLE SESSION: a small case, and a session of three seconds in which the probe
-// slides over it and a needle goes in.
+// core_write_case BUNDLE SESSION [flow]: a small case (in whose vessel blood flows), and a session
+// of three seconds in which the probe slides over it and a needle goes in.
 #include <cstdint>
 #include <fstream>
 #include <vector>
@@ -42,9 +42,11 @@ bool write(const char* path, const std::vector<std::uint8_t>& bytes) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc != 3) return 2;
+    if (argc != 3 && argc != 4) return 2;
+    CaseBundle bundle = testing::small_case();
+    if (argc == 4) testing::add_flow(bundle);
     const Sequence session = sequence_from_session(small_session());
-    const bool good = write(argv[1], write_bundle(testing::small_case())) &&
+    const bool good = write(argv[1], write_bundle(bundle)) &&
                       write(argv[2], write_sequence(session, SequenceForm::mha));
     return good ? 0 : 1;
 }

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "end_to_end/scripted_trainees.h"
+#include "formats/attempt/difficulty.h"
 #include "formats/files/bundle_file.h"
 #include "support/paths.h"
 #include "support/run_command.h"
@@ -41,7 +42,10 @@ Passed bluff(const Case& of, const Exercise& exercise, int attempts) {
     testing::Random random(7);
     Passed out;
     for (int i = 0; i < attempts; ++i) {
-        Attempt attempt(of.bundle, at_rest, breathing, exercise, 1000u + static_cast<unsigned>(i));
+        // Who fails is given easier attempts: bluffing must not pass those either.
+        const std::uint64_t seed =
+            seed_with_difficulty(1000u + static_cast<unsigned>(i), i / 3 % 2 ? kEasiest : 0);
+        Attempt attempt(of.bundle, at_rest, breathing, exercise, seed);
         if (i % 3 == 0) testing::bluff_with_fixed_keys(attempt, i / 3 % 20);
         if (i % 3 == 1) testing::bluff_with_a_random_walk(attempt, random);
         if (i % 3 == 2) testing::bluff_with_a_straight_push(attempt, random);
@@ -55,7 +59,9 @@ Passed expert(const Case& of, const Exercise& exercise, int attempts) {
     const CaseAnatomy at_rest(of.bundle), breathing(of.bundle, exercise.breathing);
     Passed out;
     for (int i = 0; i < attempts; ++i) {
-        Attempt attempt(of.bundle, at_rest, breathing, exercise, 1u + static_cast<unsigned>(i));
+        const std::uint64_t seed =
+            seed_with_difficulty(1u + static_cast<unsigned>(i), i % 2 ? kHardest : 0);
+        Attempt attempt(of.bundle, at_rest, breathing, exercise, seed);
         ++out.attempts;
         const bool tried = testing::play_as_an_expert(attempt);
         const SessionScore score = attempt.score();

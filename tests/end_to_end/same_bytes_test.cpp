@@ -25,16 +25,16 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Bundles: since exercises draw targets. Physical frames: since the skirt of the point spread.
-// Paper: commit aa0be5b.
-constexpr const char* kDraft = "8f3b795c66eb0585e4055d5844a746ec";
-constexpr const char* kBalanced = "eb6f972f531d439020739e93c9184033";
-constexpr const char* kSlender = "c40b23a8abebc0889118ce220965c463";
-constexpr const char* kReal = "673259490cd074179f83b35b2be76e69";
-constexpr const char* kDraftPhysical = "5b379a736449ca4ce643b69677eb3796";
-constexpr const char* kDraftPaper = "1628db3a0fe630d2e2b3a86b0621208a";
-constexpr const char* kRealPhysical = "a2f3f46cc8dcebdaa82d8f45cf215f0f";
-constexpr const char* kRealPaper = "83a09d20a889780ad24fa8f66478cdef";
+// Bundles: since the portal vein's flow is weighed against its velocity. Physical frames: since the
+// skirt of the point spread. Paper: commit aa0be5b.
+constexpr const char* kDraft = "a1eb85faaffc7edfbd90f76d4bbfc9b2";
+constexpr const char* kBalanced = "9fd29c25ec54009bf120ae1a0b30a7e2";
+constexpr const char* kSlender = "8204b8b89df6614c73ec63d12e6efd92";
+constexpr const char* kReal = "9028ba28372bd45a21f6605310e88da0";
+constexpr const char* kDraftPhysical = "28fda43bc55bd0c837ba7cbc2bca56b4";
+constexpr const char* kDraftPaper = "2f241268411ba418106fde0ced219bbb";
+constexpr const char* kRealPhysical = "fa6437f731f37395114f299423de666c";
+constexpr const char* kRealPaper = "ab88db573d849d9ea988c882a10a9d13";
 
 class SameBytes : public ::testing::Test {
   protected:

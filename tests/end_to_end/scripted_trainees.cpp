@@ -8,6 +8,7 @@
 
 #include "formats/scoring/image_region.h"
 #include "formats/scoring/sight.h"
+#include "formats/volume/tissue_mechanics.h"
 
 namespace sonocase::testing {
 
@@ -73,9 +74,32 @@ class Expert {
         for (std::size_t i = 0; i < a_.bundle.labels.size(); ++i) {
             no_go_[i] = std::find(e.no_go.begin(), e.no_go.end(), a_.bundle.labels[i].name) !=
                         e.no_go.end();
+            const std::string& name = a_.bundle.labels[i].name;
+            if (name == e.targets[0].inside && vessel_of_label(name) != Vessel::unknown)
+                vessel_ = static_cast<int>(i);
         }
     }
 
+    std::optional<ExpertPlan> plan() {
+        if (!find()) return {};
+        return plan_;
+    }
+    // The probe with the target in the picture's middle, from places around the first one that
+    // shows it, turned about its beam in steps of 30 degrees.
+    std::vector<MouseTracker> above() {
+        std::vector<MouseTracker> found;
+        const auto start = look();
+        for (const double x : {0.0, -15.0, 15.0})
+            for (const double y : {0.0, -15.0, 15.0})
+                for (int turn = 0; start && turn < 6; ++turn) {
+                    MouseTracker hands = *start;
+                    hands.slide(x, y);
+                    hands.rotate(turn * 3.14159265358979 / 6);
+                    centre(hands, 0);
+                    if (sees(hands) && std::abs(target(hands).y) < 0.5) found.push_back(hands);
+                }
+        return found;
+    }
     bool play() {
         if (!find()) return false;
         a_.mouse = plan_->hands;
@@ -88,11 +112,6 @@ class Expert {
     }
 
   private:
-    struct Plan {
-        MouseTracker hands;  // probe and needle in place, the needle not yet in
-        double depth_mm = 0, visible = 0;
-    };
-
     // The target in the `probe` frame of these hands.
     Point3 target(const MouseTracker& hands) const {
         return inverse(hands.mannequin_from_probe()) * a_.exercise.targets[0].centre;
@@ -140,19 +159,39 @@ class Expert {
             [&](const MouseTracker& m) { return target(m).y; });
     }
 
+    // The first place of a spiral from where fanning shows the target; not yet over it.
+    std::optional<MouseTracker> look() {
+        std::optional<MouseTracker> found;
+        spiral([&] {
+            for (double fan = -0.7; fan <= 0.71; fan += 0.05) {
+                MouseTracker hands = a_.mouse;
+                hands.fan(fan);
+                if (!sees(hands)) continue;
+                found = a_.mouse;
+                return true;
+            }
+            return false;
+        });
+        return found;
+    }
     // In a square spiral over the skin from where the attempt began, fanning at each place.
     bool find() {
+        return spiral([&] { return look_here() && plan_->visible > 0.8; }) || plan_.has_value();
+    }
+    // True as soon as done() is.
+    template <class Done>
+    bool spiral(Done done) {
         constexpr double kStepMm = 12;
         constexpr int kTurns = 22;
         const double way[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
         for (int leg = 0; leg < kTurns; ++leg) {
             for (int i = 0; i <= leg / 2; ++i) {
-                if (look_here() && plan_->visible > 0.8) return true;
+                if (done()) return true;
                 a_.mouse.slide(kStepMm * way[leg % 4][0], kStepMm * way[leg % 4][1]);
                 a_.tick();
             }
         }
-        return plan_.has_value();
+        return false;
     }
     bool look_here() {
         for (double fan = -0.7; fan <= 0.71; fan += 0.05) {
@@ -214,11 +253,16 @@ class Expert {
         if (norm(shaft - along) * depth > 1) return;
         for (const double part : {0.0, 0.5}) {
             const double time_s = part * a_.exercise.breathing.period_s;
-            for (double s = 1; s < depth; s += 1) {
+            bool in_vessel = false;
+            for (double s = 1; s < depth; s += vessel_ < 0 ? 1 : 0.25) {
                 const Point3 p = a_.anatomy.at_rest(entry + s * along, time_s);
                 const int label = a_.anatomy.label(p);
                 if (a_.anatomy.blocks_sound(label) || no_go_[static_cast<std::size_t>(label)])
                     return;
+                // Into a vessel once.
+                if (vessel_ < 0) continue;
+                if (label != vessel_ && in_vessel) return;
+                in_vessel = label == vessel_;
             }
         }
         const Rigid pose = hands.mannequin_from_probe(), back = inverse(pose);
@@ -226,16 +270,25 @@ class Expert {
                                            back * entry, half_slab_mm_, 0) /
                             depth;
         if (plan_ && plan_->visible >= seen) return;
-        plan_.emplace(Plan{hands, depth, seen});
+        plan_.emplace(ExpertPlan{hands, depth, seen});
     }
 
     Attempt& a_;
     double half_slab_mm_ = 0;
     std::array<bool, 256> no_go_{};
-    std::optional<Plan> plan_;
+    int vessel_ = -1;  // label that the target lies in; -1: no vessel
+    std::optional<ExpertPlan> plan_;
 };
 
 }  // namespace
+
+std::optional<ExpertPlan> plan_as_an_expert(Attempt& attempt) {
+    return Expert(attempt).plan();
+}
+
+std::vector<MouseTracker> look_as_an_expert(Attempt& attempt) {
+    return Expert(attempt).above();
+}
 
 bool play_as_an_expert(Attempt& attempt) {
     return Expert(attempt).play();

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "formats/attempt/draw_attempt.h"
 #include "formats/bundle/case_bundle.h"
@@ -79,6 +80,17 @@ void bluff_with_fixed_keys(Attempt& attempt, int recipe);
 void bluff_with_a_random_walk(Attempt& attempt, Random& random);
 // From where the attempt begins straight in, to a random depth.
 void bluff_with_a_straight_push(Attempt& attempt, Random& random);
+
+// What the expert has found, and not yet done: the probe over the target, the needle beside it and
+// aimed at it.
+struct ExpertPlan {
+    runtime::MouseTracker hands;
+    double depth_mm = 0, visible = 0;  // of the needle at the target; share of it that will show
+};
+// Nothing where no picture shows a free way to the target.
+std::optional<ExpertPlan> plan_as_an_expert(Attempt& attempt);
+// The probe alone over the target: some ways to hold it there.
+std::vector<runtime::MouseTracker> look_as_an_expert(Attempt& attempt);
 
 // False if the expert found no picture with a free way to the target, and did not try.
 bool play_as_an_expert(Attempt& attempt);

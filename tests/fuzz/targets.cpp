@@ -11,11 +11,13 @@
 #include <cstring>
 
 #include "formats/bundle/case_bundle.h"
+#include "formats/bundle/codec/flow_codec.h"
 #include "formats/bundle/stage_files.h"
 #include "formats/calibration/calibration.h"
 #include "formats/calibration/point.h"
 #include "formats/calibration/quality.h"
 #include "formats/exercise/exercise.h"
+#include "formats/flow/flow_summary.h"
 #include "formats/machine/machine_toml.h"
 #include "formats/recording/poses.h"
 #include "formats/recording/sequence.h"
@@ -27,6 +29,7 @@
 #include "runtime/tracking/usb/guidance_protocol.h"
 #include "runtime/tracking/usb/liberty_protocol.h"
 #include "runtime/tracking/usb/viper_protocol.h"
+#include "runtime/tracking/websocket/websocket.h"
 
 namespace sonocase::fuzz {
 namespace {
@@ -113,6 +116,14 @@ void bundle_as_is(Bytes bytes) {
 void bundle(Bytes bytes) {
     bundle_as_is(bytes);
     bundle_as_is(resealed(bytes));
+}
+
+void flow(Bytes bytes) {
+    const auto field = detail::flow_from_bytes(bytes, "fuzz");
+    check_error(field);
+    if (!field) return;
+    demand(std::equal(bytes.begin(), bytes.end(), detail::flow_bytes(*field).begin()));
+    demand(std::isfinite(worst_balance(*field)));
 }
 
 void stage_files(Bytes given) {
@@ -268,11 +279,23 @@ void openigtlink(Bytes bytes) {
     }
 }
 
+void web_socket(Bytes bytes) {
+    namespace w = runtime::websocket;
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const auto answer = w::answer_of(text, "token");
+    demand(!answer || answer->text.starts_with("HTTP/1.1 "));
+    w::ClientFrames frames;
+    std::vector<std::uint8_t> out;
+    const std::size_t half = bytes.size() / 2;
+    if (frames.take(bytes.first(half), out)) (void)frames.take(bytes.subspan(half), out);
+}
+
 }  // namespace
 
 const std::vector<Target>& targets() {
     static const std::vector<Target> table{
         {"bundle", bundle},
+        {"flow", flow},
         {"stage_files", stage_files},
         {"exercise", exercise},
         {"machine", machine},
@@ -288,6 +311,7 @@ const std::vector<Target>& targets() {
         {"liberty", liberty},
         {"guidance", guidance},
         {"openigtlink", openigtlink},
+        {"web_socket", web_socket},
     };
     return table;
 }

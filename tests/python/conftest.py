@@ -20,6 +20,15 @@ def small(tmp_path_factory):
     return case, session
 
 
+@pytest.fixture(scope="session")
+def flowing(tmp_path_factory):
+    """The same case with blood that flows in its vessel."""
+    folder = tmp_path_factory.mktemp("flowing")
+    case = folder / "flowing.sonocase"
+    subprocess.run([BIN / "core_write_case", case, folder / "small.igs.mha", "flow"], check=True)
+    return case
+
+
 @pytest.fixture
 def case(small):
     return sonocase.Case.open(small[0])

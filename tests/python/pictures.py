@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the PNG files that our programs write: grey, 8 or 16 bits, by the standard library alone."""
+"""Reads the PNG files that our programs write: grey of 8 or 16 bits or colour of 8, by the standard library alone."""
 
 import struct
 import zlib
@@ -16,11 +16,12 @@ def read_png(path):
         body = data[at + 8:at + 8 + length]
         if kind == b"IHDR":
             width, height, bits, colour, _, _, interlace = struct.unpack(">IIBBBBB", body)
-            assert colour == 0 and interlace == 0 and bits in (8, 16)
+            assert colour in (0, 2) and interlace == 0 and bits in ((8, 16) if colour == 0 else (8,))
+            channels = 3 if colour == 2 else 1
         elif kind == b"IDAT":
             packed += body
         at += 12 + length
-    size = bits // 8
+    size = bits // 8 * channels
     stride = width * size
     raw = zlib.decompress(packed)
     rows = np.zeros((height, stride), np.uint8)
@@ -48,4 +49,4 @@ def read_png(path):
         rows[y] = before = line
     if bits == 16:
         return rows.view(">u2").astype(np.uint16).reshape(height, width)
-    return rows.reshape(height, width)
+    return rows.reshape((height, width, 3) if channels == 3 else (height, width))

@@ -25,17 +25,73 @@ def test_nothing_of_the_pipeline_or_the_window_is_linked():
 @pytest.mark.parametrize("model", ["physical", "paper"])
 def test_pixels_are_those_of_the_player(small, sonoplay, tmp_path, model):
     path, _ = small
-    sonoplay(path, "--headless", "--frames", 5, "--size", "200x160", "--model", model,
+    # How a needle dents tissue depends on its past, which the player keeps: the truth says it.
+    sonoplay(path, "--headless", "--frames", 12, "--size", "200x160", "--model", model,
              "--out", tmp_path / "out", "--truth", tmp_path / "truth")
     case = sonocase.Case.open(path)
     renderer = sonocase.Renderer(case, model=model, size=(200, 160))
+    dented = 0
     for line in (tmp_path / "truth" / "truth.jsonl").read_text().splitlines():
         truth = json.loads(line)
         needle = truth["mannequin_from_needle"]
+        dent = truth["tip"]["dent_mm"] if needle else None
+        dented += dent is not None and any(dent)
         picture = renderer.render(truth["mannequin_from_probe"], needle, truth["time_s"],
-                                  frame=truth["frame"])
+                                  frame=truth["frame"], dent=dent)
         np.testing.assert_array_equal(
             picture, read_png(tmp_path / "out" / f"frame_{truth['frame']:05d}.png"))
+    assert dented > 0
+
+
+def test_a_needles_dent_is_drawn_and_said(case, pose):
+    renderer = sonocase.Renderer(case, model="physical", size=(120, 120))
+    needle = sonocase.Pose.looking(sonocase.Pose.moved(pose, (0, 0, 12))[:3, 3], pose[:3, 2])
+    still = renderer.render(pose, needle)
+    np.testing.assert_array_equal(renderer.render(pose, needle, dent=(0, 0)), still)
+    dented = renderer.render(pose, needle, dent=(2.5, 0.3))
+    assert (dented != still).any()
+    assert renderer.truth(["labels"])[1]["tip"]["dent_mm"] == (2.5, 0.3)
+    batch = renderer.render_batch(np.stack([pose] * 2), [needle] * 2, dents=[None, (2.5, 0.3)])
+    np.testing.assert_array_equal(batch[0], still)
+    np.testing.assert_array_equal(renderer.render(pose, needle, frame=1, dent=(2.5, 0.3)), batch[1])
+    for bad in ((1,), (1, float("nan")), 3):
+        with pytest.raises(ValueError, match="dent"):
+            renderer.render(pose, needle, dent=bad)
+    with pytest.raises(ValueError, match="dents: give one per pose"):
+        renderer.render_batch(np.stack([pose] * 2), [needle] * 2, dents=[None])
+
+
+@pytest.mark.parametrize("mode", ["colour", "power", "pw", "m"])
+def test_doppler_modes_are_those_of_the_player(flowing, sonoplay, tmp_path, mode):
+    sonoplay(flowing, "--headless", "--frames", 6, "--size", "120x100", "--model", "physical",
+             "--effects=-deformation", "--mode", mode, "--out", tmp_path / "out",
+             "--truth", tmp_path / "truth")
+    renderer = sonocase.Renderer(sonocase.Case.open(flowing), model="physical", size=(120, 100),
+                                 effects=["-deformation"])
+    aim = None
+    for line in (tmp_path / "truth" / "truth.jsonl").read_text().splitlines():
+        truth = json.loads(line)
+        pose = truth["mannequin_from_probe"]
+        aim = aim or renderer.aimed(pose)  # that of the first frame, as the player keeps it
+        picture = renderer.render(pose, truth["mannequin_from_needle"], truth["time_s"],
+                                  frame=truth["frame"], mode=mode, doppler=aim)
+        np.testing.assert_array_equal(
+            picture, read_png(tmp_path / "out" / f"frame_{truth['frame']:05d}.png"))
+    if mode != "m":
+        assert renderer.doppler["vessel"] == "vessel" if mode == "pw" \
+            else renderer.doppler["blood_cells"] > 0
+
+
+def test_doppler_settings_that_do_not_exist_are_refused(flowing, pose):
+    renderer = sonocase.Renderer(sonocase.Case.open(flowing), size=(64, 64))
+    with pytest.raises(ValueError, match="no mode triplex"):
+        renderer.render(pose, mode="triplex")
+    with pytest.raises(ValueError, match="no setting speed"):
+        renderer.render(pose, mode="colour", doppler={"speed": 3})
+    with pytest.raises(ValueError, match="scale_cm_s is not finite"):
+        renderer.render(pose, mode="colour", doppler={"scale_cm_s": float("nan")})
+    assert renderer.render(pose, mode="colour").shape == (64, 64, 3)
+    assert renderer.render(pose, mode="pw").shape == (96, 64, 3)
 
 
 def test_a_batch_is_the_frames_one_by_one(case, pose):
@@ -213,3 +269,31 @@ except KeyboardInterrupt:
     sys.exit(42)
 """
     assert subprocess.run([sys.executable, "-c", program]).returncode == 42
+
+
+def test_pressing_gives_force_and_moves_what_truth_says(case, pose):
+    renderer = sonocase.Renderer(case, size=(120, 120))
+    rest = renderer.render(pose)
+    assert not renderer.press["pressed"] and renderer.press["force_n"] == 0
+    at_rest, _ = renderer.truth(["labels"])
+    forces = []
+    for press_mm in (3, 6, 9):
+        pressed = renderer.render(pose, press_mm=press_mm)
+        forces.append(renderer.press["force_n"])
+        assert renderer.press["pressure_kpa"] > 0
+    assert 0 < forces[0] < forces[1] < forces[2]
+    assert (pressed != rest).any()
+    planes, facts = renderer.truth(["labels"])
+    assert facts["press"] == renderer.press
+    assert (planes.labels != at_rest.labels).any()
+    # Pressed by an argument or by the pose: the same face at the same place.
+    deeper = sonocase.Pose.moved(pose, (0, 0, 9))
+    np.testing.assert_array_equal(renderer.render(deeper), pressed)
+    # A batch, one depth for all or one each.
+    batch = renderer.render_batch(np.stack([pose, pose]), press_mm=[0, 9], first_frame=0)
+    np.testing.assert_array_equal(batch[0], rest)
+    for bad in (-1, 41, float("nan")):
+        with pytest.raises(ValueError, match="press_mm: give 0 to 40"):
+            renderer.render(pose, press_mm=bad)
+    with pytest.raises(ValueError, match="press_mm: give one number, or one per pose"):
+        renderer.render_batch(np.stack([pose, pose]), press_mm=[1, 2, 3])

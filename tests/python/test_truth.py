@@ -22,7 +22,8 @@ def plane_points(renderer, pose):
 
 
 def test_labels_are_the_volume_s(case, pose):
-    renderer = sonocase.Renderer(case, model="physical", effects=["-contact"], size=(180, 150))
+    renderer = sonocase.Renderer(case, model="physical", effects=["-contact", "-deformation"],
+                                 size=(180, 150))
     for tilt in (0, 0.3, -0.5):
         off_sides = sonocase.Pose.moved(pose, (0.1, 0.7, 0.3))  # of voxels
         turned = sonocase.Pose.turned(off_sides, tilt_rad=tilt, rotate_rad=2 * tilt)

@@ -105,6 +105,23 @@ inline CaseBundle small_case() {
     return bundle;
 }
 
+// Blood in the vessel of the case above: 10 mL/s along y, which pulses.
+inline void add_flow(CaseBundle& bundle) {
+    FlowVessel vessel;
+    vessel.name = "vessel";
+    vessel.mean_ml_s = 10;
+    vessel.wave[0] = {0.4f, -0.5f};
+    vessel.nodes = 41;
+    for (int i = 0; i < vessel.nodes; ++i) {
+        FlowNode node;
+        node.centre = {0, 3.75 * (i - 20), 25};
+        node.direction = {0, 1, 0};
+        node.radius_mm.fill(6);
+        bundle.flow.nodes.push_back(node);
+    }
+    bundle.flow.vessels = {vessel};
+}
+
 // A curvilinear probe above the middle, looking down -z, with a sweep along y and a needle in it.
 inline Exercise small_exercise() {
     Exercise exercise;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "formats/attempt/difficulty.h"
 #include "formats/recording/session.h"
 
 namespace sonocase {
@@ -96,6 +97,29 @@ TEST(DrawAttempt, TheTargetLiesInItsOrganClearOfOthersAndTheStartAwayFromIt) {
         EXPECT_FALSE(body.at_edge(drawn.exercise.start_probe));
     }
     EXPECT_GT(farthest, 25);  // the whole region is used
+}
+
+// Easier attempts keep targets near their centre and the start near the target; harder ones start
+// farther away.
+TEST(DrawAttempt, AnEasierAttemptIsDrawnFromASmallerRegion) {
+    const WindowedBall body(-2);
+    double farthest_target[5] = {}, farthest_start[5] = {};
+    for (int difficulty = kEasiest; difficulty <= kHardest; ++difficulty) {
+        for (std::uint64_t place = 1; place < 60; ++place) {
+            const AttemptDraw drawn =
+                draw_attempt(exercise(), body, kLabels, seed_with_difficulty(place, difficulty));
+            ASSERT_TRUE(drawn.warnings.empty()) << drawn.warnings[0];
+            const Vector3 off = drawn.exercise.start_probe - Point3{0, 0, 100};
+            const auto i = static_cast<std::size_t>(difficulty - kEasiest);
+            farthest_start[i] = std::max(farthest_start[i], std::hypot(off.x, off.y));
+            farthest_target[i] =
+                std::max(farthest_target[i], norm(drawn.exercise.targets[0].centre - Point3{}));
+        }
+    }
+    EXPECT_LE(farthest_target[0], 0.4 * 30);
+    EXPECT_LE(farthest_target[1], 0.7 * 30);
+    EXPECT_GT(farthest_target[2], 0.7 * 30);
+    for (std::size_t i = 1; i < 5; ++i) EXPECT_GT(farthest_start[i], farthest_start[i - 1]) << i;
 }
 
 TEST(DrawAttempt, WhatNoNeedleReachesIsNotDrawn) {

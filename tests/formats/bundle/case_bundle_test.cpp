@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "formats/bundle/case_bundle.h"
+#include "formats/bundle/codec/flow_codec.h"
 
 #include <gtest/gtest.h>
 
@@ -89,6 +90,7 @@ void expect_same(const CaseBundle& a, const CaseBundle& b) {
     EXPECT_EQ(a.skin_unfitted, b.skin_unfitted);
     expect_same(a.mannequin_skin, b.mannequin_skin);
     EXPECT_EQ(a.preview_png, b.preview_png);
+    EXPECT_EQ(detail::flow_bytes(a.flow), detail::flow_bytes(b.flow));
 }
 
 // What the types promise: a bundle is a value, a streamed one has one owner, and a view refers to
@@ -165,7 +167,7 @@ Bytes with_chunk(const Bytes& file, const std::string& type, Change change) {
         "manifest", "lab.t",    "lab.u",    "lab.p",    "echo.t",  "echo.u",  "echo.p",
         "bnd.t",    "bnd.u",    "bnd.p",    "vox.kind", "vox.one", "vox.mix", "vox.pair",
         "vox.low",  "vox.high", "vox.fix",  "ofs.kind", "ofs.one", "ofs.val", "textures",
-        "speckle",  "skin.pat", "skin.fit", "skin.man", "preview"};
+        "speckle",  "skin.pat", "skin.fit", "skin.man", "flow",    "preview"};
     const auto reader = ChunkReader::open(file, "CASE", known, "test");
     EXPECT_TRUE(reader);
     ChunkWriter writer("CASE");
@@ -180,6 +182,29 @@ Bytes with_chunk(const Bytes& file, const std::string& type, Change change) {
         }
     }
     return writer.write();
+}
+
+TEST(CaseBundle, FlowComesBackAndABundleWithoutItHasNone) {
+    CaseBundle bundle = tiny_case();
+    FlowVessel vessel;
+    vessel.name = "aorta";
+    vessel.mean_ml_s = 40;
+    vessel.nodes = 2;
+    bundle.flow.vessels = {vessel};
+    for (const double z : {0.0, 3.0}) {
+        FlowNode node{{0, 0, z}, {0, 0, 1}, {}};
+        node.radius_mm.fill(9);
+        bundle.flow.nodes.push_back(node);
+    }
+    const auto back = read_bundle(write_bundle(bundle), "test");
+    ASSERT_TRUE(back) << back.error().message();
+    expect_same(*back, bundle);
+    EXPECT_EQ(back->flow.vessels[0].name, "aorta");
+    EXPECT_TRUE(read_bundle(write_bundle(tiny_case()), "test")->flow.empty());
+    const Bytes cut = with_chunk(write_bundle(bundle), "flow", [](Bytes& b) { b.pop_back(); });
+    const auto bad = read_bundle(cut, "test");
+    ASSERT_FALSE(bad);
+    EXPECT_NE(bad.error().message().find("flow field"), std::string::npos);
 }
 
 Bytes file_of_version_1() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -26,6 +27,7 @@ ProgressEntry entry(const std::string& trainee, int number) {
     e.exercise = number % 2 ? "liver" : "kidney";
     e.started = "2026-01-01T00:00:" + std::to_string(10 + number) + "Z";
     e.passed = number % 3 == 0;
+    e.seed = 1000 + static_cast<std::uint64_t>(number);
     e.metrics = {{"elapsed_time_s", 1.0 / 3 + number}, {"targets_hit", 1}};
     return e;
 }
@@ -50,11 +52,42 @@ TEST(ProgressBook, KeepsListsComparesAndExports) {
     EXPECT_EQ((*mine)[1].metrics.at(0).name, "elapsed_time_s");
     EXPECT_EQ((*mine)[1].metrics.at(0).value, 1.0 / 3 + 3);
     EXPECT_TRUE((*mine)[1].passed);
+    EXPECT_EQ((*mine)[1].seed, 1003u);
     EXPECT_EQ(book->sessions("", "")->size(), 6u);
     const std::string csv = *book->csv("", "");
-    EXPECT_EQ(csv.substr(0, 53), "trainee,case,exercise,started,passed,elapsed_time_s,t");
+    EXPECT_EQ(csv.substr(0, 58), "trainee,case,exercise,started,passed,seed,elapsed_time_s,t");
     EXPECT_NE(csv.find("\r\n\"O'Brien, \"\"Bob\"\"\",demo,kidney,"), std::string::npos);
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 7);
+}
+
+// A book as the first version wrote it keeps its sessions and takes new ones.
+TEST(ProgressBook, OneOfVersionOneIsBroughtUpToDate) {
+    const TemporaryFolder folder(/*in_memory=*/true);
+    const std::string path = folder / "progress.sqlite";
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open(path.c_str(), &db), SQLITE_OK);
+    ASSERT_EQ(
+        sqlite3_exec(db,
+                     "CREATE TABLE session(id INTEGER PRIMARY KEY, trainee TEXT NOT NULL, case_name"
+                     " TEXT NOT NULL, exercise TEXT NOT NULL, started TEXT NOT NULL, recording TEXT"
+                     " NOT NULL, passed INTEGER NOT NULL, UNIQUE(trainee, exercise, started));"
+                     "CREATE TABLE score(session INTEGER NOT NULL REFERENCES session(id) ON DELETE"
+                     " CASCADE, metric TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY(session,"
+                     " metric)) WITHOUT ROWID;"
+                     "INSERT INTO session VALUES(7, 'Ada', 'demo', 'liver', '2025', '', 1);"
+                     "PRAGMA application_id=1397706319; PRAGMA user_version=1;",
+                     nullptr, nullptr, nullptr),
+        SQLITE_OK);
+    sqlite3_close(db);
+    auto book = ProgressBook::open(path);
+    ASSERT_TRUE(book) << book.error().message();
+    ASSERT_TRUE(book->add(entry("Ada", 3)));
+    const auto all = ProgressBook::open(path)->sessions("Ada", "");
+    ASSERT_TRUE(all);
+    ASSERT_EQ(all->size(), 2u);
+    EXPECT_EQ((*all)[0].id, 7);
+    EXPECT_EQ((*all)[0].seed, 0u);
+    EXPECT_EQ((*all)[1].seed, 1003u);
 }
 
 TEST(ProgressBook, ARemovedTraineeIsGoneWithFilesAndBytes) {

@@ -68,6 +68,7 @@ TEST(AnalyticTorso, TrueWarpsAreStrongAndFarFromFolding) {
     for (const std::string& name : analytic_body_names()) {
         SCOPED_TRACE(name);
         const AnalyticBody body = *analytic_body(name);
+        if (body.tubes) continue;  // a phantom is its own mannequin, without a warp
         const Registration truth = analytic_torso_truth(1, body);
         const LabelVolume volume = sample_analytic_torso(analytic_torso_grid({12, 12, 12}), body);
         double least = 1e9, sum = 0;

@@ -5,29 +5,35 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
+#include "pipeline/base/memory_limit.h"
 #include "pipeline/recipe/read_recipe.h"
 
 namespace sonocase::pipeline {
 namespace {
 
-MemoryNeed need_of(const std::string& text) {
-    const auto recipe = parse_recipe(text, "case.toml", {}, nullptr);
+// No exercises: the recipe would otherwise look for them beside it, which is where the test runs.
+MemoryNeed need_of(const std::string& text, double limit_mb = 0) {
+    const std::vector<EmbeddedExercise> none;
+    const auto recipe = parse_recipe(text, "case.toml", {}, &none);
     EXPECT_TRUE(recipe) << recipe.error().message();
-    return memory_need(*recipe);
+    return memory_need(*recipe, limit_mb);
 }
 
-// Peaks of `build --until resample` with two threads, /usr/bin/time: 424, 1,121 and 2,676 MB.
+// Peaks of `build --until resample` with two threads, /usr/bin/time. The map of 1 mm is measured
+// tile by tile.
 TEST(MemoryNeed, IsWithinFifteenPercentOfWhatResamplingTook) {
     const std::string head = "name = \"a\"\n[analytic]\n";
     const struct {
         const char* voxels;
         double peak_mb;
     } measured[] = {{"voxel_mm = 3\nslice_mm = 3\n", 424},
-                    {"voxel_mm = 1.5\nslice_mm = 1.5\n", 1121},
-                    {"voxel_mm = 1\nslice_mm = 1\n", 2676}};
+                    {"voxel_mm = 1.5\nslice_mm = 1.5\n", 1063},
+                    {"voxel_mm = 1\nslice_mm = 1\n", 1330}};
     for (const auto& m : measured) {
         const MemoryNeed need = need_of(head + m.voxels);
         EXPECT_EQ(need.stage, "resample");
@@ -40,6 +46,29 @@ TEST(MemoryNeed, GrowsWithTheCookedVoxels) {
     const MemoryNeed coarse = need_of(head + "2"), fine = need_of(head + "0.5");
     EXPECT_NEAR(fine.size.cooked_voxels / coarse.size.cooked_voxels, 64, 1e-6);
     EXPECT_GT(fine.mb, coarse.mb);
+}
+
+// Resampling of a large map measures distances again rather than hold them all; what it then needs
+// is what it is given, down to two layers of distances.
+TEST(MemoryNeed, OfALargeMapFollowsTheLimitDownToItsLeast) {
+    const std::string map = "name = \"a\"\n[analytic]\nvoxel_mm = 0.7\nslice_mm = 0.7\n";
+    const double all = need_of(map, 1e9).mb, least = need_of(map, 1).mb;
+    EXPECT_LT(least, 0.92 * all);
+    EXPECT_EQ(need_of(map, 0.5 * (all + least)).mb, 0.5 * (all + least));
+    EXPECT_EQ(need_of(map, all + 1).mb, all);
+    EXPECT_FALSE(check_memory(need_of(map, least - 1), least - 1));
+    EXPECT_TRUE(check_memory(need_of(map, least), least));
+}
+
+TEST(MemoryNeed, TheLowestLimitHoldsWhileItLasts) {
+    const double machine = memory_limit_mb();
+    {
+        const MemoryLimit outer(500);
+        EXPECT_EQ(memory_limit_mb(), std::min(500.0, machine));
+        const MemoryLimit inner(800), none(0);
+        EXPECT_EQ(memory_limit_mb(), std::min(500.0, machine));
+    }
+    EXPECT_EQ(memory_limit_mb(), machine);
 }
 
 TEST(MemoryNeed, IsRefusedInOneLineWhereThereIsLess) {

@@ -178,5 +178,49 @@ TEST(ImportLabelMapRefuses, MasksOnDifferentGrids) {
     expect_refused(import_label_map(folder / "m"), "spleen.nii", "another grid");
 }
 
+// A folder of slices as an export leaves it when something went wrong on the way.
+class DicomFolder : public ::testing::Test {
+  protected:
+    void write_all_but(int left_out) {
+        for (int k = 0; k < volume_.size.z; ++k)
+            if (k != left_out) write("s" + std::to_string(k), k, "1.2.3.5");
+    }
+    void write(const std::string& name, int k, const std::string& series) {
+        folder_.write("series/" + name + ".dcm", testing::dicom_slice(volume_, k, series));
+    }
+    std::string refusal() const {
+        const auto imported = import_label_map(folder_ / "series");
+        EXPECT_FALSE(imported.has_value());
+        const std::string message = imported ? "" : imported.error().message();
+        EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+        return message;
+    }
+
+    TemporaryFolder folder_;
+    TinyVolume volume_ = ras_volume();
+};
+
+TEST_F(DicomFolder, WithASliceTwiceIsRefused) {
+    write_all_but(-1);
+    write("copy", 7, "1.2.3.5");
+    EXPECT_NE(refusal().find("unevenly spaced"), std::string::npos) << refusal();
+}
+
+TEST_F(DicomFolder, WithASliceOfAnotherSeriesInPlaceOfItsOwnIsRefused) {
+    write_all_but(7);
+    write("s7", 7, "1.2.3.6");
+    EXPECT_NE(refusal().find("unevenly spaced"), std::string::npos) << refusal();
+}
+
+TEST_F(DicomFolder, WithASliceOfAnotherSeriesBesideItsOwnIsReadWithAWarning) {
+    write_all_but(-1);
+    write("other", 7, "1.2.3.6");
+    const auto imported = import_label_map(folder_ / "series");
+    ASSERT_TRUE(imported) << imported.error().message();
+    ASSERT_FALSE(imported->report.warnings.empty());
+    EXPECT_NE(imported->report.warnings[0].find("2 DICOM series"), std::string::npos);
+    EXPECT_EQ(imported->labels.grid.size.z, volume_.size.z);
+}
+
 }  // namespace
 }  // namespace sonocase::pipeline

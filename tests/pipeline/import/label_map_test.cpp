@@ -131,11 +131,12 @@ TEST(ImportLabelMap, HeaderExtensionNamesValues) {
 TEST(ImportLabelMap, SideTableAndGivenTableNameValues) {
     const TemporaryFolder folder;
     const std::string map = folder.write("map.nii", testing::nifti_bytes(ras_volume()));
-    folder.write("map.csv", "value,name,tissue_class\n1,mystery,gas\n2,kidney_right,kidney\n");
+    folder.write("map.csv",
+                 "value,name,tissue_class\n1,stomach_content,gas\n2,kidney_right,kidney\n");
     auto beside = import_label_map(map);
     ASSERT_TRUE(beside.has_value()) << beside.error().message();
-    EXPECT_EQ(beside->labels.labels[1].name, "mystery");
-    EXPECT_EQ(beside->labels.labels[1].tissue, "gas");  // of the class, as the name says nothing
+    EXPECT_EQ(beside->labels.labels[1].name, "stomach_content");
+    EXPECT_EQ(beside->labels.labels[1].tissue, "gas");  // the class wins over the name
     ImportOptions options;
     options.table = folder.write("other.csv", "1;first\n2;second\n5;third\n");
     auto given = import_label_map(map, options);

@@ -150,16 +150,21 @@ void expect_ellipsoid(const Result<Surface>& surface, const std::string& name) {
     }
 }
 
+std::vector<std::pair<std::string, std::string>> files_that_say_their_length(const Mesh& mesh) {
+    return {{"a.ply", ply_ascii(mesh)},
+            {"l.ply", ply_binary(mesh, false)},
+            {"b.ply", ply_binary(mesh, true)},
+            {"a.stl", stl_binary(mesh)},
+            {"a.vtp", vtp_text(mesh)}};
+}
+
 TEST(ImportSurface, EveryMeshFormatGivesTheSameSurfaceWithOutwardNormals) {
     const TemporaryFolder folder;
     const Mesh mesh = ellipsoid();
-    for (const auto& [name, bytes] : {std::pair<const char*, std::string>{"a.ply", ply_ascii(mesh)},
-                                      {"l.ply", ply_binary(mesh, false)},
-                                      {"b.ply", ply_binary(mesh, true)},
-                                      {"a.stl", stl_binary(mesh)},
-                                      {"A.STL", stl_binary(mesh)},
-                                      {"a.obj", obj_text(mesh)},
-                                      {"a.vtp", vtp_text(mesh)}})
+    auto files = files_that_say_their_length(mesh);
+    files.emplace_back("A.STL", stl_binary(mesh));
+    files.emplace_back("a.obj", obj_text(mesh));
+    for (const auto& [name, bytes] : files)
         expect_ellipsoid(import_surface(folder.write(name, bytes)), name);
 }
 
@@ -288,11 +293,7 @@ TEST(ImportSurfaceRefuses, PipesAndDevicesWithoutOpeningThem) {
 TEST(ImportSurfaceRefuses, EveryTruncationOfFormatsThatSayTheirLength) {
     const TemporaryFolder folder;
     const Mesh mesh = ellipsoid();
-    for (const auto& [name, bytes] : {std::pair<const char*, std::string>{"a.ply", ply_ascii(mesh)},
-                                      {"l.ply", ply_binary(mesh, false)},
-                                      {"b.ply", ply_binary(mesh, true)},
-                                      {"a.stl", stl_binary(mesh)},
-                                      {"a.vtp", vtp_text(mesh)}}) {
+    for (const auto& [name, bytes] : files_that_say_their_length(mesh)) {
         for (std::size_t n = 0; n < 100; ++n) {
             const std::size_t length = bytes.size() * n / 100;
             EXPECT_FALSE(import_surface(folder.write(name, bytes.substr(0, length))).has_value())

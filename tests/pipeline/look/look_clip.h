@@ -12,17 +12,10 @@
 
 namespace sonocase::pipeline::testing {
 
-inline constexpr int kClipWidth = 520, kClipHeight = 430;
+inline constexpr int kClipWidth = kStandInWidth, kClipHeight = kStandInHeight;
 
 inline ScanPlace clip_fan() {
-    ScanPlace place;
-    place.mm_per_px = 0.36;
-    place.apex_x_px = 259;
-    place.apex_y_px = -100;
-    place.radius_mm = 50;
-    place.half_angle_rad = 0.5;
-    place.depth_mm = 135;
-    return place;
+    return stand_in_fan();
 }
 
 inline ScanPlace clip_linear() {

@@ -4,11 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <filesystem>
 
 #include "formats/base/digest.h"
-#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/streamed_bundle.h"
 #include "formats/files/atomic_file.h"
+#include "pipeline/publish/site_list.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
 
@@ -51,11 +53,25 @@ TEST_F(Publish, a_site_holds_page_program_and_the_cases_bytes) {
     ASSERT_TRUE(published) << published.error().message();
     for (const std::string& file : published->files) EXPECT_TRUE(fs::is_regular_file(file)) << file;
     EXPECT_EQ(text_of(site("/sonoplay.wasm")), "sonoplay.wasm");
-    const std::string digest = digest_of(bytes_);
-    const auto copy = read_file(site("/round-body-" + digest.substr(0, 8) + ".sonocase"));
+    // The same chunks, in the order in which a page loads them.
+    const std::vector<std::uint8_t> sent = *arranged_for_loading(bytes_, false, "round body");
+    const std::string digest = digest_of(sent);
+    const std::string file = site("/round-body-" + digest.substr(0, 8) + ".sonocase");
+    const auto copy = read_file(file);
     ASSERT_TRUE(copy);
-    EXPECT_EQ(*copy, bytes_);
+    EXPECT_EQ(*copy, sent);
+    EXPECT_EQ(write_bundle(*read_bundle(*copy, "copy")), bytes_);
+    const auto hashes = read_file(file + ".segments");
+    ASSERT_TRUE(hashes);
+    ASSERT_EQ(hashes->size(), (sent.size() + kSegmentBytes - 1) / kSegmentBytes * 8);
+    const std::span<const std::uint8_t> last =
+        std::span(sent).subspan((hashes->size() / 8 - 1) * kSegmentBytes);
+    std::uint64_t hash = 0;
+    std::memcpy(&hash, hashes->data() + hashes->size() - 8, 8);
+    EXPECT_EQ(hash, hash_of(last));
     const std::string list = text_of(site("/cases.json"));
+    EXPECT_NE(list.find("\"segments_digest\":\"" + digest_of(*hashes) + "\""), std::string::npos);
+    EXPECT_NE(list.find("\"first\":[[0,"), std::string::npos) << list;
     EXPECT_NE(list.find("\"digest\":\"" + digest + "\""), std::string::npos) << list;
     EXPECT_NE(list.find("\"name\":\"round-body\""), std::string::npos);
     EXPECT_NE(list.find("\"title\":\"Find the vessel\""), std::string::npos);
@@ -82,6 +98,18 @@ TEST_F(Publish, a_record_store_is_allowed_by_the_policy_and_no_other_host) {
     }
 }
 
+TEST_F(Publish, a_pose_server_is_allowed_by_the_policy) {
+    options_.poses = "ws://127.0.0.1:18946/?token=secret";
+    ASSERT_TRUE(publish({case_path("round body")}, site(), options_));
+    const std::string page = text_of(site("/index.html"));
+    EXPECT_NE(page.find("connect-src 'self' ws://127.0.0.1:18946;"), std::string::npos) << page;
+    EXPECT_EQ(page.find("secret"), std::string::npos);
+    for (const char* wrong : {"127.0.0.1:18946", "http://127.0.0.1:1", "ws://a; script-src *"}) {
+        options_.poses = wrong;
+        EXPECT_FALSE(publish({case_path("round body")}, site("-wrong"), options_)) << wrong;
+    }
+}
+
 TEST_F(Publish, one_page_holds_the_case_and_no_text_of_it_ends_the_element) {
     options_.single_file = true;
     const auto published = publish({case_path("round body")}, site(".html"), options_);
@@ -92,7 +120,8 @@ TEST_F(Publish, one_page_holds_the_case_and_no_text_of_it_ends_the_element) {
     // Length of base64: four digits for three bytes.
     const std::string mark = "id=\"case-round-body\">";
     const std::size_t from = page.find(mark) + mark.size();
-    EXPECT_EQ(page.find("</script>", from) - from, (bytes_.size() + 2) / 3 * 4);
+    const std::size_t sent = arranged_for_loading(bytes_, false, "round body")->size();
+    EXPECT_EQ(page.find("</script>", from) - from, (sent + 2) / 3 * 4);
     EXPECT_FALSE(
         publish({case_path("round body"), case_path("round body")}, site("2.html"), options_));
 }

@@ -166,7 +166,7 @@ TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {
         EXPECT_TRUE(stage["errors"].is_object());
     }
     EXPECT_EQ(stages, (std::vector<std::string>{"import", "surface", "warp", "resample", "texture",
-                                                "structure", "pack"}));
+                                                "structure", "flow", "pack"}));
 
     // Moved away from its report the bundle says that the seconds are not recorded, and stays
     // valid.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Blocks of tissue given by a function of place, and the beam-space renderer over them.
+// The beam-space renderer with what it needs, so that envelopes can be read before the logarithm,
+// and blocks of tissue given by a function of place.
 #pragma once
 
 #include <cmath>
@@ -37,8 +38,8 @@ CaseBundle block_of(double voxel_mm, const Label& label) {
     return b;
 }
 
-// One frame's beams, before the logarithm. Only the effects that a test turns on.
-struct BlockBench {
+// One frame's beams, before the logarithm. bundle: outlives it.
+struct BeamBench {
     const CaseBundle& bundle;
     Exercise exercise;
     ScanGeometry geometry;
@@ -51,33 +52,43 @@ struct BlockBench {
     PhysicalFrame frame;
     std::vector<std::uint8_t> pixels;
 
-    BlockBench(const CaseBundle& b, const Exercise& e) : bundle(b), exercise(e) {
-        geometry = make_scan_geometry(exercise.probe, 192, 512, 128, 128);
+    BeamBench(const CaseBundle& b, const Exercise& e, const std::string& machine, int edge_px)
+        : bundle(b), exercise(e) {
+        geometry = make_scan_geometry(exercise.probe, 192, 512, edge_px, edge_px);
         scene = *make_physical_scene(bundle);
-        tables = physical::make_tables(exercise.probe, *built_in_machine("classic"), geometry);
+        tables = physical::make_tables(exercise.probe, *built_in_machine(machine), geometry);
         noise = make_physical_noise(scene.textures->normal_levels, 1, 192 + 128);
         gain.assign(512, 0.0f);
         renderer = std::make_unique<PhysicalFast>(
             scene, geometry, tables, noise, press::press_face(exercise.probe),
             RenderContext{workers, serial_jobs(), available_simd_targets().front()});
         frame.row_gain_db = gain;
-        pixels.resize(128 * 128);
+        pixels.resize(static_cast<std::size_t>(edge_px) * static_cast<std::size_t>(edge_px));
+    }
+    void run() { renderer->render(frame, {}, false, false, pixels); }
+    // Amplitude after TGC; row: a sample.
+    double amplitude(int row, int line) const {
+        return std::sqrt(static_cast<double>(renderer->power_row(row)[line]));
+    }
+    int row_of(double mm) const { return static_cast<int>(mm / geometry.step_mm); }
+};
+
+// Only the effects that a test turns on.
+struct BlockBench : BeamBench {
+    BlockBench(const CaseBundle& b, const Exercise& e) : BeamBench(b, e, "classic", 128) {
         frame.effects = switches_of<PhysicalEffects>(
             kPhysicalEffects, std::vector<bool>(kPhysicalEffects.size(), false));
         frame.effects.point_spread = true;
     }
-    void run() { renderer->render(frame, {}, false, false, pixels); }
     // Amplitude before TGC; row: a sample.
     double envelope(int row, int line) const {
-        return std::sqrt(static_cast<double>(renderer->power_row(row)[line])) /
-               tables.rows[static_cast<std::size_t>(row)].gain;
+        return amplitude(row, line) / tables.rows[static_cast<std::size_t>(row)].gain;
     }
     double mean_envelope(int row) const {
         double sum = 0;
         for (int l = 32; l < 160; ++l) sum += envelope(row, l);
         return sum / 128;
     }
-    int row_of(double mm) const { return static_cast<int>(mm / geometry.step_mm); }
 };
 
 // A linear probe of 40 mm and 60 mm depth at 3.5 MHz: beams are parallel, places easy to name.

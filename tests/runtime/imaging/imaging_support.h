@@ -25,6 +25,28 @@ inline const CaseBundle& phantom() {
     return bundle;
 }
 
+// The fan of the living liver's sweep that realism is judged by (docs/realism.md).
+inline Exercise sweep_exercise() {
+    Exercise e = phantom_exercise();
+    e.probe.radius_mm = 50.6;
+    e.probe.field_of_view_rad = 60.2 * 3.14159265358979 / 180;
+    e.probe.depth_mm = 180;
+    e.probe.frequency_mhz = 3.5;
+    e.probe.focus_mm = 90;
+    e.probe.elevation_mm = 3;
+    return e;
+}
+
+// Liver alone between two corners.
+inline CaseBundle liver_alone(Point3 lower, Point3 upper, double voxel_mm) {
+    sonocase::testing::PhantomOptions o;
+    o.ribs = o.gas = o.vessels = o.kidney = o.layers = false;
+    o.lower = lower;
+    o.upper = upper;
+    o.voxel_mm = voxel_mm;
+    return Phantom(o).bundle();
+}
+
 inline FrameInput needle_input() {
     FrameInput input;
     input.has_needle = true;

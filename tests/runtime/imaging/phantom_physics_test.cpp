@@ -10,49 +10,24 @@
 #include <complex>
 #include <numeric>
 
-#include "formats/machine/machine_toml.h"
-#include "imaging_support.h"
-#include "runtime/imaging/physical/fast/physical_fast.h"
+#include "block_bench.h"
 
 namespace sonocase::runtime {
 namespace {
 
 using namespace sonocase::testing;
 
-// The beam-space renderer with what it needs, so that envelopes can be read before the logarithm.
-struct Bench {
-    CaseBundle bundle;
-    Exercise exercise;
-    ScanGeometry geometry;
-    PhysicalScene scene;
-    physical::Tables tables;
-    PhysicalNoise noise;
-    SerialWorkers workers;
-    std::vector<float> gain;
-    std::unique_ptr<PhysicalFast> renderer;
-    PhysicalFrame frame;
-    std::vector<std::uint8_t> pixels;
+struct OwnCase {
+    CaseBundle own;
+};
 
+// The renderer over a phantom of its own.
+struct Bench : OwnCase, BeamBench {
     Bench(CaseBundle b, const Exercise& e, const std::string& machine = "classic")
-        : bundle(std::move(b)), exercise(e) {
-        geometry = make_scan_geometry(exercise.probe, 192, 512, 512, 512);
-        scene = *make_physical_scene(bundle);
-        tables = physical::make_tables(exercise.probe, *built_in_machine(machine), geometry);
-        noise = make_physical_noise(scene.textures->normal_levels, 1, 192 + 128);
-        gain.assign(512, 0.0f);
-        renderer = std::make_unique<PhysicalFast>(
-            scene, geometry, tables, noise, press::press_face(exercise.probe),
-            RenderContext{workers, serial_jobs(), available_simd_targets().front()});
-        frame.row_gain_db = gain;
+        : OwnCase{std::move(b)}, BeamBench(own, e, machine, 512) {
         // What organs and the wall add would blur the measures of the physics.
         frame.effects.parenchyma = frame.effects.streaks = frame.effects.wall = false;
-        pixels.resize(512 * 512);
     }
-    void run() { renderer->render(frame, {}, false, false, pixels); }
-    double envelope(int k, int l) const {
-        return std::sqrt(static_cast<double>(renderer->power_row(k)[l]));
-    }
-    int row_of(double mm) const { return static_cast<int>(mm / geometry.step_mm); }
 };
 
 CaseBundle homogeneous() {
@@ -351,7 +326,7 @@ TEST(PhantomPhysics, SpeckleFollowsTheTissue) {
     const int k0 = b.row_of(10), k1 = b.row_of(30);
     for (int k = k0; k < k1; ++k) {
         before.emplace_back();
-        for (int l = 0; l < 192; ++l) before.back().push_back(std::log(b.envelope(k, l)));
+        for (int l = 0; l < 192; ++l) before.back().push_back(std::log(b.amplitude(k, l)));
     }
     b.frame.volume_from_probe.translation.x = beams * pitch;  // slides 1.75 mm along its face
     b.frame.frame = 1;
@@ -362,7 +337,7 @@ TEST(PhantomPhysics, SpeckleFollowsTheTissue) {
             for (int l = 20; l < 170; ++l) {
                 const double x = before[static_cast<std::size_t>(k - k0)]
                                        [static_cast<std::size_t>(l + shift)],
-                             y = std::log(b.envelope(k, l));
+                             y = std::log(b.amplitude(k, l));
                 sa += x;
                 sb += y;
                 aa += x * x;

@@ -131,4 +131,43 @@ inline Exercise block_exercise() {
     return e;
 }
 
+// The same with a convex and with a phased array.
+inline std::vector<Exercise> block_exercises() {
+    std::vector<Exercise> out{block_exercise(), block_exercise(), block_exercise()};
+    out[1].probe.shape = ProbeShape::curvilinear;
+    out[1].probe.radius_mm = 50;
+    out[1].probe.field_of_view_rad = 0.8;
+    out[2].probe.shape = ProbeShape::phased;
+    out[2].probe.width_mm = 20;
+    out[2].probe.field_of_view_rad = 1;
+    return out;
+}
+
+inline const CaseBundle& pressed_block() {
+    static const CaseBundle bundle = PressedBlock().bundle();
+    return bundle;
+}
+
+inline runtime::RenderOptions block_picture(
+    runtime::ImageModel model,
+    int scanlines = 96,
+    runtime::RendererKind kind = runtime::RendererKind::fast) {
+    runtime::RenderOptions o;
+    o.model = model;
+    o.kind = kind;
+    o.width_px = o.height_px = 160;
+    o.scanlines = scanlines;
+    o.samples = 256;
+    return o;
+}
+
+// Tissue where the press field puts it and nothing else, sharp enough to measure in.
+inline runtime::RenderOptions field_picture() {
+    runtime::RenderOptions o = block_picture(runtime::ImageModel::paper, 384);
+    o.effects = {"deformation"};
+    o.width_px = o.height_px = 400;
+    o.samples = 512;
+    return o;
+}
+
 }  // namespace sonocase::testing

@@ -12,21 +12,6 @@ namespace {
 
 using namespace sonocase::testing;
 
-const CaseBundle& block() {
-    static const CaseBundle bundle = PressedBlock().bundle();
-    return bundle;
-}
-
-RenderOptions options_of(ImageModel model, RendererKind kind = RendererKind::fast) {
-    RenderOptions o;
-    o.model = model;
-    o.kind = kind;
-    o.width_px = o.height_px = 160;
-    o.scanlines = 96;
-    o.samples = 256;
-    return o;
-}
-
 FrameInput pressed_input(double mm) {
     FrameInput input = needle_input();
     input.mannequin_from_probe = pressed_by(mm);
@@ -34,44 +19,37 @@ FrameInput pressed_input(double mm) {
     return input;
 }
 
-std::vector<Exercise> probes() {
-    std::vector<Exercise> out{block_exercise(), block_exercise(), block_exercise()};
-    out[1].probe.shape = ProbeShape::curvilinear;
-    out[1].probe.radius_mm = 50;
-    out[1].probe.field_of_view_rad = 0.8;
-    out[2].probe.shape = ProbeShape::phased;
-    out[2].probe.width_mm = 20;
-    out[2].probe.field_of_view_rad = 1;
-    return out;
-}
-
 // As for frames without pressing: single precision against double, where speckle nulls and grains
 // whose look-up rounds the other way differ. The reference of model `paper` works by pixels and not
 // by beams: it differs as much as it does where nothing is pressed. Effect wall is worked out at
-// nodes 1.6 mm apart, and tissue under the face is pressed more unevenly than that.
+// nodes 1.6 mm apart, and tissue under the face is pressed more unevenly than that. The fast
+// renderer's shift is linear between nodes 0.7 columns apart, up to 0.1 mm off where the stiffness
+// changes from column to column: grains of speckle without a point spread show it, and nothing
+// else.
 TEST(PressedFrame, FastAndSlowRenderersAgreeEffectByEffect) {
     for (const ImageModel model : {ImageModel::physical, ImageModel::paper}) {
         std::vector<std::vector<std::string>> rows{{"auto"}, {"deformation"}};
         for (const char* name : effect_names(model)) rows.push_back({"deformation", name});
-        for (const Exercise& exercise : probes())
+        for (const Exercise& exercise : block_exercises())
             for (const auto& effects : rows) {
                 if (&effects != &rows.front() && exercise.probe.shape != ProbeShape::linear)
                     continue;
-                RenderOptions fast = options_of(model),
-                              slow = options_of(model, RendererKind::reference);
+                RenderOptions fast = block_picture(model),
+                              slow = block_picture(model, 96, RendererKind::reference);
                 fast.effects = slow.effects = effects;
                 const FrameInput input = pressed_input(8);
-                const Difference d = compare(draw(exercise, fast, input, block()),
-                                             draw(exercise, slow, input, block()));
+                const Difference d = compare(draw(exercise, fast, input, pressed_block()),
+                                             draw(exercise, slow, input, pressed_block()));
                 std::printf("%d %d %-16s mean %.3f bias %+.3f worst %d\n", int(model),
                             int(exercise.probe.shape), effects.back().c_str(), d.mean, d.bias,
                             d.worst);
                 double before = 0;
                 if (model == ImageModel::paper)
-                    before = compare(draw(exercise, fast, pressed_input(-1), block()),
-                                     draw(exercise, slow, pressed_input(-1), block()))
+                    before = compare(draw(exercise, fast, pressed_input(-1), pressed_block()),
+                                     draw(exercise, slow, pressed_input(-1), pressed_block()))
                                  .mean;
-                EXPECT_LT(d.mean, 0.5 + 1.1 * before) << effects.back();
+                const double grains = effects.back() == "speckle" ? 0.3 : 0;
+                EXPECT_LT(d.mean, 0.5 + grains + 1.1 * before) << effects.back();
                 EXPECT_LT(std::abs(d.bias), 0.15) << effects.back();
             }
     }
@@ -87,7 +65,7 @@ TEST(PressedFrame, AgreementHoldsOverRandomPosesOfAPhantom) {
         exercise.probe.shape = static_cast<ProbeShape>(seed % 3);
         exercise.probe.width_mm = 38;
         exercise.pulsation.amplitude_mm = 1;
-        RenderOptions fast = options_of(ImageModel::physical), slow = fast;
+        RenderOptions fast = block_picture(ImageModel::physical), slow = fast;
         slow.kind = RendererKind::reference;
         const Difference d = compare(draw(exercise, fast, input), draw(exercise, slow, input));
         std::printf("seed %d mean %.3f bias %+.3f worst %d\n", int(seed), d.mean, d.bias, d.worst);
@@ -98,19 +76,19 @@ TEST(PressedFrame, AgreementHoldsOverRandomPosesOfAPhantom) {
 
 TEST(PressedFrame, PixelsAreTheSameOnEveryInstructionSetAndThreadCount) {
     for (const ImageModel model : {ImageModel::physical, ImageModel::paper})
-        for (Exercise exercise : probes()) {
+        for (Exercise exercise : block_exercises()) {
             exercise.breathing.amplitude_mm = 4;
             FrameInput input = pressed_input(9);
             input.time_s = 1.3;
-            RenderOptions options = options_of(model);
+            RenderOptions options = block_picture(model);
             options.host = thread_host();
             options.scanlines = 101;
-            const auto expected = draw(exercise, options, input, block());
+            const auto expected = draw(exercise, options, input, pressed_block());
             for (const std::string& simd : simd_targets()) {
                 options.simd = simd;
                 for (const int threads : {1, 2, 3}) {
                     options.threads = threads;
-                    EXPECT_TRUE(draw(exercise, options, input, block()) == expected)
+                    EXPECT_TRUE(draw(exercise, options, input, pressed_block()) == expected)
                         << simd << " " << threads;
                 }
             }
@@ -120,9 +98,9 @@ TEST(PressedFrame, PixelsAreTheSameOnEveryInstructionSetAndThreadCount) {
 TEST(PressedFrame, LiftedTheFrameOfBeforeComesBackByteForByte) {
     for (const ImageModel model : {ImageModel::physical, ImageModel::paper})
         for (const RendererKind kind : {RendererKind::fast, RendererKind::reference}) {
-            RenderOptions options = options_of(model, kind);
+            RenderOptions options = block_picture(model, 96, kind);
             if (kind == RendererKind::reference) options.width_px = options.height_px = 64;
-            auto renderer = Renderer::create(block(), block_exercise(), options);
+            auto renderer = Renderer::create(pressed_block(), block_exercise(), options);
             ASSERT_TRUE(renderer.has_value());
             const auto frame = [&](double mm) {
                 std::vector<std::uint8_t> pixels(static_cast<std::size_t>(options.width_px) *
@@ -143,11 +121,11 @@ TEST(PressedFrame, LiftedTheFrameOfBeforeComesBackByteForByte) {
 
 TEST(PressedFrame, WhereNothingIsPressedTheEffectChangesNoPixelAndSaysSo) {
     for (const ImageModel model : {ImageModel::physical, ImageModel::paper}) {
-        RenderOptions with = options_of(model), without = with;
+        RenderOptions with = block_picture(model), without = with;
         without.effects = {"-deformation"};
-        EXPECT_TRUE(draw(block_exercise(), with, pressed_input(-1), block()) ==
-                    draw(block_exercise(), without, pressed_input(-1), block()));
-        auto renderer = Renderer::create(block(), block_exercise(), with);
+        EXPECT_TRUE(draw(block_exercise(), with, pressed_input(-1), pressed_block()) ==
+                    draw(block_exercise(), without, pressed_input(-1), pressed_block()));
+        auto renderer = Renderer::create(pressed_block(), block_exercise(), with);
         ASSERT_TRUE(renderer.has_value());
         std::vector<std::uint8_t> pixels(160 * 160);
         const auto said = [&](double mm) {
@@ -183,12 +161,8 @@ int dark_pixels(const std::vector<std::uint8_t>& pixels,
 // The vein closes and the artery does not, as far as the field says.
 TEST(PressedFrame, TheVeinClosesAndTheArteryStaysRound) {
     const PressedBlock shape;
-    RenderOptions options = options_of(ImageModel::paper);
-    options.effects = {"deformation"};
-    options.width_px = options.height_px = 400;
-    options.scanlines = 384;
-    options.samples = 512;
-    auto renderer = Renderer::create(block(), block_exercise(), options);
+    const RenderOptions options = field_picture();
+    auto renderer = Renderer::create(pressed_block(), block_exercise(), options);
     ASSERT_TRUE(renderer.has_value());
     std::vector<std::uint8_t> pixels(400 * 400);
     double vein_rest = 0, artery_rest = 0;
@@ -237,7 +211,7 @@ TEST(PressedFrame, SpeckleMovesWithTheTissue) {
     PressedBlock plain;
     plain.vessels = false;
     const CaseBundle bundle = plain.bundle();
-    RenderOptions options = options_of(ImageModel::physical);
+    RenderOptions options = block_picture(ImageModel::physical);
     options.effects = {"deformation", "speckle", "point_spread"};
     options.width_px = options.height_px = 512;
     options.scanlines = 192;
@@ -289,7 +263,7 @@ TEST(PressedFrame, BoneHoldsTheFace) {
     shallow.bone_mm = 15;
     shallow.vessels = false;
     const CaseBundle bundle = shallow.bundle();
-    auto renderer = Renderer::create(bundle, block_exercise(), options_of(ImageModel::physical));
+    auto renderer = Renderer::create(bundle, block_exercise(), block_picture(ImageModel::physical));
     ASSERT_TRUE(renderer.has_value());
     const auto frame = [&](double mm) {
         std::vector<std::uint8_t> pixels(160 * 160);
@@ -310,8 +284,8 @@ TEST(PressedFrame, BoneHoldsTheFace) {
 
 TEST(PressedFrame, AnyPoseGivesAPicture) {
     for (const ImageModel model : {ImageModel::physical, ImageModel::paper})
-        for (const Exercise& exercise : probes()) {
-            auto renderer = Renderer::create(block(), exercise, options_of(model));
+        for (const Exercise& exercise : block_exercises()) {
+            auto renderer = Renderer::create(pressed_block(), exercise, block_picture(model));
             ASSERT_TRUE(renderer.has_value());
             std::vector<std::uint8_t> pixels(160 * 160);
             Random random(5);

@@ -19,18 +19,6 @@ using namespace sonocase::testing;
 
 constexpr int kWidth = 764, kHeight = 617;  // 0.315 mm a pixel, as in the real sweep
 
-// The fan of the real sweep.
-Exercise sweep_exercise() {
-    Exercise e = phantom_exercise();
-    e.probe.radius_mm = 50.6;
-    e.probe.field_of_view_rad = 60.2 * 3.14159265358979 / 180;
-    e.probe.depth_mm = 180;
-    e.probe.frequency_mhz = 3.5;
-    e.probe.focus_mm = 90;
-    e.probe.elevation_mm = 3;
-    return e;
-}
-
 // Frames of one case, as the scores see them.
 class View {
   public:
@@ -73,14 +61,7 @@ class View {
 
 // Liver alone, as far as the fan reaches.
 const CaseBundle& liver() {
-    static const CaseBundle bundle = [] {
-        PhantomOptions o;
-        o.ribs = o.gas = o.vessels = o.kidney = o.layers = false;
-        o.lower = {-125, -16, -25};
-        o.upper = {125, 16, 190};
-        o.voxel_mm = 1.5;
-        return Phantom(o).bundle();
-    }();
+    static const CaseBundle bundle = liver_alone({-125, -16, -25}, {125, 16, 190}, 1.5);
     return bundle;
 }
 

@@ -20,27 +20,8 @@ constexpr int kWidth = 764, kHeight = 617, kPatch = 48;
 
 // A liver that fills the fan, as far as the probe moves.
 const CaseBundle& liver() {
-    static const CaseBundle bundle = [] {
-        PhantomOptions o;
-        o.ribs = o.gas = o.vessels = o.kidney = o.layers = false;
-        o.lower = {-80, -20, -25};
-        o.upper = {80, 20, 130};
-        o.voxel_mm = 2;
-        return Phantom(o).bundle();
-    }();
+    static const CaseBundle bundle = liver_alone({-80, -20, -25}, {80, 20, 130}, 2);
     return bundle;
-}
-
-// The fan of the sweep.
-Exercise sweep_exercise() {
-    Exercise e = phantom_exercise();
-    e.probe.radius_mm = 50.6;
-    e.probe.field_of_view_rad = 60.2 * 3.14159265358979 / 180;
-    e.probe.depth_mm = 180;
-    e.probe.frequency_mhz = 3.5;
-    e.probe.focus_mm = 90;
-    e.probe.elevation_mm = 3;
-    return e;
 }
 
 using Plane = std::vector<double>;

@@ -20,7 +20,7 @@ TEST(SettingsText, ComesBackAsTheSameDoubles) {
     EXPECT_EQ(back.dynamic_range_db, 55);
     EXPECT_EQ(back.tgc_db, s.tgc_db);
     EXPECT_TRUE(back.flip_left_right);
-    EXPECT_LT(settings_text(s).size(), 224u);  // fits a RecordedFrame
+    EXPECT_LT(settings_text(s).size(), 640u);  // fits a RecordedFrame
 }
 
 TEST(SettingsText, MalformedWordsChangeNothing) {

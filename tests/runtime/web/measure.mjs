@@ -1,60 +1,111 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// measure.mjs SITE CASE: the figures of docs/browser.md, for a published site: first picture over 10 Mbit/s and 40 ms
-// from an empty and from a warm cache, times of a frame, memory.
+// measure.mjs SITE CASE [BIN CASE_FILE SESSION]: the figures of docs/browser.md, for a published site: first picture over
+// 10 Mbit/s and 40 ms from an empty and from a warm cache, pictures per second, times of a frame, memory; with BIN (a
+// build's programs) frames of the session's poses beside the desktop's, in turns.
+import {execFileSync} from 'node:child_process';
 import {site_server} from '../../../scripts/web-serve.mjs';
 import {Browser} from './support.mjs';
 
-const [site, name] = process.argv.slice(2);
-let sent = 0;
-const server = site_server(site, (request, response) => {
-    const write = response.write, end = response.end;
-    response.write = function (data, ...rest) { sent += data?.length ?? 0; return write.call(this, data, ...rest); };
-    response.end = function (data, ...rest) { sent += data?.length ?? 0; return end.call(this, data, ...rest); };
-    return false;
-});
+const [site, name, bin, case_file, session_file] = process.argv.slice(2);
+const kSlow = {offline: false, latency: 40, downloadThroughput: 10e6 / 8, uploadThroughput: 10e6 / 8};
+const server = site_server(site);
 await new Promise((done) => server.listen(0, '127.0.0.1', done));
-const url = `http://127.0.0.1:${server.address().port}/?case=${name}`;
+const base = `http://127.0.0.1:${server.address().port}/`;
+// The server compresses at the first request: not part of a visit.
+for (const file of ['', 'style.css', 'sonoplay.js', 'sonoplay.wasm', 'cases.json', 'worker.js'])
+    await (await fetch(base + file, {headers: {'Accept-Encoding': 'br'}})).arrayBuffer();
+const url = `${base}?case=${name}`;
+
+// Bytes as they come over the link, with the time of the browser's clock.
+function watch(page) {
+    const received = [];
+    let wall_minus_own;
+    page.browser.listeners.add(({sessionId, method, params}) => {
+        if (sessionId !== page.session) return;
+        if (method === 'Network.requestWillBeSent') wall_minus_own = params.wallTime - params.timestamp;
+        if (method === 'Network.dataReceived') received.push([params.timestamp, params.encodedDataLength]);
+    });
+    return (wall_s) => received.filter(([own]) => own + wall_minus_own <= wall_s).reduce((sum, [, bytes]) => sum + bytes, 0);
+}
+async function first_picture(page, words) {
+    const bytes_until = watch(page);
+    await page.open('about:blank');
+    await page.send('Network.emulateNetworkConditions', kSlow);
+    await page.open(url);
+    await page.until('sonoplay.app.scan.complete', 300);
+    const origin = await page.value('performance.timeOrigin');
+    const at = async (mark) => {
+        const ms = await page.value(`performance.getEntriesByName("${mark}")[0].startTime`);
+        return `${(ms / 1000).toFixed(2)} s, ${(bytes_until((origin + ms) / 1000) / 1e6).toFixed(2)} MB`;
+    };
+    console.log(`${words}: ${await at('first-picture')}; with all its blocks ${await at('complete-picture')}`);
+}
+const sorted = (ms) => ms.sort((a, b) => a - b);
+
 const browser = await Browser.start();
 const page = await browser.page(1280, 720);
-await page.open('about:blank');
-await page.send('Network.emulateNetworkConditions', {offline: false, latency: 40, downloadThroughput: 10e6 / 8, uploadThroughput: 10e6 / 8});
-
-async function first_picture(words) {
-    sent = 0;
-    const bytes_at = new Promise((done) => {
-        const look = () => page.value('globalThis.sonoplay?.app.scan.frames > 0').then((good) => good ? done(sent) : setImmediate(look), () => setImmediate(look));
-        look();
-    });
-    await page.open(url);
-    await page.until('sonoplay.app.scan.frames > 0 && sonoplay.app.scan.values.missing === 0', 300);
-    const ms = await page.value('performance.getEntriesByName("first-picture")[0]?.startTime ?? performance.now()');
-    console.log(`${words}: ${(ms / 1000).toFixed(2)} s, ${(await bytes_at / 1e6).toFixed(2)} MB sent by then`);
-}
-await first_picture('first picture, empty cache');
+await first_picture(page, 'first picture, empty cache');
+await page.send('Network.emulateNetworkConditions', {offline: false, latency: 0, downloadThroughput: -1, uploadThroughput: -1});
+await page.until('!sonoplay.app.arriving() && navigator.serviceWorker.controller', 300);
+await first_picture(page, 'first picture, warm cache');
 await page.until('!sonoplay.app.arriving()', 300);
-await page.value('navigator.serviceWorker.ready.then(() => true)');
-await page.until('navigator.serviceWorker.controller');
-await first_picture('first picture, warm cache');
-const times = await page.value(`(() => {
-    const {core, scan} = sonoplay.app;
-    const out = {};
-    for (const paper of [false, true]) {
-        core.set_image({...core.values(), model_paper: paper, side: 512});
-        const ms = [];
+// Pictures per second while the probe moves, panels and all.
+const rate = await page.value(`new Promise((done) => {
+    const {core, scan} = sonoplay.app, from = scan.frames, start = performance.now();
+    const step = () => {
+        core.calls.slide(0, Math.sin(performance.now() / 300));
+        scan.touched();
+        const seconds = (performance.now() - start) / 1000;
+        if (seconds < 5) requestAnimationFrame(step);
+        else done({side: scan.values.side, pictures_per_s: (scan.frames - from) / seconds, frame_ms: scan.frame_ms});
+    };
+    step();
+})`);
+console.log(`1280 x 720: ${rate.pictures_per_s.toFixed(1)} pictures per second of ${rate.side} x ${rate.side}`);
+for (const paper of [false, true]) {
+    const ms = sorted(await page.value(`(() => {
+        const {core} = sonoplay.app, ms = [];
+        core.set_image({...core.values(), model_paper: ${paper}, side: 512});
         for (let n = 0; n < 120; ++n) {
             core.calls.slide(0, n % 60 < 30 ? 1 : -1);
             const start = performance.now();
             core.calls.frame(1000 + n / 60);
             ms.push(performance.now() - start);
         }
-        ms.sort((a, b) => a - b);
-        out[paper ? 'paper' : 'physical'] = {fastest: ms[0], median: ms[60], slowest: ms[119]};
+        return ms;
+    })()`));
+    console.log(`${paper ? 'paper' : 'physical'} 512 x 512: fastest ${ms[0].toFixed(2)}, median ${ms[60].toFixed(2)}, slowest ${ms[119].toFixed(2)} ms`);
+}
+console.log(`memory of the program: ${(await page.value('sonoplay.app.core.memory.buffer.byteLength') / 1e6).toFixed(0)} MB; `
+    + `of scripts: ${(await page.value('performance.memory?.usedJSHeapSize ?? NaN') / 1e6).toFixed(0)} MB`);
+
+// The same poses here and there, five times in turns; the fastest of each pose counts, as others may use the machine.
+if (bin) {
+    const oracle = (...args) => JSON.parse(execFileSync(`${bin}/web_oracle`, args, {encoding: 'utf8', maxBuffer: 1 << 28}));
+    for (const simd of ['', 'AVX2']) {
+        const best = {page: [], desktop: []};
+        const keep = (to, ms) => ms.forEach((x, n) => { to[n] = Math.min(to[n] ?? Infinity, x); });
+        for (let turn = 0; turn < 5; ++turn) {
+            const frames = oracle('times', case_file, session_file, 'physical', '512', ...(simd ? [simd] : []));
+            keep(best.desktop, frames.map((frame) => frame.ms));
+            keep(best.page, await page.value(`(() => {
+                const {core, scan} = sonoplay.app;
+                scan.hide();
+                core.choose_exercise(0, 512);
+                return ${JSON.stringify(frames)}.map(({time_s, probe, needle, has_needle}) => {
+                    core.put_tools(time_s, probe, has_needle ? needle : null);
+                    const start = performance.now();
+                    core.calls.frame(time_s);
+                    return performance.now() - start;
+                });
+            })()`));
+        }
+        const median = (ms) => sorted([...ms])[ms.length >> 1];
+        console.log(`physical, ${best.page.length} poses: page ${median(best.page).toFixed(2)} ms, desktop ${simd || 'best'} `
+            + `${median(best.desktop).toFixed(2)} ms, ratio ${(median(best.page) / median(best.desktop)).toFixed(2)}`);
     }
-    out.memory_mb = core.memory.buffer.byteLength / 1e6;
-    return out;
-})()`);
-console.log(JSON.stringify(times));
+}
 await browser.stop();
 server.closeAllConnections?.();
 server.close();

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "formats/attempt/draw_attempt.h"
 #include "runtime/web/page_json.h"
 #include "support/small_case.h"
 
@@ -56,7 +57,7 @@ TEST(PagePlayer, a_kept_picture_is_rendered_again_to_the_same_pixels) {
 
 TEST(PagePlayer, an_attempt_is_scored_as_its_recording_is) {
     const auto player = open_small();
-    player->start_attempt("somebody", "2026-01-31T12:00:00Z", 50);
+    ASSERT_TRUE(player->start_attempt("somebody", "2026-01-31T12:00:00Z", 50));
     ASSERT_TRUE(player->hands().take_needle(player->exercise().probe, true));
     ASSERT_TRUE(player->hands().aim_needle_at({0, 0, 25}));
     for (int n = 0; n < 200; ++n) {
@@ -84,9 +85,56 @@ TEST(PagePlayer, an_attempt_is_scored_as_its_recording_is) {
     EXPECT_EQ(score_json(replayed, player->exercises()[0]), finished->score_json);
 }
 
+// An attempt's targets lie where the seed in its recording says, as the desktop finds them.
+TEST(PagePlayer, an_attempt_is_drawn_from_its_seed_and_scored_there) {
+    CaseBundle bundle = testing::small_case();
+    std::string& toml = bundle.exercises[0].toml;
+    const std::string hit = "hit_radius_mm = 6";
+    toml.replace(toml.find(hit), hit.size(), hit + "\nspread_mm = 20\nclearance_mm = 1");
+    auto opened = PagePlayer::open(bytes_of(bundle), "small");
+    ASSERT_TRUE(opened);
+    PagePlayer& player = **opened;
+    ASSERT_TRUE(player.choose_exercise(0, 128));
+    EXPECT_NE(case_json(player).find("\"drawn\":true"), std::string::npos);
+    const Exercise written = player.exercises()[0];
+    const AttemptDraw expected = draw_attempt(written, CaseAnatomy(bundle), bundle.labels, 5);
+    ASSERT_TRUE(player.start_attempt("", "2026-01-31T12:00:00Z", 0, 5));
+    EXPECT_EQ(player.exercise().targets[0].centre, expected.exercise.targets[0].centre);
+    EXPECT_NE(player.exercise().targets[0].centre, written.targets[0].centre);
+    player.frame(0, {});
+    const Point3 shown = player.target_in_probe(0);
+    const Rigid& place = player.engine().last().tools.mannequin_from_probe;
+    EXPECT_LT(distance(place * shown, expected.exercise.targets[0].centre), 1e-9);
+    for (int n = 1; n < 60; ++n) player.frame(0.1 * n, {});
+    const auto finished = player.finish_attempt();
+    ASSERT_TRUE(finished);
+    const auto sequence = read_sequence(finished->recording, "");
+    ASSERT_TRUE(sequence);
+    const auto session = session_from_sequence(*sequence, guess_names(*sequence), "");
+    ASSERT_TRUE(session);
+    EXPECT_EQ(attempt_seed(session->header), 5u);
+    // The next attempt without a seed is as written again.
+    ASSERT_TRUE(player.choose_exercise(0, 128));
+    EXPECT_EQ(player.exercise().targets[0].centre, written.targets[0].centre);
+}
+
+TEST(PagePlayer, names_what_a_pixel_shows) {
+    const auto player = open_small();
+    EXPECT_EQ(player->name_at(64, 64), "");  // no picture yet
+    player->frame(0, {});
+    const Renderer::Layout layout = player->engine().renderer().layout();
+    const auto at = [&](double x_mm, double z_mm) {
+        return player->name_at(static_cast<int>(layout.origin_x_px + x_mm / layout.mm_per_px),
+                               static_cast<int>(layout.origin_y_px + z_mm / layout.mm_per_px));
+    };
+    EXPECT_EQ(at(0, 20), "muscle");
+    EXPECT_EQ(player->name_at(-1, 5), "");
+    EXPECT_EQ(player->name_at(5, 128), "");
+}
+
 TEST(PagePlayer, another_image_goes_on_with_the_session) {
     const auto player = open_small();
-    player->start_attempt("", "2026-01-31T12:00:00Z", 0);
+    ASSERT_TRUE(player->start_attempt("", "2026-01-31T12:00:00Z", 0));
     player->frame(0, {});
     PageImage image = player->image();
     image.depth_mm = 60;

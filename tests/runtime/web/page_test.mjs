@@ -98,6 +98,29 @@ await run_tests({
         await page.until('document.querySelectorAll("#attempts tr").length === 1');
         await page.close();
     },
+    async practice_gives_hints_and_the_distance_and_an_exam_neither() {
+        const page = await browser.page();
+        await scanning(page);
+        await page.value('sonoplay.app.description.exercises[0].hints = ["Look for the vessel.", "It is round."]');
+        const hint = 'document.getElementById("hint").textContent', tip = 'document.getElementById("value-tip").textContent';
+        for (const words of ['Hint 1 of 2: Look for the vessel.', 'Hint 2 of 2: It is round.', 'The target is shown.', 'Hint 1 of 2: Look for the vessel.']) {
+            await page.key('KeyH');
+            await page.until(`${hint} === ${JSON.stringify(words)}`);
+        }
+        await page.key('KeyN');
+        await page.key('KeyB');
+        await page.until(`sonoplay.app.scan.values.attempt && ${tip}.includes('mm')`);
+        await page.value('sonoplay.app.core.calls.drop_attempt()');
+        await page.until('!document.getElementById("mode").disabled');
+        await page.value('document.getElementById("mode").value = "exam"');
+        await page.key('KeyB');
+        await page.until(`sonoplay.app.scan.values.attempt && ${hint} === ''`);
+        await page.key('KeyH');
+        await page.until(`${kFrames} > ${await page.value(kFrames)} + 2`);
+        expect_equal(await page.value(hint), '', 'no hint in an exam');
+        expect_equal(await page.value(tip), '–', 'no distance in an exam');
+        await page.close();
+    },
     async mouse_and_fingers_move_the_probe() {
         const page = await browser.page();
         await scanning(page);
@@ -141,7 +164,7 @@ await run_tests({
         await page.value('navigator.serviceWorker.ready.then(() => true)');
         await page.until('navigator.serviceWorker.controller');
         for (const request of page.requests) expect(request.startsWith(url) || request.startsWith('data:') || request.startsWith('blob:'), request);
-        await page.value(`caches.open('sonocase-cases-1').then((cache) => cache.keys()).then((keys) => keys.length > 0)`);
+        await page.value(`caches.open('sonocase-cases-2').then((cache) => cache.keys()).then((keys) => keys.length > 0)`);
         await page.send('Network.emulateNetworkConditions', {offline: true, latency: 0, downloadThroughput: -1, uploadThroughput: -1});
         server.closeAllConnections?.();
         const offline = new Promise((done) => server.close(done));

@@ -72,11 +72,12 @@ export class Browser {
         this.process.stdio[3].write(JSON.stringify({id, method, params, sessionId}) + '\0');
         return new Promise((done, failed) => this.waiting.set(id, {done, failed}));
     }
-    async page(width = 1280, height = 720) {
-        const {browserContextId} = await this.send('Target.createBrowserContext');
-        const {targetId} = await this.send('Target.createTarget', {url: 'about:blank', browserContextId, width, height});
+    // context: of another page, whose storage this one shares.
+    async page(width = 1280, height = 720, context = undefined) {
+        const browserContextId = context ?? (await this.send('Target.createBrowserContext')).browserContextId;
+        const {targetId} = await this.send('Target.createTarget', {url: 'about:blank', browserContextId, ...(context ? {} : {width, height})});
         const {sessionId} = await this.send('Target.attachToTarget', {targetId, flatten: true});
-        return new Page(this, sessionId, targetId, width, height);
+        return Object.assign(new Page(this, sessionId, targetId, width, height), {context: browserContextId});
     }
     async stop() {
         await this.send('Browser.close').catch(() => {});

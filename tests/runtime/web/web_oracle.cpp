@@ -3,7 +3,10 @@
 // What the tests of the page compare with: the desktop's engine, with its best instruction set.
 //   web_oracle frames CASE SESSION paper|physical SIDE   the session's poses, and XXH3-128 of each
 //                                                        picture, as JSON
+//   web_oracle times CASE SESSION paper|physical SIDE [SIMD]   the same with the milliseconds of
+//                                                        each frame, by one thread
 //   web_oracle score CASE RECORDING                      the scores of a recording, as JSON
+#include <chrono>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -37,11 +40,14 @@ int frames(const CaseBundle& bundle,
            const Exercise& exercise,
            const Session& session,
            const std::string& model,
-           int side) {
+           int side,
+           const std::string& simd,
+           bool timed) {
     EngineOptions options;
     options.render.model = model == "paper" ? ImageModel::paper : ImageModel::physical;
     options.render.width_px = options.render.height_px = side;
     options.render.effects = exercise.effects;
+    options.render.simd = simd;
     Result<ScanEngine> engine = ScanEngine::create(bundle, exercise, options);
     if (!engine) return fail(engine.error());
     std::vector<std::uint8_t> pixels(static_cast<std::size_t>(side) *
@@ -58,8 +64,12 @@ int frames(const CaseBundle& bundle,
             reading.sensors[kNeedleSensor] = {SensorState::ok, sample.mannequin_from_needle, 1.0f,
                                               0};
         engine->observe(reading, true);
+        const auto start = std::chrono::steady_clock::now();
         engine->frame(sample.time_s, {}, pixels);
+        const std::chrono::duration<double, std::milli> ms =
+            std::chrono::steady_clock::now() - start;
         std::printf("%s{\"time_s\": %.17g, ", between, sample.time_s);
+        if (timed) std::printf("\"ms\": %.4f, ", ms.count());
         print_matrix("probe", sample.mannequin_from_probe);
         std::printf(", ");
         print_matrix("needle", sample.mannequin_from_needle);
@@ -75,7 +85,8 @@ int frames(const CaseBundle& bundle,
 
 int main(int argc, char** argv) {
     const std::string verb = argc > 1 ? argv[1] : "";
-    if (argc < 4 || (verb == "frames" && argc != 6)) return 2;
+    const bool timed = verb == "times";
+    if (argc < 4 || (verb == "frames" && argc != 6) || (timed && argc != 6 && argc != 7)) return 2;
     const auto bundle = load_bundle(argv[2]);
     if (!bundle) return fail(bundle.error());
     const auto sequence = load_sequence(argv[3]);
@@ -87,7 +98,9 @@ int main(int argc, char** argv) {
     for (const Exercise& one : exercises) {
         if (one.name == session->header.exercise) exercise = &one;
     }
-    if (verb == "frames") return frames(*bundle, *exercise, *session, argv[4], std::stoi(argv[5]));
+    if (timed || verb == "frames")
+        return frames(*bundle, *exercise, *session, argv[4], std::stoi(argv[5]),
+                      argc > 6 ? argv[6] : "", timed);
     const CaseAnatomy anatomy(*bundle, breathing_shown(*exercise, session->header));
     const SessionScore score = score_session(*session, *exercise, &anatomy, bundle->labels);
     std::fputs(score_json(score, *exercise).c_str(), stdout);

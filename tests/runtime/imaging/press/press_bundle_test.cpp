@@ -49,16 +49,25 @@ TEST(PressBundle, LooksUpTheVoxelsOwnLabelsAlongAnyLine) {
     PressBundle body(bundle);
     ASSERT_EQ(body.tissues().size(), bundle.labels.size());
     Random random(41);
-    for (int n = 0; n < 300; ++n) {
+    for (int n = 0; n < 80; ++n) {
         const Rigid pose = random.rigid(40);
         const PressScene scene = body.scene(pose);
-        const Point3 from = random.point(60);
-        const Vector3 direction = random.direction();
-        std::array<float, 5> depth{-30, -1, 0, 12.5f, 71};
-        std::array<std::uint8_t, 5> found{};
-        scene.lookup.along(scene.lookup.context, from, direction, depth, found.data());
-        for (std::size_t k = 0; k < depth.size(); ++k) {
-            const Point3 p = pose * (from + double{depth[k]} * direction);
+        std::vector<PressLine> lines;
+        for (int l = 0; l <= n % kMostPressLines; ++l)
+            lines.push_back({random.point(60), random.direction()});
+        const std::array<float, 5> depth{-30, -1, 0, 12.5f, 71};
+        std::vector<std::uint8_t> found(depth.size() * lines.size());
+        scene.lookup.along(scene.lookup.context, lines, depth, found.data());
+        for (const runtime::SimdTarget& target : runtime::available_simd_targets()) {
+            PressBundle other(bundle, {8, target});
+            std::vector<std::uint8_t> again(found.size());
+            const PressScene same = other.scene(pose);
+            same.lookup.along(same.lookup.context, lines, depth, again.data());
+            EXPECT_EQ(again, found) << target.name;
+        }
+        for (std::size_t k = 0; k < found.size(); ++k) {
+            const PressLine& line = lines[k % lines.size()];
+            const Point3 p = pose * (line.from + double{depth[k / lines.size()]} * line.direction);
             const Point3 v = bundle.grid.voxel_from_point(p);
             const auto clamped = [](double x, int size) {
                 return static_cast<int>(std::clamp(std::floor(x + 0.5), 0.0, size - 1.0));

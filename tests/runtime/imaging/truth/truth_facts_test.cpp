@@ -147,7 +147,7 @@ TEST(Truth, DepthBelowTheSkinIsThatOfTheFlatBlock) {
     const CaseBundle& bundle = phantom();
     Exercise exercise = phantom_exercise();
     exercise.probe.shape = ProbeShape::linear;
-    const RenderOptions options = picture(128, 200);
+    const RenderOptions options = picture(128, 200, {"-deformation"});
     auto truth = truth_of(bundle, exercise, options);
     for (const double pressed_mm : {-5.0, 0.0, 8.0}) {
         FrameInput input;

@@ -66,8 +66,8 @@ TEST(Truth, LabelsAreThoseOfTheVolumeForEveryProbeAndPose) {
         exercise.probe.shape = shape;
         exercise.breathing.amplitude_mm = 12;
         exercise.breathing.direction = {0, 0.6, 0.8};
-        // Without contact, which has a test of its own, the plane is flat.
-        const RenderOptions options = picture(150, 130, {"-contact"});
+        // Without contact and pressing, which have tests of their own, the plane is flat.
+        const RenderOptions options = picture(150, 130, {"-contact", "-deformation"});
         auto truth = truth_of(bundle, exercise, options);
         auto renderer = Renderer::create(bundle, exercise, options);
         ASSERT_TRUE(renderer);

@@ -69,6 +69,7 @@ TEST(LeavingAnAttempt, IsAskedAboutOnceAndTheAnswerHoldsForFourSeconds) {
     EXPECT_NE(app.view.notices.standing()[0].text.find("F5"), std::string::npos);
     app.player.now_s = 12;
     EXPECT_TRUE(may_leave_attempt(app, "F5"));
+    EXPECT_FALSE(may_leave_attempt(app, "Ctrl + Q"));  // another key is another question
     app.player.now_s = 30;
     EXPECT_FALSE(may_leave_attempt(app, "F5"));
     app.scan.attempt.reset();

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/bundle_list.h"
+#include "runtime/player/app/kept/bundle_list.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdlib>
 
-#include "runtime/player/app/user_folders.h"
+#include "runtime/player/app/kept/user_folders.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::runtime {

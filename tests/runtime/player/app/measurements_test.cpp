@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/measurements.h"
+#include "runtime/player/app/scan/measurements.h"
 
 #include <gtest/gtest.h>
 

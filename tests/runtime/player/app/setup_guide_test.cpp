@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/setup_guide.h"
+#include "runtime/player/app/set_up/setup_guide.h"
 
 #include <gtest/gtest.h>
 

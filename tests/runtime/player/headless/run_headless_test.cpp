@@ -50,6 +50,13 @@ TEST_F(Headless, WritesFramesAndStatsOfASweep) {
     int frames = 0;
     for (const auto& entry : std::filesystem::directory_iterator(folder_ / "frames")) {
         if (entry.path().filename() == "contact-sheet.png") continue;
+        if (entry.path().filename() == "pictures.json") {  // what DICOM needs to know of them
+            const auto about = nlohmann::json::parse(read_text(entry.path().string()));
+            EXPECT_EQ(about["case"], "cylinder");
+            EXPECT_GT(about["mm_per_px"].get<double>(), 0.5);  // 100 mm in 96 rows
+            EXPECT_EQ(about["picture_height_px"], 96);
+            continue;
+        }
         EXPECT_EQ(entry.path().extension(), ".png");
         const std::string png = read_text(entry.path().string());
         ASSERT_GT(png.size(), 100u);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Every panel compared with its kept picture, at 1280 x 720 and at 3840 x 2160.
-//     SONOCASE_RENEW_PICTURES=1 build/release/bin/runtime_window_test \
-//         --gtest_filter='WindowPictures.*'
+//     SONOCASE_RENEW_PICTURES=1 build/release/bin/runtime_window_test --gtest_filter='WindowP*'
 // writes the pictures of tests/golden/window/ again; look at them afterwards.
 #include <gtest/gtest.h>
 
@@ -11,9 +10,9 @@
 #include "formats/bundle/case_bundle.h"
 #include "formats/files/bundle_file.h"
 #include "runtime/player/ui/window_picture.h"
+#include "support/flowing_case.h"
 #include "support/paths.h"
 #include "support/run_command.h"
-#include "support/small_case.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::runtime {
@@ -22,8 +21,9 @@ namespace {
 using sonocase::testing::load_picture;
 using sonocase::testing::Picture;
 
-const char* const kPanels[] = {"panels", "frozen",      "help", "setup",
-                               "scores", "needle_view", "cases"};
+const char* const kPanels[] = {"panels",      "frozen", "help",     "setup",    "scores",
+                               "needle_view", "cases",  "attempt",  "replay",   "tracker",
+                               "effects",     "colour", "spectrum", "exercises"};
 
 // A tour of all panels.
 std::string script(const std::string& folder) {
@@ -31,8 +31,13 @@ std::string script(const std::string& folder) {
     return "wait 12\nkey n\nhold w 20\nwait 8\n" + shot("panels") + "key o\nkey o\nwait 4\n" +
            shot("needle_view") + "key o\nwait 3\n" + "key space\nwait 6\n" + shot("frozen") +
            "key space\nwait 2\n" + "key f1\nwait 3\n" + shot("help") + "key f1\nkey f3\nwait 3\n" +
-           shot("setup") + "key escape\nkey b\nwait 20\nkey b\nwait 6\n" + shot("scores") +
-           "key escape\nkey f2\nwait 4\n" + shot("cases") + "quit\n";
+           shot("setup") + "key escape\nkey f9\nwait 3\n" + shot("tracker") +
+           "key f9\nkey f10\nwait 3\n" + shot("effects") + "key f10\nkey b\nwait 20\n" +
+           shot("attempt") + "key b\nwait 6\n" + shot("scores") + "key p\nwait 6\n" +
+           shot("replay") + "key p\nwait 3\nkey escape\nkey f8\nwait 3\n" + shot("exercises") +
+           "key f8\nhold e 118\nkey 2 shift\nwait 20\n" + shot("colour") +
+           "key 3 shift\nwait 20\n" + shot("spectrum") + "key 1 shift\nkey f2\nwait 60\n" +
+           shot("cases") + "quit\n";
 }
 
 // The kept pictures are means of 4 x 4 pixels (12 x 12 of the large window). The edges of letters,
@@ -57,13 +62,15 @@ TEST(WindowPictures, EveryPanelLooksAsKeptAtBothSizes) {
         // The list of cases shows folder and size, which must be the same in every run.
         const std::string place = folder / "home";
         std::filesystem::create_directories(place);
-        ASSERT_TRUE(save_bundle(sonocase::testing::small_case(), place + "/cylinder.sonocase"));
+        ASSERT_TRUE(save_bundle(sonocase::testing::flowing_case(), place + "/cylinder.sonocase"));
+        folder.write("home/sonocase/player.json", R"({"sound": false})");
         folder.write("script", script(folder.path()));
         const auto result = sonocase::testing::run_command(
             "cd " + place + " && env XDG_CONFIG_HOME=" + place + " XDG_DATA_HOME=" + place +
-            " XDG_DATA_DIRS=/nowhere xvfb-run -a -s '-screen 0 " + window.screen +
-            "x24' " SONOCASE_BIN "/sonoplay cylinder.sonocase --frame-budget 0 --size " +
-            window.size + " --ui-scale " + window.scale + " --script " + (folder / "script"));
+            " XDG_DATA_DIRS=/nowhere " SONOCASE_SOURCE "/tests/support/on-display " +
+            window.screen +
+            " " SONOCASE_BIN "/sonoplay cylinder.sonocase --frame-budget 0 --size " + window.size +
+            " --ui-scale " + window.scale + " --script " + (folder / "script"));
         ASSERT_EQ(result.status, 0) << result.error;
         for (const char* panel : kPanels) {
             const Picture seen = load_picture(folder / (std::string(panel) + ".png"));

@@ -11,7 +11,7 @@
 
 #include "formats/bundle/case_bundle.h"
 #include "formats/files/bundle_file.h"
-#include "runtime/player/ui/shortcuts.h"
+#include "runtime/player/ui/pages/shortcuts.h"
 #include "runtime/player/ui/window_picture.h"
 #include "support/paths.h"
 #include "support/run_command.h"
@@ -37,8 +37,8 @@ class WindowOnVirtualDisplay : public ::testing::Test {
         folder_.write("script", script);
         return sonocase::testing::run_command(
             "env XDG_CONFIG_HOME=" + (folder_ / "config") + " XDG_DATA_HOME=" + (folder_ / "data") +
-            " xvfb-run -a -s '-screen 0 " + screen + "x24' " SONOCASE_BIN "/sonoplay " + arguments +
-            " --script " + (folder_ / "script"));
+            " " SONOCASE_SOURCE "/tests/support/on-display " + screen +
+            " " SONOCASE_BIN "/sonoplay " + arguments + " --script " + (folder_ / "script"));
     }
     sonocase::testing::TemporaryFolder folder_;
     std::string bundle_;
@@ -98,6 +98,64 @@ TEST_F(WindowOnVirtualDisplay, PlaysAnExerciseFromInjectedInput) {
     EXPECT_EQ(sessions, 1);
 }
 
+// From the start page to the second attempt and its replay, in the fewest inputs: Enter starts
+// practice, N takes the needle, W pushes it, B ends the attempt, P plays it, P goes back, B starts
+// the next. The bar is twelve.
+TEST_F(WindowOnVirtualDisplay, ANewcomerIsAtTheSecondAttemptAfterSevenInputs) {
+    std::filesystem::create_directories(folder_ / "data/sonocase/cases");
+    std::filesystem::copy(bundle_, folder_ / "data/sonocase/cases/cylinder.sonocase");
+    const std::string shots = folder_.path() + "/";
+    const std::string script =
+        "wait 60\nkey enter\nwait 6\nkey n\nhold w 20\nwait 4\nkey b\nwait 4\nshot " + shots +
+        "after.png\nkey p\nwait 6\nshot " + shots +
+        "replay.png\nkey p\nwait 3\nkey b\nwait 4\nshot " + shots + "second.png\nquit\n";
+    int inputs = 0;
+    for (std::size_t at = 0; at < script.size(); at = script.find('\n', at) + 1)
+        inputs += script.compare(at, 4, "key ") == 0 || script.compare(at, 5, "hold ") == 0;
+    EXPECT_EQ(inputs, 7);
+    const CommandResult result = run("--size 1280x720 --model paper", script, "1280x720");
+    ASSERT_EQ(result.status, 0) << result.error;
+    const auto has = [&](const char* shot, const std::string& name) {
+        return sonocase::testing::read_text(shots + shot + ".png.boxes").find(name) !=
+               std::string::npos;
+    };
+    // Controls that only these pages have.
+    EXPECT_TRUE(has("after", " again\n"));
+    EXPECT_TRUE(has("replay", " time\n"));  // the time line
+    EXPECT_FALSE(has("second", " time\n"));
+    EXPECT_TRUE(has("second", " hint\n"));  // an attempt at practice runs
+    int sessions = 0;
+    for (const auto& entry :
+         std::filesystem::directory_iterator(folder_ / "data/sonocase/sessions")) {
+        sessions += entry.path().string().find(".frames.") == std::string::npos;
+    }
+    EXPECT_EQ(sessions, 2);
+}
+
+// Colour never on the picture, frozen or live: the sector stays grey (saturation at most 0.15).
+TEST_F(WindowOnVirtualDisplay, ThePictureIsGreyAndStaysInItsPlace) {
+    const std::string shots = folder_.path() + "/";
+    const CommandResult result =
+        run(bundle_ + " --size 1280x720 --model paper",
+            "wait 6\nshot " + shots + "live.png\nkey space\nwait 3\nshot " + shots +
+                "frozen.png\nquit\n",
+            "1280x720");
+    ASSERT_EQ(result.status, 0) << result.error;
+    for (const char* name : {"live", "frozen"}) {
+        const Picture picture = load_picture(shots + name + ".png");
+        ASSERT_EQ(picture.width, 1280);
+        int coloured = 0;
+        for (int y = 60; y < 640; ++y) {
+            for (int x = 300; x < 970; ++x) {
+                const std::uint8_t* p = &picture.rgb[3 * (static_cast<std::size_t>(y) * 1280 + x)];
+                const int high = std::max({p[0], p[1], p[2]}), low = std::min({p[0], p[1], p[2]});
+                coloured += high > 40 && high - low > 0.15 * high;
+            }
+        }
+        EXPECT_EQ(coloured, 0) << name;
+    }
+}
+
 TEST_F(WindowOnVirtualDisplay, IsTheSameLayoutAtFourTimesTheSize) {
     const CommandResult result =
         run(bundle_ + " --size 3840x2160 --ui-scale 3 --model paper",
@@ -149,7 +207,7 @@ TEST_F(WindowOnVirtualDisplay, WithoutOpenGl33SaysSoInOneLine) {
 // The help lists every key that the window reads, and docs/player.md has every line of the help.
 TEST(Shortcuts, EveryKeyOfTheWindowIsInTheHelpAndEveryLineOfItInTheDocument) {
     const std::string source =
-        sonocase::testing::read_text(SONOCASE_SOURCE "/runtime/player/ui/keys.cpp");
+        sonocase::testing::read_text(SONOCASE_SOURCE "/runtime/player/ui/pages/keys.cpp");
     const std::string document = sonocase::testing::read_text(SONOCASE_SOURCE "/docs/player.md");
     std::string help;
     for (const Shortcut& s : shortcuts()) {

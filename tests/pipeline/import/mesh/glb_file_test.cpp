@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/import/mesh/glb_file.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/import/mesh/mesh_shapes.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using testing::ball_mesh;
+using testing::glb_of;
+
+std::string refusal(const std::vector<std::uint8_t>& bytes) {
+    const auto nodes = read_glb(bytes, "x.glb");
+    return nodes ? "read" : nodes.error().message();
+}
+
+TEST(GlbFile, KeepsNamesPointsAndTransforms) {
+    const auto nodes = read_glb(glb_of({{"VH_F_liver", ball_mesh({1, 2, 3}, 4),
+                                         "\"translation\":[10,0,0],\"scale\":[2,2,2]"},
+                                        {"spleen", ball_mesh({0, 0, 0}, 1), ""}}),
+                                "x.glb");
+    ASSERT_TRUE(nodes) << nodes.error().message();
+    ASSERT_EQ(nodes->size(), 2u);
+    EXPECT_EQ((*nodes)[0].name, "VH_F_liver");
+    EXPECT_EQ((*nodes)[1].name, "spleen");
+    const Point3 top = (*nodes)[0].surface.points[0];  // (1, 2, 7), doubled, moved
+    EXPECT_NEAR(top.x, 12, 1e-5);
+    EXPECT_NEAR(top.y, 4, 1e-5);
+    EXPECT_NEAR(top.z, 14, 1e-5);
+}
+
+TEST(GlbFile, EveryTruncationIsRefusedInOneLine) {
+    const auto whole = glb_of({{"a", ball_mesh({0, 0, 0}, 1, 6), ""}});
+    for (std::size_t n = 0; n < whole.size(); n += 7) {
+        const auto nodes = read_glb(std::span(whole).first(n), "x.glb");
+        ASSERT_FALSE(nodes) << n;
+        EXPECT_EQ(nodes.error().message().find('\n'), std::string::npos);
+    }
+}
+
+TEST(GlbFile, RefusesWhatItCannotRead) {
+    const Surface ball = ball_mesh({0, 0, 0}, 1, 6);
+    EXPECT_NE(refusal(glb_of({{"a", ball, ""}},
+                             "\"extensionsRequired\":[\"KHR_draco_mesh_compression\"]"))
+                  .find("without compression"),
+              std::string::npos);
+    EXPECT_NE(refusal({1, 2, 3}).find("not a binary glTF"), std::string::npos);
+    EXPECT_NE(refusal(glb_of({{"a", ball, "\"children\":[0]"}})).find("child"), std::string::npos);
+    Surface wrong = ball;
+    wrong.triangles[0][0] = 100000;
+    EXPECT_NE(refusal(glb_of({{"a", wrong, ""}})).find("corner"), std::string::npos);
+    Surface nan = ball;
+    nan.points[3].y = NAN;
+    EXPECT_NE(refusal(glb_of({{"a", nan, ""}})).find("not a number"), std::string::npos);
+}
+
+// One byte at a time of the description: a message or a result, never more.
+TEST(GlbFile, SurvivesChangedBytes) {
+    const auto whole = glb_of({{"a", ball_mesh({0, 0, 0}, 1, 4), ""}});
+    int refused = 0;
+    for (std::size_t n = 0; n < std::min<std::size_t>(whole.size(), 900); ++n)
+        for (const std::uint8_t value : {0, 57, 255}) {
+            auto bytes = whole;
+            bytes[n] = value;
+            refused += !read_glb(bytes, "x.glb");
+        }
+    EXPECT_GT(refused, 500);
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline

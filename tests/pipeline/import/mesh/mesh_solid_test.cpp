@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include <gtest/gtest.h>
+
+#include "pipeline/base/counter_random.h"
+#include "pipeline/import/mesh/fill_lumen.h"
+#include "pipeline/import/mesh/mend_mesh.h"
+#include "pipeline/import/mesh/mesh_shapes.h"
+#include "pipeline/import/mesh/winding_number.h"
+#include "pipeline/import/mesh/winding_voxels.h"
+#include "support/shapes.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using testing::ball_mesh;
+using testing::without_top;
+
+constexpr double kPi = 3.14159265358979;
+
+Surface together(Surface a, const Surface& b) {
+    const auto base = static_cast<std::uint32_t>(a.points.size());
+    a.points.insert(a.points.end(), b.points.begin(), b.points.end());
+    for (const auto& t : b.triangles)
+        a.triangles.push_back({base + t[0], base + t[1], base + t[2]});
+    return a;
+}
+
+TEST(MendMesh, WeldsPatchesAndTurnsThemOutwards) {
+    // Every triangle with corners of its own: a soup.
+    const Surface ball = ball_mesh({3, 4, 5}, 20, 24, true);
+    Surface soup;
+    for (const auto& t : ball.triangles) {
+        const auto n = static_cast<std::uint32_t>(soup.points.size());
+        for (const std::uint32_t corner : t) soup.points.push_back(ball.points[corner]);
+        soup.triangles.push_back({n, n + 1, n + 2});
+    }
+    MendReport report;
+    mend_mesh(soup, {}, &report);
+    EXPECT_EQ(report.components, 1);
+    EXPECT_EQ(report.turned, 1);
+    EXPECT_EQ(report.caps, 0);
+    EXPECT_NEAR(report.volume_ml, 4.0 / 3 * kPi * 8, 0.4);  // facets lie inside the ball
+}
+
+TEST(MendMesh, CapsAnOpeningAndTellsItsLength) {
+    MendReport report;
+    const Surface bowl = without_top(ball_mesh({0, 0, 0}, 20, 40), 10);
+    const Surface solid = mend_mesh(bowl, {}, &report);
+    EXPECT_EQ(report.caps, 1);
+    EXPECT_EQ(report.open_loops, 0);
+    EXPECT_NEAR(report.longest_cap_mm, 2 * kPi * std::sqrt(300.0), 4);  // a ring of facets
+    EXPECT_GT(solid.triangles.size(), bowl.triangles.size());
+}
+
+TEST(WindingNumber, IsOneInsideZeroOutsideAndTheTreeAgrees) {
+    const Surface whole = ball_mesh({0, 0, 0}, 20), bowl = without_top(whole, 12);
+    const WindingTree tree(bowl, 2), closed(whole, 2);
+    EXPECT_NEAR(winding_number(whole, {1, 2, 3}), 1, 1e-9);
+    EXPECT_NEAR(winding_number(whole, {30, 2, 3}), 0, 1e-9);
+    for (std::uint64_t n = 0; n < 200; ++n) {
+        const Point3 p{60 * uniform_at(1, 3 * n) - 30, 60 * uniform_at(1, 3 * n + 1) - 30,
+                       60 * uniform_at(1, 3 * n + 2) - 30};
+        EXPECT_NEAR(tree.at(p), winding_number(bowl, p), 0.04);
+        EXPECT_NEAR(closed.at(p), winding_number(whole, p), 0.04);
+    }
+}
+
+TEST(Voxelise, ABallHasItsVolumeWhereverItLies) {
+    const Grid grid = testing::cubic_grid(61);
+    for (const Point3 c : {Point3{0, 0, 0}, Point3{0.3, 0.5, 0.1}, Point3{5, -3, 2}}) {
+        MendReport report;
+        const Surface solid = mend_mesh(ball_mesh(c, 20, 60), {}, &report);
+        const VoxelMask mask = voxelise(solid, true, grid);
+        EXPECT_NEAR(static_cast<double>(mask.count()) / 1000 / report.volume_ml, 1,
+                    0.004);  // of 33 ml: lattice
+    }
+}
+
+TEST(Voxelise, OverlappingPartsAreInsideAndNestedOnesToo) {
+    const Grid grid = testing::cubic_grid(61);
+    const Surface two = together(ball_mesh({-6, 0, 0}, 15), ball_mesh({6, 0, 0}, 15));
+    const VoxelMask mask = voxelise(mend_mesh(two, {}, nullptr), true, grid);
+    const auto inside = [&](int i, int j, int k) {
+        return mask.inside[mask.index(30 + i - mask.first.x, 30 + j - mask.first.y,
+                                      30 + k - mask.first.z)];
+    };
+    EXPECT_TRUE(inside(0, 0, 0));
+    EXPECT_TRUE(inside(-15, 0, 0));
+    EXPECT_FALSE(inside(0, 14, 0));
+}
+
+TEST(Voxelise, AnOpenSurfaceGoesByWindingNumbers) {
+    const Grid grid = testing::cubic_grid(61);
+    const VoxelMask open = voxelise(without_top(ball_mesh({0, 0, 0}, 20, 60), 17), false, grid);
+    // The cap that is missing has a height of 3 mm: pi h^2 (3 r - h) / 3 = 0.54 of 33.5 ml.
+    EXPECT_NEAR(static_cast<double>(open.count()) / 1000, 33.2, 0.6);
+}
+
+TEST(FillLumen, FillsAPipeThatBends) {
+    const Grid grid = testing::cubic_grid(81);
+    VoxelMask wall;
+    wall.size = grid.size;
+    wall.inside.assign(grid.voxel_count(), 0);
+    double lumen = 0;
+    for (int k = 0; k < 81; ++k)
+        for (int j = 0; j < 81; ++j)
+            for (int i = 0; i < 81; ++i) {
+                // A quarter of a torus about (10, 10): radius 45, pipe 8 with a wall of 2.
+                const double x = i - 10, y = j - 10, z = k - 40;
+                const double r = std::hypot(std::hypot(x, y) - 45, z);
+                if (x < 2 || y < 2) continue;
+                wall.inside[grid.index(i, j, k)] = r < 8 && r >= 6;
+                lumen += r < 6;
+            }
+    const auto added = static_cast<double>(fill_lumen(wall, {1, 400}));
+    EXPECT_NEAR(added / lumen, 1, 0.12);  // its ends stay open or bulge by a voxel
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline

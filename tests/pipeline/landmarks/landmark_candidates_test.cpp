@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/landmarks/landmark_candidates.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace sonocase::pipeline {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Readings of a trunk of 300 x 200 mm from z = 0 to 450, with a navel of 6 mm at (0, front, 170),
+// and of two legs of 150 mm below it; axes: x right, y front, z up.
+std::vector<Point3> body(bool legs, bool navel, double noise_mm = 0.5) {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> share(0, 1);
+    std::normal_distribution<double> off(0, noise_mm);
+    std::vector<Point3> out;
+    const auto add = [&](Point3 p) {
+        out.push_back({p.x + off(random), p.y + off(random), p.z + off(random)});
+    };
+    for (int i = 0; i < 9000; ++i) {
+        const double a = 2 * kPi * share(random), z = 450 * share(random);
+        Point3 p{150 * std::cos(a), 100 * std::sin(a), z};
+        const double r = std::hypot(p.x, p.z - 170);
+        if (navel && p.y > 0) p.y -= 6 * std::exp(-0.5 * r * r / 36);
+        add(p);
+    }
+    for (int i = 0; legs && i < 4000; ++i) {
+        const double a = 2 * kPi * share(random), z = -300 * share(random);
+        const double side = i % 2 == 0 ? 76 : -76;
+        add({side + 74 * std::cos(a), 80 * std::sin(a), z});
+    }
+    for (int i = 0; legs && i < 300; ++i)  // between the legs
+        add({30 * share(random) - 15, 80 * share(random) - 40, 0});
+    return out;
+}
+
+const LandmarkCandidate* named(const std::vector<LandmarkCandidate>& all, const char* name) {
+    for (const LandmarkCandidate& one : all)
+        if (one.name == name) return &one;
+    return nullptr;
+}
+
+TEST(LandmarkCandidates, FindNavelAndCrotchInAnyFrame) {
+    for (const double turn : {0.0, 1.1, 3.0}) {
+        const Matrix3 frame = rotation_about(normalized(Vector3{0.3, -1, 0.5}), turn);
+        const Vector3 shift{120, -340, 55};
+        Surface skin;
+        for (const Point3 p : body(true, true))
+            skin.points.push_back(Point3{} + frame * (p - Point3{}) + shift);
+        const auto found =
+            landmark_candidates(skin, frame * Vector3{0, 0, 1}, frame * Vector3{0.1, 1, 0.2});
+        const auto at = [&](Point3 p) { return Point3{} + frame * (p - Point3{}) + shift; };
+        const auto* navel = named(found, "navel");
+        const auto* crotch = named(found, "crotch");
+        ASSERT_NE(navel, nullptr);
+        ASSERT_NE(crotch, nullptr);
+        // Readings lie 6 mm apart; a front that is 6 degrees off moves the midline's band.
+        EXPECT_LT(distance(navel->place, at({0, 94, 170})), 9) << turn;
+        const Vector3 off = crotch->place - at({0, 0, 0});
+        EXPECT_LT(std::abs(dot(off, frame * Vector3{0, 0, 1})), 16) << turn;  // a slice
+        EXPECT_LT(std::abs(dot(off, frame * Vector3{1, 0, 0})), 10) << turn;
+        ASSERT_NE(named(found, "leftmost"), nullptr);
+        EXPECT_NEAR(dot(named(found, "rightmost")->place - named(found, "leftmost")->place,
+                        frame * Vector3{1, 0, 0}),
+                    300, 8);
+    }
+}
+
+TEST(LandmarkCandidates, LeaveOutWhatTheBodyDoesNotShow) {
+    Surface trunk;
+    trunk.points = body(false, false);
+    const auto found = landmark_candidates(trunk, {0, 0, 1}, {0, 1, 0});
+    EXPECT_EQ(named(found, "crotch"), nullptr);
+    EXPECT_EQ(named(found, "navel"), nullptr);
+    EXPECT_EQ(found.size(), 4u);
+    EXPECT_TRUE(landmark_candidates(Surface{}, {0, 0, 1}, {0, 1, 0}).empty());
+    EXPECT_EQ(landmark_rows(found, {}), "name,ct_x,ct_y,ct_z,x,y,z\n");
+}
+
+TEST(LandmarkCandidates, ThePictureAndTheRowsHoldBoth) {
+    Surface skin;
+    skin.points = body(true, true);
+    const auto found = landmark_candidates(skin, {0, 0, 1}, {0, 1, 0});
+    const std::string rows = landmark_rows(found, found);
+    EXPECT_NE(rows.find("navel,"), std::string::npos);
+    const auto png = landmark_picture(
+        {{&skin, {0, 0, 1}, {0, 1, 0}, found}, {&skin, {0, 0, 1}, {0, 1, 0}, found}});
+    ASSERT_GT(png.size(), 1000u);
+    EXPECT_EQ(png[1], 'P');
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline

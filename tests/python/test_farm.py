@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Data sets rendered by the farm, on this machine: the same bytes, and what fails is said."""
+
+import pathlib
+import shutil
+import subprocess
+
+import pytest
+
+from conftest import BIN
+from test_dataset import content_of, recipe  # noqa: F401  (a fixture)
+
+RENDER = pathlib.Path(__file__).parents[2] / "scripts" / "farm" / "render-dataset"
+needs_snakemake = pytest.mark.skipif(shutil.which("snakemake") is None, reason="no snakemake")
+
+
+def render(*arguments):
+    return subprocess.run([RENDER, "--sonoplay", BIN / "sonoplay", *map(str, arguments)],
+                          capture_output=True, text=True)
+
+
+@needs_snakemake
+def test_shards_of_the_farm_give_the_same_bytes(recipe, sonoplay, tmp_path):
+    whole, farmed = tmp_path / "whole", tmp_path / "farmed"
+    sonoplay("dataset", recipe, "-o", whole, "--frames", 13, "--seed", 5)
+    done = render(recipe, "-o", farmed, "--frames", 13, "--seed", 5, "--shards", 3)
+    assert done.returncode == 0, done.stderr
+    shutil.rmtree(farmed / "farm")
+    assert content_of(farmed) == content_of(whole)
+
+
+@needs_snakemake
+def test_a_bad_recipe_is_said_by_shard(recipe, tmp_path):
+    recipe.write_text(recipe.read_text().replace("chunk = 3", "chunky = 3"))
+    done = render(recipe, "-o", tmp_path / "out", "--frames", 4, "--", "--restart-times", "0")
+    assert done.returncode == 1
+    assert done.stderr.count("chunky") == 2  # of two shards
+    assert not (tmp_path / "out" / "manifest.jsonl").exists()
+
+
+@pytest.mark.parametrize("arguments, words", [
+    ((), "no recipe"), (("none.toml", "-o", "x", "--frames", 3), "none.toml"),
+    ((RENDER, "--frames", 3), "no -o"), ((RENDER, "-o", "x"), "--frames"),
+    ((RENDER, "-o", "x", "--frames", 0), "--frames"), ((RENDER, "-o", "x", "--frams", 3), "--frams"),
+    ((RENDER, "-o", "x", "--frames", 3, "--shards", "two"), "two"),
+    ((RENDER, "-o", "x", "--frames", 3, "--profile", "moon"), "moon")])
+def test_wrong_usage_is_one_line(arguments, words):
+    done = render(*arguments)
+    assert done.returncode == 2 and words in done.stderr and done.stderr.count("\n") == 1

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The truth of tissue that yields: what the picture shows, and not what lies there at rest.
+#include <optional>
+
+#include "pressed_block.h"
+#include "runtime/needle/needle_shift.h"
+#include "truth_support.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using namespace sonocase::testing;
+
+FrameInput pressed_input(double mm, double tent_mm = 0) {
+    FrameInput input;
+    input.mannequin_from_probe = pressed_by(mm);
+    input.has_needle = tent_mm > 0;
+    input.needle = {{-6, 0, 15.5}, {0, 0, 1}, tent_mm, 0.4};
+    return input;
+}
+
+// The body's own shape at the place to which the three-dimensional map pulls a pixel back: another
+// way than that of the planes, which go by tables along the beams.
+TEST(TruthPressed, LabelsAreThoseOfThePlacesThatTheFieldPullsBack) {
+    const PressedBlock shape;
+    for (const ImageModel model : {ImageModel::physical, ImageModel::paper})
+        for (const Exercise& exercise : block_exercises()) {
+            RenderOptions options = picture(260, 260);
+            options.model = model;
+            auto truth = truth_of(pressed_block(), exercise, options);
+            auto renderer = Renderer::create(pressed_block(), exercise, options);
+            ASSERT_TRUE(renderer);
+            for (const double mm : {4.0, 9.0, 16.0}) {
+                Planes planes(options);
+                const FrameInput input = pressed_input(mm);
+                const FrameTruth& facts = truth.render(input, planes.spans());
+                renderer->settle(input);
+                EXPECT_EQ(facts.press.force_n, renderer->press().force_n);
+                EXPECT_GT(facts.press.force_n, 0.5);
+                EXPECT_TRUE(facts.mannequin_from_probe == renderer->shown_pose());
+                const auto layout = renderer->layout();
+                int compared = 0, wrong = 0, at_rest_wrong = 0, vein = 0;
+                for (int row = 0; row < 260; ++row)
+                    for (int column = 0; column < 260; ++column) {
+                        const double x = (column - layout.origin_x_px) * layout.mm_per_px,
+                                     z = (row - layout.origin_y_px) * layout.mm_per_px;
+                        if (depth_along(exercise.probe, x, z) < 0.5 || z > 45) continue;
+                        const Point3 now = renderer->shown_pose() * Point3{x, 0, z};
+                        const Point3 rest = renderer->at_rest(now);
+                        if (renderer->shut(rest)) continue;
+                        const int label = planes.labels[planes.at(column, row)];
+                        ++compared;
+                        wrong += label != shape.label(rest);
+                        at_rest_wrong += label != shape.label(now);
+                        vein += label == PressedBlock::vein_label;
+                    }
+                std::printf("%d %d %2.0f mm: %d of %d differ, %d from rest, vein %d\n", int(model),
+                            int(exercise.probe.shape), mm, wrong, compared, at_rest_wrong, vein);
+                // Surfaces that the nodes between beams move by a fraction of a pixel.
+                EXPECT_LT(wrong, 0.004 * compared) << mm;
+                EXPECT_GT(at_rest_wrong, 3 * wrong) << mm;
+            }
+        }
+}
+
+TEST(TruthPressed, OnePixelAsksTheSameAsAllTogether) {
+    for (const Exercise& exercise : block_exercises())
+        for (const double tent_mm : {0.0, 2.5}) {
+            const RenderOptions options = picture(110, 120);
+            auto truth = truth_of(pressed_block(), exercise, options);
+            for (const double mm : {-1.0, 12.0}) {
+                Planes planes(options);
+                const FrameInput input = pressed_input(mm, tent_mm);
+                truth.render(input, planes.spans());
+                int scanned = 0, differ = 0;
+                for (int row = 0; row < 120; ++row)
+                    for (int column = 0; column < 110; ++column) {
+                        const PixelTruth pixel = truth.at(input, column, row);
+                        if (!pixel.scanned) continue;
+                        ++scanned;
+                        differ += pixel.label != planes.labels[planes.at(column, row)];
+                        if (!std::isnan(pixel.skin_depth_mm)) {
+                            EXPECT_NEAR(planes.depth[planes.at(column, row)], pixel.skin_depth_mm,
+                                        0.05);
+                        }
+                        // The skin lies at a flat face that presses.
+                        if (mm > 0 && exercise.probe.shape == ProbeShape::linear) {
+                            EXPECT_NEAR(pixel.skin_depth_mm, pixel.shown.z - mm, 0.05);
+                        }
+                    }
+                // Between nodes four beams apart at most, surfaces lie 0.1 mm off at most.
+                EXPECT_LT(differ, 0.01 * scanned)
+                    << int(exercise.probe.shape) << " " << mm << " " << tent_mm;
+            }
+        }
+}
+
+TEST(TruthPressed, AnAdvancingNeedleDentsTheWallBeforeIt) {
+    const PressedBlock shape;
+    const RenderOptions options = picture(260, 260, {"-contact"});
+    auto truth = truth_of(pressed_block(), block_exercise(), options);
+    auto renderer = Renderer::create(pressed_block(), block_exercise(), options);
+    ASSERT_TRUE(renderer);
+    const auto layout = renderer->layout();
+    const FrameInput input = pressed_input(-1, 2.5);
+    Planes planes(options);
+    truth.render(input, planes.spans());
+    const Rigid& pose = input.mannequin_from_probe;
+    NeedleDent dent{input.needle.tip, input.needle.direction, 2.5, 0.4};
+    int compared = 0, wrong = 0, moved = 0;
+    for (int row = 0; row < 260; ++row)
+        for (int column = 0; column < 260; ++column) {
+            const Point3 now = pose * Point3{(column - layout.origin_x_px) * layout.mm_per_px, 0,
+                                             (row - layout.origin_y_px) * layout.mm_per_px};
+            if (now.z < 0.5 || now.z > 45 || std::abs(now.x) > 19) continue;
+            const Vector3 u = dent_shift(dent, now);
+            const int expected = shape.label(now - u);
+            ++compared;
+            wrong += planes.labels[planes.at(column, row)] != expected;
+            moved += expected != shape.label(now);
+        }
+    std::printf("%d of %d differ, %d moved\n", wrong, compared, moved);
+    EXPECT_GT(moved, 50);
+    EXPECT_LT(wrong, 0.005 * compared);
+}
+
+TEST(TruthPressed, TargetsAndTheTipAreWhereTissueIsNow) {
+    Exercise exercise = block_exercise();
+    exercise.targets.resize(1);
+    exercise.targets[0].name = "vein";
+    exercise.targets[0].centre = PressedBlock().vein;
+    const RenderOptions options = picture(100, 100);
+    auto truth = truth_of(pressed_block(), exercise, options);
+    auto renderer = Renderer::create(pressed_block(), exercise, options);
+    ASSERT_TRUE(renderer);
+    FrameInput input = pressed_input(8, 0.01);
+    renderer->settle(input);
+    const Point3 now = renderer->now_at(exercise.targets[0].centre);
+    EXPECT_GT(now.z, PressedBlock().vein.z + 1);
+    input.needle.tip = now;
+    const FrameTruth& facts = truth.render(input, {});
+    EXPECT_NEAR(distance(facts.targets[0].centre, now), 0, 1e-9);
+    EXPECT_NEAR(facts.targets[0].tip_mm, 0, 1e-9);
+    EXPECT_EQ(facts.tip_label, PressedBlock::vein_label);
+}
+
+TEST(TruthPressed, EveryInstructionSetGivesTheSameBytesAndWithoutTheEffectNothingMoves) {
+    for (const Exercise& exercise : block_exercises()) {
+        RenderOptions options = picture(150, 140);
+        std::optional<Planes> first;
+        for (const std::string& name : simd_targets()) {
+            options.simd = name;
+            auto truth = truth_of(pressed_block(), exercise, options);
+            Planes planes(options);
+            truth.render(pressed_input(11, 2), planes.spans());
+            if (!first) first = planes;
+            EXPECT_TRUE(planes == *first) << name;
+        }
+        options.effects = {"-deformation"};
+        auto still = truth_of(pressed_block(), exercise, options);
+        Planes planes(options), again(options);
+        const FrameTruth& facts = still.render(pressed_input(11, 2), planes.spans());
+        EXPECT_FALSE(facts.press.pressed);
+        EXPECT_FALSE(planes == *first);
+    }
+}
+
+}  // namespace
+}  // namespace sonocase::runtime

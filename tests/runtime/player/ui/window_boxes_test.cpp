@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The boxes of every page and dialog as they are drawn, at three sizes and four scales, in both
+// languages: no control or word overlaps another on its layer, nothing leaves the window, no words
+// are cut that are not meant to be, every word is translated, and the picture keeps its place.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "formats/bundle/case_bundle.h"
+#include "formats/files/bundle_file.h"
+#include "formats/progress_book/progress_book.h"
+#include "runtime/player/ui/window_picture.h"
+#include "support/flowing_case.h"
+#include "support/paths.h"
+#include "support/run_command.h"
+#include "support/temporary_folder.h"
+
+namespace sonocase::runtime {
+namespace {
+
+struct SeenBox {
+    std::string kind;
+    int layer = 0;
+    double x = 0, y = 0, w = 0, h = 0;
+    int cut = 0;
+    std::string name;
+};
+
+std::vector<SeenBox> load_boxes(const std::string& file) {
+    std::vector<SeenBox> boxes;
+    std::ifstream in(file);
+    for (std::string line; std::getline(in, line);) {
+        std::istringstream words(line);
+        SeenBox b;
+        words >> b.kind >> b.layer >> b.x >> b.y >> b.w >> b.h >> b.cut;
+        std::getline(words >> std::ws, b.name);
+        boxes.push_back(b);
+    }
+    return boxes;
+}
+
+const char* const kPages[] = {"scan",  "attempt",  "frozen",   "after",  "replay",
+                              "help",  "tracker",  "effects",  "cases",  "exercises",
+                              "setup", "colour",   "spectrum", "motion", "named",
+                              "marks", "settings", "notices",  "class",  "sign_in"};
+
+std::string script(const std::string& folder) {
+    const auto shot = [&](const char* name) { return "shot " + folder + "/" + name + ".png\n"; };
+    return "wait 4\n" + shot("scan") + "key b\nkey n\nhold w 6\nkey h\nwait 2\n" + shot("attempt") +
+           "key space\nwait 2\n" + shot("frozen") + "key space\nwait 2\nkey b\nwait 3\n" +
+           shot("after") + "key p\nwait 2\n" + shot("replay") + "key p\nwait 2\nkey escape\n" +
+           "key f1\nwait 2\n" + shot("help") + "key f1\nkey f9\nwait 2\n" + shot("tracker") +
+           "key f9\nkey f10\nwait 2\n" + shot("effects") + "key f10\nkey f8\nwait 2\n" +
+           shot("exercises") + "press in_exam\npress marks\nwait 2\n" + shot("marks") +
+           "key escape\nkey f12\nwait 2\nkey f3\nwait 2\n" + shot("setup") + "key f3\nhold u 6\n" +
+           shot("named") + "key 2 shift\nwait 6\n" + shot("colour") + "key 3 shift\nwait 6\n" +
+           shot("spectrum") + "key 4 shift\nwait 6\n" + shot("motion") +
+           "key 1 shift\nkey f2\nwait 30\n" + shot("cases") + "press settings\nwait 2\n" +
+           shot("settings") + "press Notices\nwait 2\n" + shot("notices") +
+           "key escape\npress settings\nwait 2\npress Sign in\nwait 2\n" + shot("sign_in") +
+           "key escape\npress settings\nwait 2\npress Class\nwait 4\npress Ann Onymous\nwait 2\n" +
+           shot("class") + "quit\n";
+}
+
+void check(const std::vector<SeenBox>& boxes, double width, double height) {
+    ASSERT_GT(boxes.size(), 5u);
+    std::vector<SeenBox> leaves;
+    for (const SeenBox& b : boxes) {
+        if (b.kind == "untranslated") {
+            ADD_FAILURE() << "no translation of: " << b.name;
+            continue;
+        }
+        EXPECT_FALSE(b.cut) << b.kind << " " << b.name << " is cut";
+        EXPECT_GE(b.x, -1) << b.name;
+        EXPECT_GE(b.y, -1) << b.name;
+        EXPECT_LE(b.x + b.w, width + 1) << b.name;
+        EXPECT_LE(b.y + b.h, height + 1) << b.name;
+        if (b.kind == "control" || b.kind == "words") leaves.push_back(b);
+    }
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+        for (std::size_t k = i + 1; k < leaves.size(); ++k) {
+            const SeenBox &a = leaves[i], &b = leaves[k];
+            if (a.layer != b.layer) continue;
+            const double across = std::min(a.x + a.w, b.x + b.w) - std::max(a.x, b.x);
+            const double down = std::min(a.y + a.h, b.y + b.h) - std::max(a.y, b.y);
+            // A line's box has the font's whole height, which its letters do not fill.
+            EXPECT_FALSE(across > 0.6 && down > 1.5)
+                << a.kind << " " << a.name << " overlaps " << b.kind << " " << b.name;
+        }
+    }
+}
+
+const char* const kMarks = R"(
+[[pass_marks]]
+metric = "tissue_damage_mm2"
+at_most = 1900
+[[pass_marks]]
+metric = "final_tip_to_target_mm"
+at_most = 6.5
+[[pass_marks]]
+metric = "needle_in_beam_fraction"
+at_least = 0.55
+)";
+
+// A class whose names, exercises and attempts are more than a small window shows.
+void fill_book(const std::string& path) {
+    auto book = ProgressBook::open(path);
+    ASSERT_TRUE(book) << book.error().message();
+    const char* const kNames[] = {"Ann Onymous", "Bernadette von Hohenfels-Trautmannsdorf",
+                                  "Łukasz Żółć", "D",
+                                  "E. Fünf",     "F",
+                                  "G",           "H",
+                                  "I",           "J",
+                                  "K",           "L"};
+    int minute = 0;
+    for (const char* name : kNames) {
+        for (int e = 0; e < 8; ++e) {
+            for (int k = 0; k < 4; ++k) {
+                ProgressEntry entry;
+                entry.trainee = name;
+                entry.case_name = "cylinder";
+                entry.exercise = "exercise-with-a-name-" + std::to_string(e);
+                entry.started = "2026-01-01T" + std::to_string(10 + minute / 60) + ":" +
+                                std::to_string(10 + minute % 60) + ":00Z";
+                ++minute;
+                entry.passed = (minute + e) % 3 == 0;
+                entry.metrics = {{"final_tip_to_target_mm", 12.0 - 2 * k}};
+                ASSERT_TRUE(book->add(entry));
+            }
+        }
+    }
+}
+
+void tour(const std::string& size, double scale, const std::string& language) {
+    SCOPED_TRACE(size + " at " + std::to_string(scale) + " in " + language);
+    const sonocase::testing::TemporaryFolder folder;
+    const std::string place = folder / "home";
+    std::filesystem::create_directories(place);
+    CaseBundle bundle = sonocase::testing::flowing_case();
+    bundle.exercises[0].toml += kMarks;
+    ASSERT_TRUE(save_bundle(bundle, place + "/cylinder.sonocase"));
+    folder.write("home/sonocase/player.json", R"({"sound": false})");
+    fill_book(place + "/sonocase/progress.sqlite");
+    folder.write("script", script(folder.path()));
+    const auto result = sonocase::testing::run_command(
+        "cd " + place + " && env LC_ALL=" + language + " XDG_CONFIG_HOME=" + place +
+        " XDG_DATA_HOME=" + place +
+        " XDG_DATA_DIRS=/nowhere " SONOCASE_SOURCE "/tests/support/on-display " + size +
+        " " SONOCASE_BIN "/sonoplay cylinder.sonocase --model paper --size " + size +
+        " --ui-scale " + std::to_string(scale) + " --script " + (folder / "script"));
+    ASSERT_EQ(result.status, 0) << result.error;
+    int width_px = 0, height_px = 0;
+    ASSERT_EQ(std::sscanf(size.c_str(), "%dx%d", &width_px, &height_px), 2);
+    const double used = std::min({scale, width_px / 640.0, height_px / 360.0});
+    std::string picture;
+    for (const char* page : kPages) {
+        SCOPED_TRACE(page);
+        const std::vector<SeenBox> boxes = load_boxes(folder / (std::string(page) + ".png.boxes"));
+        check(boxes, width_px / used + 1, height_px / used + 1);
+        const auto has = [&](const std::string& name) {
+            return std::any_of(boxes.begin(), boxes.end(),
+                               [&](const SeenBox& b) { return b.name == name; });
+        };
+        // The script came where it meant to.
+        if (page == std::string("class")) {
+            EXPECT_TRUE(has("csv") && has("Ann Onymous"));
+        }
+        if (page == std::string("marks")) {
+            EXPECT_TRUE(has("save") && has("plus"));
+        }
+        if (page == std::string("settings")) {
+            EXPECT_TRUE(has("Help") && has("Instructor"));
+        }
+        if (page == std::string("notices")) {
+            EXPECT_TRUE(has("close") && !has("Help"));
+        }
+        if (page == std::string("sign_in")) {
+            EXPECT_TRUE(has("sign"));
+        }
+        for (const SeenBox& b : boxes) {
+            if (b.kind != "picture" || b.name != "picture") continue;
+            const std::string at = std::to_string(b.x) + " " + std::to_string(b.y) + " " +
+                                   std::to_string(b.w) + " " + std::to_string(b.h);
+            if (picture.empty()) picture = at;
+            EXPECT_EQ(at, picture) << "the picture has moved";
+        }
+    }
+    EXPECT_FALSE(picture.empty());
+}
+
+TEST(WindowBoxes, NothingOverlapsOrIsCutAt1280) {
+    for (const double scale : {1.0, 1.5, 2.0, 3.0}) tour("1280x720", scale, "C");
+}
+
+TEST(WindowBoxes, NothingOverlapsOrIsCutAt1920) {
+    for (const double scale : {1.0, 1.5, 2.0, 3.0}) tour("1920x1080", scale, "C");
+}
+
+TEST(WindowBoxes, NothingOverlapsOrIsCutAt4K) {
+    for (const double scale : {1.0, 1.5, 2.0, 3.0}) tour("3840x2160", scale, "C");
+}
+
+TEST(WindowBoxes, GermanFitsAndIsWhole) {
+    for (const char* size : {"1280x720", "960x600"}) tour(size, 1, "de_DE.UTF-8");
+    tour("1280x720", 2, "de_DE.UTF-8");
+}
+
+}  // namespace
+}  // namespace sonocase::runtime

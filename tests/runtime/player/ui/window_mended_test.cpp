@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Faults of the window that people met, each kept from coming back.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "formats/files/recording_file.h"
+#include "formats/progress_book/progress_book.h"
+#include "formats/recording/session.h"
+#include "runtime/player/ui/window_picture.h"
+#include "support/small_case.h"
+#include "window_run.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using sonocase::testing::CommandResult;
+using sonocase::testing::load_picture;
+using sonocase::testing::Picture;
+using sonocase::testing::read_text;
+
+class WindowMended : public sonocase::testing::WindowRun {
+  protected:
+    WindowMended() : WindowRun(sonocase::testing::small_case(), "cylinder.sonocase") {}
+    std::string command(const std::string& arguments, const std::string& script) {
+        return WindowRun::command("--model paper " + arguments, script);
+    }
+    CommandResult run(const std::string& arguments, const std::string& script) {
+        return in_display(command(arguments, script));
+    }
+    nlohmann::json settings() {
+        return nlohmann::json::parse(read_text(folder_ / "config/sonocase/player.json"));
+    }
+    std::vector<SessionSample> samples(const std::string& file) {
+        const auto sequence = load_sequence(file);
+        if (!sequence) return {};
+        const auto session = session_from_sequence(*sequence, guess_names(*sequence), file);
+        return session ? session->samples : std::vector<SessionSample>{};
+    }
+};
+
+TEST_F(WindowMended, ControlAndEqualChangeTheWordsAndNotTheGain) {
+    ASSERT_EQ(run("", "wait 4\nhold = 20 ctrl\nwait 2\nquit\n").status, 0);
+    EXPECT_EQ(settings()["gain_db"], 0);
+    EXPECT_GT(settings()["ui_scale"].get<double>(), 1.05);
+    ASSERT_EQ(run("--ui-scale 1", "wait 4\nhold = 20\nwait 2\nquit\n").status, 0);
+    EXPECT_GT(settings()["gain_db"].get<double>(), 1);
+}
+
+// A session that ends, or a system that shuts down.
+TEST_F(WindowMended, SigtermKeepsTheSettings) {
+    const std::string picture = folder_ / "now.png";
+    const std::string line = command("", "wait 4\nhold = 30\nwait 2\n" + shot("now"));
+    const CommandResult result = in_display(line + " &\nplayer=$!\nuntil [ -e " + picture +
+                                            " ]; do :; done\nkill -TERM $player\nwait $player");
+    EXPECT_EQ(result.status, 0) << result.error;
+    EXPECT_GT(settings()["gain_db"].get<double>(), 1);
+}
+
+// What was measured in one picture says nothing about the next.
+TEST_F(WindowMended, CalipersEndWithTheirPicture) {
+    ASSERT_EQ(run("", "wait 6\nkey space\nwait 2\n" + shot("before") +
+                          "key m\nmove 560 300\ndown 0\nup 0\nmove 700 400\ndown 0\nup 0\n"
+                          "key m\nmove 20 700\nwait 2\n" +
+                          shot("measured") + "key space\nwait 2\nkey space\nwait 2\n" +
+                          shot("after") + "quit\n")
+                  .status,
+              0);
+    // Its words stand where the sector leaves the corner black.
+    const auto words = [&](const char* name) {
+        return load_picture(folder_ / (std::string(name) + ".png")).mean(330, 590, 440, 640);
+    };
+    EXPECT_GT(words("measured"), words("before") + 1);
+    EXPECT_NEAR(words("after"), words("before"), 0.2);
+}
+
+// D moves the tip to the right on the screen, also where left and right are exchanged.
+TEST_F(WindowMended, TheNeedleGoesWhereItsKeySays) {
+    for (const bool flipped : {false, true}) {
+        const std::string file = folder_ / (flipped ? "b.igs.mha" : "a.igs.mha");
+        ASSERT_EQ(run("--record " + file, std::string("wait 4\n") + (flipped ? "key f\n" : "") +
+                                              "key n\nhold w 40\nwait 2\nhold d 30\nwait 4\nquit\n")
+                      .status,
+                  0);
+        // Pushing does not turn the needle, however many frames each key took: its direction at the
+        // beginning and at the end, along the probe's x.
+        std::vector<double> across;
+        for (const SessionSample& sample : samples(file)) {
+            if (!sample.needle_ok) continue;
+            const Vector3 forward = sample.mannequin_from_needle.rotation * Vector3{0, 0, 1};
+            across.push_back(dot(sample.mannequin_from_probe.rotation.column(0), forward));
+        }
+        ASSERT_GT(across.size(), 2u);
+        const double by = across.back() - across.front();
+        EXPECT_GT(flipped ? -by : by, 0.02) << flipped;  // 30 x 1/60 s x 0.35 rad/s at an angle
+    }
+}
+
+TEST_F(WindowMended, EveryDepthOfTheDepthGainHasItsOwnNumber) {
+    ASSERT_EQ(run("", "wait 4\nkey ]\nkey ]\nkey ]\nwait 4\n" + shot("scan") + "quit\n").status, 0);
+    std::set<std::string> numbers;
+    std::istringstream lines(read_text(folder_ / "scan.png.boxes"));
+    for (std::string line; std::getline(lines, line);) {
+        const std::size_t cm = line.rfind(" cm");
+        if (line.rfind("words", 0) == 0 && cm == line.size() - 3 && line.find('.') < cm)
+            numbers.insert(line.substr(line.rfind(' ', cm - 1)));
+    }
+    EXPECT_GE(numbers.size(), 8u);
+}
+
+// Letters that a font lacks all look the same; these do not.
+TEST_F(WindowMended, LettersBeyondLatin1AreShown) {
+    for (const char* letters : {"ŁŁŁŁ", "ΩΩΩΩ", "ЖЖЖЖ", "ŻŻŻŻ"}) {
+        std::string exercise = sonocase::testing::small_exercise_toml();
+        const std::string title = "Find the vessel";
+        exercise.replace(exercise.find(title), title.size(), letters);
+        folder_.write("own.toml", exercise);
+        ASSERT_EQ(run("--exercise " + (folder_ / "own.toml"), "wait 4\n" + shot(letters) + "quit\n")
+                      .status,
+                  0);
+    }
+    const auto title = [&](const char* letters) {
+        return load_picture(folder_ / (std::string(letters) + ".png"));
+    };
+    const Picture first = title("ŁŁŁŁ");
+    ASSERT_EQ(first.width, 1280);
+    EXPECT_GT(first.mean(18, 58, 80, 82), 20);
+    for (const char* other : {"ΩΩΩΩ", "ЖЖЖЖ", "ŻŻŻŻ"})
+        EXPECT_GT(first.difference(title(other), 18, 58, 80, 82, 40), 0.03) << other;
+}
+
+// What is said stands in the top bar, in words, and can be read again later; it moves nothing.
+TEST_F(WindowMended, ANoticeIsShownInTheTopBarAndKept) {
+    ASSERT_EQ(
+        run("", "wait 6\n" + shot("before") + "key f12\nwait 3\n" + shot("said") +
+                    "press dismiss\nwait 2\n" + shot("after") +
+                    "press settings\nwait 2\npress Notices\nwait 2\n" + shot("kept") + "quit\n")
+            .status,
+        0);
+    const auto boxes = [&](const char* name) {
+        return read_text(folder_ / (std::string(name) + ".png.boxes"));
+    };
+    EXPECT_EQ(boxes("before").find("Saved as"), std::string::npos);
+    EXPECT_NE(boxes("said").find(" Saved as"), std::string::npos);
+    EXPECT_NE(boxes("said").find(" notice\n"), std::string::npos);
+    EXPECT_EQ(boxes("after").find("Saved as"), std::string::npos);
+    EXPECT_NE(boxes("kept").find(" Saved as"), std::string::npos);
+    // Its letters are light on the bar.
+    const Picture said = load_picture(folder_ / "said.png"),
+                  before = load_picture(folder_ / "before.png");
+    EXPECT_GT(said.difference(before, 300, 4, 1100, 44, 60), 0.03);
+}
+
+// The curve of residuals while the probe pivots on a pin: in the accent colour, on the set-up.
+TEST_F(WindowMended, TheSetUpShowsTheCourseOfTheResiduals) {
+    std::string csv = "frame,timestamp_s,status,tx,ty,tz,r00,r01,r02,r10,r11,r12,r20,r21,r22\n";
+    const Vector3 tip{10, -20, 150};
+    for (int i = 0; i < 1200; ++i) {
+        const double a = 0.011 * i, tilt = 0.6 * std::sin(0.037 * i);
+        const Matrix3 r = rotation_about({std::cos(a), std::sin(a), 0}, tilt) *
+                          rotation_about({0, 0, 1}, 0.3 * a);
+        // The pin gives way by some millimetres, so that there is something to see.
+        const Vector3 t = Vector3{100 + 3 * std::sin(0.5 * i), 50, 400} - r * tip;
+        csv += std::to_string(i) + "," + std::to_string(0.02 * i) + ",OK";
+        for (const double v : {t.x, t.y, t.z, r(0, 0), r(0, 1), r(0, 2), r(1, 0), r(1, 1), r(1, 2),
+                               r(2, 0), r(2, 1), r(2, 2)})
+            csv += "," + std::to_string(v);
+        csv += "\n";
+    }
+    folder_.write("poses.csv", csv);
+    // Next, Record: both are Dear ImGui's own and stand where the dialog has them at this size.
+    ASSERT_EQ(
+        run("--tracker replay:" + (folder_ / "poses.csv"),
+            "wait 6\nkey f3\nwait 3\nmove 955 595\nwait 1\ndown 0\nup 0\nwait 3\n" + shot("step") +
+                "move 585 346\nwait 1\ndown 0\nup 0\nwait 400\n" + shot("course") + "quit\n")
+            .status,
+        0);
+    // Its curve: pixels of the accent colour below the residual's number.
+    const auto accent = [&](const char* name) {
+        const Picture picture = load_picture(folder_ / (std::string(name) + ".png"));
+        int count = 0;
+        for (int y = 412; y < 484 && picture.width == 1280; ++y) {
+            for (int x = 516; x < 1006; ++x) {
+                const std::uint8_t* p = &picture.rgb[3 * (static_cast<std::size_t>(y) * 1280 + x)];
+                count += std::abs(p[0] - 0x82) < 24 && std::abs(p[1] - 0xC8) < 24 &&
+                         std::abs(p[2] - 0xE0) < 24;
+            }
+        }
+        return count;
+    };
+    EXPECT_EQ(accent("step"), 0);
+    EXPECT_GT(accent("course"), 300);
+}
+
+std::size_t sessions_in(const std::string& book) {
+    auto opened = ProgressBook::open(book);
+    if (!opened) return 99;
+    auto sessions = opened->sessions("", "");
+    return sessions ? sessions->size() : 99;
+}
+
+// A slip of the hand is not an attempt: it is scored, but not put into the book.
+TEST_F(WindowMended, AnAttemptOfASecondIsNotPutIntoTheBook) {
+    ASSERT_EQ(run("--trainee Ann", "wait 6\nkey b\nwait 20\nkey b\nwait 4\nquit\n").status, 0);
+    EXPECT_EQ(sessions_in(folder_ / "data/sonocase/progress.sqlite"), 0u);
+    ASSERT_EQ(run("--trainee Ann", "wait 6\nkey b\nwait 260\nkey b\nwait 4\nquit\n").status, 0);
+    EXPECT_EQ(sessions_in(folder_ / "data/sonocase/progress.sqlite"), 1u);
+}
+
+// A long title is shown on two lines where it is read, and with an ellipsis elsewhere; no letter is
+// cut in two.
+TEST_F(WindowMended, ALongTitleEndsInAnEllipsisAndNothingElseMoves) {
+    std::string title;
+    for (int i = 0; i < 12; ++i) title += "Überlänge " + std::to_string(i) + " ";
+    std::string exercise = sonocase::testing::small_exercise_toml();
+    const std::string before = "Find the vessel";
+    exercise.replace(exercise.find(before), before.size(), title);
+    folder_.write("long.toml", exercise);
+    ASSERT_EQ(run("--exercise " + (folder_ / "long.toml"),
+                  "wait 6\n" + shot("scan") + "key f8\nwait 3\n" + shot("exercises") +
+                      "key f8\nkey b\nwait 20\nkey b\nwait 4\n" + shot("after") + "quit\n")
+                  .status,
+              0);
+    for (const char* name : {"scan", "exercises", "after"}) {
+        std::istringstream lines(read_text(folder_ / (std::string(name) + ".png.boxes")));
+        int controls = 0;
+        for (std::string line; std::getline(lines, line);) {
+            std::istringstream fields(line);
+            std::string kind;
+            int layer = 0, cut = 0;
+            double x = 0, y = 0, w = 0, h = 0;
+            fields >> kind >> layer >> x >> y >> w >> h >> cut;
+            EXPECT_EQ(cut, 0) << name << ": " << line;
+            EXPECT_LE(x + w, 1281) << name << ": " << line;
+            controls += kind == "control";
+        }
+        EXPECT_GT(controls, 3) << name;
+    }
+}
+
+// Another tracker that is not there: the picture says so instead of looking live.
+TEST_F(WindowMended, AnAbsentTrackerIsSaidOnThePicture) {
+    ASSERT_EQ(
+        run("", "wait 6\n" + shot("mouse") + "key f7 shift\nwait 90\n" + shot("absent") + "quit\n")
+            .status,
+        0);
+    const std::string before = read_text(folder_ / "mouse.png.boxes"),
+                      after = read_text(folder_ / "absent.png.boxes");
+    EXPECT_EQ(before.find(" NO TRACKER\n"), std::string::npos);
+    EXPECT_NE(after.find(" NO TRACKER\n"), std::string::npos) << after;
+    EXPECT_LT(load_picture(folder_ / "absent.png").mean(400, 150, 900, 250),
+              0.6 * load_picture(folder_ / "mouse.png").mean(400, 150, 900, 250) + 8);
+}
+
+// A second F5 leaves, the first only asks.
+TEST_F(WindowMended, ChangingTheExerciseDuringAnAttemptAsksFirst) {
+    ASSERT_EQ(run("", "wait 6\nkey b\nwait 6\nkey f5\nwait 3\n" + shot("asked") +
+                          "key q ctrl\nwait 3\n" + shot("still") + "quit\n")
+                  .status,
+              0);
+    const std::string asked = read_text(folder_ / "asked.png.boxes");
+    EXPECT_NE(asked.find("An attempt is running."), std::string::npos);
+    EXPECT_NE(asked.find(" hint\n"), std::string::npos);  // the attempt goes on
+}
+
+}  // namespace
+}  // namespace sonocase::runtime

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The codec of OpenIGTLink by itself.
+#include "runtime/tracking/igtl/igtl_message.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "support/random.h"
+
+namespace sonocase::runtime {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+TEST(IgtlMessage, CrcOfTheCheckString) {
+    // CRC-64 of ECMA-182 with this polynomial.
+    const std::string check = "123456789";
+    EXPECT_EQ(igtl::crc64({reinterpret_cast<const std::uint8_t*>(check.data()), 9}),
+              0x6C40DF5F0B497347ull);
+}
+
+TEST(IgtlMessage, TransformComesBack) {
+    sonocase::testing::Random random(5);
+    for (int i = 0; i < 50; ++i) {
+        const Rigid pose = random.rigid(500);
+        igtl::MessageReader reader;
+        reader.add(igtl::encode_transform("ProbeToTracker", 1700000000.25, pose));
+        ASSERT_EQ(reader.next(), igtl::MessageReader::Event::message);
+        EXPECT_EQ(reader.header().time_s, 1700000000.25);
+        const auto poses = igtl::parse_poses(reader.header(), reader.body());
+        ASSERT_EQ(poses.size(), 1u);
+        EXPECT_EQ(poses[0].name, "ProbeToTracker");
+        // Single precision.
+        EXPECT_LT(norm(poses[0].to_from.translation - pose.translation), 1e-4);
+        EXPECT_LT(rotation_angle(transpose(poses[0].to_from.rotation) * pose.rotation), 1e-6);
+    }
+}
+
+TEST(IgtlMessage, ForceComesBackAndNonsenseDoesNot) {
+    const auto read = [](const Bytes& message) {
+        igtl::MessageReader reader;
+        reader.add(message);
+        EXPECT_EQ(reader.next(), igtl::MessageReader::Event::message);
+        EXPECT_TRUE(igtl::parse_poses(reader.header(), reader.body()).empty());
+        return igtl::parse_force_n(reader.header(), reader.body());
+    };
+    const auto sensor = [](std::vector<double> values) {
+        return igtl::encode_sensor("ProbeForce", 1, values);
+    };
+    EXPECT_EQ(read(sensor({7.25})), 7.25);
+    EXPECT_EQ(read(sensor({0, 3})), 0.0);
+    EXPECT_FALSE(read(sensor({})));
+    for (const double bad : {-1.0, 501.0, std::nan(""), HUGE_VAL})
+        EXPECT_FALSE(read(sensor({bad}))) << bad;
+    EXPECT_FALSE(read(igtl::encode_sensor("Glucose", 1, std::vector<double>{5})));
+    // Every length but the right one.
+    for (std::size_t size = 0; size < 40; ++size) {
+        Bytes body(size, 0);
+        if (size > 0) body[0] = 2;
+        EXPECT_EQ(read(igtl::encode("SENSOR", "ProbeForce", 1, body)).has_value(), size == 26);
+    }
+}
+
+TEST(IgtlMessage, ReadsEverySplit) {
+    Bytes stream;
+    for (int i = 0; i < 3; ++i) {
+        for (const Bytes& m :
+             {igtl::encode_transform("A", 1, {}), igtl::encode("STATUS", "B", 1, Bytes(31, 7))}) {
+            stream.insert(stream.end(), m.begin(), m.end());
+        }
+    }
+    for (std::size_t chunk = 1; chunk < stream.size(); chunk += 3) {
+        igtl::MessageReader reader;
+        int messages = 0, poses = 0;
+        for (std::size_t at = 0; at < stream.size(); at += chunk) {
+            reader.add(std::span(stream).subspan(at, std::min(chunk, stream.size() - at)));
+            while (reader.next() == igtl::MessageReader::Event::message) {
+                ++messages;
+                poses += static_cast<int>(igtl::parse_poses(reader.header(), reader.body()).size());
+            }
+        }
+        EXPECT_EQ(messages, 6) << chunk;
+        EXPECT_EQ(poses, 3) << chunk;
+    }
+}
+
+TEST(IgtlMessage, DamageGivesNoPose) {
+    const Bytes good = igtl::encode_transform("ProbeToTracker", 1, {});
+    for (std::size_t i = 58; i < good.size(); ++i) {
+        Bytes damaged = good;
+        damaged[i] ^= 1;
+        igtl::MessageReader reader;
+        reader.add(damaged);
+        EXPECT_EQ(reader.next(), igtl::MessageReader::Event::bad_crc) << i;
+    }
+    igtl::Header header;
+    for (const char* type : {"TRANSFORM", "TDATA", "QTDATA", "POSITION", "NONSENSE"}) {
+        header.type = type;
+        for (std::size_t n = 0; n < 160; ++n) {
+            for (const std::uint8_t fill : Bytes{0, 255}) {
+                for (const auto& pose : igtl::parse_poses(header, Bytes(n, fill))) {
+                    EXPECT_TRUE(is_finite(pose.to_from));
+                }
+            }
+        }
+    }
+    for (int version : {2, 3}) {
+        header.version = static_cast<std::uint16_t>(version);
+        header.type = "TRANSFORM";
+        for (std::size_t n = 0; n < 90; ++n) igtl::parse_poses(header, Bytes(n, 255));
+    }
+}
+
+}  // namespace
+}  // namespace sonocase::runtime
