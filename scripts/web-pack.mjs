@@ -12,7 +12,7 @@ const hash = (data) => createHash('sha256').update(data).digest('base64');
 
 // Modules in the order in which they need each other. Each imports by one line per module and exports declarations
 // only, and top-level names are unique: then the text without those words is the same program.
-const modules = ['core.js', 'source.js', 'results.js', 'picture.js', 'hands.js', 'scan.js', 'app.js'];
+const modules = ['core.js', 'source.js', 'arriving.js', 'results.js', 'picture.js', 'poses.js', 'hands.js', 'scan.js', 'app.js'];
 const seen = new Map();
 let script = '// SPDX-License-Identifier: Apache-2.0\n';
 for (const name of modules) {
@@ -50,6 +50,7 @@ const policy = `default-src 'none'; script-src 'sha256-${hash(script)}' 'wasm-un
     + `img-src blob: data:; connect-src 'none'; base-uri 'none'; form-action 'none'`;
 const single = index
     .replace(/content="default-src[^"]*"/, () => `content="${policy}"`)
+    .replaceAll(/<link rel="preload".*\n/g, '')
     .replace('<link rel="stylesheet" href="style.css">', () => `<style>${style}</style>`)
     .replace('<script type="module" src="sonoplay.js"></script>', '')
     .replace('</body>', () => `<!--LIST-->\n<!--CASES-->\n<script type="text/plain" id="program">${binary.toString('base64')}</script>\n`

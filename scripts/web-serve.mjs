@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// web-serve.mjs SITE [PORT]: serves a folder on loopback alone, with byte ranges, for trying a site out. Port 0 takes a
-// free one; the address is printed.
-import {createReadStream, statSync} from 'node:fs';
+// web-serve.mjs SITE [PORT]: serves a folder on loopback alone, for trying a site out: with byte ranges, and page and
+// program compressed, as hosts do. Port 0 takes a free one; the address is printed.
+import {createReadStream, readFileSync, statSync} from 'node:fs';
 import {createServer} from 'node:http';
 import {extname, join, normalize} from 'node:path';
+import {brotliCompressSync} from 'node:zlib';
 
 const kTypes = {'.html': 'text/html; charset=utf-8', '.css': 'text/css', '.js': 'text/javascript', '.json': 'application/json',
     '.wasm': 'application/wasm', '.png': 'image/png'};
@@ -12,20 +13,37 @@ const kTypes = {'.html': 'text/html; charset=utf-8', '.css': 'text/css', '.js': 
 // site: a folder. before(request, response): for tests; true where it has answered itself. Returns the server; listen()
 // it.
 export function site_server(site, before = () => false) {
+    const compressed = new Map();
+    const brotli = (file, {mtimeMs}) => {
+        const key = `${file} ${mtimeMs}`;
+        if (!compressed.has(key)) compressed.set(key, brotliCompressSync(readFileSync(file)));
+        return compressed.get(key);
+    };
     return createServer((request, response) => {
         if (before(request, response)) return;
         const path = decodeURIComponent(new URL(request.url, 'http://x').pathname);
         const file = join(site, normalize(path.endsWith('/') ? `${path}index.html` : path));
-        let size;
+        let size, state;
         try {
-            if (!file.startsWith(join(site, '/')) || !statSync(file).isFile()) throw new Error();
-            size = statSync(file).size;
+            if (!file.startsWith(join(site, '/')) || !(state = statSync(file)).isFile()) throw new Error();
+            size = state.size;
         } catch {
             response.writeHead(404).end('not found');
             return;
         }
         const headers = {'Content-Type': kTypes[extname(file)] ?? 'application/octet-stream', 'Accept-Ranges': 'bytes',
-            'Cache-Control': 'no-cache'};
+            'Cache-Control': 'no-cache', ETag: `"${state.size}-${Math.floor(state.mtimeMs)}"`};
+        if (request.headers['if-none-match'] === headers.ETag) {
+            response.writeHead(304, headers).end();
+            return;
+        }
+        const packs = /\.(html|css|js|json|wasm)$/.test(file) && /\bbr\b/.test(request.headers['accept-encoding'] ?? '');
+        if (packs && size > 0) {
+            const bytes = brotli(file, state);
+            response.writeHead(200, {...headers, 'Content-Encoding': 'br', 'Content-Length': bytes.length});
+            response.end(request.method === 'HEAD' ? undefined : bytes);
+            return;
+        }
         const range = /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? '');
         let start = 0, end = size - 1;
         if (range) {

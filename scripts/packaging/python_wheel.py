@@ -23,19 +23,27 @@ def _tag():
     return f"{python}-{python}-{re.sub('[-.]', '_', sysconfig.get_platform())}"
 
 
-def _built(prefix):
-    """Builds and installs the package below `prefix`."""
-    build = ROOT / "build" / f"wheel-{_tag()}"
-    off = [f"-DSONOCASE_{part}=OFF" for part in ("PIPELINE", "TESTS", "BENCH")]
-    subprocess.run(["cmake", "-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
-                    f"-DPython_EXECUTABLE={sys.executable}", "-DSONOCASE_PYTHON_FOLDER=.", *off],
-                   check=True)
+def _built(prefix, build):
+    """Builds and installs the package below `prefix`; `build`: a build folder that exists, or None. Returns its folder."""
+    if build is None:
+        build = ROOT / "build" / f"wheel-{_tag()}"
+        off = [f"-DSONOCASE_{part}=OFF" for part in ("PIPELINE", "TESTS", "BENCH")]
+        subprocess.run(["cmake", "-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
+                        f"-DPython_EXECUTABLE={sys.executable}", "-DSONOCASE_PYTHON_FOLDER=.", *off],
+                       check=True)
+    elif not pathlib.Path(build, "CMakeCache.txt").is_file():
+        raise SystemExit(f"{build}: no CMakeCache.txt; give the folder of a configured build")
     subprocess.run(["cmake", "--build", build, "--target", "sonocase_python"], check=True)
     subprocess.run(["cmake", "--install", build, "--component", "python", "--prefix", prefix,
                     "--strip"], check=True)
+    modules = list(pathlib.Path(prefix).rglob("sonocase/_core.*"))
+    if len(modules) != 1 or f"cpython-{sys.version_info.major}{sys.version_info.minor}" not in modules[0].name:
+        raise SystemExit(f"{build}: holds {[m.name for m in modules]}; expected a module for this Python")
+    return modules[0].parent
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    """config_settings: `build`, the folder of a build to take the module from instead of a new one."""
     version, tag = _version(), _tag()
     info = f"sonocase-{version}.dist-info"
     files = {
@@ -48,10 +56,10 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     }
     name = f"sonocase-{version}-{tag}.whl"
     with tempfile.TemporaryDirectory() as prefix:
-        _built(prefix)
-        for path in sorted(pathlib.Path(prefix, "sonocase").rglob("*")):
+        package = _built(prefix, (config_settings or {}).get("build"))
+        for path in sorted(package.rglob("*")):
             if path.is_file():
-                files[str(path.relative_to(prefix))] = path.read_bytes()
+                files[str(path.relative_to(package.parent))] = path.read_bytes()
         record = ""
         with zipfile.ZipFile(pathlib.Path(wheel_directory, name), "w", zipfile.ZIP_DEFLATED) as wheel:
             for path, content in files.items():

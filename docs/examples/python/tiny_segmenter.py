@@ -67,6 +67,9 @@ def synthetic(bundle, name, count, random):
 
 
 def main(bundle, exercise, folder):
+    real = sorted(pathlib.Path(folder, "images").glob("*.png"))[:12]
+    if not real:
+        sys.exit(f"{folder}: no images/*.png")
     random = np.random.default_rng(1)
     pictures, truths = synthetic(bundle, exercise, 40, random)
     x = np.concatenate([features(p) for p in pictures])
@@ -80,7 +83,7 @@ def main(bundle, exercise, folder):
     forest.fit(x[chosen], y[chosen])
 
     areas = []  # under the ROC curve: how often a vessel's pixel ranks above another
-    for path in sorted(pathlib.Path(folder, "images").glob("*.png"))[:12]:
+    for path in real:
         colours = np.asarray(Image.open(pathlib.Path(folder, "masks", path.name)).convert("RGB"))
         green = (colours[..., 1] > 127) & (colours[..., 0] < 128)
         mask = squared(green.astype(np.uint8), Image.NEAREST).ravel() > 0
