@@ -37,7 +37,7 @@ void apply_difficulty(int difficulty, Exercise& exercise) {
     const Factors& by = kFactors[std::clamp(difficulty, kEasiest, kHardest) - kEasiest];
     for (Target& target : exercise.targets) {
         // Room that the author asked for is not given up with the size.
-        if (target.clearance_mm < 0) target.clearance_mm = target.radius_mm;
+        if (target.clearance_mm < 0) target.clearance_mm = outer_radius_mm(target);
         target.spread_mm *= by.spread;
         target.hit_radius_mm *= by.size;
         if (target.look != TargetLook::none) target.radius_mm *= by.size;

@@ -8,6 +8,8 @@
 #include <optional>
 
 #include "formats/attempt/difficulty.h"
+#include "formats/attempt/draw_lesion.h"
+#include "formats/attempt/draws.h"
 
 namespace sonocase {
 namespace {
@@ -17,38 +19,10 @@ constexpr int kStarts = 200;                          // tried for the probe
 constexpr int kDirections = 96;                       // tried for lines to a target
 constexpr double kSpareLengthMm = 10;                 // of the needle, for the hand
 constexpr double kOffPlaneMm = 20;                    // of the targets at the start
+constexpr double kApartMm = 2;                        // of a finding from others and from targets
+constexpr std::uint64_t kLesionStream = 0x6A09E667F3BCC909ull;  // fraction of the root of 2
 constexpr double kLeastCosine = 0.17364817766693041;  // of 80 degrees
 constexpr double kMostCosine = 0.93969262078590843;   // of 20 degrees
-
-// SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
-class Draws {
-  public:
-    explicit Draws(std::uint64_t seed) : state_(seed) {}
-    double uniform(double low, double high) {
-        state_ += 0x9E3779B97F4A7C15ull;
-        std::uint64_t z = state_;
-        z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
-        z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
-        z ^= z >> 31;
-        return low + (high - low) * (static_cast<double>(z >> 11) * 0x1p-53);
-    }
-    // Uniform in the unit ball. By rejection: trigonometry would differ between machines.
-    Vector3 in_ball() {
-        for (;;) {
-            const Vector3 v{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
-            if (dot(v, v) <= 1) return v;
-        }
-    }
-    Vector3 direction() {
-        for (;;) {
-            const Vector3 v = in_ball();
-            if (dot(v, v) > 0.01) return v / std::sqrt(dot(v, v));
-        }
-    }
-
-  private:
-    std::uint64_t state_;
-};
 
 struct Body {
     const Anatomy& anatomy;
@@ -80,7 +54,8 @@ struct Body {
     }
 };
 
-// The 26 directions to the neighbours of a cube's middle, scaled to unit length.
+// True if a ball about p lies in a label: tried at its middle, and half-way and at its surface in
+// the 26 directions to the neighbours of a cube's middle.
 bool clear_of_others(const Anatomy& anatomy, Point3 p, int label, double clearance_mm) {
     if (anatomy.label(p) != label) return false;
     for (const double part : {0.5, 1.0}) {
@@ -124,6 +99,35 @@ int label_of(const std::vector<Label>& labels, const std::string& name) {
     return -1;
 }
 
+double clearance_of(const Target& lesion) {
+    return lesion.clearance_mm < 0 ? outer_radius_mm(lesion) : lesion.clearance_mm;
+}
+
+// A place for a finding, clear of targets and of the findings before it.
+std::optional<Point3> draw_finding(const Exercise& exercise,
+                                   std::size_t f,
+                                   const Anatomy& anatomy,
+                                   const std::vector<Label>& labels,
+                                   Draws& draws) {
+    const Target& lesion = exercise.findings[f].lesion;
+    const int label =
+        lesion.inside.empty() ? anatomy.label(lesion.centre) : label_of(labels, lesion.inside);
+    if (label < 0) return {};
+    const double reach = outer_radius_mm(lesion);
+    const auto apart = [&](const Target& other, Point3 p) {
+        return distance(other.centre, p) >= outer_radius_mm(other) + reach + kApartMm;
+    };
+    for (int i = 0; i < kPlaces; ++i) {
+        const Point3 p = lesion.centre + lesion.spread_mm * draws.in_ball();
+        bool room = clear_of_others(anatomy, p, label, clearance_of(lesion));
+        for (const Target& target : exercise.targets) room = room && apart(target, p);
+        for (std::size_t before = 0; before < f; ++before)
+            room = room && apart(exercise.findings[before].lesion, p);
+        if (room) return p;
+    }
+    return {};
+}
+
 std::optional<Point3> draw_target(const Exercise& exercise,
                                   std::size_t t,
                                   const Body& body,
@@ -133,7 +137,7 @@ std::optional<Point3> draw_target(const Exercise& exercise,
     const int label =
         target.inside.empty() ? body.anatomy.label(target.centre) : label_of(labels, target.inside);
     if (label < 0) return {};
-    const double clearance = target.clearance_mm < 0 ? target.radius_mm : target.clearance_mm;
+    const double clearance = clearance_of(target);
     for (int i = 0; i < kPlaces; ++i) {
         const Point3 p = target.centre + target.spread_mm * draws.in_ball();
         if (!clear_of_others(body.anatomy, p, label, clearance)) continue;
@@ -216,6 +220,24 @@ bool draw_start(Exercise& exercise, const Anatomy& anatomy, Draws& draws) {
     return true;
 }
 
+// Findings for which there is no room are left out.
+void place_findings(AttemptDraw& out,
+                    const Anatomy& anatomy,
+                    const std::vector<Label>& labels,
+                    Draws& draws) {
+    std::vector<Finding>& findings = out.exercise.findings;
+    for (std::size_t f = 0; f < findings.size();) {
+        if (const auto place = draw_finding(out.exercise, f, anatomy, labels, draws)) {
+            findings[f++].lesion.centre = *place;
+            continue;
+        }
+        out.warnings.push_back("No place was found for the finding '" + findings[f].lesion.name +
+                               "', so this attempt lacks it: check its inside, spread_mm, "
+                               "radius_mm and clearance_mm.");
+        findings.erase(findings.begin() + static_cast<std::ptrdiff_t>(f));
+    }
+}
+
 }  // namespace
 
 AttemptDraw draw_attempt(const Exercise& exercise,
@@ -227,6 +249,9 @@ AttemptDraw draw_attempt(const Exercise& exercise,
     apply_difficulty(attempt_difficulty(seed), out.exercise);
     Draws draws(seed);
     const Body body(exercise, anatomy, labels);
+    // A stream of their own: exercises without lesions are drawn as they were.
+    Draws lesion_draws(seed ^ kLesionStream);
+    draw_shapes(out.exercise, lesion_draws);
     for (std::size_t t = 0; t < exercise.targets.size(); ++t) {
         if (!(out.exercise.targets[t].spread_mm > 0)) continue;
         if (const auto place = draw_target(out.exercise, t, body, labels, draws)) {
@@ -238,6 +263,7 @@ AttemptDraw draw_attempt(const Exercise& exercise,
                                    "inside, spread_mm and clearance_mm.");
         }
     }
+    place_findings(out, anatomy, labels, lesion_draws);
     if (out.exercise.start_spread_mm > 0 && !draw_start(out.exercise, anatomy, draws)) {
         out.warnings.push_back(
             "No place away from the target was found for the probe, so it "

@@ -36,6 +36,11 @@ struct AttemptDraw {
 //     from the first, leads to it through no bone and no gas.
 // A target for which 400 draws find no such place stays at its centre, with a warning.
 //
+// A target whose look is a kind of formats/pathology gets an ellipsoid's shape. Findings are there
+// with their `chance`, with a radius and shape that are drawn, placed likewise in their spread_mm,
+// clear of the targets and of each other; they need not be reached. One that finds no place is left
+// out, with a warning.
+//
 // With start_spread_mm > 0 the probe begins on the skin, half to all of that distance from
 // start_probe. Of 200 places drawn it is the first where every target lies at least 20 mm beside
 // the scan plane that the mouse holds there, else the one where they lie farthest beside it.

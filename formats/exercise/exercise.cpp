@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "formats/exercise/metric_table.h"
+#include "formats/pathology/pathology_kinds.h"
 #include "formats/text/nearest_name.h"
 #include "formats/text/toml_reader.h"
 
@@ -25,6 +26,13 @@ const std::vector<std::string>& shape_names() {
 const std::vector<std::string>& look_names() {
     static const std::vector<std::string> names{"none", "marker",  "lesion",
                                                 "cyst", "abscess", "calyx"};
+    return names;
+}
+
+std::vector<std::string> look_and_kind_names() {
+    std::vector<std::string> names = look_names();
+    const std::vector<std::string> kinds = kinds_drawn_per_attempt();
+    names.insert(names.end(), kinds.begin(), kinds.end());
     return names;
 }
 
@@ -65,25 +73,47 @@ void read_needle(const TomlTable& table, NeedleModel& needle) {
     table.finish();
 }
 
-void read_target(const TomlTable& table, std::vector<Target>& targets) {
+// What targets and findings share.
+Target read_place_and_look(const TomlTable& table, const std::string& name) {
     Target target;
-    target.name = "target " + std::to_string(targets.size() + 1);
+    target.name = name;
     table.text("name", target.name);
     if (!table.point("centre", target.centre) && !table.has("centre")) {
         table.complain("centre", "is missing",
                        "expected the centre of the target in mm, as in [10, 20, 30]");
     }
-    const bool radius = table.number("radius_mm", target.radius_mm, 0.1, 200);
-    if (!table.number("hit_radius_mm", target.hit_radius_mm, 0.1, 200) && radius) {
-        target.hit_radius_mm = target.radius_mm;
+    table.number("radius_mm", target.radius_mm, 0.1, 200);
+    static const std::vector<std::string> looks = look_and_kind_names();
+    if (const auto look = table.choice("look", looks)) {
+        const bool kind = *look >= look_names().size();
+        target.look = kind ? TargetLook::lesion : static_cast<TargetLook>(*look);
+        if (kind) target.kind = looks[*look];
     }
-    if (const auto look = table.choice("look", look_names()))
-        target.look = static_cast<TargetLook>(*look);
     table.text("inside", target.inside);
     table.number("spread_mm", target.spread_mm, 0, 200);
     table.number("clearance_mm", target.clearance_mm, 0, 100);
+    return target;
+}
+
+void read_target(const TomlTable& table, std::vector<Target>& targets) {
+    Target target = read_place_and_look(table, "target " + std::to_string(targets.size() + 1));
+    if (!table.number("hit_radius_mm", target.hit_radius_mm, 0.1, 200) && table.has("radius_mm"))
+        target.hit_radius_mm = target.radius_mm;
     table.finish();
     targets.push_back(std::move(target));
+}
+
+void read_finding(const TomlTable& table, std::vector<Finding>& findings) {
+    Finding finding;
+    finding.lesion =
+        read_place_and_look(table, "finding " + std::to_string(findings.size() + 1));
+    if (finding.lesion.look == TargetLook::none || finding.lesion.look == TargetLook::marker)
+        table.complain("look", "is missing, or shows nothing",
+                       "expected what the finding is, as in \"simple_cyst\"");
+    table.number("radius_spread", finding.radius_spread, 0, 0.8);
+    table.number("chance", finding.chance, 0, 1, true);
+    table.finish();
+    findings.push_back(std::move(finding));
 }
 
 void read_sweep(const TomlTable& table, std::vector<Sweep>& sweeps) {
@@ -187,6 +217,7 @@ Exercise read_exercise(const TomlTable& root) {
     if (auto table = root.table("probe")) read_probe(*table, e.probe);
     if (auto table = root.table("needle")) read_needle(*table, e.needle);
     for (const TomlTable& table : root.tables("targets")) read_target(table, e.targets);
+    for (const TomlTable& table : root.tables("findings")) read_finding(table, e.findings);
     root.texts("no_go", e.no_go);
     root.point("start_probe", e.start_probe);
     root.direction("start_beam", e.start_beam);
@@ -224,6 +255,22 @@ Result<Exercise> parse_exercise(std::string_view text, const std::string& where)
     Exercise exercise = read_exercise(*root);
     if (root->fault()) return *root->fault();
     return exercise;
+}
+
+std::vector<Target> shown_lesions(const Exercise& exercise) {
+    std::vector<Target> shown;
+    for (const Finding& finding : exercise.findings) shown.push_back(finding.lesion);
+    shown.insert(shown.end(), exercise.targets.begin(), exercise.targets.end());
+    return shown;
+}
+
+double outer_radius_mm(const Target& lesion) {
+    const Vector3 l = lesion.axes.lengths;
+    double reach = lesion.radius_mm * std::max({l.x, l.y, l.z});
+    if (const PathologyKind* kind = find_pathology_kind(lesion.kind))
+        for (const LesionPart& part : kind->parts)
+            if (part.place == PartPlace::shell) reach += part.size;
+    return reach;
 }
 
 double needle_diameter_mm(const NeedleModel& needle) {

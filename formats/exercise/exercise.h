@@ -45,17 +45,33 @@ struct NeedleModel {
 
 enum class TargetLook { none, marker, lesion, cyst, abscess, calyx };
 
+// The axes of a drawn lesion: an ellipsoid of the same volume as the ball of its radius.
+struct LesionAxes {
+    Matrix3 axes;              // columns: unit, at right angles
+    Vector3 lengths{1, 1, 1};  // half of each axis, radii of the ball; their product is 1
+};
+
 struct Target {
     std::string name;
     Point3 centre;             // `mannequin` frame
     double radius_mm = 5;      // of the target itself
     double hit_radius_mm = 5;  // a tip this near the centre is a hit
     TargetLook look = TargetLook::marker;
+    // look lesion: a kind of formats/pathology, by whose figures it shows; empty: a plain lesion.
+    std::string kind;
+    LesionAxes axes;  // of a kind, drawn for each attempt; a ball as written
     std::string inside;  // label that it must lie in; empty: anywhere
     // Where an attempt may draw it (formats/attempt): anywhere in this ball about `centre`, with
     // nothing but `inside` within clearance_mm. 0: the target stays at its centre.
     double spread_mm = 0;
     double clearance_mm = -1;  // negative: the target's radius
+};
+
+// A finding that is no target: it is there to be told from one.
+struct Finding {
+    Target lesion;             // hit_radius_mm means nothing
+    double radius_spread = 0;  // an attempt draws the radius from (1 -+ this) of what is written
+    double chance = 1;         // that an attempt has it, (0, 1]
 };
 
 // One pose of a scripted path, to be reached at a given time; positions and directions are
@@ -113,6 +129,7 @@ struct Exercise {
     Probe probe;
     NeedleModel needle;
     std::vector<Target> targets;
+    std::vector<Finding> findings;
     std::vector<std::string> no_go;  // labels that must not be touched
     Point3 start_probe;              // where the mouse tracker begins
     Vector3 start_beam{0, 0, -1};
@@ -132,6 +149,12 @@ struct Exercise {
 
 // `where` names the file in errors.
 Result<Exercise> parse_exercise(std::string_view toml, const std::string& where);
+
+// What shows in the tissue: findings, then targets.
+std::vector<Target> shown_lesions(const Exercise& exercise);
+
+// To where a lesion reaches from its centre, with the shells of its kind.
+double outer_radius_mm(const Target& lesion);
 
 double needle_diameter_mm(const NeedleModel& needle);  // from the gauge table where not given
 

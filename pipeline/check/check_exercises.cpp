@@ -34,6 +34,8 @@ class Exercises {
             const auto exercise = parse_exercise(embedded.toml, embedded.name);
             if (!exercise) continue;  // not-valid says so
             for (const std::string& name : exercise->no_go) expect_label(embedded.name, name);
+            for (const Finding& finding : exercise->findings)
+                expect_label(embedded.name, finding.lesion.inside);
             windows_.clear();
             for (const Target& target : exercise->targets) check_target(*exercise, target);
             play(*exercise);

@@ -217,7 +217,8 @@ Result<std::string> exercise_to_mannequin(const std::string& stripped_toml,
         if (at) set_triple(*breathing, "direction", mapper.direction(*at, d), 1e-6);
     }
     mapper.map_point(root, "start_probe");
-    each_table(root, "targets", [&](toml::table& target) { mapper.map_point(target, "centre"); });
+    for (const char* list : {"targets", "findings"})
+        each_table(root, list, [&](toml::table& table) { mapper.map_point(table, "centre"); });
     each_table(root, "sweeps", [&](toml::table& sweep) {
         each_table(sweep, "keys", [&](toml::table& key) { mapper.map_key(key); });
     });

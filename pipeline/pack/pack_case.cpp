@@ -36,20 +36,21 @@ void check_exercise(const Exercise& exercise,
     const auto has = [&](const std::string& name) {
         return std::find(names.begin(), names.end(), name) != names.end();
     };
-    for (const Target& target : exercise.targets) {
+    const auto check_place = [&](const std::string& what, const Target& target) {
+        const std::string start = exercise.name + ": " + what + " '" + target.name + "' ";
         const int label = label_at(volume, target.centre);
         const std::string& found = names[static_cast<std::size_t>(label)];
         if (!target.inside.empty() && !has(target.inside))
-            warnings->push_back(exercise.name + ": target '" + target.name + "' is to lie in '" +
-                                target.inside + "', which this case lacks; " +
-                                suggest_name(target.inside, names));
+            warnings->push_back(start + "is to lie in '" + target.inside +
+                                "', which this case lacks; " + suggest_name(target.inside, names));
         else if (!target.inside.empty() && found != target.inside)
-            warnings->push_back(exercise.name + ": target '" + target.name + "' lies in '" + found +
-                                "' and not in '" + target.inside + "'; move it");
+            warnings->push_back(start + "lies in '" + found + "' and not in '" + target.inside +
+                                "'; move it");
         else if (label == 0)
-            warnings->push_back(exercise.name + ": target '" + target.name +
-                                "' lies outside the body; move it");
-    }
+            warnings->push_back(start + "lies outside the body; move it");
+    };
+    for (const Target& target : exercise.targets) check_place("target", target);
+    for (const Finding& finding : exercise.findings) check_place("finding", finding.lesion);
     for (const std::string& name : exercise.no_go)
         if (!has(name))
             warnings->push_back(exercise.name + ": no-go label '" + name + "' is not in this case");

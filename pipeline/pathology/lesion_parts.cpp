@@ -8,6 +8,7 @@
 #include "pipeline/base/counter_random.h"
 #include "pipeline/pathology/lesion_shape.h"
 #include "pipeline/pathology/region_shapes.h"
+#include "pipeline/pathology/requested_parts.h"
 
 namespace sonocase::pipeline {
 namespace {

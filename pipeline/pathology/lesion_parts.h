@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "pipeline/pathology/label_canvas.h"
-#include "pipeline/pathology/pathology_kinds.h"
+#include "pipeline/pathology/pathology.h"
+#include "formats/base/result.h"
+#include "formats/pathology/pathology_kinds.h"
 
 namespace sonocase::pipeline {
 

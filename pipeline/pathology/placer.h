@@ -12,7 +12,7 @@
 #include "pipeline/pathology/lesion_parts.h"
 #include "pipeline/pathology/lesion_place.h"
 #include "pipeline/pathology/pathology.h"
-#include "pipeline/pathology/pathology_kinds.h"
+#include "formats/pathology/pathology_kinds.h"
 
 namespace sonocase::pipeline {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "pipeline/pathology/pathology_kinds.h"
+#include "pipeline/pathology/requested_parts.h"
 #include "pipeline/recipe/recipe_sections.h"
 
 namespace sonocase::pipeline {

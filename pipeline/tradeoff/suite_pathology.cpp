@@ -7,7 +7,7 @@
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/stopwatch.h"
 #include "pipeline/pathology/pathology.h"
-#include "pipeline/pathology/pathology_kinds.h"
+#include "pipeline/pathology/requested_parts.h"
 #include "pipeline/tradeoff/suites.h"
 
 namespace sonocase::pipeline {

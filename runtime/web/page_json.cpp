@@ -21,7 +21,8 @@ Json json_of_exercise(const Exercise& exercise) {
     out["hints"] = exercise.hints;
     // Whether an attempt draws targets or start anew, for which the whole case is needed.
     bool drawn = exercise.start_spread_mm > 0;
-    for (const Target& target : exercise.targets) drawn = drawn || target.spread_mm > 0;
+    for (const Target& lesion : shown_lesions(exercise)) drawn = drawn || lesion.spread_mm > 0;
+    drawn = drawn || !exercise.findings.empty();
     out["drawn"] = drawn;
     Json targets = Json::array();
     for (const Target& target : exercise.targets) targets.push_back(target.name);

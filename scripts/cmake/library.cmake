@@ -15,7 +15,7 @@ find_package(ZLIB REQUIRED)
 find_package(Threads REQUIRED)
 include(CMakePackageConfigHelpers)
 
-string(CONCAT core_rooms "^(formats/(base|text|volume|flow|container|bundle|bundle/codec|registration|attempt|exercise|machine|recording|"
+string(CONCAT core_rooms "^(formats/(base|text|volume|flow|container|bundle|bundle/codec|registration|attempt|pathology|exercise|machine|recording|"
   "calibration|calibration/solve|scoring)|runtime/(imaging|imaging/.*|needle|engine))$")
 set(formats_rooms "^formats/(threads|files|progress_book)$")
 # Rooms whose headers a program may include, and headers of theirs that are for the room's neighbours alone.

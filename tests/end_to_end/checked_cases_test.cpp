@@ -18,7 +18,7 @@
 #include "pipeline/aim/plain_case.h"
 #include "pipeline/check/check_case.h"
 #include "pipeline/pathology/pathology.h"
-#include "pipeline/pathology/pathology_kinds.h"
+#include "pipeline/pathology/requested_parts.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 

@@ -11,7 +11,7 @@
 #include "formats/machine/machine_toml.h"
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/pathology/pathology.h"
-#include "pipeline/pathology/pathology_kinds.h"
+#include "pipeline/pathology/requested_parts.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
 #include "support/phantom_bundle.h"
 

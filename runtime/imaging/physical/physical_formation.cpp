@@ -156,7 +156,7 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
     jobs.run(2, [&](std::size_t job) {
         if (job == 0) {  // the longer one, on the caller's thread, whose memory it keeps
             const Machine machine = machine_of(input);
-            scene = make_physical_scene(input.bundle, input.exercise.targets,
+            scene = make_physical_scene(input.bundle, shown_lesions(input.exercise),
                                         {&jobs, textures, machine.tissue_db, machine.structures});
         } else {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,

@@ -39,6 +39,10 @@ std::span<const Translation> german_notices() {
          "raise start_spread_mm.",
          "Fern vom Ziel fand sich kein Platz für den Schallkopf, er beginnt bei start_probe: "
          "start_spread_mm erhöhen."},
+        {"No place was found for the finding '%s', so this attempt lacks it: check its inside, "
+         "spread_mm, radius_mm and clearance_mm.",
+         "Für den Befund '%s' fand sich kein Platz, dieser Versuch hat ihn nicht: prüfen Sie "
+         "inside, spread_mm, radius_mm und clearance_mm."},
         {"No place was found for the target '%s', so it stays where the exercise has it: check "
          "its inside, spread_mm and clearance_mm.",
          "Für das Ziel '%s' fand sich kein Platz, es bleibt, wo die Übung es hat: prüfen Sie "

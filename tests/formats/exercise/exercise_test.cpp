@@ -123,6 +123,31 @@ TEST(Exercise, ATypoNamesFileLineKeyAndNearestKey) {
     expect_fault("name = \"x\"\n[probe]\nshape = \"curvlinear\"\n", {"e.toml:3", "'curvilinear'"});
 }
 
+TEST(Exercise, ALookMayBeAKindAndFindingsAreNoTargets) {
+    const auto e = parse_exercise(
+        "name = \"x\"\n[[targets]]\ncentre = [1, 2, 3]\nlook = \"metastasis\"\nradius_mm = 7\n"
+        "[[findings]]\ncentre = [4, 5, 6]\nlook = \"simple_cyst\"\nchance = 0.5\n"
+        "radius_spread = 0.3\n[[findings]]\ncentre = [4, 5, 6]\nlook = \"cyst\"\n",
+        "e.toml");
+    ASSERT_TRUE(e) << e.error().message();
+    ASSERT_EQ(e->targets.size(), 1u);
+    EXPECT_EQ(e->targets[0].look, TargetLook::lesion);
+    EXPECT_EQ(e->targets[0].kind, "metastasis");
+    EXPECT_EQ(outer_radius_mm(e->targets[0]), 10);  // its halo is 3 mm thick
+    EXPECT_EQ(e->targets[0].hit_radius_mm, 7);
+    ASSERT_EQ(e->findings.size(), 2u);
+    EXPECT_EQ(e->findings[0].lesion.kind, "simple_cyst");
+    EXPECT_EQ(e->findings[0].chance, 0.5);
+    EXPECT_EQ(e->findings[1].lesion.look, TargetLook::cyst);
+    const std::string start = "name = \"x\"\n[[findings]]\ncentre = [1, 2, 3]\n";
+    expect_fault(start, {"findings[0].look", "simple_cyst"});
+    expect_fault(start + "look = \"metastsis\"\n", {"e.toml:4", "'metastasis'"});
+    // What settles, flows or has septa is painted by a recipe.
+    expect_fault(start + "look = \"ascites\"\n", {"e.toml:4", "look"});
+    expect_fault(start + "look = \"cyst\"\nchance = 0\n", {"e.toml:5", "out of range"});
+    expect_fault(start + "look = \"cyst\"\nhit_radius_mm = 3\n", {"e.toml:5"});
+}
+
 TEST(Exercise, RangesAreChecked) {
     expect_fault("name = \"x\"\n[probe]\ndepth_mm = -1\n",
                  {"e.toml:3", "probe.depth_mm", "out of range"});

@@ -22,7 +22,8 @@ inline Result<Recipe> coarse_recipe(const std::string& extra = "",
     const std::vector<EmbeddedExercise> exercises{
         {"aim",
          "frame = \"ct\"\nname = \"aim\"\nno_go = [\"aorta\"]\n[[targets]]\nname = \"t\"\n"
-         "centre = [80, 20, 70]\ninside = \"liver\"\n[[sweeps]]\nname = \"s\"\n[[sweeps.keys]]\n"
+         "centre = [80, 20, 70]\ninside = \"liver\"\n[[findings]]\nname = \"f\"\n"
+         "look = \"cyst\"\ncentre = [80, 20, 70]\n[[sweeps]]\nname = \"s\"\n[[sweeps.keys]]\n"
          "time_s = 0\nprobe = [80, 130, 70]\nbeam = [0, -1, 0]\nlateral = [1, 0, 0]\n"
          "needle_tip = [85, 60, 70]\nneedle_direction = [0, -1, 0]\n"}};
     RecipeOverrides overrides;

@@ -95,6 +95,7 @@ TEST(ExerciseFrame, PositionsGoThroughTheMapAndTheNeedleStaysInThePlane) {
     ASSERT_TRUE(exercise.has_value()) << exercise.error().message();
     const Registration truth = analytic_torso_truth();
     EXPECT_LT(distance(exercise->targets[0].centre, mannequin_from_ct(truth, {80, 20, 70})), 1e-3);
+    EXPECT_EQ(exercise->findings[0].lesion.centre, exercise->targets[0].centre);
     const SweepKey& key = exercise->sweeps[0].keys[0];
     EXPECT_LT(distance(key.probe, mannequin_from_ct(truth, {80, 130, 70})), 1e-3);
     const Vector3 normal = cross(key.beam, key.lateral);

@@ -9,7 +9,7 @@
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/pathology/answer_key.h"
-#include "pipeline/pathology/pathology_kinds.h"
+#include "pipeline/pathology/requested_parts.h"
 #include "support/shapes.h"
 
 namespace sonocase::pipeline {

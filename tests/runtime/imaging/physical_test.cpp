@@ -55,6 +55,30 @@ TEST(PhysicalModel, AgreesWithTheSlowRendererEffectByEffect) {
     }
 }
 
+// Nested ellipsoids of a kind: halo, lesion and core, each over the one before.
+TEST(PhysicalModel, LesionsOfAKindAgreeWithTheSlowRenderer) {
+    Exercise exercise = phantom_exercise();
+    const Matrix3 turned = rotation_about(normalized(Vector3{1, 2, -1}), 0.7);
+    for (const char* kind : {"metastasis", "hcc", "simple_cyst", "lymph_node", "adenoma"}) {
+        Finding finding;
+        finding.lesion.look = TargetLook::lesion;
+        finding.lesion.kind = kind;
+        finding.lesion.radius_mm = 6;
+        finding.lesion.axes = {turned, {1.25, 0.8, 1}};
+        finding.lesion.centre = {-36 + 18.0 * static_cast<double>(exercise.findings.size()), 1, 60};
+        exercise.findings.push_back(finding);
+    }
+    const FrameInput input;
+    const auto plain = draw(phantom_exercise(), physical_options(), input);
+    const auto fast = draw(exercise, physical_options(), input);
+    const Difference d =
+        compare(fast, draw(exercise, physical_options(RendererKind::reference), input));
+    std::printf("lesions mean %.3f bias %+.3f worst %d\n", d.mean, d.bias, d.worst);
+    EXPECT_LT(d.mean, 0.35);
+    EXPECT_LT(std::abs(d.bias), 0.1);
+    EXPECT_GT(compare(fast, plain).mean, 0.2);  // five lesions in one picture
+}
+
 // The fast renderer works out the breathing weight on a coarse lattice. Where it is a hundredth
 // off, 8 mm of breathing shift the tissue by a quarter of a scatterer: one grain in four differs.
 TEST(PhysicalModel, AgreesWithTheSlowRendererWhileBreathing) {
@@ -163,6 +187,45 @@ TEST(PhysicalModel, TargetsShowWhereTheyAreAndNowhereElse) {
     // Far from the slab it is pruned, and the picture is the plain one.
     exercise.targets[0].centre.y = 25;
     EXPECT_TRUE(draw(exercise, options, input) == without);
+}
+
+// A simple cyst covers the area of its ellipse in the scan plane, and the tissue behind it is
+// brighter than beside it.
+TEST(PhysicalModel, ACystIsTheEllipseOfItsAxesAndEnhances) {
+    RenderOptions options = physical_options();
+    options.machine = *built_in_machine("classic");
+    Exercise exercise = phantom_exercise();
+    const auto without = draw(exercise, options, FrameInput{});
+    Finding finding;
+    finding.lesion.centre = {20, 0, 50};
+    finding.lesion.radius_mm = 9;
+    finding.lesion.look = TargetLook::lesion;
+    finding.lesion.kind = "simple_cyst";
+    finding.lesion.axes.lengths = {1.6, 1 / 1.6, 1};  // 14.4 mm along x, 9 along z
+    exercise.findings = {finding};
+    auto renderer = Renderer::create(phantom(), exercise, options);
+    ASSERT_TRUE(renderer.has_value());
+    std::vector<std::uint8_t> with(256 * 256);
+    renderer->render(FrameInput{}, with);
+    const auto layout = renderer->layout();
+    double inside = 0, beside = 0, beside_before = 0, behind = 0, behind_before = 0;
+    int n_inside = 0, n_beside = 0, n_behind = 0;
+    for (int row = 0; row < 256; ++row) {
+        for (int column = 0; column < 256; ++column) {
+            const double x = (column - layout.origin_x_px) * layout.mm_per_px - 20,
+                         z = (row - layout.origin_y_px) * layout.mm_per_px - 50;
+            const std::size_t i = static_cast<std::size_t>(row * 256 + column);
+            const double rank = std::hypot(x / 14.4, z / 9);
+            if (rank < 0.75) inside += with[i], ++n_inside;
+            if (rank > 1.35 && rank < 1.6 && z < 0)
+                beside += with[i], beside_before += without[i], ++n_beside;
+            if (std::abs(x) < 6 && z > 16 && z < 26)
+                behind += with[i], behind_before += without[i], ++n_behind;
+        }
+    }
+    EXPECT_LT(inside / n_inside, 35);
+    EXPECT_NEAR(beside / n_beside, beside_before / n_beside, 4);
+    EXPECT_GT(behind / n_behind, behind_before / n_behind + 3);
 }
 
 TEST(PhysicalModel, PicturesForTheEye) {

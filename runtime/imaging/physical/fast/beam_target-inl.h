@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effect targets: the exercise's balls, over the anatomy.
+// Effect targets: the exercise's balls and ellipsoids, over the anatomy.
 #include "runtime/imaging/physical/fast/beam_surface-inl.h"
 
 #if defined(SONOCASE_BEAM_TARGET_INL_H) == defined(HWY_TARGET_TOGGLE)
@@ -12,6 +12,34 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
+
+// Where samples lie about the surface of a target: half the gradient of what rises outwards, its
+// length, and the distance to the surface in mm, to first order.
+template <class V>
+struct AboutTarget {
+    V x, y, z, length, distance_mm;
+};
+
+// f: from the centre, mm; away: its length.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE AboutTarget<V> about_target(
+    D d, const PhysicalTarget& t, V fx, V fy, V fz, V away) {
+    if (t.round) return {fx, fy, fz, away, hn::Sub(away, hn::Set(d, t.radius_mm))};
+    const auto row = [&](int a, int b, int c) HWY_ATTR {
+        return hn::Add(hn::Add(hn::Mul(hn::Set(d, t.shape[a]), fx),
+                               hn::Mul(hn::Set(d, t.shape[b]), fy)),
+                       hn::Mul(hn::Set(d, t.shape[c]), fz));
+    };
+    const auto x = row(0, 3, 4), y = row(3, 1, 5), z = row(4, 5, 2);
+    const auto least = hn::Set(d, 1e-3f);
+    const auto rank =
+        hn::Sqrt(hn::Add(hn::Add(hn::Mul(fx, x), hn::Mul(fy, y)), hn::Mul(fz, z)));
+    const auto length = hn::Max(
+        hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z))), least);
+    return {x, y, z, length,
+            hn::Mul(hn::Sub(rank, hn::Set(d, t.radius_mm)),
+                    hn::Div(hn::Max(rank, least), length))};
+}
 
 template <class D>
 HWY_INLINE void target_row(
@@ -25,9 +53,11 @@ HWY_INLINE void target_row(
     const auto fx = from(c.x.row(row), ball.x), fy = from(c.y.row(row), ball.y),
                fz = from(c.z.row(row), ball.z);
     const auto away = hn::Sqrt(hn::Add(hn::Add(hn::Mul(fx, fx), hn::Mul(fy, fy)), hn::Mul(fz, fz)));
-    auto distance = hn::Sub(away, hn::Set(d, ball.radius_mm));
-    const auto reached = hn::Le(distance, hn::Set(d, static_cast<float>(physical::kTargetReachMm)));
-    if (hn::AllFalse(d, reached)) return;
+    const auto reach = hn::Set(d, static_cast<float>(physical::kTargetReachMm));
+    if (hn::AllFalse(d, hn::Le(hn::Sub(away, hn::Set(d, ball.reach_mm)), reach))) return;
+    const auto about = about_target(d, ball, fx, fy, fz, away);
+    auto distance = about.distance_mm;
+    const auto reached = hn::Le(distance, reach);
     const auto own = hn::Load(di, c.label.row(row));
     const auto kind =
         hn::And(hn::ShiftRight<16>(hn::GatherIndex(di, b.looks, own)), hn::Set(di, 7));
@@ -48,8 +78,9 @@ HWY_INLINE void target_row(
     const auto at = [&](int axis)
                         HWY_ATTR { return hn::LoadU(d, b.beams + (kBeam + axis) * b.lines + v); };
     const auto cosine = hn::Div(
-        hn::Abs(hn::Add(hn::Add(hn::Mul(fx, at(0)), hn::Mul(fy, at(1))), hn::Mul(fz, at(2)))),
-        hn::Max(away, hn::Set(d, 1e-3f)));
+        hn::Abs(hn::Add(hn::Add(hn::Mul(about.x, at(0)), hn::Mul(about.y, at(1))),
+                        hn::Mul(about.z, at(2)))),
+        hn::Max(about.length, hn::Set(d, 1e-3f)));
     const auto within = hn::RebindMask(di, hn::And(close, hn::Lt(distance, zero)));
     hn::Store(hn::IfThenElse(within, hn::Set(di, ball.look), own), di, c.label.row(row));
     if (b.interfaces) {

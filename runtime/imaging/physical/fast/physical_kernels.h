@@ -72,6 +72,9 @@ inline constexpr int kBlockStreaks = 192;  // in a block of beams
 
 struct PhysicalTarget {
     float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels
+    float reach_mm = 0;
+    bool round = true;
+    float shape[6] = {};    // xx, yy, zz, xy, xz, yz
     std::int32_t look = 0;                     // index
     float wall = 0;
     bool fluid = false;

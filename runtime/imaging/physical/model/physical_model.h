@@ -103,8 +103,9 @@ inline constexpr int kFineLayers[] = {16, 32, 64, 4};
 // Plates in organs, and the diaphragm: deviation of their thickness (streak_plates.h, gas_faces.h).
 inline constexpr double kStreakMm = 0.25, kDomeMm = 1.5;
 
-// Targets of an exercise are balls in the anatomy; their surface is as rough as that of organs.
+// Targets and findings of an exercise are balls and ellipsoids in the anatomy; their surface is as
+// rough as that of organs.
 inline constexpr double kTargetReachMm = 2;
-inline constexpr int kMaxTargets = 8;
+inline constexpr int kMaxTargets = 48;
 
 }  // namespace sonocase::runtime::physical

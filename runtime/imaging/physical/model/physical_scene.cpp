@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "formats/pathology/pathology_kinds.h"
 #include "runtime/imaging/physical/model/physical_model.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
 #include "runtime/imaging/physical/model/wall_sheets.h"
@@ -94,6 +95,11 @@ struct TargetTissue {
     double wall = 0.5;
 };
 
+TargetTissue tissue_of(const Tissue& tissue) {
+    return {{tissue.echo_db, tissue.attenuation_db_cm_mhz, tissue.kind},
+            tissue.kind == TissueKind::fluid ? 3 : 0.5};
+}
+
 TargetTissue tissue_of_target(TargetLook look) {
     switch (look) {
         case TargetLook::none:
@@ -106,20 +112,43 @@ TargetTissue tissue_of_target(TargetLook look) {
     return {};
 }
 
+void add_ball(const Target& t, double radius_mm, const TargetTissue& tissue, PhysicalScene& s) {
+    if (!(radius_mm > 0) || s.targets.size() >= kMaxTargets || s.looks.size() >= 255) return;
+    TargetBall ball;
+    ball.centre_vx = s.grid.voxel_from_point(t.centre);
+    ball.radius_mm = radius_mm;
+    const Vector3 l = t.axes.lengths;
+    ball.round = l == Vector3{1, 1, 1};
+    ball.reach_mm = ball.round ? radius_mm : radius_mm * std::max({l.x, l.y, l.z});
+    if (!ball.round) {
+        const Vector3 squares{1 / (l.x * l.x), 1 / (l.y * l.y), 1 / (l.z * l.z)};
+        ball.shape = t.axes.axes * Matrix3::diagonal(squares) * transpose(t.axes.axes);
+    }
+    ball.look = static_cast<int>(s.looks.size());
+    ball.wall = tissue.wall;
+    ball.fluid = tissue.look.kind == TissueKind::fluid;
+    s.looks.push_back(tissue.look);
+    s.targets.push_back(ball);
+}
+
+// From the outermost shell to the core. A shell thinner than kThinShellMm is left to the echo of
+// the surface.
 void add_targets(const std::vector<Target>& targets, PhysicalScene& s) {
+    constexpr double kThinShellMm = 0.75;
     for (const Target& t : targets) {
-        if (t.look == TargetLook::none || !(t.radius_mm > 0) || s.targets.size() >= kMaxTargets ||
-            s.looks.size() >= 255)
+        if (t.look == TargetLook::none) continue;
+        const PathologyKind* kind = find_pathology_kind(t.kind);
+        if (kind == nullptr) {
+            add_ball(t, t.radius_mm, tissue_of_target(t.look), s);
             continue;
-        const TargetTissue tissue = tissue_of_target(t.look);
-        TargetBall ball;
-        ball.centre_vx = s.grid.voxel_from_point(t.centre);
-        ball.radius_mm = t.radius_mm;
-        ball.look = static_cast<int>(s.looks.size());
-        ball.wall = tissue.wall;
-        ball.fluid = tissue.look.kind == TissueKind::fluid;
-        s.looks.push_back(tissue.look);
-        s.targets.push_back(ball);
+        }
+        for (const LesionPart& part : kind->parts)
+            if (part.place == PartPlace::shell && part.size >= kThinShellMm)
+                add_ball(t, t.radius_mm + part.size, tissue_of(part.tissue), s);
+        add_ball(t, t.radius_mm, tissue_of(kind->tissue), s);
+        for (const LesionPart& part : kind->parts)
+            if (part.place == PartPlace::core)
+                add_ball(t, t.radius_mm * part.size, tissue_of(part.tissue), s);
     }
 }
 

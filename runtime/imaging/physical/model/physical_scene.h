@@ -39,10 +39,14 @@ struct AcousticProperties {
     double wall_db = 0;  // added to echo_db by effect wall, whose sheets draw the skin
 };
 
-// A target of the exercise: a ball in the anatomy.
+// A target or finding of the exercise, or a part of one: a ball or an ellipsoid in the anatomy. An
+// ellipsoid is where f . shape f <= radius_mm^2, f from its centre in mm.
 struct TargetBall {
     Point3 centre_vx;  // voxel coordinates
     double radius_mm = 5;
+    double reach_mm = 5;  // of the longest axis
+    bool round = true;    // shape is the identity
+    Matrix3 shape;        // symmetric
     int look = 0;     // index into looks
     double wall = 0;  // amplitude of its surface
     bool fluid = false;
@@ -88,7 +92,8 @@ struct PhysicalSceneOptions {
     MachineStructures structures;                      // that the machine shows
 };
 
-// targets: of the exercise; those that only mark a place do not show in the tissue.
+// targets: of the exercise, with its findings; those that only mark a place do not show in the
+// tissue. Of two that overlap the later one shows.
 // The bundle must outlive the scene. Errors: a bundle without labels; too little memory
 // for the tables. Cost: some tens of ms for a torso at 1 mm.
 Result<PhysicalScene> make_physical_scene(CaseView view,

@@ -176,7 +176,7 @@ class Beams {
                 continue;
             }
             Sample p = place_sample(k, l, beam);
-            if (in_.frame.effects.targets) find_target(in_, beam, p);
+            if (in_.frame.effects.targets) find_target(in_, p);
             const AcousticProperties& look =
                 in_.scene.looks[static_cast<std::size_t>(p.look_index)];
             const double past = in_.row(k).r_mm - face.dome_mm;
@@ -187,7 +187,7 @@ class Beams {
             p.re += p.row.interface_scale * wall.amplitude;
             if (look.kind == TissueKind::soft) meet_streaks(o, d, p);
             meet_surface(in_, beam, p);
-            meet_target(in_, p);
+            if (in_.frame.effects.targets) meet_targets(in_, beam, p);
             if (std::abs(past) < kDomeReachMm) {
                 p.re = line * in_.tables.dome_scale * p.row.interface_scale;
                 p.im = 0;

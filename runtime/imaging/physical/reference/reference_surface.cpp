@@ -18,6 +18,33 @@ double graze_loss(double cosine, double distance_mm, double step_mm) {
     return kEdgeLossLog2PerMm * graze * graze * near * step_mm;
 }
 
+// A sample beside the surface of a target.
+struct NearTarget {
+    bool reached = false;
+    double distance_mm = 0;  // to the rough surface, to first order; < 0 inside
+    Vector3 normal;
+};
+
+NearTarget near_target(const ReferenceInput& in, const TargetBall& t, Point3 v) {
+    const Vector3 from_centre = in.scene.voxel_mm * (v - t.centre_vx);
+    const Vector3 slope = t.shape * from_centre;
+    const double rank = std::sqrt(dot(from_centre, slope));
+    const double smooth = t.round
+                              ? norm(from_centre) - t.radius_mm
+                              : (rank - t.radius_mm) * std::max(rank, 1e-3) /
+                                    std::max(norm(slope), 1e-3);
+    NearTarget near;
+    near.reached = smooth <= kTargetReachMm;
+    if (!near.reached) return near;
+    near.distance_mm = smooth + kRoughnessMm * roughness_at(in.scene, v).shift;
+    near.normal = slope / std::max(norm(slope), 1e-3);
+    return near;
+}
+
+bool gives_way(const ReferenceInput& in, const Sample& p) {
+    return in.scene.looks[static_cast<std::size_t>(p.place.label)].kind == TissueKind::soft;
+}
+
 }  // namespace
 
 void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p) {
@@ -40,35 +67,33 @@ void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p) {
         p.loss += graze_loss(cosine, place.distance_mm, in.geometry.step_mm);
 }
 
-void find_target(const ReferenceInput& in, Vector3 beam, Sample& p) {
-    const PhysicalScene& s = in.scene;
-    for (const TargetBall& t : s.targets) {
-        const Vector3 from_centre = s.voxel_mm * (p.v - t.centre_vx);
-        const double away = norm(from_centre);
-        if (away - t.radius_mm > kTargetReachMm ||
-            s.looks[static_cast<std::size_t>(p.place.label)].kind != TissueKind::soft)
-            continue;
-        p.ball = &t;
-        p.ball_mm = away - t.radius_mm + kRoughnessMm * roughness_at(s, p.v).shift;
-        p.ball_cosine = std::abs(dot(from_centre, beam)) / std::max(away, 1e-3);
-        if (p.ball_mm < 0) p.look_index = t.look;
+void find_target(const ReferenceInput& in, Sample& p) {
+    if (!gives_way(in, p)) return;
+    for (const TargetBall& t : in.scene.targets) {
+        const NearTarget near = near_target(in, t, p.v);
+        if (near.reached && near.distance_mm < 0) p.look_index = t.look;
     }
 }
 
-void meet_target(const ReferenceInput& in, Sample& p) {
-    if (p.ball == nullptr) return;
-    const Roughness rough = roughness_at(in.scene, p.v);
-    if (in.frame.effects.interfaces) {
-        const double u = p.ball_mm / 0.16;
-        const double c2 = p.ball_cosine * p.ball_cosine;
-        const double i = p.ball->wall * (0.08 * p.ball_cosine + 0.92 * c2 * c2 * c2) *
-                         std::exp2(rough.log2_glint) * std::exp(-0.5 * u * u) *
-                         p.row.interface_scale;
-        p.re += i * rough.re;
-        p.im += i * rough.im;
+void meet_targets(const ReferenceInput& in, Vector3 beam, Sample& p) {
+    if (!gives_way(in, p)) return;
+    for (const TargetBall& t : in.scene.targets) {
+        const NearTarget near = near_target(in, t, p.v);
+        if (!near.reached) continue;
+        const Roughness rough = roughness_at(in.scene, p.v);
+        const double cosine = std::abs(dot(near.normal, beam));
+        if (in.frame.effects.interfaces) {
+            const double u = near.distance_mm / 0.16;
+            const double c2 = cosine * cosine;
+            const double i = t.wall * (0.08 * cosine + 0.92 * c2 * c2 * c2) *
+                             std::exp2(rough.log2_glint) * std::exp(-0.5 * u * u) *
+                             p.row.interface_scale;
+            p.re += i * rough.re;
+            p.im += i * rough.im;
+        }
+        if (in.frame.effects.edge_shadow && t.fluid)
+            p.loss += graze_loss(cosine, near.distance_mm, in.geometry.step_mm);
     }
-    if (in.frame.effects.edge_shadow && p.ball->fluid)
-        p.loss += graze_loss(p.ball_cosine, p.ball_mm, in.geometry.step_mm);
 }
 
 }  // namespace sonocase::runtime

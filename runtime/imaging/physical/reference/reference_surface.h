@@ -16,8 +16,6 @@ struct Sample {
     Vector3 from_origin{};    // of the volume, mm, before the slab's random step
     Point3 v{}, looked_up{};  // voxel coordinates: the sample, and the voxel that is asked
     Place place{};
-    const TargetBall* ball = nullptr;  // whose surface is near
-    double ball_mm = 0, ball_cosine = 0;
     int look_index = 0;
     double re = 0, im = 0;                                           // echo of surfaces
     std::array<double, physical::kMaxLooks> field_re{}, field_im{};  // of scatterers, one per look
@@ -28,10 +26,9 @@ struct Sample {
 
 // The surface between two labels: its echo, and what it takes. beam: unit, frame `mannequin`.
 void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p);
-// The target whose surface is near, if any: the last one that is. Soft tissue alone gives way to
-// it.
-void find_target(const ReferenceInput& in, Vector3 beam, Sample& p);
-// The surface of a target.
-void meet_target(const ReferenceInput& in, Sample& p);
+// The target that the sample lies in, if any: the last one. Soft tissue alone gives way to it.
+void find_target(const ReferenceInput& in, Sample& p);
+// The surfaces of targets that are near.
+void meet_targets(const ReferenceInput& in, Vector3 beam, Sample& p);
 
 }  // namespace sonocase::runtime

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/pathology/pathology_kinds.h"
+#include "formats/pathology/pathology_kinds.h"
 
 #include <algorithm>
 
-namespace sonocase::pipeline {
+namespace sonocase {
 namespace {
 
 constexpr auto kSoft = TissueKind::soft;
@@ -334,34 +334,21 @@ std::vector<std::string> pathology_kind_names() {
     return names;
 }
 
-double part_size(const PathologyRequest& request, const LesionPart& part) {
-    const auto given = request.parts.find(part.name);
-    return given == request.parts.end() ? part.size : given->second;
+bool drawn_per_attempt(const PathologyKind& kind) {
+    const auto plain = [](const LesionPart& part) {
+        return part.tissue.kind == TissueKind::soft &&
+               (part.place == PartPlace::shell || part.place == PartPlace::core);
+    };
+    return kind.shape == LesionShape::ellipsoid && !kind.settles &&
+           (kind.tissue.kind == TissueKind::soft || kind.tissue.kind == TissueKind::fluid) &&
+           std::all_of(kind.parts.begin(), kind.parts.end(), plain);
 }
 
-std::vector<std::string> pathology_labels(const PathologyRequest& request) {
-    std::vector<std::string> names{request.name};
-    if (const PathologyKind* kind = find_pathology_kind(request.kind))
-        for (const LesionPart& part : kind->parts)
-            if (part_size(request, part) > 0) names.push_back(request.name + "_" + part.name);
+std::vector<std::string> kinds_drawn_per_attempt() {
+    std::vector<std::string> names;
+    for (const PathologyKind& kind : kinds())
+        if (drawn_per_attempt(kind)) names.push_back(kind.name);
     return names;
 }
 
-std::vector<Tissue> pathology_tissues(std::span<const PathologyRequest> requests) {
-    std::vector<Tissue> needed;
-    const auto add = [&](const Tissue& tissue) {
-        const bool there = std::any_of(needed.begin(), needed.end(),
-                                       [&](const Tissue& t) { return t.name == tissue.name; });
-        if (!there) needed.push_back(tissue);
-    };
-    for (const PathologyRequest& request : requests) {
-        const PathologyKind* kind = find_pathology_kind(request.kind);
-        if (kind == nullptr) continue;
-        if (request.tissue.empty()) add(kind->tissue);
-        for (const LesionPart& part : kind->parts)
-            if (part_size(request, part) > 0) add(part.tissue);
-    }
-    return needed;
-}
-
-}  // namespace sonocase::pipeline
+}  // namespace sonocase

@@ -11,9 +11,8 @@
 #include <vector>
 
 #include "formats/volume/tissue.h"
-#include "pipeline/pathology/pathology.h"
 
-namespace sonocase::pipeline {
+namespace sonocase {
 
 enum class LesionShape { ellipsoid, tube, pool, swell };
 
@@ -48,10 +47,9 @@ std::span<const PathologyKind> pathology_kinds();
 const PathologyKind* find_pathology_kind(std::string_view name);  // null: none of that name
 std::vector<std::string> pathology_kind_names();
 
-// The tissues that these requests need and that the table lacks, once each.
-std::vector<Tissue> pathology_tissues(std::span<const PathologyRequest> requests);
+// True for the kinds that a player can draw anew in each attempt: soft or fluid ellipsoids whose
+// parts are shells and cores of soft tissue.
+bool drawn_per_attempt(const PathologyKind& kind);
+std::vector<std::string> kinds_drawn_per_attempt();  // their names
 
-// Thickness, count or share of a part: the request's, else the kind's. 0: the part is left out.
-double part_size(const PathologyRequest& request, const LesionPart& part);
-
-}  // namespace sonocase::pipeline
+}  // namespace sonocase
