@@ -14,15 +14,15 @@
 namespace sonocase {
 namespace {
 
-constexpr int kPlaces = 400;                          // tried for a target
-constexpr int kStarts = 200;                          // tried for the probe
-constexpr int kDirections = 96;                       // tried for lines to a target
-constexpr double kSpareLengthMm = 10;                 // of the needle, for the hand
-constexpr double kOffPlaneMm = 20;                    // of the targets at the start
-constexpr double kApartMm = 2;                        // of a finding from others and from targets
+constexpr int kPlaces = 400;           // tried for a target
+constexpr int kStarts = 200;           // tried for the probe
+constexpr int kDirections = 96;        // tried for lines to a target
+constexpr double kSpareLengthMm = 10;  // of the needle, for the hand
+constexpr double kOffPlaneMm = 20;     // of the targets at the start
+constexpr double kApartMm = 2;         // of a finding from others and from targets
 constexpr std::uint64_t kLesionStream = 0x6A09E667F3BCC909ull;  // fraction of the root of 2
-constexpr double kLeastCosine = 0.17364817766693041;  // of 80 degrees
-constexpr double kMostCosine = 0.93969262078590843;   // of 20 degrees
+constexpr double kLeastCosine = 0.17364817766693041;            // of 80 degrees
+constexpr double kMostCosine = 0.93969262078590843;             // of 20 degrees
 
 struct Body {
     const Anatomy& anatomy;

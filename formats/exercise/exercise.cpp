@@ -105,8 +105,7 @@ void read_target(const TomlTable& table, std::vector<Target>& targets) {
 
 void read_finding(const TomlTable& table, std::vector<Finding>& findings) {
     Finding finding;
-    finding.lesion =
-        read_place_and_look(table, "finding " + std::to_string(findings.size() + 1));
+    finding.lesion = read_place_and_look(table, "finding " + std::to_string(findings.size() + 1));
     if (finding.lesion.look == TargetLook::none || finding.lesion.look == TargetLook::marker)
         table.complain("look", "is missing, or shows nothing",
                        "expected what the finding is, as in \"simple_cyst\"");

@@ -59,7 +59,7 @@ struct Target {
     TargetLook look = TargetLook::marker;
     // look lesion: a kind of formats/pathology, by whose figures it shows; empty: a plain lesion.
     std::string kind;
-    LesionAxes axes;  // of a kind, drawn for each attempt; a ball as written
+    LesionAxes axes;     // of a kind, drawn for each attempt; a ball as written
     std::string inside;  // label that it must lie in; empty: anywhere
     // Where an attempt may draw it (formats/attempt): anywhere in this ball about `centre`, with
     // nothing but `inside` within clearance_mm. 0: the target stays at its centre.

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/pathology/label_canvas.h"
-#include "pipeline/pathology/pathology.h"
 #include "formats/base/result.h"
 #include "formats/pathology/pathology_kinds.h"
+#include "pipeline/pathology/label_canvas.h"
+#include "pipeline/pathology/pathology.h"
 
 namespace sonocase::pipeline {
 

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "formats/pathology/pathology_kinds.h"
 #include "pipeline/pathology/label_canvas.h"
 #include "pipeline/pathology/lesion_parts.h"
 #include "pipeline/pathology/lesion_place.h"
 #include "pipeline/pathology/pathology.h"
-#include "formats/pathology/pathology_kinds.h"
 
 namespace sonocase::pipeline {
 

@@ -28,7 +28,8 @@ class PlainBall final : public Anatomy {
     bool knows_tissue() const override { return true; }
 };
 
-const std::vector<Label> kLabels{{"outside", "", 0, {}}, {"organ", "", 1, {}}, {"flesh", "", 2, {}}};
+const std::vector<Label> kLabels{
+    {"outside", "", 0, {}}, {"organ", "", 1, {}}, {"flesh", "", 2, {}}};
 
 Finding finding(const std::string& kind, double radius_mm) {
     Finding f;

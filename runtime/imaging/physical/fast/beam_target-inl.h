@@ -22,23 +22,20 @@ struct AboutTarget {
 
 // f: from the centre, mm; away: its length.
 template <class D, class V = hn::Vec<D>>
-HWY_INLINE AboutTarget<V> about_target(
-    D d, const PhysicalTarget& t, V fx, V fy, V fz, V away) {
+HWY_INLINE AboutTarget<V> about_target(D d, const PhysicalTarget& t, V fx, V fy, V fz, V away) {
     if (t.round) return {fx, fy, fz, away, hn::Sub(away, hn::Set(d, t.radius_mm))};
     const auto row = [&](int a, int b, int c) HWY_ATTR {
-        return hn::Add(hn::Add(hn::Mul(hn::Set(d, t.shape[a]), fx),
-                               hn::Mul(hn::Set(d, t.shape[b]), fy)),
-                       hn::Mul(hn::Set(d, t.shape[c]), fz));
+        return hn::Add(
+            hn::Add(hn::Mul(hn::Set(d, t.shape[a]), fx), hn::Mul(hn::Set(d, t.shape[b]), fy)),
+            hn::Mul(hn::Set(d, t.shape[c]), fz));
     };
     const auto x = row(0, 3, 4), y = row(3, 1, 5), z = row(4, 5, 2);
     const auto least = hn::Set(d, 1e-3f);
-    const auto rank =
-        hn::Sqrt(hn::Add(hn::Add(hn::Mul(fx, x), hn::Mul(fy, y)), hn::Mul(fz, z)));
-    const auto length = hn::Max(
-        hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z))), least);
+    const auto rank = hn::Sqrt(hn::Add(hn::Add(hn::Mul(fx, x), hn::Mul(fy, y)), hn::Mul(fz, z)));
+    const auto length =
+        hn::Max(hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z))), least);
     return {x, y, z, length,
-            hn::Mul(hn::Sub(rank, hn::Set(d, t.radius_mm)),
-                    hn::Div(hn::Max(rank, least), length))};
+            hn::Mul(hn::Sub(rank, hn::Set(d, t.radius_mm)), hn::Div(hn::Max(rank, least), length))};
 }
 
 template <class D>
@@ -77,10 +74,10 @@ HWY_INLINE void target_row(
                                   hn::Set(d, static_cast<float>(physical::kRoughnessMm) / 32)));
     const auto at = [&](int axis)
                         HWY_ATTR { return hn::LoadU(d, b.beams + (kBeam + axis) * b.lines + v); };
-    const auto cosine = hn::Div(
-        hn::Abs(hn::Add(hn::Add(hn::Mul(about.x, at(0)), hn::Mul(about.y, at(1))),
-                        hn::Mul(about.z, at(2)))),
-        hn::Max(about.length, hn::Set(d, 1e-3f)));
+    const auto cosine =
+        hn::Div(hn::Abs(hn::Add(hn::Add(hn::Mul(about.x, at(0)), hn::Mul(about.y, at(1))),
+                                hn::Mul(about.z, at(2)))),
+                hn::Max(about.length, hn::Set(d, 1e-3f)));
     const auto within = hn::RebindMask(di, hn::And(close, hn::Lt(distance, zero)));
     hn::Store(hn::IfThenElse(within, hn::Set(di, ball.look), own), di, c.label.row(row));
     if (b.interfaces) {

@@ -112,8 +112,7 @@ void PhysicalFast::choose_targets(const PhysicalFrame& f, bool keep_all) {
     const Point3 origin = f.volume_from_probe * Point3{0, 0, 0};
     for (std::size_t t = 0; t < targets_.size(); ++t) {
         const Point3 centre = scene_.grid.point_from_voxel(scene_.targets[t].centre_vx);
-        if (keep_all ||
-            std::abs(dot(normal, centre - origin)) < thick + scene_.targets[t].reach_mm)
+        if (keep_all || std::abs(dot(normal, centre - origin)) < thick + scene_.targets[t].reach_mm)
             near_targets_.push_back(targets_[t]);
     }
 }

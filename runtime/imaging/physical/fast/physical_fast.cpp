@@ -97,17 +97,17 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
         const auto shape = [&](int row, int column) {
             return static_cast<float>(t.shape(row, column));
         };
-        targets_.push_back({static_cast<float>(t.centre_vx.x),
-                            static_cast<float>(t.centre_vx.y),
-                            static_cast<float>(t.centre_vx.z),
-                            static_cast<float>(t.radius_mm),
-                            static_cast<float>(t.reach_mm),
-                            t.round,
-                            {shape(0, 0), shape(1, 1), shape(2, 2), shape(0, 1), shape(0, 2),
-                             shape(1, 2)},
-                            t.look,
-                            static_cast<float>(t.wall),
-                            t.fluid});
+        targets_.push_back(
+            {static_cast<float>(t.centre_vx.x),
+             static_cast<float>(t.centre_vx.y),
+             static_cast<float>(t.centre_vx.z),
+             static_cast<float>(t.radius_mm),
+             static_cast<float>(t.reach_mm),
+             t.round,
+             {shape(0, 0), shape(1, 1), shape(2, 2), shape(0, 1), shape(0, 2), shape(1, 2)},
+             t.look,
+             static_cast<float>(t.wall),
+             t.fluid});
     }
     frame_looks_ = looks_;
     near_targets_.reserve(targets_.size());

@@ -75,7 +75,7 @@ struct PhysicalTarget {
     float reach_mm = 0;
     bool round = true;
     float shape[6] = {};    // xx, yy, zz, xy, xz, yz
-    std::int32_t look = 0;                     // index
+    std::int32_t look = 0;  // index
     float wall = 0;
     bool fluid = false;
 };

@@ -47,8 +47,8 @@ struct TargetBall {
     double reach_mm = 5;  // of the longest axis
     bool round = true;    // shape is the identity
     Matrix3 shape;        // symmetric
-    int look = 0;     // index into looks
-    double wall = 0;  // amplitude of its surface
+    int look = 0;         // index into looks
+    double wall = 0;      // amplitude of its surface
     bool fluid = false;
 };
 

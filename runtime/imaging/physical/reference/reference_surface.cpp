@@ -29,10 +29,9 @@ NearTarget near_target(const ReferenceInput& in, const TargetBall& t, Point3 v) 
     const Vector3 from_centre = in.scene.voxel_mm * (v - t.centre_vx);
     const Vector3 slope = t.shape * from_centre;
     const double rank = std::sqrt(dot(from_centre, slope));
-    const double smooth = t.round
-                              ? norm(from_centre) - t.radius_mm
-                              : (rank - t.radius_mm) * std::max(rank, 1e-3) /
-                                    std::max(norm(slope), 1e-3);
+    const double smooth =
+        t.round ? norm(from_centre) - t.radius_mm
+                : (rank - t.radius_mm) * std::max(rank, 1e-3) / std::max(norm(slope), 1e-3);
     NearTarget near;
     near.reached = smooth <= kTargetReachMm;
     if (!near.reached) return near;

@@ -90,6 +90,68 @@ TEST(Voxelise, OverlappingPartsAreInsideAndNestedOnesToo) {
     EXPECT_FALSE(inside(0, 14, 0));
 }
 
+// A closed tube along a figure of eight in the plane z = 0: one surface that passes through itself.
+constexpr double kEightRadiusMm = 6;
+Point3 on_eight(double t) {
+    return {30 * std::sin(t), 20 * std::sin(2 * t), 0};
+}
+Surface eight() {
+    constexpr int kRings = 240, kAround = 24;
+    Surface s;
+    for (int ring = 0; ring < kRings; ++ring) {
+        const double t = 2 * kPi * ring / kRings;
+        const Vector3 along = normalized(Vector3{30 * std::cos(t), 40 * std::cos(2 * t), 0});
+        const Vector3 side = cross({0, 0, 1}, along);
+        for (int a = 0; a < kAround; ++a) {
+            const double turn = 2 * kPi * a / kAround;
+            s.points.push_back(on_eight(t) + kEightRadiusMm * (std::cos(turn) * side +
+                                                               std::sin(turn) * Vector3{0, 0, 1}));
+        }
+    }
+    for (int ring = 0; ring < kRings; ++ring) {
+        for (int a = 0; a < kAround; ++a) {
+            const auto at = [&](int r, int b) {
+                return static_cast<std::uint32_t>(r % kRings * kAround + b % kAround);
+            };
+            s.triangles.push_back({at(ring, a), at(ring, a + 1), at(ring + 1, a)});
+            s.triangles.push_back({at(ring, a + 1), at(ring + 1, a + 1), at(ring + 1, a)});
+        }
+    }
+    return s;
+}
+
+// Where the two arms cross is inside, as if each were a solid of its own.
+TEST(Voxelise, ASurfaceThatCrossesItselfIsTheUnionOfItsArms) {
+    MendReport report;
+    const Surface solid = mend_mesh(eight(), {}, &report);
+    EXPECT_EQ(report.components, 1);
+    EXPECT_EQ(report.open_loops, 0);
+    const Grid grid = testing::cubic_grid(81);
+    const VoxelMask mask = voxelise(solid, true, grid);
+    int wrong = 0, inside = 0;
+    for (int k = 0; k < 81; ++k) {
+        for (int j = 0; j < 81; ++j) {
+            for (int i = 0; i < 81; ++i) {
+                const Point3 p = grid.point_from_voxel(
+                    {static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)});
+                double nearest = 1e9;
+                for (int n = 0; n < 360 && std::abs(p.z) < kEightRadiusMm + 1; ++n)
+                    nearest = std::min(nearest, distance(p, on_eight(kPi * n / 180)));
+                // Facets cut chords of 0.05 mm; the lattice of voxels is 1 mm.
+                if (std::abs(nearest - kEightRadiusMm) < 0.25) continue;
+                inside += nearest < kEightRadiusMm ? 1 : 0;
+                const Int3 v{i - mask.first.x, j - mask.first.y, k - mask.first.z};
+                const bool in_mask = v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < mask.size.x &&
+                                     v.y < mask.size.y && v.z < mask.size.z;
+                const bool covered = in_mask && mask.inside[mask.index(v.x, v.y, v.z)] != 0;
+                wrong += covered != (nearest < kEightRadiusMm) ? 1 : 0;
+            }
+        }
+    }
+    EXPECT_GT(inside, 10000);
+    EXPECT_EQ(wrong, 0);
+}
+
 TEST(Voxelise, AnOpenSurfaceGoesByWindingNumbers) {
     const Grid grid = testing::cubic_grid(61);
     const VoxelMask open = voxelise(without_top(ball_mesh({0, 0, 0}, 20, 60), 17), false, grid);
