@@ -10,7 +10,7 @@ import {Browser, expect, expect_equal, folder, run, run_tests} from './support.m
 const [program, bin] = process.argv.slice(2);
 const work = folder();
 const case_file = join(work, 'small.sonocase'), session_file = join(work, 'small.igs.mha'), site = join(work, 'site');
-run(join(bin, 'core_write_case'), case_file, session_file);
+run(join(bin, 'core_write_case'), case_file, session_file, 'flow');
 run(join(bin, 'sonocase'), 'publish', case_file, '-o', site, '--program', program);
 
 async function serve(of) {
@@ -145,6 +145,55 @@ await run_tests({
         expect(await pixels() !== tilted, 'two fingers tilt');
         await page.close();
     },
+    async doppler_modes_are_switched_aimed_dragged_and_recorded() {
+        const page = await browser.page();
+        await scanning(page);
+        const doppler = 'sonoplay.app.core.doppler()', kShift = 8;
+        await page.value('sonoplay.app.core.calls.turn(1.57)');
+        await page.key('KeyB');
+        await page.until('sonoplay.app.scan.values.attempt');
+        await page.key('Digit2', kShift);
+        await page.until('!document.getElementById("doppler").hidden && sonoplay.app.core.overlay()?.some((index) => index > 0)');
+        expect(await page.value(`(() => {
+            const canvas = document.getElementById('picture'), {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+            for (let n = 0; n < data.length; n += 4) if (Math.abs(data[n] - data[n + 2]) > 60) return true;
+        })()`), 'there is colour on the canvas');
+        // The box follows the mouse, and the probe stays.
+        const before = await page.value(doppler), {x, y} = await page.value(`(() => {
+            const {core, scan} = sonoplay.app, points = core.doppler_marks(), r = document.getElementById('picture').getBoundingClientRect(), v = scan.values;
+            const middle = points.reduce((sum, p) => ({x: sum.x + p.x / points.length, z: sum.z + p.z / points.length}), {x: 0, z: 0});
+            const of = (mm, origin) => (mm / v.mm_per_px + origin) * r.width / v.side;
+            return {x: r.left + of(middle.x, v.origin_x), y: r.top + of(middle.z, v.origin_y)};
+        })()`);
+        await page.send('Input.dispatchMouseEvent', {type: 'mousePressed', x, y, button: 'left', buttons: 1, clickCount: 1});
+        await page.send('Input.dispatchMouseEvent', {type: 'mouseMoved', x, y: y + 30, button: 'left', buttons: 1});
+        await page.send('Input.dispatchMouseEvent', {type: 'mouseReleased', x, y: y + 30, button: 'left', clickCount: 1});
+        await page.until(`${doppler}.box_top_mm > ${before.box_top_mm} + 1`);
+        const after = await page.value(doppler);
+        expect(Math.abs((after.box_bottom_mm - after.box_top_mm) - (before.box_bottom_mm - before.box_top_mm)) < 1e-9, 'in its size');
+        // Its controls by keyboard; each is named (the test of names looks at them in this mode too).
+        await page.value('document.getElementById("d-scale").value = 50; document.getElementById("d-scale").dispatchEvent(new Event("change"))');
+        expect_equal((await page.value(doppler)).scale_cm_s, 50, 'scale');
+        await page.key('Digit3', kShift);
+        await page.until('!document.getElementById("strip").hidden && sonoplay.app.scan.values.beats > 0', 30);
+        await page.until('document.getElementById("doppler-words").textContent.includes("PSV")');
+        await page.click('d-sound');
+        await page.until('sonoplay.app.scan.doppler.audio.next_s > 0');
+        await page.key('Digit4', kShift);
+        await page.until('document.getElementById("doppler-words").textContent.includes("Depth over time")');
+        await page.until(`${seconds_attempt} > 5.2`);
+        await page.key('Digit1', kShift);
+        await page.until('document.getElementById("doppler").hidden && document.getElementById("strip").hidden');
+        await page.key('KeyB');
+        await page.until('!document.getElementById("after").hidden');
+        const {recording, text} = await page.value('({recording: [...sonoplay.app.attempt.recording], text: sonoplay.app.attempt.score_text})');
+        const file = join(work, 'doppler.igs.mha');
+        writeFileSync(file, Buffer.from(recording));
+        expect(Buffer.from(recording).includes('vessel'), 'the recording names the vessel');
+        expect_equal(text, run(join(bin, 'web_oracle'), 'score', case_file, file), 'scores');
+        expect_equal(page.errors.join(), '', 'errors on the console');
+        await page.close();
+    },
     async freezing_holds_the_picture_and_looks_back() {
         const page = await browser.page();
         await scanning(page);
@@ -200,6 +249,8 @@ await run_tests({
                 }
             };
             look('scan');
+            for (const mode of ['colour', 'power', 'spectral', 'm_mode']) { sonoplay.app.scan.doppler.choose(mode); look(mode); }
+            sonoplay.app.scan.doppler.choose('off');
             for (const name of ['start', 'after', 'scores']) { sonoplay.app.show(name); look(name); }
             document.getElementById('help').showModal(); look('help');
             return faults;
