@@ -12,7 +12,7 @@ const hash = (data) => createHash('sha256').update(data).digest('base64');
 
 // Modules in the order in which they need each other. Each imports by one line per module and exports declarations
 // only, and top-level names are unique: then the text without those words is the same program.
-const modules = ['core.js', 'source.js', 'arriving.js', 'results.js', 'picture.js', 'poses.js', 'scan_keys.js', 'hands.js', 'doppler.js', 'scan.js', 'app.js'];
+const modules = ['core.js', 'source.js', 'arriving.js', 'results.js', 'picture.js', 'poses.js', 'scan_keys.js', 'hands.js', 'doppler.js', 'view3d.js', 'scan.js', 'app.js'];
 const seen = new Map();
 let script = '// SPDX-License-Identifier: Apache-2.0\n';
 for (const name of modules) {

@@ -179,6 +179,23 @@ export class Core {
     palette(power) { return new Uint8Array(this.memory.buffer, this.calls.palette(power ? 1 : 0), 768).slice(); }
     // Pairs of samples of the last picture: flow towards the probe, flow away.
     sound() { return new Float32Array(this.memory.buffer, this.calls.sound(), 2 * this.calls.sound_count()); }
+    // A part of the 3-D view: eight floats a vertex (place, normal, texture), three indices a triangle, 0xRRGGBB.
+    scene_part(part) {
+        const count = this.calls.scene_part(part), {buffer} = this.memory;
+        return {vertices: new Float32Array(buffer, this.calls.scene_vertices(), 8 * count),
+            indices: new Uint32Array(buffer, this.calls.scene_indices(), this.calls.scene_index_count()), rgb: this.calls.scene_rgb(part)};
+    }
+    scene_first() {
+        this.calls.scene_first();
+        const [yaw, pitch, distance] = new Float64Array(this.memory.buffer, this.calls.numbers(), 3);
+        return {yaw, pitch, distance};
+    }
+    // Rows of camera_from_mannequin, mannequin_from_probe, mannequin_from_needle. from: 0 outside, 1 probe, 2 needle.
+    scene_places(from, {yaw, pitch, distance}) {
+        this.calls.scene_places(from, yaw, pitch, distance);
+        const at = this.calls.numbers();
+        return [0, 1, 2].map((n) => new Float64Array(this.memory.buffer, at + 128 * n, 16).slice());
+    }
     // The name of what a pixel of the last picture shows.
     name_at(column, row) {
         this.calls.name_at(column, row);

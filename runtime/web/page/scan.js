@@ -5,6 +5,7 @@ import {Doppler} from './doppler.js';
 import {Hands} from './hands.js';
 import {Picture} from './picture.js';
 import {minutes} from './results.js';
+import {View3d} from './view3d.js';
 
 const kIdleRate = 40;  // pictures per second while nothing moves: tissue breathes, noise changes
 const kSliders = 8;
@@ -25,6 +26,7 @@ export class ScanPage {
         this.listen();
         this.hands = new Hands(this, $('picture'));
         this.doppler = new Doppler(this);
+        this.view3d = new View3d(this);
         new ResizeObserver(() => this.fit_later()).observe($('picture-box'));
     }
 
@@ -93,6 +95,7 @@ export class ScanPage {
         this.core.set_console(this.console);
         this.values = core.values();
         this.doppler.show();
+        this.view3d.show();
         this.fit();
         this.say_console();
         this.last_s = undefined;
@@ -158,6 +161,7 @@ export class ScanPage {
         this.values = this.core.values();
         this.picture.show(this.core.pixels(), this.core.overlay(), this.doppler.colours());
         this.doppler.picture_drawn();
+        this.view3d.picture_drawn(now_s);
         this.frame_ms = performance.now() - before;
         this.picture.draw_over(this.values, this.flip_sign(), this.measures, this.first_point,
             this.shows_targets() ? this.core.targets() : [], this.name_there(), (on) => this.doppler.draw_over(on));

@@ -26,6 +26,7 @@ export function press_key(scan, code, {shift}, repeated) {
         KeyN: () => scan.toggle_needle(!shift),
         KeyM: () => scan.measure(!scan.measuring),
         KeyC: () => scan.clear(),
+        KeyV: () => scan.view3d.show_it(!scan.view3d.on),
         KeyF: () => scan.flip(),
         KeyB: () => scan.toggle_attempt(),
         KeyH: () => scan.next_hint(),
