@@ -16,7 +16,7 @@ const modules = ['core.js', 'source.js', 'arriving.js', 'results.js', 'picture.j
 const seen = new Map();
 let script = '// SPDX-License-Identifier: Apache-2.0\n';
 for (const name of modules) {
-    const lines = read(name).split('\n').filter((line) => !/^import .* from '\.\/[a-z]+\.js';$/.test(line));
+    const lines = read(name).split('\n').filter((line) => !/^import .* from '\.\/[a-z0-9_]+\.js';$/.test(line));
     for (const line of lines) {
         if (/^import\b/.test(line)) throw new Error(`${name}: an import on more than one line: ${line}`);
         const top = /^(?:export )?(?:async )?(?:function|class|const|let) ([A-Za-z_$]+)/.exec(line);

@@ -48,7 +48,11 @@ Result<std::unique_ptr<PagePlayer>> PagePlayer::open(RawVector<std::uint8_t> byt
                                                      const std::string& where) {
     Result<StreamedBundle> bundle = stream_bundle(std::move(bytes), where);
     if (!bundle) return bundle.error();
-    return std::unique_ptr<PagePlayer>(new PagePlayer(std::move(*bundle), where));
+    return of(std::move(*bundle), where);
+}
+
+std::unique_ptr<PagePlayer> PagePlayer::of(StreamedBundle bundle, const std::string& where) {
+    return std::unique_ptr<PagePlayer>(new PagePlayer(std::move(bundle), where));
 }
 
 Result<std::unique_ptr<PagePlayer>> PagePlayer::open_in_parts(RawVector<std::uint8_t> bytes,

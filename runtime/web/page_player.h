@@ -36,6 +36,9 @@ class PagePlayer {
     static Result<std::unique_ptr<PagePlayer>> open(RawVector<std::uint8_t> bytes,
                                                     const std::string& where);
 
+    // The same of a case that is in memory.
+    static std::unique_ptr<PagePlayer> of(StreamedBundle bundle, const std::string& where);
+
     // The same of a case that arrives in segments, with those of parts_to_open() there.
     static Result<std::unique_ptr<PagePlayer>> open_in_parts(RawVector<std::uint8_t> bytes,
                                                              Arrivals arrivals,

@@ -15,6 +15,7 @@
 #include "formats/base/digest.h"
 #include "runtime/web/page_json.h"
 #include "runtime/web/program/page_state.h"
+#include "runtime/web/warm_up.h"
 
 using namespace sonocase;
 using namespace sonocase::runtime;
@@ -171,6 +172,14 @@ SONOCASE_EXPORT(ask_again) void ask_again(std::uint32_t first, std::uint32_t cou
 // Work that every case needs, to be done while one is on its way.
 SONOCASE_EXPORT(prepare) void prepare() {
     PagePlayer::prepare();
+}
+// A picture of the program's own small case; frame 0 makes it, a negative one ends it.
+SONOCASE_EXPORT(warm_up) void warm_up(int frame) {
+    if (frame < 0) page.warming.reset();
+    if (frame == 0) page.warming = warm_up_player(512);
+    if (frame < 0 || !page.warming) return;
+    page.warming->hands().slide(0, frame % 2 ? 2 : -2);
+    page.warming->frame(0.03 * frame, {});
 }
 SONOCASE_EXPORT(close_case) void close_case() {
     page.player.reset();

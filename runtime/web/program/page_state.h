@@ -58,7 +58,7 @@ struct Page {
     std::optional<Arrivals> arrivals;  // of incoming; the player's own once it is open
     std::vector<std::uint64_t> segment_hashes;
     std::vector<SegmentRun> runs;
-    std::unique_ptr<PagePlayer> player;
+    std::unique_ptr<PagePlayer> player, warming;
     ImageSettings settings;
     std::string text;
     std::vector<std::uint8_t> bytes;
