@@ -19,6 +19,9 @@ void PageScene::begin(const CaseBundle& bundle) {
     body_ = {};
     for (const Point3 p : skin_.points) body_.include(p);
     if (body_.empty()) body_ = bundle.grid.bounds();
+}
+
+void PageScene::add_organs(const CaseBundle& bundle) {
     organs_ = organ_meshes(bundle, kOrganStepMm, std::atomic<bool>{false});
 }
 

@@ -20,8 +20,10 @@ enum class ScenePart : int { skin, probe, mark, plane, needle, hub, ball, count 
 
 class PageScene {
   public:
-    // Skin and organs of a case. Cost: see skin_mesh.h; a torso 0.3 s in a browser.
+    // The skin of a case, so that there is something to see at once. Cost: see skin_mesh.h.
     void begin(const CaseBundle& bundle);
+    // Then its organs, which take longer.
+    void add_organs(const CaseBundle& bundle);
     void end() { *this = {}; }
     bool begun() const { return begun_; }
     int parts() const { return static_cast<int>(ScenePart::count) + static_cast<int>(organs_.size()); }

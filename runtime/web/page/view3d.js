@@ -83,7 +83,9 @@ export class View3d {
         this.on = on;
         $('view3d-show').setAttribute('aria-expanded', String(on));
         $('view3d-room').hidden = !on;
-        if (!on) {
+        if (on) {
+            $('view3d-room').scrollIntoView({block: 'nearest'});
+        } else {
             this.forget();
             this.core.calls.scene_end();
         }
@@ -153,6 +155,15 @@ export class View3d {
         this.gl = gl;
         return true;
     }
+    // Skin and tools at once; organs, for which a torso takes half a second, after the view has been drawn.
+    make_meshes() {
+        const meshes = this.meshes = Array.from({length: this.core.calls.scene_parts()}, (unused, part) => this.upload(part));
+        setTimeout(() => {
+            if (this.meshes !== meshes || !this.gl) return;
+            for (let part = meshes.length, end = this.core.calls.scene_organs(); part < end; ++part) meshes.push(this.upload(part));
+            this.turned();
+        });
+    }
     upload(part) {
         const {gl} = this, {vertices, indices, rgb} = this.core.scene_part(part);
         const mesh = {array: gl.createVertexArray(), buffers: [gl.createBuffer(), gl.createBuffer()], count: indices.length, rgb};
@@ -178,7 +189,7 @@ export class View3d {
         if (!this.on || now_s - this.drawn_s < 1 / kRate || !this.canvas.checkVisibility()) return;
         this.drawn_s = now_s;
         const {gl} = this, {values} = this.scan;
-        this.meshes ??= Array.from({length: this.core.calls.scene_parts()}, (unused, part) => this.upload(part));
+        if (!this.meshes) this.make_meshes();
         this.orbit ??= this.core.scene_first();
         const plane = [values.mm_per_px, values.origin_x, values.origin_y, values.side, this.scan.flip_sign()].join();
         if (plane !== this.plane) {  // the picture lies on it in another way

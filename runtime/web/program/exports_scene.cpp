@@ -32,8 +32,13 @@ PlanePicture picture_of(const PagePlayer& player) {
 
 }  // namespace
 
-// Number of parts; makes the meshes of a case when it is first asked.
+// Number of parts without organs; makes the skin of a case when it is first asked.
 SONOCASE_EXPORT(scene_parts) int scene_parts() {
+    return scene().parts();
+}
+// The same with organs, which are made now.
+SONOCASE_EXPORT(scene_organs) int scene_organs() {
+    scene().add_organs(*page.player->bundle());
     return scene().parts();
 }
 // Memory of the meshes is given back.
