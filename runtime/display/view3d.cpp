@@ -10,9 +10,9 @@
 #include <cmath>
 #include <future>
 
-#include "runtime/display/scene_gl.h"
 #include "runtime/display/models/skin_mesh.h"
 #include "runtime/display/models/tool_models.h"
+#include "runtime/display/scene_gl.h"
 
 namespace sonocase::runtime {
 namespace {

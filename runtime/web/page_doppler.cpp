@@ -53,7 +53,8 @@ doppler::SpectralMeasures PageDoppler::measures() const {
                                           : doppler::SpectralMeasures{};
 }
 
-DopplerSettings PageDoppler::aimed(const ScanEngine& engine, const DopplerSettings& settings) const {
+DopplerSettings PageDoppler::aimed(const ScanEngine& engine,
+                                   const DopplerSettings& settings) const {
     FrameInput input;
     input.mannequin_from_probe = engine.last().tools.mannequin_from_probe;
     return view_ ? view_->aimed(input, settings) : settings;

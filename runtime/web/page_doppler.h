@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The Doppler modes of a page: what DopplerFrames and DopplerRun are to the desktop, with an overlay
-// and a strip that the page colours itself.
+// The Doppler modes of a page: what DopplerFrames and DopplerRun are to the desktop, with an
+// overlay and a strip that the page colours itself.
 #pragma once
 
 #include <cstdint>

@@ -26,7 +26,9 @@ class PageScene {
     void add_organs(const CaseBundle& bundle);
     void end() { *this = {}; }
     bool begun() const { return begun_; }
-    int parts() const { return static_cast<int>(ScenePart::count) + static_cast<int>(organs_.size()); }
+    int parts() const {
+        return static_cast<int>(ScenePart::count) + static_cast<int>(organs_.size());
+    }
 
     // A part of the scene, its frame that of the tool or `mannequin`. part: from 0 to parts() - 1.
     Model part(int part, const ScanEngine& engine, const PlanePicture& picture) const;

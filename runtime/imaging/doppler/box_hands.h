@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Box, gate and line of the Doppler modes as hands see them: what is drawn of them, what a pointer
-// takes hold of, and where it moves it. All places are in the scan plane, mm, so that a window and a
-// page do the same.
+// takes hold of, and where it moves it. All places are in the scan plane, mm, so that a window and
+// a page do the same.
 #pragma once
 
 #include <vector>

@@ -178,6 +178,8 @@ SONOCASE_EXPORT(warm_up) void warm_up(int frame) {
     if (frame < 0) page.warming.reset();
     if (frame == 0) page.warming = warm_up_player(512);
     if (frame < 0 || !page.warming) return;
+    // What a scene is made with has to run more than once, too.
+    if (frame % 4 == 3 && !page.warming->choose_exercise(0, 512)) return;
     page.warming->hands().slide(0, frame % 2 ? 2 : -2);
     page.warming->frame(0.03 * frame, {});
 }

@@ -13,12 +13,10 @@ namespace {
 
 // Order of doppler(); page/core.js names them in the same order.
 void fill_doppler(const DopplerSettings& d) {
-    page.doppler = {double(d.mode), d.box_left,    d.box_right,
-                    d.box_top_mm,   d.box_bottom_mm, d.steer_deg,
-                    d.scale_cm_s,   d.spectral_scale_cm_s, d.baseline,
-                    double(d.invert), d.wall_filter, d.gain_db,
-                    d.gate_line,    d.gate_depth_mm, d.gate_mm,
-                    d.angle_deg};
+    page.doppler = {double(d.mode),  d.box_left,       d.box_right,   d.box_top_mm,
+                    d.box_bottom_mm, d.steer_deg,      d.scale_cm_s,  d.spectral_scale_cm_s,
+                    d.baseline,      double(d.invert), d.wall_filter, d.gain_db,
+                    d.gate_line,     d.gate_depth_mm,  d.gate_mm,     d.angle_deg};
 }
 
 DopplerSettings settings_of(const std::array<double, 16>& from) {

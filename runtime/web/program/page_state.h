@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the functions that the page calls share: the page is single and so is its player. exports.cpp
-// plays the part of main() and holds it.
+// What the functions that the page calls share: the page is single and so is its player.
+// exports.cpp plays the part of main() and holds it.
 #pragma once
 
 #include <array>
@@ -42,7 +42,7 @@ enum Value {
     kFrameNumber,
     kMissing,  // blocks
     kSegmentsLeft,
-    kHasFlow,  // 0: says nothing of the flow of blood, or no Doppler mode was on
+    kHasFlow,    // 0: says nothing of the flow of blood, or no Doppler mode was on
     kMachineHz,  // pictures per second of a machine with this colour box
     kSoundHz,
     kBeats,  // of the spectrum, that were measured; the next four are of them

@@ -132,8 +132,7 @@ TEST(PageDoppler, ARecordingKeepsWhatWasShownAndIsScoredAsOnTheDesktop) {
 }
 
 TEST(PageDoppler, WaitsForTheFlowOfACaseThatArrives) {
-    const auto file =
-        arranged_for_loading(write_bundle(testing::flowing_case()), true, "tube");
+    const auto file = arranged_for_loading(write_bundle(testing::flowing_case()), true, "tube");
     ASSERT_TRUE(file);
     constexpr std::size_t kSegment = 256;
     Arrivals arrivals(file->size(), kSegment);
@@ -141,7 +140,8 @@ TEST(PageDoppler, WaitsForTheFlowOfACaseThatArrives) {
     ASSERT_TRUE(parts);
     for (const ByteRange& range : *parts)
         for (std::size_t n = range.at / kSegment; n * kSegment < range.end(); ++n) arrivals.add(n);
-    auto opened = PagePlayer::open_in_parts({file->begin(), file->end()}, std::move(arrivals), "tube");
+    auto opened =
+        PagePlayer::open_in_parts({file->begin(), file->end()}, std::move(arrivals), "tube");
     ASSERT_TRUE(opened) << opened.error().message();
     PagePlayer& player = **opened;
     ASSERT_TRUE(player.choose_exercise(0, 128));

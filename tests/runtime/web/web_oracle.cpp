@@ -138,13 +138,13 @@ int doppler_frames(const CaseBundle& bundle,
         const auto overlay = view->overlay();
         std::printf("%s{\"time_s\": %.17g, ", between, sample.time_s);
         print_matrix("probe", pose);
-        std::printf(", \"digest\": \"%s\", \"overlay\": \"%s\", \"strip\": \"%s\", "
-                    "\"coloured\": %d, \"psv\": %.17g}",
-                    digest_of(pixels).c_str(), digest_of(overlay).c_str(),
-                    digest_of(strip).c_str(),
-                    static_cast<int>(std::count_if(overlay.begin(), overlay.end(),
-                                                   [](std::uint8_t index) { return index != 0; })),
-                    view->spectrum().measures().psv_cm_s);
+        std::printf(
+            ", \"digest\": \"%s\", \"overlay\": \"%s\", \"strip\": \"%s\", "
+            "\"coloured\": %d, \"psv\": %.17g}",
+            digest_of(pixels).c_str(), digest_of(overlay).c_str(), digest_of(strip).c_str(),
+            static_cast<int>(std::count_if(overlay.begin(), overlay.end(),
+                                           [](std::uint8_t index) { return index != 0; })),
+            view->spectrum().measures().psv_cm_s);
         between = ",\n";
     }
     std::printf("]\n");
