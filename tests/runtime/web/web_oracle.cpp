@@ -5,10 +5,10 @@
 //                                                        picture, as JSON
 //   web_oracle times CASE SESSION paper|physical SIDE [SIMD]   the same with the milliseconds of
 //                                                        each frame, by one thread
-//   web_oracle doppler CASE SESSION colour|power|spectral|m_mode SIDE   the session's poses with the
-//                                                        probe turned by a right angle, box and gate
-//                                                        aimed at the first; XXH3-128 of each
-//                                                        picture, overlay and strip
+//   web_oracle doppler CASE SESSION colour|power|spectral|m_mode SIDE   the same with the probe
+//                                                        turned by a right angle, box and gate
+//                                                        aimed at the first pose, and with
+//                                                        XXH3-128 of overlay and strip
 //   web_oracle score CASE RECORDING                      the scores of a recording, as JSON
 #include <algorithm>
 #include <chrono>
