@@ -12,11 +12,11 @@ const hash = (data) => createHash('sha256').update(data).digest('base64');
 
 // Modules in the order in which they need each other. Each imports by one line per module and exports declarations
 // only, and top-level names are unique: then the text without those words is the same program.
-const modules = ['core.js', 'source.js', 'arriving.js', 'results.js', 'picture.js', 'poses.js', 'hands.js', 'scan.js', 'app.js'];
+const modules = ['core.js', 'source.js', 'arriving.js', 'results.js', 'picture.js', 'poses.js', 'scan_keys.js', 'hands.js', 'doppler.js', 'view3d.js', 'scan.js', 'app.js'];
 const seen = new Map();
 let script = '// SPDX-License-Identifier: Apache-2.0\n';
 for (const name of modules) {
-    const lines = read(name).split('\n').filter((line) => !/^import .* from '\.\/[a-z]+\.js';$/.test(line));
+    const lines = read(name).split('\n').filter((line) => !/^import .* from '\.\/[a-z0-9_]+\.js';$/.test(line));
     for (const line of lines) {
         if (/^import\b/.test(line)) throw new Error(`${name}: an import on more than one line: ${line}`);
         const top = /^(?:export )?(?:async )?(?:function|class|const|let) ([A-Za-z_$]+)/.exec(line);

@@ -203,6 +203,12 @@ Result<CaseBundle> read_bundle(std::span<const std::uint8_t> bytes,
 struct StreamedBundle::Arriving {
     Arrivals arrivals;
     std::optional<PackedBundle> packed;  // what is left to read; its bundle has moved on
+
+    bool has(std::string_view type) const {
+        const auto& pending = packed->pending;
+        return std::none_of(pending.begin(), pending.end(),
+                            [&](const SmallPart* part) { return part->type == type; });
+    }
 };
 
 StreamedBundle::StreamedBundle() = default;
@@ -226,11 +232,11 @@ Status StreamedBundle::look_again() {
 }
 
 bool StreamedBundle::has_textures() const {
-    if (!arriving_) return true;
-    const auto& pending = arriving_->packed->pending;
-    return std::none_of(pending.begin(), pending.end(), [](const SmallPart* part) {
-        return part->type == std::string_view("textures");
-    });
+    return !arriving_ || arriving_->has("textures");
+}
+
+bool StreamedBundle::has_flow() const {
+    return !arriving_ || arriving_->has("flow");
 }
 
 Result<StreamedBundle> stream_bundle(RawVector<std::uint8_t> bytes,

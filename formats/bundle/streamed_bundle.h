@@ -53,6 +53,8 @@ class StreamedBundle {
     Status look_again();
     // False: the textures of model `paper` have not arrived yet.
     bool has_textures() const;
+    // False: whether and where blood flows has not arrived yet.
+    bool has_flow() const;
 
   private:
     struct Arriving;

@@ -8,7 +8,7 @@
 #include <array>
 
 #include "formats/base/geometry.h"
-#include "runtime/display/tool_models.h"
+#include "runtime/display/models/tool_models.h"
 
 namespace sonocase::runtime {
 

@@ -10,28 +10,15 @@
 #include <cmath>
 #include <future>
 
+#include "runtime/display/models/skin_mesh.h"
+#include "runtime/display/models/tool_models.h"
 #include "runtime/display/scene_gl.h"
-#include "runtime/display/skin_mesh.h"
-#include "runtime/display/tool_models.h"
 
 namespace sonocase::runtime {
 namespace {
 
 constexpr double kTanHalf = 0.36;          // of half the vertical field of view
 constexpr double kNear = 10, kFar = 5000;  // mm from the eye
-
-Model model_of(const Surface& mesh) {
-    Model model;
-    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
-        const Point3 p = mesh.points[i];
-        const Vector3 n = mesh.normals[i];
-        model.vertices.push_back(
-            {{float(p.x), float(p.y), float(p.z)}, {float(n.x), float(n.y), float(n.z)}, {0, 0}});
-    }
-    for (const auto& t : mesh.triangles)
-        model.indices.insert(model.indices.end(), t.begin(), t.end());
-    return model;
-}
 
 }  // namespace
 
@@ -119,18 +106,10 @@ void View3d::set_case(const CaseBundle& bundle) {
 void View3d::set_exercise(const Exercise& exercise) {
     Impl& d = *impl_;
     d.exercise = exercise;
-    // The probe looks down in the picture, whatever the mannequin's axes are called; the body's
-    // long axis runs across, as when a patient lies in front of an operator.
-    const Vector3 up = normalized(-exercise.start_beam);
-    const Vector3 extent = d.box.extent();
-    Vector3 along{1, 0, 0};
-    if (extent.y > extent.x && extent.y >= extent.z) along = {0, 1, 0};
-    if (extent.z > extent.x && extent.z > extent.y) along = {0, 0, 1};
-    Vector3 right = along - dot(along, up) * up;
-    right = norm(right) > 0.3 ? normalized(right) : any_perpendicular(up);
-    d.home = Matrix3::from_columns(right, up, cross(right, up));
-    d.interest = d.box.centre() + 0.3 * (exercise.start_probe - d.box.centre());
-    first_.distance_mm = 1.55 * std::max({extent.x, extent.y, extent.z, 100.0});
+    const HomeView view = home_view(d.box, exercise);
+    d.home = view.home;
+    d.interest = view.interest;
+    first_.distance_mm = view.orbit.distance_mm;
     orbit_ = first_;
     d.probe.upload(probe_model(exercise.probe));
     d.mark.upload(mark_model(exercise.probe));

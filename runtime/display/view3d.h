@@ -10,7 +10,7 @@
 
 #include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
-#include "runtime/display/camera.h"
+#include "runtime/display/models/camera.h"
 #include "runtime/imaging/renderer.h"
 
 namespace sonocase::runtime {

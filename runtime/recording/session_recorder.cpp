@@ -13,6 +13,7 @@
 #include "formats/files/growing_sequence.h"
 #include "formats/files/recording_file.h"
 #include "formats/text/number_text.h"
+#include "runtime/recording/doppler_sample.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -94,25 +95,6 @@ struct SessionRecorder::Impl {
         state.frames_dropped = dropped.load();
     }
 
-    DopplerSample sample_of(const DopplerReport& report) const {
-        const auto name = [&](int label) {
-            return label >= 0 && label < static_cast<int>(labels.size())
-                       ? labels[static_cast<std::size_t>(label)].name
-                       : std::string();
-        };
-        DopplerSample sample;
-        for (const int label : report.coloured)
-            if (!name(label).empty()) sample.coloured.push_back(name(label));
-        sample.gate = name(report.gate_label);
-        sample.gate_fill = report.gate_fill;
-        sample.angle_deg = report.angle_deg;
-        sample.cursor_deg = report.cursor_deg;
-        sample.psv_cm_s = report.psv_cm_s;
-        sample.true_psv_cm_s = report.true_psv_cm_s;
-        sample.beats = report.beats;
-        return sample;
-    }
-
     SequenceFrame frame_of(const Record& record) const {
         const RecordedFrame& f = record.frame;
         SessionSample sample;
@@ -126,7 +108,7 @@ struct SessionRecorder::Impl {
         sample.has_press = f.has_press;
         sample.press = f.press;
         sample.has_doppler = f.doppler.on;
-        sample.doppler = sample_of(f.doppler);
+        sample.doppler = doppler_sample(f.doppler, labels);
         sample.settings.assign(f.settings.data(), ::strnlen(f.settings.data(), f.settings.size()));
         std::vector<SessionEvent> events;
         for (std::size_t i = 0; i < record.event_count; ++i) {

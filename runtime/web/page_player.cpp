@@ -48,7 +48,11 @@ Result<std::unique_ptr<PagePlayer>> PagePlayer::open(RawVector<std::uint8_t> byt
                                                      const std::string& where) {
     Result<StreamedBundle> bundle = stream_bundle(std::move(bytes), where);
     if (!bundle) return bundle.error();
-    return std::unique_ptr<PagePlayer>(new PagePlayer(std::move(*bundle), where));
+    return of(std::move(*bundle), where);
+}
+
+std::unique_ptr<PagePlayer> PagePlayer::of(StreamedBundle bundle, const std::string& where) {
+    return std::unique_ptr<PagePlayer>(new PagePlayer(std::move(bundle), where));
 }
 
 Result<std::unique_ptr<PagePlayer>> PagePlayer::open_in_parts(RawVector<std::uint8_t> bytes,
@@ -106,6 +110,8 @@ Status PagePlayer::set_image(const PageImage& image) {
     if (!engine) return engine.error();
     auto next = std::make_unique<ScanEngine>(std::move(*engine));
     if (engine_) next->take_over(*engine_);
+    if (doppler_.begun())
+        if (Status made = doppler_.begin(bundle_, *next); !made) return made;
     engine_ = std::move(next);
     truth_.reset();
     image_ = image;
@@ -129,7 +135,9 @@ FrameStatus PagePlayer::frame(double now_s, const ImageSettings& settings) {
     if (hands_->poll(now_s, reading)) engine_->observe(reading, false);
     if (bundle_.blocks()) bundle_.blocks()->forget_awaited();
     const FrameStatus status = engine_->frame(now_s, settings, pixels_);
-    const FrameRecord& record = engine_->last();
+    FrameRecord record = engine_->last();
+    doppler_.frame(*engine_, record, pixels_, true);
+    record.doppler = doppler_.report();
     // A session's clock starts over, so that time may fall.
     if (kept_last_s_ < 0 || now_s < kept_last_s_ || now_s - kept_last_s_ >= 0.98 / kKeptRate) {
         kept_[kept_next_] = record;
@@ -153,7 +161,13 @@ FrameStatus PagePlayer::frame_again(int back, const ImageSettings& settings) {
     if (bundle_.blocks()) bundle_.blocks()->forget_awaited();
     FrameRecord record = kept_record(back);
     record.input.settings = settings;  // gain and TGC still work on a frozen picture
-    return engine_->frame_again(record, pixels_);
+    const FrameStatus status = engine_->frame_again(record, pixels_);
+    doppler_.frame(*engine_, record, pixels_, false);
+    return status;
+}
+
+Status PagePlayer::begin_doppler() {
+    return doppler_.begun() ? Status(Done{}) : doppler_.begin(bundle_, *engine_);
 }
 
 double PagePlayer::kept_age_s(int back) const {

@@ -18,6 +18,7 @@
 #include "runtime/imaging/truth/frame_truth.h"
 #include "runtime/tracking/mouse_tracker.h"
 #include "runtime/web/load_plan.h"
+#include "runtime/web/page_doppler.h"
 #include "runtime/web/page_session.h"
 
 namespace sonocase::runtime {
@@ -34,6 +35,9 @@ class PagePlayer {
     // where: names the case in errors. Errors: bytes that are not a bundle.
     static Result<std::unique_ptr<PagePlayer>> open(RawVector<std::uint8_t> bytes,
                                                     const std::string& where);
+
+    // The same of a case that is in memory.
+    static std::unique_ptr<PagePlayer> of(StreamedBundle bundle, const std::string& where);
 
     // The same of a case that arrives in segments, with those of parts_to_open() there.
     static Result<std::unique_ptr<PagePlayer>> open_in_parts(RawVector<std::uint8_t> bytes,
@@ -86,6 +90,13 @@ class PagePlayer {
     // # side_px * side_px, of the last picture.
     std::span<const std::uint8_t> pixels() const { return pixels_; }
 
+    // Before frames whose settings ask for a Doppler mode; until then they show none. Error: blood
+    // flow has not arrived yet.
+    Status begin_doppler();
+    // Of the last frame.
+    PageDoppler& doppler() { return doppler_; }
+    const PageDoppler& doppler() const { return doppler_; }
+
     // started: ISO 8601, UTC. seed: that targets and start are drawn with (formats/attempt); 0: as
     // written. Else the probe goes to the start without a needle, and the case has to be whole: a
     // draw looks at all of it. Errors: it is not; the image cannot be made.
@@ -123,6 +134,7 @@ class PagePlayer {
     PageImage image_;
     std::vector<std::uint8_t> pixels_;
     std::unique_ptr<ScanEngine> engine_;
+    PageDoppler doppler_;
     std::unique_ptr<MouseTracker> hands_;
     std::unique_ptr<PageSession> session_;
     std::vector<FrameRecord> kept_;  // ring

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "runtime/engine/tool_sample.h"
+#include "runtime/recording/doppler_sample.h"
 #include "runtime/recording/event_words.h"
 #include "runtime/recording/session_header.h"
 #include "runtime/recording/settings_text.h"
@@ -41,6 +42,8 @@ void PageSession::observe(const FrameRecord& record) {
     const FrameInput& input = record.input;
     SessionSample sample;
     fill_sample(record, sample);
+    sample.has_doppler = record.doppler.on;
+    sample.doppler = doppler_sample(record.doppler, bundle_.labels);
     if (session_.samples.empty() || !same(settings_, input.settings))
         sample.settings = settings_text(input.settings);
     settings_ = input.settings;

@@ -9,6 +9,7 @@ const kGroup = 256;    // segments that are kept under one key
 const kAhead = 128;    // segments that are fetched ahead at a time
 const kRequests = 2;   // that fetch ahead at the same time
 const kLongestWaitMs = 15000;
+const kWarmUp = 60;    // pictures
 
 // The server sends the whole file where a part was asked for.
 class NoRanges extends Error {}
@@ -39,7 +40,11 @@ export class ArrivingCase {
         const wanted = [...new Set(entry.first.flatMap(([at, bytes]) =>
             segments_from(Math.floor(at / this.size), Math.ceil((at + bytes) / this.size))))];
         this.cache = await case_cache();
-        await this.ask_early(runs_of(wanted));
+        const groups = [...new Set(wanted.map((n) => Math.floor(n / kGroup)))];
+        // What is kept is read while the program is still on its way.
+        this.reading = new Map(groups.map((group) => [group, this.read_kept(this.key(group))]));
+        this.reading_hashes = this.read_kept(this.hashes_key());
+        await this.ask_early(groups[0], runs_of(wanted));
         const core = this.core = await this.program;
         if (signal.aborted) throw new DOMException('stopped', 'AbortError');
         core.calls.prepare();
@@ -55,7 +60,8 @@ export class ArrivingCase {
                 if (lacking.size === 0) done();
             };
         });
-        await Promise.all([...new Set(wanted.map((n) => Math.floor(n / kGroup)))].map((group) => this.from_cache(group)));
+        await Promise.all(groups.map((group) => this.from_cache(group)));
+        if (lacking.size > 0) this.warm_up(() => lacking.size > 0);
         try {
             await Promise.all(runs_of(wanted.filter((n) => !this.here[n])).map((run) => this.fetch_run(run)));
         } catch (error) {
@@ -66,10 +72,20 @@ export class ArrivingCase {
         if (signal.aborted) throw new DOMException('stopped', 'AbortError');
         this.on_segment = undefined;
     }
+    // A browser compiles for speed what it has seen run: pictures of the program's own small case, while the real one
+    // is on its way.
+    async warm_up(waits) {
+        const {calls} = this.core;
+        for (let n = 0; n < kWarmUp && waits() && !this.stopping.signal.aborted; ++n) {
+            calls.warm_up(n);
+            await new Promise((done) => setTimeout(done, 10));
+        }
+        calls.warm_up(-1);
+    }
     // While the program is still on its way, so that the link is never idle.
-    async ask_early(runs) {
+    async ask_early(group, runs) {
         const {entry} = this;
-        if (await this.cache?.match(this.key(0)).catch(() => undefined)) return;
+        if (await this.reading.get(group)) return;
         const ask = (url, options) => {
             const answer = fetch(url, {signal: this.stopping.signal, ...options});
             answer.catch(() => {});  // whoever takes it hears of it
@@ -88,17 +104,14 @@ export class ArrivingCase {
         return `bytes=${first * this.size}-${Math.min((first + count) * this.size, this.entry.bytes) - 1}`;
     }
     async hashes() {
-        const {entry} = this, key = `${entry.segments}?digest=${entry.segments_digest}`, core = this.core;
+        const {entry} = this, core = this.core;
         const good = (bytes) => {
             core.reserve(bytes.length);
             core.put(bytes, 0);
             return bytes.length === 8 * this.count && core.digest_of(0, bytes.length) === entry.segments_digest;
         };
-        const kept = await this.cache?.match(key);
-        if (kept) {
-            const bytes = new Uint8Array(await kept.arrayBuffer());
-            if (good(bytes)) return bytes;
-        }
+        const kept = await this.reading_hashes;
+        if (kept && good(new Uint8Array(kept))) return new Uint8Array(kept);
         for (const cache of ['default', 'reload']) {
             const early = await this.early.get(entry.segments)?.catch(() => undefined);
             this.early.delete(entry.segments);
@@ -106,7 +119,7 @@ export class ArrivingCase {
                 : await fetch_twice(entry.segments, {signal: this.stopping.signal, cache}, (r) => r.ok);
             const bytes = new Uint8Array(await response.arrayBuffer().catch((error) => { throw lost(error); }));
             if (!good(bytes)) continue;
-            await this.cache?.put(key, new Response(bytes)).catch(() => {});
+            await this.cache?.put(this.hashes_key(), new Response(bytes)).catch(() => {});
             return bytes;
         }
         throw new PlainError(`${entry.title} is damaged on the server: its list of segments is wrong. Tell the site's owner.`);
@@ -127,6 +140,15 @@ export class ArrivingCase {
     }
 
     key(group) { return `${this.entry.file}?digest=${this.entry.digest}&group=${group}`; }
+    hashes_key() { return `${this.entry.segments}?digest=${this.entry.segments_digest}`; }
+    // The bytes under a key of the cache; undefined where there are none, or the cache fails.
+    async read_kept(key) {
+        try {
+            return await (await this.cache?.match(key))?.arrayBuffer();
+        } catch {
+            return undefined;
+        }
+    }
     // A group that is kept; what of it is not right is fetched again.
     from_cache(group) {
         if (!this.looked.has(group)) this.looked.set(group, this.take_kept(group));
@@ -134,9 +156,10 @@ export class ArrivingCase {
     }
     async take_kept(group) {
         try {
-            const kept = await this.cache?.match(this.key(group));
+            const kept = await (this.reading.get(group) ?? this.read_kept(this.key(group)));
+            this.reading.delete(group);
             if (!kept) return;
-            const bytes = new Uint8Array(await kept.arrayBuffer()), from = group * kGroup;
+            const bytes = new Uint8Array(kept), from = group * kGroup;
             if (this.stopping.signal.aborted) return;
             let good = bytes.length === Math.min(kGroup * this.size, this.entry.bytes - from * this.size);
             this.filling = true;

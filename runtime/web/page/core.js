@@ -8,7 +8,14 @@ export const kValues = [
     'side', 'mm_per_px', 'origin_x', 'origin_y', 'depth_mm', 'focus_mm', 'model_paper', 'has_needle',
     'needle_depth_mm', 'in_contact', 'press_mm', 'kept', 'attempt', 'seconds', 'insertions',
     'targets_hit', 'tip_to_target_mm', 'tip_in_view', 'in_no_go', 'damaged', 'frame_number',
-    'missing', 'segments_left'];
+    'missing', 'segments_left', 'has_flow', 'machine_hz', 'sound_hz', 'beats', 'psv', 'edv', 'resistive_index', 'flow'];
+
+// In the order of exports_doppler.cpp; mode as in kDopplerModes.
+export const kDoppler = [
+    'mode', 'box_left', 'box_right', 'box_top_mm', 'box_bottom_mm', 'steer_deg', 'scale_cm_s',
+    'spectral_scale_cm_s', 'baseline', 'invert', 'wall_filter', 'gain_db', 'gate_line',
+    'gate_depth_mm', 'gate_mm', 'angle_deg'];
+export const kDopplerModes = ['off', 'colour', 'power', 'spectral', 'm_mode'];
 
 export const kFrameStatus = ['rendered', 'held_bad_pose', 'no_contact'];
 
@@ -140,8 +147,54 @@ export class Core {
     // Of the last picture, mm in the probe's frame: y is the distance to the plane.
     targets() {
         const count = this.calls.target_count();
-        const from = new Float64Array(this.memory.buffer, this.calls.targets(), 4 * count);
+        const from = new Float64Array(this.memory.buffer, this.calls.numbers(), 4 * count);
         return Array.from({length: count}, (unused, n) => ({x: from[4 * n], y: from[4 * n + 1], z: from[4 * n + 2], radius: from[4 * n + 3]}));
+    }
+    // The console of the Doppler modes, by name.
+    doppler() {
+        const from = new Float64Array(this.memory.buffer, this.calls.doppler(), kDoppler.length);
+        return Object.fromEntries(kDoppler.map((name, n) => [name, from[n]]));
+    }
+    set_doppler(settings) {
+        const to = new Float64Array(this.memory.buffer, this.calls.doppler(), kDoppler.length);
+        kDoppler.forEach((name, n) => { to[n] = settings[name]; });
+        this.check(this.calls.set_doppler());
+    }
+    // Points of the scan plane, mm: the colour box's outline, or face, end, upper, lower and middle of the gate.
+    doppler_marks() {
+        const count = this.calls.doppler_marks();
+        const from = new Float64Array(this.memory.buffer, this.calls.numbers(), 2 * count);
+        return Array.from({length: count}, (unused, n) => ({x: from[2 * n], z: from[2 * n + 1]}));
+    }
+    // Views of the program's memory as pixels(); null where the last picture has no such part.
+    overlay() {
+        const at = this.calls.overlay(), side = this.values().side;
+        return at ? new Uint8Array(this.memory.buffer, at, side * side) : null;
+    }
+    strip(width, height) {
+        const at = this.calls.strip(width, height);
+        return at ? new Uint8Array(this.memory.buffer, at, width * height) : null;
+    }
+    // Red, green and blue of 256 colours.
+    palette(power) { return new Uint8Array(this.memory.buffer, this.calls.palette(power ? 1 : 0), 768).slice(); }
+    // Pairs of samples of the last picture: flow towards the probe, flow away.
+    sound() { return new Float32Array(this.memory.buffer, this.calls.sound(), 2 * this.calls.sound_count()); }
+    // A part of the 3-D view: eight floats a vertex (place, normal, texture), three indices a triangle, 0xRRGGBB.
+    scene_part(part) {
+        const count = this.calls.scene_part(part), {buffer} = this.memory;
+        return {vertices: new Float32Array(buffer, this.calls.scene_vertices(), 8 * count),
+            indices: new Uint32Array(buffer, this.calls.scene_indices(), this.calls.scene_index_count()), rgb: this.calls.scene_rgb(part)};
+    }
+    scene_first() {
+        this.calls.scene_first();
+        const [yaw, pitch, distance] = new Float64Array(this.memory.buffer, this.calls.numbers(), 3);
+        return {yaw, pitch, distance};
+    }
+    // Rows of camera_from_mannequin, mannequin_from_probe, mannequin_from_needle. from: 0 outside, 1 probe, 2 needle.
+    scene_places(from, {yaw, pitch, distance}) {
+        this.calls.scene_places(from, yaw, pitch, distance);
+        const at = this.calls.numbers();
+        return [0, 1, 2].map((n) => new Float64Array(this.memory.buffer, at + 128 * n, 16).slice());
     }
     // The name of what a pixel of the last picture shows.
     name_at(column, row) {

@@ -3,6 +3,8 @@
 // Hands on the page: mouse, pen, fingers, keys, game controller and the device's own tilt move
 // probe and needle. Factors are those of the desktop's window.
 
+import {hold_console, press_key} from './scan_keys.js';
+
 const kLongPressMs = 500;
 const kStillPx = 8;
 
@@ -34,6 +36,7 @@ export class Hands {
     let_go() {
         this.held.clear();
         this.pointers.clear();
+        this.scan.doppler?.let_go();
         clearTimeout(this.long_press);
     }
 
@@ -46,12 +49,15 @@ export class Hands {
             this.scan.measure_at(e.clientX, e.clientY);
             return;
         }
+        this.scan.doppler.let_go();
+        if (e.button === 0 && !e.shiftKey && this.pointers.size === 1 && this.scan.doppler.take(e)) return;
         if (e.pointerType !== 'mouse' && this.pointers.size === 1) {
             this.long_press = setTimeout(() => this.scan.needle_to(e.clientX, e.clientY), kLongPressMs);
         }
     }
     up(e) {
         this.pointers.delete(e.pointerId);
+        this.scan.doppler.let_go();
         clearTimeout(this.long_press);
     }
     // Where a mouse or pen points without pressing; a finger covers what it points at.
@@ -65,7 +71,9 @@ export class Hands {
         if (!before || this.scan.measuring) return;
         if (Math.hypot(e.clientX - before.from_x, e.clientY - before.from_y) > kStillPx) clearTimeout(this.long_press);
         const dx = e.clientX - before.x, dy = e.clientY - before.y;
-        if (this.pointers.size >= 2) {
+        if (this.scan.doppler.held) {
+            this.scan.doppler.drag(before, e);
+        } else if (this.pointers.size >= 2) {
             this.two_fingers(e, before, dx, dy);
         } else {
             this.drag(e, dx, dy);
@@ -127,7 +135,7 @@ export class Hands {
         if ((tag === 'BUTTON' || tag === 'SUMMARY' || e.target.type === 'checkbox') && (e.code === 'Space' || e.code === 'Enter')) return;
         if (e.code === 'Tab' || e.code === 'Escape') return;
         if (!e.repeat) this.held.add(e.code);
-        if (this.scan.key(e.code, this.modifiers, e.repeat) || this.is_movement(e.code)) e.preventDefault();
+        if (press_key(this.scan, e.code, this.modifiers, e.repeat) || this.is_movement(e.code)) e.preventDefault();
     }
     is_movement(code) { return /^(Arrow|Page|Home$)/.test(code); }
 
@@ -155,7 +163,7 @@ export class Hands {
             const side = this.axis('KeyJ', 'KeyL'), up = this.axis('KeyK', 'KeyI');
             if (side || up) calls.slide_needle(30 * seconds * side, 30 * seconds * up);
         }
-        this.scan.held_console(seconds, (a, b) => this.axis(a, b), this.held);
+        hold_console(this.scan, seconds, (a, b) => this.axis(a, b), this.held);
     }
     controller(seconds) {
         const pad = navigator.getGamepads?.().find((one) => one);

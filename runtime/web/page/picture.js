@@ -19,9 +19,12 @@ export class Picture {
         const side = Math.min(width - 44, height) * devicePixelRatio;
         return Math.max(256, Math.min(1024, 64 * Math.round(side / 64)));
     }
-    place(side) {
+    // strip: part of the height, at the bottom, that is not the picture's
+    place(side, strip = 0) {
         const {width, height} = this.box.getBoundingClientRect();
-        this.css_side = Math.max(64, Math.min(width - 44, height));
+        this.room = (1 - strip) * height;
+        this.css_side = Math.max(64, Math.min(width - 44, this.room));
+        this.canvas.style.top = `${this.room / 2}px`;
         if (this.canvas.width !== side) this.canvas.width = this.canvas.height = side;
         this.image = this.context.createImageData(side, side);
         this.words = new Uint32Array(this.image.data.buffer);
@@ -35,10 +38,11 @@ export class Picture {
         this.overlay.style.height = `${height}px`;
     }
 
-    // pixels: # side * side, grey
-    show(pixels) {
+    // pixels: # side * side, grey; overlay: indices into colours, 0 for grey, or null
+    show(pixels, overlay, colours) {
         const {words, grey} = this;
-        for (let n = 0; n < pixels.length; ++n) words[n] = grey[pixels[n]];
+        if (overlay) for (let n = 0; n < pixels.length; ++n) words[n] = overlay[n] ? colours[overlay[n]] : grey[pixels[n]];
+        else for (let n = 0; n < pixels.length; ++n) words[n] = grey[pixels[n]];
         this.context.putImageData(this.image, 0, 0);
     }
 
@@ -49,14 +53,15 @@ export class Picture {
                 z: ((client_y - rect.top) * px - values.origin_y) * values.mm_per_px};
     }
 
-    // targets: in the probe's frame, those that may be shown; name: what lies under the pointer, or null
-    draw_over(values, flip, measures, first, targets, name) {
+    // targets: in the probe's frame, those that may be shown; name: what lies under the pointer, or null;
+    // more(on): draws further marks
+    draw_over(values, flip, measures, first, targets, name, more) {
         const to = this.overlay.getContext('2d'), ratio = devicePixelRatio;
         to.setTransform(ratio, 0, 0, ratio, 0, 0);
         const height = this.overlay.height / ratio;
         to.clearRect(0, 0, this.overlay.width / ratio, height);
         const per_mm = this.css_side / values.side / values.mm_per_px;
-        const left = this.left, top = (height - this.css_side) / 2;
+        const left = this.left, top = (this.room - this.css_side) / 2;
         const x_of = (mm) => left + values.origin_x * this.css_side / values.side + mm * per_mm;
         const y_of = (mm) => top + values.origin_y * this.css_side / values.side + mm * per_mm;
         to.font = '13px "Noto Sans", "DejaVu Sans", sans-serif';
@@ -115,6 +120,7 @@ export class Picture {
             const wide = to.measureText(name.words).width;
             say(name.words, Math.min(name.x - rect.left + 16, rect.width - wide - 4), Math.min(name.y - rect.top + 24, height - 6));
         }
+        more({to, x_of, y_of, line, say, flip, height});
         if (first) line(x_of(flip * first.x) - 5, y_of(first.z), x_of(flip * first.x) + 5, y_of(first.z));
     }
 }

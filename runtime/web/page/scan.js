@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The scanning page: picture, console, cine and attempts.
+import {Doppler} from './doppler.js';
 import {Hands} from './hands.js';
 import {Picture} from './picture.js';
 import {minutes} from './results.js';
+import {View3d} from './view3d.js';
 
 const kIdleRate = 40;  // pictures per second while nothing moves: tissue breathes, noise changes
 const kSliders = 8;
@@ -23,6 +25,8 @@ export class ScanPage {
         this.make_sliders();
         this.listen();
         this.hands = new Hands(this, $('picture'));
+        this.doppler = new Doppler(this);
+        this.view3d = new View3d(this);
         new ResizeObserver(() => this.fit_later()).observe($('picture-box'));
     }
 
@@ -90,6 +94,8 @@ export class ScanPage {
         $('mode').value = description.exercises[exercise].mode;
         this.core.set_console(this.console);
         this.values = core.values();
+        this.doppler.show();
+        this.view3d.show();
         this.fit();
         this.say_console();
         this.last_s = undefined;
@@ -106,7 +112,7 @@ export class ScanPage {
     // The side follows the window once it has stopped changing.
     fit_later() {
         if (!this.shown()) return;
-        this.picture.place(this.values.side);
+        this.picture.place(this.values.side, this.doppler.strip_part());
         clearTimeout(this.fitting);
         this.fitting = setTimeout(() => this.shown() && this.fit(), 150);
     }
@@ -114,7 +120,7 @@ export class ScanPage {
         const side = this.side();
         if (side !== this.values.side) this.core.set_image({...this.values, side});
         this.values = this.core.values();
-        this.picture.place(this.values.side);
+        this.picture.place(this.values.side, this.doppler.strip_part());
         this.touched();
     }
 
@@ -153,10 +159,12 @@ export class ScanPage {
         const before = performance.now();
         this.status = this.frozen ? this.core.calls.frame_again(this.back) : this.core.calls.frame(now_s);
         this.values = this.core.values();
-        this.picture.show(this.core.pixels());
+        this.picture.show(this.core.pixels(), this.core.overlay(), this.doppler.colours());
+        this.doppler.picture_drawn();
+        this.view3d.picture_drawn(now_s);
         this.frame_ms = performance.now() - before;
         this.picture.draw_over(this.values, this.flip_sign(), this.measures, this.first_point,
-            this.shows_targets() ? this.core.targets() : [], this.name_there());
+            this.shows_targets() ? this.core.targets() : [], this.name_there(), (on) => this.doppler.draw_over(on));
         this.say();
         if (++this.frames === 1) performance.mark('first-picture');
         if (!this.complete && !this.values.missing) {
@@ -349,50 +357,5 @@ export class ScanPage {
     toggle_attempt() {
         if (this.values.attempt) this.page.finish_attempt();
         else this.page.start_attempt();
-    }
-
-    // One press of a key; true if it did something.
-    key(code, {shift}, repeated) {
-        const v = this.values;
-        const digit = [...this.hands.held].some((one) => /^Digit[1-8]$/.test(one));
-        const stepping = {
-            BracketLeft: () => this.set_image({depth_mm: v.depth_mm - 10}),
-            BracketRight: () => this.set_image({depth_mm: v.depth_mm + 10}),
-            Semicolon: () => this.set_image({focus_mm: v.focus_mm - 5}),
-            Quote: () => this.set_image({focus_mm: v.focus_mm + 5}),
-            Comma: () => digit || this.look_back((this.frozen ? this.back : 0) + 1),
-            Period: () => digit || this.look_back((this.frozen ? this.back : 0) - 1),
-        };
-        const once = {
-            Space: () => this.freeze(!this.frozen),
-            KeyP: () => { this.playing = this.frozen && !this.playing; },
-            KeyN: () => this.toggle_needle(!shift),
-            KeyM: () => this.measure(!this.measuring),
-            KeyC: () => this.clear(),
-            KeyF: () => this.flip(),
-            KeyB: () => this.toggle_attempt(),
-            KeyH: () => this.next_hint(),
-            Home: () => { this.core.calls.probe_home(); this.touched(); },
-            Digit0: () => this.level(),
-            F1: () => this.page.help(),
-            F2: () => this.page.to_cases(),
-            F5: () => this.page.choose_exercise(Number($('exercise').value) + (shift ? -1 : 1)),
-            F6: () => this.choose_model(!v.model_paper),
-            F11: () => this.full_screen(),
-            F12: () => this.save_picture(),
-        };
-        const act = stepping[code] ?? (repeated ? undefined : once[code]);
-        act?.();
-        return Boolean(act);
-    }
-    // Keys of the console that act while they are held.
-    held_console(seconds, axis, held) {
-        const gain = axis('Minus', 'Equal');
-        if (gain) this.set_console({gain_db: clamp(this.console.gain_db + 12 * gain * seconds, -30, 30)});
-        const digit = [...held].find((one) => /^Digit[1-8]$/.test(one)), by = axis('Comma', 'Period');
-        if (digit && by) {
-            const n = Number(digit.slice(5)) - 1;
-            this.set_tgc(n, this.console.tgc_db[n] + 12 * by * seconds);
-        }
     }
 }

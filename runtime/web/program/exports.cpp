@@ -14,63 +14,20 @@
 
 #include "formats/base/digest.h"
 #include "runtime/web/page_json.h"
-#include "runtime/web/page_player.h"
-
-#define SONOCASE_EXPORT(name) extern "C" __attribute__((export_name(#name)))
+#include "runtime/web/program/page_state.h"
+#include "runtime/web/warm_up.h"
 
 using namespace sonocase;
 using namespace sonocase::runtime;
 
-namespace {
+Page sonocase::runtime::page;
 
-// Order of values(); page/core.js names them in the same order.
-enum Value {
-    kSide,
-    kMmPerPx,
-    kOriginX,
-    kOriginY,
-    kDepthMm,
-    kFocusMm,
-    kModelPaper,
-    kHasNeedle,
-    kNeedleDepthMm,
-    kInContact,
-    kPressMm,
-    kKept,
-    kAttempt,
-    kSeconds,
-    kInsertions,
-    kTargetsHit,
-    kTipToTargetMm,
-    kTipInView,
-    kInNoGo,
-    kDamaged,
-    kFrameNumber,
-    kMissing,  // blocks
-    kSegmentsLeft,
-    kValueCount
-};
-
-// The page is single and so is its player: this file plays the part of main().
-struct Page {
-    RawVector<std::uint8_t> incoming;
-    std::optional<Arrivals> arrivals;  // of incoming; the player's own once it is open
-    std::vector<std::uint64_t> segment_hashes;
-    std::vector<SegmentRun> runs;
-    std::unique_ptr<PagePlayer> player;
-    ImageSettings settings;
-    std::string text;
-    std::vector<std::uint8_t> bytes;
-    std::array<double, kValueCount> values{};
-    std::array<double, 32> poses{};
-    std::vector<double> targets;
-};
-Page page;
-
-int answer(const Status& status) {
+int sonocase::runtime::answer(const Status& status) {
     page.text = status ? std::string() : status.error().message();
     return status ? 1 : 0;
 }
+
+namespace {
 
 Rigid rigid_at(const double* rows) {
     Rigid out;
@@ -103,6 +60,15 @@ void fill_values() {
     v[kMissing] = p.missing_blocks();
     if (p.bundle().arrivals())
         v[kSegmentsLeft] = static_cast<double>(p.bundle().arrivals()->left());
+    const doppler::SpectralMeasures measures = p.doppler().measures();
+    v[kHasFlow] = p.doppler().has_flow();
+    v[kMachineHz] = p.doppler().machine_hz();
+    v[kSoundHz] = p.doppler().sound_hz();
+    v[kBeats] = measures.beats;
+    v[kPsv] = measures.psv_cm_s;
+    v[kEdv] = measures.edv_cm_s;
+    v[kResistiveIndex] = measures.resistive_index;
+    v[kFlow] = measures.flow_ml_min;
     if (const PageSession* attempt = p.attempt()) {
         const SessionMonitor& monitor = attempt->monitor();
         v[kAttempt] = 1;
@@ -207,6 +173,16 @@ SONOCASE_EXPORT(ask_again) void ask_again(std::uint32_t first, std::uint32_t cou
 SONOCASE_EXPORT(prepare) void prepare() {
     PagePlayer::prepare();
 }
+// A picture of the program's own small case; frame 0 makes it, a negative one ends it.
+SONOCASE_EXPORT(warm_up) void warm_up(int frame) {
+    if (frame < 0) page.warming.reset();
+    if (frame == 0) page.warming = warm_up_player(512);
+    if (frame < 0 || !page.warming) return;
+    // What a scene is made with has to run more than once, too.
+    if (frame % 4 == 3 && !page.warming->choose_exercise(0, 512)) return;
+    page.warming->hands().slide(0, frame % 2 ? 2 : -2);
+    page.warming->frame(0.03 * frame, {});
+}
 SONOCASE_EXPORT(close_case) void close_case() {
     page.player.reset();
 }
@@ -309,18 +285,18 @@ SONOCASE_EXPORT(start_attempt) int start_attempt(double now_s, double seed) {
     return answer(
         page.player->start_attempt(trainee, started, now_s, static_cast<std::uint64_t>(seed)));
 }
-// Four numbers for each target at targets(): its middle in the `probe` frame and its radius.
+// Four numbers for each target at numbers(): its middle in the `probe` frame and its radius.
 SONOCASE_EXPORT(target_count) int target_count() {
     const std::vector<Target>& targets = page.player->exercise().targets;
-    page.targets.clear();
+    page.numbers.clear();
     for (std::size_t i = 0; i < targets.size(); ++i) {
         const Point3 at = page.player->target_in_probe(i);
-        page.targets.insert(page.targets.end(), {at.x, at.y, at.z, targets[i].radius_mm});
+        page.numbers.insert(page.numbers.end(), {at.x, at.y, at.z, targets[i].radius_mm});
     }
     return static_cast<int>(targets.size());
 }
-SONOCASE_EXPORT(targets) const double* targets() {
-    return page.targets.data();
+SONOCASE_EXPORT(numbers) const double* numbers() {
+    return page.numbers.data();
 }
 // text(): the label that a pixel of the last picture shows.
 SONOCASE_EXPORT(name_at) void name_at(int column, int row) {

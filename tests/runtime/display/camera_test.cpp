@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/display/camera.h"
+#include "runtime/display/models/camera.h"
 
 #include <gtest/gtest.h>
 

@@ -8,6 +8,7 @@ import {site_server} from '../../../scripts/web-serve.mjs';
 import {Browser} from './support.mjs';
 
 const [site, name, bin, case_file, session_file] = process.argv.slice(2);
+const kTurns = 24;
 const kSlow = {offline: false, latency: 40, downloadThroughput: 10e6 / 8, uploadThroughput: 10e6 / 8};
 const server = site_server(site);
 await new Promise((done) => server.listen(0, '127.0.0.1', done));
@@ -80,13 +81,14 @@ for (const paper of [false, true]) {
 console.log(`memory of the program: ${(await page.value('sonoplay.app.core.memory.buffer.byteLength') / 1e6).toFixed(0)} MB; `
     + `of scripts: ${(await page.value('performance.memory?.usedJSHeapSize ?? NaN') / 1e6).toFixed(0)} MB`);
 
-// The same poses here and there, five times in turns; the fastest of each pose counts, as others may use the machine.
+// The same poses here and there, 24 times in turns; the fastest of each pose counts, as others may use the machine and the
+// browser compiles what runs often anew in the first turns.
 if (bin) {
     const oracle = (...args) => JSON.parse(execFileSync(`${bin}/web_oracle`, args, {encoding: 'utf8', maxBuffer: 1 << 28}));
     for (const simd of ['', 'AVX2']) {
         const best = {page: [], desktop: []};
         const keep = (to, ms) => ms.forEach((x, n) => { to[n] = Math.min(to[n] ?? Infinity, x); });
-        for (let turn = 0; turn < 5; ++turn) {
+        for (let turn = 0; turn < kTurns; ++turn) {
             const frames = oracle('times', case_file, session_file, 'physical', '512', ...(simd ? [simd] : []));
             keep(best.desktop, frames.map((frame) => frame.ms));
             keep(best.page, await page.value(`(() => {

@@ -11,6 +11,7 @@
 
 #include "formats/attempt/draw_attempt.h"
 #include "runtime/web/page_json.h"
+#include "runtime/web/warm_up.h"
 #include "support/small_case.h"
 
 namespace sonocase::runtime {
@@ -155,6 +156,16 @@ TEST(PagePlayer, an_image_that_cannot_be_made_leaves_the_one_before) {
     EXPECT_EQ(player->image().side_px, 128);
     player->frame(0, {});
     EXPECT_NE(*std::max_element(player->pixels().begin(), player->pixels().end()), 0);
+}
+
+TEST(PagePlayer, warms_up_with_a_case_of_its_own) {
+    const auto player = warm_up_player(128);
+    ASSERT_TRUE(player);
+    EXPECT_TRUE(player->warnings().empty());
+    player->frame(0, {});
+    EXPECT_GT(std::count_if(player->pixels().begin(), player->pixels().end(),
+                            [](std::uint8_t grey) { return grey > 20; }),
+              1000);
 }
 
 TEST(PageJson, names_what_the_page_shows) {

@@ -5,7 +5,12 @@
 //                                                        picture, as JSON
 //   web_oracle times CASE SESSION paper|physical SIDE [SIMD]   the same with the milliseconds of
 //                                                        each frame, by one thread
+//   web_oracle doppler CASE SESSION colour|power|spectral|m_mode SIDE   the same with the probe
+//                                                        turned by a right angle, box and gate
+//                                                        aimed at the first pose, and with
+//                                                        XXH3-128 of overlay and strip
 //   web_oracle score CASE RECORDING                      the scores of a recording, as JSON
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <string>
@@ -18,6 +23,8 @@
 #include "formats/recording/session.h"
 #include "formats/scoring/session_score.h"
 #include "runtime/engine/scan_engine.h"
+#include "runtime/imaging/doppler/doppler_colours.h"
+#include "runtime/imaging/doppler/view/doppler_view.h"
 
 namespace {
 
@@ -81,12 +88,76 @@ int frames(const CaseBundle& bundle,
     return 0;
 }
 
+DopplerMode mode_of(const std::string& name) {
+    return name == "colour"     ? DopplerMode::colour
+           : name == "power"    ? DopplerMode::power
+           : name == "spectral" ? DopplerMode::spectral
+                                : DopplerMode::m_mode;
+}
+
+int doppler_frames(const CaseBundle& bundle,
+                   const Exercise& exercise,
+                   const Session& session,
+                   const std::string& mode,
+                   int side) {
+    constexpr int kStripWidth = 768, kStripHeight = 192;
+    EngineOptions options;
+    options.render.width_px = options.render.height_px = side;
+    options.render.model = ImageModel::physical;
+    options.render.effects = exercise.effects;
+    Result<ScanEngine> engine = ScanEngine::create(bundle, exercise, options);
+    if (!engine) return fail(engine.error());
+    auto view = DopplerView::create(bundle, engine->exercise(), engine->render_options());
+    if (!view) return fail(view.error());
+    const auto count = static_cast<std::size_t>(side) * static_cast<std::size_t>(side);
+    std::vector<std::uint8_t> pixels(count),
+        strip(static_cast<std::size_t>(kStripWidth) * kStripHeight);
+    const Matrix3 turn = Matrix3::from_columns({0, 1, 0}, {-1, 0, 0}, {0, 0, 1});
+    ImageSettings settings;
+    settings.doppler.mode = mode_of(mode);
+    const char* between = "[";
+    for (const SessionSample& sample : session.samples) {
+        Rigid pose = sample.mannequin_from_probe;
+        pose.rotation = pose.rotation * turn;
+        FrameInput there;
+        there.mannequin_from_probe = pose;
+        if (*between == '[') settings.doppler = view->aimed(there, settings.doppler);
+        TrackerReading reading;
+        reading.time_s = sample.time_s;
+        reading.in_mannequin = true;
+        reading.sensor_count = 2;
+        reading.sensors[kProbeSensor] = {SensorState::ok, pose, 1.0f, 0};
+        engine->observe(reading, true);
+        engine->frame(sample.time_s, settings, pixels);
+        view->frame(engine->last().input, engine->renderer(), pixels);
+        std::fill(strip.begin(), strip.end(), std::uint8_t{0});
+        if (settings.doppler.mode == DopplerMode::spectral)
+            doppler::draw_spectrum(view->spectrum(), 4, kStripWidth, kStripHeight, strip);
+        if (settings.doppler.mode == DopplerMode::m_mode)
+            doppler::draw_m_mode(view->m_mode(), kStripWidth, kStripHeight, strip);
+        const auto overlay = view->overlay();
+        std::printf("%s{\"time_s\": %.17g, ", between, sample.time_s);
+        print_matrix("probe", pose);
+        std::printf(
+            ", \"digest\": \"%s\", \"overlay\": \"%s\", \"strip\": \"%s\", "
+            "\"coloured\": %d, \"psv\": %.17g}",
+            digest_of(pixels).c_str(), digest_of(overlay).c_str(), digest_of(strip).c_str(),
+            static_cast<int>(std::count_if(overlay.begin(), overlay.end(),
+                                           [](std::uint8_t index) { return index != 0; })),
+            view->spectrum().measures().psv_cm_s);
+        between = ",\n";
+    }
+    std::printf("]\n");
+    return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
     const std::string verb = argc > 1 ? argv[1] : "";
     const bool timed = verb == "times";
-    if (argc < 4 || (verb == "frames" && argc != 6) || (timed && argc != 6 && argc != 7)) return 2;
+    const bool frames_asked = verb == "frames" || verb == "doppler";
+    if (argc < 4 || (frames_asked && argc != 6) || (timed && argc != 6 && argc != 7)) return 2;
     const auto bundle = load_bundle(argv[2]);
     if (!bundle) return fail(bundle.error());
     const auto sequence = load_sequence(argv[3]);
@@ -98,6 +169,8 @@ int main(int argc, char** argv) {
     for (const Exercise& one : exercises) {
         if (one.name == session->header.exercise) exercise = &one;
     }
+    if (verb == "doppler")
+        return doppler_frames(*bundle, *exercise, *session, argv[4], std::stoi(argv[5]));
     if (timed || verb == "frames")
         return frames(*bundle, *exercise, *session, argv[4], std::stoi(argv[5]),
                       argc > 6 ? argv[6] : "", timed);

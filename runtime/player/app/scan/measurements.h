@@ -8,10 +8,12 @@
 #include <optional>
 #include <vector>
 
+#include "runtime/imaging/doppler/box_hands.h"
+
 namespace sonocase::runtime {
 
 // What the mouse drags in a Doppler mode.
-enum class DopplerDrag { none, box, corner, gate };
+using DopplerDrag = doppler::Held;
 
 struct Measurement {
     double x0_mm = 0, z0_mm = 0, x1_mm = 0, z1_mm = 0;  // scan plane, `probe` frame

@@ -9,7 +9,7 @@
 #include <cstdio>
 
 #include "runtime/display/theme.h"
-#include "runtime/imaging/doppler/colour_box.h"
+#include "runtime/imaging/doppler/box_hands.h"
 #include "runtime/imaging/doppler/doppler_colours.h"
 #include "runtime/imaging/doppler/m_mode.h"
 #include "runtime/player/words/words.h"
@@ -17,40 +17,22 @@
 namespace sonocase::runtime {
 namespace {
 
-using doppler::ColourBox;
 using doppler::kColourLines;
 using doppler::kColourRows;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr float kReach = 14;  // u, from the mouse to what it takes hold of
 
-// Part of the face and depth, as the settings have them.
-struct FacePoint {
-    double line = 0, depth_mm = 0;
-};
-
 ImVec2 screen(const ImagePlace& place, PlanePoint p, bool flipped) {
     return {static_cast<float>(place.origin_x + (flipped ? -p.x : p.x) / place.mm_per_screen_px),
             static_cast<float>(place.origin_y + p.z / place.mm_per_screen_px)};
 }
 
-PlanePoint plane_point(const ColourBox& box, FacePoint at) {
-    return box.point(at.line * kColourLines - 0.5, at.depth_mm / box.row_mm - 0.5);
-}
-
-FacePoint face_point(const ImagePlace& place,
-                     const ScanGeometry& geometry,
-                     double steer_tan,
-                     bool flipped,
-                     float x,
-                     float y) {
+PlanePoint in_plane(const ImagePlace& place, bool flipped, float x, float y) {
     PlanePoint p{(x - place.origin_x) * place.mm_per_screen_px,
                  (y - place.origin_y) * place.mm_per_screen_px};
     if (flipped) p.x = -p.x;
-    p.x -= p.z * steer_tan;  // 0 for a fan
-    double line = 0, sample = 0;
-    geometry.locate(p, line, sample);
-    return {(line + 0.5) / geometry.scanlines, (sample + 0.5) * geometry.step_mm};
+    return p;
 }
 
 void outline(const std::vector<ImVec2>& points, bool closed, float s) {
@@ -62,34 +44,23 @@ void outline(const std::vector<ImVec2>& points, bool closed, float s) {
 }
 
 void draw_box(const ImagePlace& place,
-              const ColourBox& box,
+              const ScanGeometry& geometry,
               const DopplerSettings& d,
               bool flipped,
               float s) {
-    constexpr int kSteps = 12;  // along the arcs of a fan
     std::vector<ImVec2> points;
-    for (int i = 0; i <= kSteps; ++i)
-        points.push_back(screen(
-            place,
-            plane_point(box, {d.box_left + (d.box_right - d.box_left) * i / kSteps, d.box_top_mm}),
-            flipped));
-    for (int i = kSteps; i >= 0; --i)
-        points.push_back(screen(
-            place,
-            plane_point(box,
-                        {d.box_left + (d.box_right - d.box_left) * i / kSteps, d.box_bottom_mm}),
-            flipped));
+    for (const PlanePoint p : doppler::box_outline(geometry, d))
+        points.push_back(screen(place, p, flipped));
     outline(points, true, s);
 }
 
 void draw_gate(const ImagePlace& place,
                const ScanGeometry& geometry,
-               const ColourBox& box,
                const DopplerSettings& d,
                bool flipped,
                float s) {
-    const ImVec2 face = screen(place, plane_point(box, {d.gate_line, 0}), flipped),
-                 end = screen(place, plane_point(box, {d.gate_line, geometry.depth_mm}), flipped);
+    const doppler::GateMarks gate = doppler::gate_marks(geometry, d);
+    const ImVec2 face = screen(place, gate.face, flipped), end = screen(place, gate.end, flipped);
     ImDrawList* draw = ImGui::GetWindowDrawList();
     const float dx = end.x - face.x, dy = end.y - face.y;
     const float length = std::max(std::hypot(dx, dy), 1.0f);
@@ -101,14 +72,13 @@ void draw_gate(const ImagePlace& place,
     if (d.mode != DopplerMode::spectral) return;
     // The gate: two strokes across the line, and the cursor along the vessel.
     const ImVec2 unit{dx / length, dy / length}, across{-unit.y, unit.x};
-    for (const double half : {-0.5, 0.5}) {
-        const ImVec2 p = screen(
-            place, plane_point(box, {d.gate_line, d.gate_depth_mm + half * d.gate_mm}), flipped);
+    for (const PlanePoint limit : {gate.upper, gate.lower}) {
+        const ImVec2 p = screen(place, limit, flipped);
         outline({{p.x - 11 * s * across.x, p.y - 11 * s * across.y},
                  {p.x + 11 * s * across.x, p.y + 11 * s * across.y}},
                 false, s);
     }
-    const ImVec2 middle = screen(place, plane_point(box, {d.gate_line, d.gate_depth_mm}), flipped);
+    const ImVec2 middle = screen(place, gate.middle, flipped);
     const double angle = (flipped ? -1 : 1) * d.angle_deg * kPi / 180;
     const auto c = static_cast<float>(std::cos(angle)), n = static_cast<float>(std::sin(angle));
     const ImVec2 along{c * unit.x - n * unit.y, n * unit.x + c * unit.y};
@@ -163,11 +133,10 @@ void draw_doppler_marks(Ui& ui,
                         const DopplerSettings& settings,
                         bool flipped) {
     if (settings.mode == DopplerMode::off) return;
-    const ColourBox box = doppler::colour_box(geometry, settings);
     if (has_strip(settings.mode)) {
-        draw_gate(place, geometry, box, settings, flipped, ui.scale());
+        draw_gate(place, geometry, settings, flipped, ui.scale());
     } else {
-        draw_box(place, box, settings, flipped, ui.scale());
+        draw_box(place, geometry, settings, flipped, ui.scale());
     }
 }
 
@@ -254,22 +223,8 @@ DopplerDrag doppler_hold(const ImagePlace& place,
                          float x,
                          float y,
                          float scale) {
-    if (d.mode == DopplerMode::off) return DopplerDrag::none;
-    const ColourBox box = doppler::colour_box(geometry, d);
-    const auto near = [&](FacePoint at, float reach) {
-        const ImVec2 p = screen(place, plane_point(box, at), flipped);
-        return std::hypot(p.x - x, p.y - y) <= reach * scale;
-    };
-    const FacePoint mouse = face_point(place, geometry, box.steer_tan, flipped, x, y);
-    if (d.mode == DopplerMode::m_mode)
-        return near({d.gate_line, mouse.depth_mm}, kReach) ? DopplerDrag::gate : DopplerDrag::none;
-    if (d.mode == DopplerMode::spectral)
-        return near({d.gate_line, d.gate_depth_mm}, 2 * kReach) ? DopplerDrag::gate
-                                                                : DopplerDrag::none;
-    if (near({d.box_right, d.box_bottom_mm}, kReach)) return DopplerDrag::corner;
-    const bool inside = mouse.line >= d.box_left && mouse.line <= d.box_right &&
-                        mouse.depth_mm >= d.box_top_mm && mouse.depth_mm <= d.box_bottom_mm;
-    return inside ? DopplerDrag::box : DopplerDrag::none;
+    return doppler::hold_at(geometry, d, in_plane(place, flipped, x, y),
+                            kReach * scale * place.mm_per_screen_px);
 }
 
 void drag_doppler(const ImagePlace& place,
@@ -281,32 +236,8 @@ void drag_doppler(const ImagePlace& place,
                   float to_x,
                   float to_y,
                   DopplerSettings& d) {
-    constexpr double kLeastLine = 0.08, kLeastMm = 5;
-    const double steer_tan = doppler::colour_box(geometry, d).steer_tan;
-    const FacePoint from = face_point(place, geometry, steer_tan, flipped, from_x, from_y),
-                    to = face_point(place, geometry, steer_tan, flipped, to_x, to_y);
-    const double depth = geometry.depth_mm;
-    switch (held) {
-        case DopplerDrag::none: return;
-        case DopplerDrag::gate:
-            d.gate_line = std::clamp(to.line, 0.0, 1.0);
-            if (d.mode == DopplerMode::spectral)
-                d.gate_depth_mm = std::clamp(to.depth_mm, 1.0, depth);
-            return;
-        case DopplerDrag::corner:
-            d.box_right = std::clamp(to.line, std::min(d.box_left + kLeastLine, 1.0), 1.0);
-            d.box_bottom_mm =
-                std::clamp(to.depth_mm, std::min(d.box_top_mm + kLeastMm, depth), depth);
-            return;
-        case DopplerDrag::box: break;
-    }
-    const double by_line = std::clamp(to.line - from.line, -d.box_left, 1 - d.box_right);
-    const double by_mm = std::clamp(to.depth_mm - from.depth_mm, std::min(1 - d.box_top_mm, 0.0),
-                                    std::max(depth - d.box_bottom_mm, 0.0));
-    d.box_left += by_line;
-    d.box_right += by_line;
-    d.box_top_mm += by_mm;
-    d.box_bottom_mm += by_mm;
+    doppler::drag_held(geometry, held, in_plane(place, flipped, from_x, from_y),
+                       in_plane(place, flipped, to_x, to_y), d);
 }
 
 }  // namespace sonocase::runtime

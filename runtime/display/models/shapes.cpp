@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/display/shapes.h"
+#include "runtime/display/models/shapes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "formats/base/geometry.h"
+#include "formats/exercise/exercise.h"
 
 namespace sonocase::runtime {
 
@@ -15,6 +16,15 @@ struct Orbit {
 };
 
 enum class ViewFrom { outside, probe, needle };
+
+// Where the view from outside stands at first.
+struct HomeView {
+    Matrix3 home;     // columns: right, up, towards the eye
+    Point3 interest;  // that it turns about
+    Orbit orbit;
+};
+// body: of the skin. The probe points down, the long axis of the body runs across.
+HomeView home_view(const Box3& body, const Exercise& exercise);
 
 // home: columns right, up and towards the eye, where yaw and pitch are 0.
 Rigid mannequin_from_outside_camera(const Matrix3& home, Point3 interest, const Orbit& orbit);

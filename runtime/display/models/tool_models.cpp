@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/display/tool_models.h"
+#include "runtime/display/models/tool_models.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,6 +27,19 @@ ProbeSize probe_size(const Probe& probe) {
 }
 
 }  // namespace
+
+Model model_of(const Surface& mesh) {
+    Model model;
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+        const Point3 p = mesh.points[i];
+        const Vector3 n = mesh.normals[i];
+        model.vertices.push_back(
+            {{float(p.x), float(p.y), float(p.z)}, {float(n.x), float(n.y), float(n.z)}, {0, 0}});
+    }
+    for (const auto& t : mesh.triangles)
+        model.indices.insert(model.indices.end(), t.begin(), t.end());
+    return model;
+}
 
 Model probe_model(const Probe& probe) {
     const auto [half, grip] = probe_size(probe);

@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "formats/exercise/exercise.h"
-#include "runtime/display/shapes.h"
+#include "formats/volume/surface.h"
+#include "runtime/display/models/shapes.h"
 #include "runtime/imaging/renderer.h"
 
 namespace sonocase::runtime {
@@ -16,6 +17,9 @@ struct Model {
     std::vector<Vertex> vertices;
     std::vector<std::uint32_t> indices;  // three per triangle
 };
+
+// A mesh of skin_mesh.h, without a texture.
+Model model_of(const Surface& mesh);
 
 Model probe_model(const Probe& probe);
 // The orientation mark on the side of the probe.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/display/skin_mesh.h"
+#include "runtime/display/models/skin_mesh.h"
 
 #include <algorithm>
 #include <cmath>
