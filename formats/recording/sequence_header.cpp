@@ -11,83 +11,6 @@ namespace {
 
 constexpr std::size_t kMaxKeyBytes = 512;
 
-// Hands out lines without their ends, and knows the number of the last one.
-class LineReader {
-  public:
-    explicit LineReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
-
-    bool next(std::string_view& line) {
-        if (at_ >= bytes_.size()) return false;
-        const auto* from = reinterpret_cast<const char*>(bytes_.data()) + at_;
-        const std::string_view rest(from, bytes_.size() - at_);
-        const std::size_t end = rest.find('\n');
-        if (end == std::string_view::npos) return false;  // cut off: every header line has an end
-        line = rest.substr(0, end);
-        if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-        at_ += end + 1;
-        ++number_;
-        return true;
-    }
-    int number() const { return number_; }
-    std::span<const std::uint8_t> rest() const { return bytes_.subspan(at_); }
-
-  private:
-    std::span<const std::uint8_t> bytes_;
-    std::size_t at_ = 0;
-    int number_ = 0;
-};
-
-Result<SequenceHeader> split_mha(LineReader lines, const std::string& where) {
-    SequenceHeader header;
-    std::string_view line;
-    while (lines.next(line)) {
-        const std::size_t equal = line.find('=');
-        if (trimmed(line).empty()) continue;
-        if (equal == std::string_view::npos || equal > kMaxKeyBytes) {
-            return sequence_fault(where, "holds no 'key = value'", "is it a sequence (.igs.mha)?",
-                                  lines.number());
-        }
-        const HeaderLine entry{trimmed(line.substr(0, equal)), trimmed(line.substr(equal + 1)),
-                               lines.number()};
-        header.lines.push_back(entry);
-        if (entry.key == "ElementDataFile") {
-            if (entry.value != "LOCAL") {
-                return sequence_fault(where, "keeps its pixels in another file",
-                                      "expected ElementDataFile = LOCAL", lines.number());
-            }
-            header.data = lines.rest();
-            return header;
-        }
-    }
-    return sequence_fault(where, "ends inside its header",
-                          "expected ElementDataFile = LOCAL as the last header line");
-}
-
-Result<SequenceHeader> split_nrrd(LineReader lines, const std::string& where) {
-    SequenceHeader header;
-    header.nrrd = true;
-    std::string_view line;
-    lines.next(line);  // the magic
-    while (lines.next(line)) {
-        if (line.empty()) {
-            header.data = lines.rest();
-            return header;
-        }
-        if (line.front() == '#') continue;
-        const std::size_t custom = line.find(":=");
-        const std::size_t plain = line.find(": ");
-        const std::size_t colon = std::min(custom, plain);
-        if (colon == std::string_view::npos || colon > kMaxKeyBytes) {
-            return sequence_fault(where, "holds neither 'field: value' nor 'key:=value'",
-                                  "is it a sequence (.igs.nrrd)?", lines.number());
-        }
-        header.lines.push_back(
-            {trimmed(line.substr(0, colon)), trimmed(line.substr(colon + 2)), lines.number()});
-    }
-    return sequence_fault(where, "ends inside its header",
-                          "expected an empty line after the header");
-}
-
 }  // namespace
 
 Error sequence_fault(const std::string& where,
@@ -97,12 +20,77 @@ Error sequence_fault(const std::string& where,
     return {what, line ? where + ":" + std::to_string(line) : where, expected};
 }
 
+HeaderLines::HeaderLines(std::span<const std::uint8_t> bytes, bool nrrd)
+    : bytes_(bytes), nrrd_(nrrd) {
+    std::string_view magic;
+    if (nrrd_) next_text(magic);
+}
+
+// A line without its end.
+bool HeaderLines::next_text(std::string_view& line) {
+    if (at_ >= bytes_.size()) return false;
+    const auto* from = reinterpret_cast<const char*>(bytes_.data()) + at_;
+    const std::string_view rest(from, bytes_.size() - at_);
+    const std::size_t end = rest.find('\n');
+    if (end == std::string_view::npos) return false;  // cut off: every header line has an end
+    line = rest.substr(0, end);
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    at_ += end + 1;
+    ++number_;
+    return true;
+}
+
+HeaderLines::Next HeaderLines::next(HeaderLine& entry) {
+    if (ended_) return Next::data;
+    std::string_view line;
+    while (next_text(line)) {
+        if (nrrd_ && line.empty()) return Next::data;
+        if (nrrd_ ? line.front() == '#' : trimmed(line).empty()) continue;
+        const std::size_t sign =
+            nrrd_ ? std::min(line.find(":="), line.find(": ")) : line.find('=');
+        if (sign == std::string_view::npos || sign > kMaxKeyBytes) return Next::malformed;
+        entry = {trimmed(line.substr(0, sign)), trimmed(line.substr(sign + (nrrd_ ? 2 : 1))),
+                 number_};
+        ended_ = !nrrd_ && entry.key == "ElementDataFile";
+        return Next::line;
+    }
+    return Next::cut_off;
+}
+
 Result<SequenceHeader> split_sequence_header(std::span<const std::uint8_t> bytes,
                                              const std::string& where) {
     static constexpr std::string_view kNrrd = "NRRD000";
-    const bool nrrd =
+    SequenceHeader header;
+    header.bytes = bytes;
+    header.nrrd =
         bytes.size() > kNrrd.size() && std::equal(kNrrd.begin(), kNrrd.end(), bytes.begin());
-    return nrrd ? split_nrrd(LineReader(bytes), where) : split_mha(LineReader(bytes), where);
+    HeaderLines lines(bytes, header.nrrd);
+    for (HeaderLine entry;;) {
+        switch (lines.next(entry)) {
+            case HeaderLines::Next::line: break;
+            case HeaderLines::Next::data: header.data = lines.rest(); return header;
+            case HeaderLines::Next::cut_off:
+                return sequence_fault(where, "ends inside its header",
+                                      header.nrrd
+                                          ? "expected an empty line after the header"
+                                          : "expected ElementDataFile = LOCAL as the last header "
+                                            "line");
+            case HeaderLines::Next::malformed:
+                return header.nrrd
+                           ? sequence_fault(where, "holds neither 'field: value' nor 'key:=value'",
+                                            "is it a sequence (.igs.nrrd)?", lines.number())
+                           : sequence_fault(where, "holds no 'key = value'",
+                                            "is it a sequence (.igs.mha)?", lines.number());
+        }
+        if (!header.nrrd && entry.key == "ElementDataFile" && entry.value != "LOCAL")
+            return sequence_fault(where, "keeps its pixels in another file",
+                                  "expected ElementDataFile = LOCAL", lines.number());
+        if (is_frame_key(entry.key)) {
+            ++header.frame_lines;
+        } else {
+            header.lines.push_back(entry);
+        }
+    }
 }
 
 }  // namespace sonocase::detail

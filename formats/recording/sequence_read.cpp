@@ -186,7 +186,7 @@ Status Reader::read_structure_line(const HeaderLine& line) {
 
 Status Reader::read_structure() {
     for (const HeaderLine& line : header_.lines) {
-        if (line.key.substr(0, 9) == "Seq_Frame" || line.key.substr(0, 7) == "Comment") continue;
+        if (line.key.substr(0, 7) == "Comment") continue;
         if (Status s = read_structure_line(line); !s) return s;
     }
     return check_shape();
@@ -278,6 +278,8 @@ Status Reader::read_frame_field(const HeaderLine& line, std::size_t index, std::
         const std::size_t slot =
             pose_slot(name.substr(0, name.size() - (is_status ? kStatus : kTransform).size()));
         if (slot >= kMaxTransforms) return fault("has too many transforms", "", line.number);
+        if (frame.poses.capacity() <= slot)
+            frame.poses.reserve(std::max(slot + 1, out_.transforms.size()));
         while (frame.poses.size() <= slot) frame.poses.emplace_back();
         SequencePose& pose = frame.poses[slot];
         return is_status ? read_transform_status(line, pose) : read_transform(line, pose);
@@ -306,19 +308,16 @@ Status Reader::read_frame_field(const HeaderLine& line, std::size_t index, std::
 Status Reader::read_frames() {
     const auto frame_count = static_cast<std::size_t>(sizes_.back());
     // Every frame has a line of its own, so the lines bound what is allocated.
-    std::size_t described = 0;
-    for (const HeaderLine& line : header_.lines) {
-        if (line.key.substr(0, 9) == "Seq_Frame") ++described;
-    }
-    if (frame_count > described) {
-        return fault("describes " + std::to_string(described) + " fields of " +
+    if (frame_count > header_.frame_lines) {
+        return fault("describes " + std::to_string(header_.frame_lines) + " fields of " +
                          std::to_string(frame_count) + " frames",
                      "is it a sequence (with Seq_Frame0000_Timestamp and so on)?");
     }
     out_.frames.resize(frame_count);
     seen_.assign(frame_count, false);
-    for (const HeaderLine& line : header_.lines) {
-        if (line.key.substr(0, 9) != "Seq_Frame") continue;
+    detail::HeaderLines lines(header_.bytes, header_.nrrd);
+    for (HeaderLine line; lines.next(line) == detail::HeaderLines::Next::line;) {
+        if (!detail::is_frame_key(line.key)) continue;
         const std::size_t underscore = line.key.find('_', 9);
         std::int64_t index = -1;
         if (underscore == std::string_view::npos ||

@@ -197,6 +197,7 @@ Result<Session> session_from_sequence(const Sequence& sequence,
                      there.empty() ? "it has none" : "it has " + there};
     }
     const Rigid turn = z_along(names.needle_axis);
+    session.samples.reserve(sequence.frames.size());
     for (const SequenceFrame& frame : sequence.frames) {
         SessionSample sample;
         sample.time_s = frame.timestamp_s;

@@ -60,9 +60,12 @@ Result<ReviewInput> load_review(const std::string& session_path,
                                 const ReviewOptions& options) {
     ReviewInput input;
     input.session_path = session_path;
-    const auto sequence = load_recording_file(session_path);
-    if (!sequence) return sequence.error();
-    auto session = session_from_sequence(*sequence, guess_names(*sequence), session_path);
+    // The file as it is goes before the session is looked at: of eight hours it is a gigabyte.
+    auto session = [&]() -> Result<Session> {
+        const auto sequence = load_recording_file(session_path);
+        if (!sequence) return sequence.error();
+        return session_from_sequence(*sequence, guess_names(*sequence), session_path);
+    }();
     if (!session) return session.error();
     input.session = std::move(*session);
     if (input.session.samples.empty()) {

@@ -210,7 +210,8 @@ std::string review_page(const ReviewInput& input, const std::vector<SessionView>
 Result<StageReport> make_review(const std::string& session_path,
                                 const std::string& bundle_path,
                                 const std::string& folder,
-                                const ReviewOptions& options) {
+                                const ReviewOptions& options,
+                                ReviewInput* seen) {
     const auto start = std::chrono::steady_clock::now();
     const auto seconds = [&] {
         return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -238,6 +239,7 @@ Result<StageReport> make_review(const std::string& session_path,
     report.measures.push_back({"readings", static_cast<double>(input->session.samples.size())});
     report.warnings = input->warnings;
     report.seconds = seconds();
+    if (seen != nullptr) *seen = std::move(*input);
     return report;
 }
 

@@ -15,10 +15,12 @@ namespace sonocase::pipeline {
 std::string review_page(const ReviewInput& input, const std::vector<SessionView>& views);
 
 // Loads, scores, renders and writes DIR/review.html and DIR/scores.json. Views that could not be
-// rendered (no display) are left out with a warning in the page.
+// rendered (no display) are left out with a warning in the page. seen: takes what was loaded and
+// scored, for callers that go on with it.
 Result<StageReport> make_review(const std::string& session_path,
                                 const std::string& bundle_path,
                                 const std::string& folder,
-                                const ReviewOptions& options);
+                                const ReviewOptions& options,
+                                ReviewInput* seen = nullptr);
 
 }  // namespace sonocase::pipeline

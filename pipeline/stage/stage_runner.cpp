@@ -111,9 +111,11 @@ Status StageRunner::make(std::size_t i, bool damaged, const Progress& progress) 
     Slot& slot = slots_[i];
     StageInputs inputs = inputs_of(i);
     const Stopwatch watch;
+    const double processor_before = processor_seconds();
     auto value = stage.run(inputs, progress);
     if (!value) return value.error();
     const double seconds = watch.seconds();
+    processor_seconds_ = processor_seconds() - processor_before;
     slot.value = std::move(*value);
     std::vector<std::string> notes;
     if (damaged) notes.push_back("a damaged cache entry was made again");
@@ -140,7 +142,11 @@ void StageRunner::keep_reports(std::size_t i,
     double known = 0;
     for (const StageReport& report : reports) known += report.seconds;
     for (std::size_t n = 0; n < reports.size(); ++n) {
-        StageRun run{std::move(reports[n]), stage.codec ? slots_[i].key : "", cached, {}};
+        StageRun run{std::move(reports[n]),
+                     stage.codec ? slots_[i].key : "",
+                     cached,
+                     n == 0 && !cached ? processor_seconds_ : 0,
+                     {}};
         if (known <= 0) run.report.seconds = n == 0 ? seconds : 0;
         runs.push_back(std::move(run));
     }

@@ -23,6 +23,7 @@ struct StageRun {
     StageReport report;  // with the seconds of the run that made the result
     std::string key;     // in the cache; empty without one
     bool from_cache = false;
+    double processor_seconds = 0;  // of this run; of a stage of several parts, with its first
     std::vector<std::string> cache_notes;  // what happened in the cache: no matter of the result
 };
 
@@ -63,6 +64,7 @@ class StageRunner {
     Status make(std::size_t i, bool damaged, const Progress& progress);
     bool read(std::size_t i, bool* damaged);
     void keep_reports(std::size_t i, double seconds, bool cached, std::vector<std::string> notes);
+    double processor_seconds_ = 0;  // of the stage made last
     StageInputs inputs_of(std::size_t i);
     void let_go_after(std::size_t i);
 

@@ -114,13 +114,9 @@ double probe_seconds() {
 
 Choice choose_settings(const FrontTable& table,
                        const AccuracyTarget& target,
-                       double volume_mm3,
-                       double speed) {
+                       const std::function<double(const Settings&)>& seconds_of) {
     assert(!table.rows.empty());
-    const CostModel model = fit_cost_model(table);
-    const auto seconds = [&](const FrontRow& row) {
-        return speed * seconds_at(row, table, model, volume_mm3);
-    };
+    const auto seconds = [&](const FrontRow& row) { return seconds_of(row.settings); };
     std::vector<FrontRow> rows = table.rows;
     std::stable_sort(rows.begin(), rows.end(),
                      [&](const FrontRow& a, const FrontRow& b) { return seconds(a) < seconds(b); });

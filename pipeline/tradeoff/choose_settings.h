@@ -3,12 +3,13 @@
 // Chooses settings for a wanted accuracy, or for the time available.
 //
 // The table of measured settings (measured_front.inc, written by scripts/accuracy from a sweep of
-// the whole case on the synthetic bodies) gives the error, the worst of the bodies'. Seconds are
-// those of the sweep, moved to the volume of the case at hand by a cost per voxel fitted to it,
-//     seconds = speed * (row + b * (volume - volume of the sweep) / voxel^3)
-// with `speed` from a probe of about a second on this machine.
+// the whole case on the synthetic bodies) gives the error, the worst of the bodies'. The seconds of
+// a case at hand are given by the caller; those of the next step in a bundle, which must not depend
+// on the machine, are those of the sweep, moved to the case's volume by a cost per voxel fitted to
+// it.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -61,12 +62,11 @@ struct Choice {
     std::string warning;  // what of the target cannot be achieved; empty: nothing
 };
 
-// volume_mm3: of the case's cooked grid, about the mannequin's bounding box; speed: probe_seconds()
-// over the table's. The table has at least one row.
+// seconds: that the case at hand takes with settings, the whole command
+// (pipeline/cook/build_time.h). The table has at least one row.
 Choice choose_settings(const FrontTable& table,
                        const AccuracyTarget& target,
-                       double volume_mm3,
-                       double speed);
+                       const std::function<double(const Settings&)>& seconds);
 
 // What would lower the error next: the cheapest row that is better than the one a case was cooked
 // with (by its voxel).

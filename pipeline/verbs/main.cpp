@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // sonocase: turns a segmented CT and a digitised mannequin into a case bundle.
+#include <csignal>
 #include <cstdio>
 #include <functional>
 #include <string>
@@ -129,6 +130,8 @@ int run(int argc, char** argv) {
 }  // namespace sonocase::pipeline
 
 int main(int argc, char** argv) {
+    // A file that may not grow further is an error of its write, as a full disk is.
+    std::signal(SIGXFSZ, SIG_IGN);
     try {
         return sonocase::pipeline::run(argc, argv);
     } catch (const std::exception& exception) {

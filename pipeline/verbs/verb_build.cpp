@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -19,10 +20,12 @@
 #include "pipeline/base/parallel.h"
 #include "pipeline/command_line/command_line.h"
 #include "pipeline/command_line/verbs.h"
+#include "pipeline/cook/build_time.h"
 #include "pipeline/cook/case_size.h"
 #include "pipeline/cook/cook_case.h"
 #include "pipeline/cook/memory_need.h"
 #include "pipeline/recipe/read_recipe.h"
+#include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/tradeoff/boundary_error.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/tradeoff/suites.h"
@@ -68,11 +71,17 @@ StageReport with_cache_notes(const StageRun& run) {
 }
 
 // Puts settings for the accuracy or the time that was asked for into the recipe.
-Result<Choice> choose_for(const AccuracyTarget& target, Recipe& recipe) {
-    auto size = cooked_volume_mm3(recipe);
-    if (!size) return size.error();
-    const FrontTable& front = measured_front();
-    Choice choice = choose_settings(front, target, *size, probe_seconds() / front.probe_seconds);
+Result<Choice> choose_for(const BuildOptions& options, Recipe& recipe, double speed) {
+    if (auto size = cooked_volume_mm3(recipe); !size) return size.error();
+    const CaseSize size = case_size(recipe);
+    const double voxel_mm = recipe.settings.of<ResampleOptions>("resample").voxel_mm;
+    Recipe tried = recipe;
+    const auto seconds = [&](const Settings& settings) {
+        tried.settings = recipe.settings;
+        if (!apply_settings(settings, tried.settings)) return HUGE_VAL;
+        return build_time(tried, size, voxel_mm, speed, options.common.threads).alone_s;
+    };
+    Choice choice = choose_settings(measured_front(), options.target, seconds);
     if (const Status s = apply_settings(choice.settings, recipe.settings); !s) return s.error();
     return choice;
 }
@@ -84,12 +93,20 @@ double peak_memory_mb() {
     return static_cast<double>(usage.ru_maxrss) * 1024 / 1e6;
 }
 
+// What was said before the work began.
+struct Expected {
+    double memory_mb = 0;
+    BuildTime time;
+    bool said = false;
+};
+
 // What a build reports: the stages as they ran, and which of them came from the cache.
 std::string build_report(const CookResult& cooked,
                          const std::string& out,
                          const std::string& digest,
                          std::size_t bytes,
                          double seconds,
+                         const Expected& expected,
                          const std::optional<Choice>& choice,
                          const std::optional<double>& achieved_error_mm) {
     nlohmann::ordered_json json;
@@ -97,14 +114,19 @@ std::string build_report(const CookResult& cooked,
     json["digest"] = digest;
     if (bytes > 0) json["bytes"] = bytes;
     json["seconds"] = seconds;
+    json["processor_seconds"] = processor_seconds();
     json["peak_mb"] = peak_memory_mb();
+    if (expected.said)
+        json["expected"] = {{"processor_seconds", expected.time.processor_s},
+                            {"seconds_alone", expected.time.alone_s},
+                            {"memory_mb", expected.memory_mb}};
     char host[64] = "";
     if (gethostname(host, sizeof host - 1) == 0) json["host"] = host;
     if (choice) {
         json["choice"] = {{"settings", settings_text(choice->settings)},
                           {"predicted_error_mm", choice->predicted_error_mm},
                           {"predicted_seconds", choice->predicted_seconds},
-                          {"achieved_seconds", seconds_of(cooked)}};
+                          {"achieved_seconds", seconds}};
         if (achieved_error_mm) json["choice"]["achieved_error_mm"] = *achieved_error_mm;
     }
     json["stages"] = nlohmann::ordered_json::array();
@@ -113,6 +135,7 @@ std::string build_report(const CookResult& cooked,
         const StageReport report = with_cache_notes(run);
         auto stage = nlohmann::ordered_json::parse(report_json(report));
         stage["from_cache"] = run.from_cache;
+        if (run.processor_seconds > 0) stage["processor_seconds"] = run.processor_seconds;
         if (!run.key.empty()) stage["key"] = run.key;
         json["stages"].push_back(stage);
         for (const std::string& warning : report.warnings)
@@ -121,9 +144,10 @@ std::string build_report(const CookResult& cooked,
     return json.dump(2) + "\n";
 }
 
-Result<std::optional<Choice>> choose(const AccuracyTarget& target, Recipe& recipe) {
+Result<std::optional<Choice>> choose(const BuildOptions& options, Recipe& recipe, double speed) {
+    const AccuracyTarget& target = options.target;
     if (target.tolerance_mm <= 0 && target.time_budget_s <= 0) return std::optional<Choice>();
-    auto choice = choose_for(target, recipe);
+    auto choice = choose_for(options, recipe, speed);
     if (!choice) return choice.error();
     std::printf("chosen: %s, about %.2g mm in %.2g s\n", settings_text(choice->settings).c_str(),
                 choice->predicted_error_mm, choice->predicted_seconds);
@@ -145,11 +169,13 @@ Result<CookResult> cook(const BuildOptions& options, const Recipe& recipe) {
 
 Status write_stage_report(const BuildOptions& options,
                           const CookResult& cooked,
+                          const Expected& expected,
                           const std::optional<Choice>& choice,
                           double seconds) {
     if (options.common.report_path.empty()) return Done{};
-    return write_file(options.common.report_path,
-                      build_report(cooked, "", cooked.digest, 0, seconds, choice, std::nullopt));
+    return write_file(
+        options.common.report_path,
+        build_report(cooked, "", cooked.digest, 0, seconds, expected, choice, std::nullopt));
 }
 
 // The bundle, its picture, and the report beside it, which inspect reads: seconds are not part of
@@ -174,17 +200,28 @@ int build_one(const BuildOptions& options) {
     auto recipe = options.recipe.empty() ? embedded_recipe(options.overrides)
                                          : load_recipe(options.recipe, options.overrides);
     if (!recipe) return fail("build", recipe.error());
-    const auto choice = choose(options.target, *recipe);
+    const bool say = !options.common.quiet || options.target.tolerance_mm > 0 ||
+                     options.target.time_budget_s > 0 || !options.common.report_path.empty();
+    const double speed = say ? machine_speed() : 1;
+    const auto choice = choose(options, *recipe, speed);
     if (!choice) return fail("build", choice.error());
     const MemoryNeed need = memory_need(*recipe, options.memory_mb);
     if (const Status s = check_memory(need, options.memory_mb); !s) return fail("build", s.error());
+    const Expected expected{
+        need.mb,
+        build_time(*recipe, need.size, recipe->settings.of<ResampleOptions>("resample").voxel_mm,
+                   speed, options.common.threads),
+        say};
     if (!options.common.quiet)
-        std::printf("to cook: %.1f million voxels, about %.0f MB (%s)\n", need.size.cooked_voxels,
-                    need.mb, need.stage.c_str());
+        std::printf(
+            "to cook: %.1f million voxels, about %.0f MB (%s), %.2g s of processors, %.2g s on "
+            "this machine with nothing else to do\n",
+            need.size.cooked_voxels, need.mb, need.stage.c_str(), expected.time.processor_s,
+            expected.time.alone_s);
     const auto cooked = cook(options, *recipe);
     if (!cooked) return fail("build", cooked.error());
     if (!cooked->digest.empty()) {  // stopped before the bundle
-        auto status = write_stage_report(options, *cooked, *choice, watch.seconds());
+        auto status = write_stage_report(options, *cooked, expected, *choice, watch.seconds());
         if (!status) return fail("build", status.error());
         std::printf("%s of %s, %.1f s\n", options.until.c_str(), recipe->name.c_str(),
                     watch.seconds());
@@ -199,7 +236,7 @@ int build_one(const BuildOptions& options) {
     ThreadJobs jobs;
     const std::vector<std::uint8_t> bytes = write_bundle(cooked->bundle, jobs);
     const std::string report = build_report(*cooked, out, digest_of(bytes), bytes.size(),
-                                            watch.seconds(), *choice, achieved_error_mm);
+                                            watch.seconds(), expected, *choice, achieved_error_mm);
     if (auto status = write_case(options, out, *cooked, bytes, report); !status)
         return fail("build", status.error());
     for (const StageRun& run : cooked->stages) print_warnings("build", with_cache_notes(run));

@@ -42,16 +42,14 @@ int verb_review(int argc, char** argv) {
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     if (no_progress) options.progress_path.clear();
     options.threads = common.threads;
-    const auto report = make_review(session, bundle, out, options);
+    ReviewInput input;
+    const auto report = make_review(session, bundle, out, options, &input);
     if (!report) return fail("review", report.error());
     print_warnings("review", *report);
     if (keep && !options.progress_path.empty()) {
-        const auto input = load_review(session, bundle, options);
-        if (!input) return fail("review", input.error());
         auto book = ProgressBook::open(options.progress_path);
         if (!book) return fail("review", book.error());
-        const Status added =
-            book->add(progress_entry(input->session.header, input->score, session));
+        const Status added = book->add(progress_entry(input.session.header, input.score, session));
         if (!added) return fail("review", added.error());
     }
     if (auto s = write_report(common, *report); !s) return fail("review", s.error());
@@ -106,13 +104,15 @@ int verb_score(int argc, char** argv) {
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     const auto axis = axis_of(a.axis);
     if (!axis) return wrong_usage("score", "--needle-axis is not a direction x,y,z");
-    const auto sequence = load_recording_file(a.session);
-    if (!sequence) return fail("score", sequence.error());
-    SessionNames names = guess_names(*sequence);
-    names.needle_axis = *axis;
-    if (!a.probe.empty()) names.probe = a.probe;
-    if (!a.needle.empty()) names.needle = names.drawn = a.needle;
-    const auto session = session_from_sequence(*sequence, names, a.session);
+    const auto session = [&]() -> Result<Session> {
+        const auto sequence = load_recording_file(a.session);
+        if (!sequence) return sequence.error();
+        SessionNames names = guess_names(*sequence);
+        names.needle_axis = *axis;
+        if (!a.probe.empty()) names.probe = a.probe;
+        if (!a.needle.empty()) names.needle = names.drawn = a.needle;
+        return session_from_sequence(*sequence, names, a.session);
+    }();
     if (!session) return fail("score", session.error());
     CaseBundle bundle;
     std::vector<std::string> warnings;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <string_view>
@@ -15,6 +16,8 @@ using namespace sonocase::runtime;
 
 int main(int argc, char** argv) {
     const double start_s = steady_seconds();
+    // A file that may not grow further is an error of its write, as a full disk is.
+    std::signal(SIGXFSZ, SIG_IGN);
     try {
         if (argc > 1 && std::string_view(argv[1]) == "dataset")
             return run_dataset_command(argc - 1, argv + 1);

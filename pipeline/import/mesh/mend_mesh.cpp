@@ -151,23 +151,35 @@ std::vector<std::vector<std::uint32_t>> border_chains(const std::vector<Triangle
     return chains;
 }
 
-// Components whose own triangles leave no edge without its opposite.
+// Components whose own triangles leave no edge without its opposite. Cost: n log n, however many
+// components there are.
 std::vector<bool> closed_components(const std::vector<Triangle>& triangles,
                                     const std::vector<int>& component,
                                     int count) {
-    std::unordered_map<std::uint64_t, int> balance;
+    struct Side {
+        int component;
+        std::uint64_t edge;
+        int sense;
+    };
+    std::vector<Side> sides;
+    sides.reserve(3 * triangles.size());
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        for (std::size_t e = 0; e < 3; ++e) {
+            const std::uint32_t a = triangles[t][e], b = triangles[t][(e + 1) % 3];
+            sides.push_back({component[t], edge_key(a, b), a < b ? 1 : -1});
+        }
+    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+        return a.component != b.component ? a.component < b.component : a.edge < b.edge;
+    });
     std::vector<bool> closed(static_cast<std::size_t>(count), true);
-    std::vector<std::vector<std::uint32_t>> of(static_cast<std::size_t>(count));
-    for (std::uint32_t t = 0; t < triangles.size(); ++t)
-        of[static_cast<std::size_t>(component[t])].push_back(t);
-    for (std::size_t c = 0; c < of.size(); ++c) {
-        balance.clear();
-        for (const std::uint32_t t : of[c])
-            for (std::size_t e = 0; e < 3; ++e) {
-                ++balance[pair_key(triangles[t][e], triangles[t][(e + 1) % 3])];
-                --balance[pair_key(triangles[t][(e + 1) % 3], triangles[t][e])];
-            }
-        for (const auto& [edge, sum] : balance) closed[c] = closed[c] && sum == 0;
+    for (std::size_t n = 0; n < sides.size();) {
+        const Side& first = sides[n];
+        int sum = 0;
+        for (; n < sides.size() && sides[n].component == first.component &&
+               sides[n].edge == first.edge;
+             ++n)
+            sum += sides[n].sense;
+        if (sum != 0) closed[static_cast<std::size_t>(first.component)] = false;
     }
     return closed;
 }

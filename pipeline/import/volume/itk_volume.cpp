@@ -10,11 +10,13 @@
 
 #include <cmath>
 #include <filesystem>
-#include <optional>
 
+#include "pipeline/base/line_text.h"
+#include "pipeline/base/memory_limit.h"
 #include "pipeline/base/quiet_library.h"
 #include "pipeline/import/source/source_path.h"
 #include "pipeline/import/volume/data_file.h"
+#include "pipeline/import/volume/itk_component.h"
 #include "pipeline/import/volume/native_volume.h"
 #include "pipeline/import/volume/volume_file.h"
 
@@ -22,26 +24,6 @@ namespace sonocase::pipeline {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = 16ull << 30;  // no patient's volume is larger
-
-std::optional<Component> component_of(itk::IOComponentEnum type) {
-    using E = itk::IOComponentEnum;
-    constexpr bool long_is_64 = sizeof(long) == 8;
-    switch (type) {
-        case E::UCHAR: return Component::u8;
-        case E::CHAR: return Component::i8;
-        case E::USHORT: return Component::u16;
-        case E::SHORT: return Component::i16;
-        case E::UINT: return Component::u32;
-        case E::INT: return Component::i32;
-        case E::ULONG: return long_is_64 ? Component::u64 : Component::u32;
-        case E::LONG: return long_is_64 ? Component::i64 : Component::i32;
-        case E::ULONGLONG: return Component::u64;
-        case E::LONGLONG: return Component::i64;
-        case E::FLOAT: return Component::f32;
-        case E::DOUBLE: return Component::f64;
-        default: return std::nullopt;
-    }
-}
 
 itk::ImageIOBase::Pointer reader_for(const std::string& path) {
     const auto ends = [&](const char* ending) { return path.ends_with(ending); };
@@ -94,6 +76,16 @@ Result<Grid> grid_of(const itk::ImageIOBase& io, const std::string& path) {
     return grid;
 }
 
+// The voxels in the file's type, and a byte for each value, must fit into memory.
+Status check_room(const NativeVolume& volume, std::uint64_t bytes, const std::string& path) {
+    const double values = static_cast<double>(volume.grid.voxel_count()) * volume.layers;
+    const double mb = (static_cast<double>(bytes) + values) / 1e6;
+    if (mb <= memory_limit_mb()) return Done{};
+    return Error{text("its %.0f million voxels take %.0f MB, and there are %.0f MB", values / 1e6,
+                      mb, memory_limit_mb()),
+                 path, "a coarser or cropped label map, or more memory"};
+}
+
 }  // namespace
 
 bool is_volume_file_name(const std::string& path) {
@@ -111,17 +103,18 @@ std::string volume_stem(const std::string& path) {
     return name;
 }
 
-std::uint64_t voxel_bytes_in_header(const std::string& path) {
-    if (!check_source_file(path, "") || !check_data_files(path)) return 0;
+VolumeSize size_in_file_header(const std::string& path) {
+    if (!check_source_file(path, "") || !check_data_files(path)) return {};
     const QuietLibrary quiet;
     itk::Object::GlobalWarningDisplayOff();
     try {
         const itk::ImageIOBase::Pointer io = reader_for(path);
         io->SetFileName(path);
         io->ReadImageInformation();
-        return static_cast<std::uint64_t>(io->GetImageSizeInBytes());
+        return {static_cast<std::uint64_t>(io->GetImageSizeInPixels()),
+                static_cast<std::uint64_t>(io->GetImageSizeInBytes())};
     } catch (const std::exception&) {  // reading the voxels will report it
-        return 0;
+        return {};
     }
 }
 
@@ -158,10 +151,12 @@ Result<NativeVolume> read_itk_volume(const std::string& path) {
         if (bytes > kMaxBytes)
             return Error{"header asks for " + std::to_string(bytes >> 30) + " GB of voxels", path,
                          todo};
-        volume.bytes.resize(bytes);
+        // A file that is cut off is refused before room is made for what its header promises.
         if (auto status = check_nifti_length(path, bytes); !status) return status.error();
         if (auto status = check_meta_length(path, bytes); !status) return status.error();
         if (auto status = check_nrrd_length(path, bytes); !status) return status.error();
+        if (auto status = check_room(volume, bytes, path); !status) return status.error();
+        volume.bytes.resize(bytes);
         itk::ImageIORegion region(dimensions);
         for (unsigned d = 0; d < dimensions; ++d) region.SetSize(d, io->GetDimensions(d));
         io->SetIORegion(region);

@@ -11,6 +11,7 @@
 
 #include "formats/base/result.h"
 #include "formats/volume/grid.h"
+#include "pipeline/import/volume/volume_file.h"
 
 namespace sonocase::pipeline {
 
@@ -25,6 +26,7 @@ struct NativeVolume {
     std::vector<std::string> warnings;
 };
 
+VolumeSize size_in_file_header(const std::string& path);            // one file
 Result<NativeVolume> read_itk_volume(const std::string& path);      // one file
 Result<NativeVolume> read_dicom_series(const std::string& folder);  // the folder's largest series
 

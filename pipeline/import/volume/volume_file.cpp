@@ -9,6 +9,7 @@
 #include <unordered_map>
 
 #include "pipeline/import/source/source_path.h"
+#include "pipeline/import/volume/dicom_stack.h"
 #include "pipeline/import/volume/native_volume.h"
 
 namespace sonocase::pipeline {
@@ -111,6 +112,24 @@ class ValueTable {
 };
 
 }  // namespace
+
+VolumeSize size_in_headers(const std::string& path) {
+    std::error_code code;
+    if (!fs::is_directory(path, code)) return size_in_file_header(path);
+    if (!check_source_folder(path, "")) return {};
+    for (const auto& entry : fs::directory_iterator(path, code))
+        if (is_volume_file_name(entry.path().string()))
+            return size_in_file_header(entry.path().string());
+    const auto stack = dicom_stack(read_dicom_headers(path), path);
+    if (!stack) return {};
+    VolumeSize size;
+    for (const DicomSlice& slice : stack->slices)
+        size.voxels += static_cast<std::uint64_t>(slice.rows) *
+                       static_cast<std::uint64_t>(slice.columns) *
+                       static_cast<std::uint64_t>(slice.frames);
+    size.bytes = 2 * size.voxels;  // of CT and of most others
+    return size;
+}
 
 Result<LabelLayers> read_label_layers(const std::string& path) {
     auto native = read_native(path);

@@ -33,9 +33,13 @@ struct LabelLayers {
 // and one byte each.
 Result<LabelLayers> read_label_layers(const std::string& path);
 
-// Bytes of voxels according to the file's header, which is all that is read; 0 if it cannot be
-// read.
-std::uint64_t voxel_bytes_in_header(const std::string& path);
+// Voxels of a file or of a folder's DICOM series, and the bytes that they take in their own type,
+// according to headers, which are all that is read; of a folder of masks those of one. 0: they
+// cannot be read.
+struct VolumeSize {
+    std::uint64_t voxels = 0, bytes = 0;
+};
+VolumeSize size_in_headers(const std::string& path);
 
 // True for names that read_label_layers takes as a single file.
 bool is_volume_file_name(const std::string& path);

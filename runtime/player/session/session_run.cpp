@@ -105,9 +105,12 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
 
 Result<SessionScore> SessionRun::finish() {
     if (Status written = recorder_->finish(); !written) return written.error();
-    const auto sequence = load_sequence(path_);
-    if (!sequence) return sequence.error();
-    const auto session = session_from_sequence(*sequence, guess_names(*sequence), path_);
+    // The file as it is goes before the session is scored: of eight hours it is a gigabyte.
+    const auto session = [&]() -> Result<Session> {
+        const auto sequence = load_sequence(path_);
+        if (!sequence) return sequence.error();
+        return session_from_sequence(*sequence, guess_names(*sequence), path_);
+    }();
     if (!session) return session.error();
     ThreadJobs jobs;
     ScoreOptions options;

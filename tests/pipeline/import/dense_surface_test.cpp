@@ -145,6 +145,26 @@ TEST(DenseSurface, AMeshIsReducedWithItsErrorSaidAndItsSpecksCounted) {
     }
 }
 
+TEST(DenseSurface, AMillionPartsLeaveTheBody) {
+    const TemporaryFolder folder(/*in_memory=*/true);
+    Surface body = dense_body(480, 0);
+    constexpr int kParts = 1000000;
+    for (int n = 0; n < kParts; ++n) {
+        const int i = n % 100, j = n / 100 % 100, k = n / 10000;
+        const Point3 p{300 + 0.5 * i, 0.5 * j, 0.5 * k};
+        const auto first = static_cast<std::uint32_t>(body.points.size());
+        for (const Vector3 d : {Vector3{0, 0, 0}, Vector3{0.3, 0, 0}, Vector3{0, 0.3, 0}})
+            body.points.push_back(p + d);
+        body.triangles.push_back({first, first + 1, first + 2});
+    }
+    write_stl(body, folder / "body.stl");
+    StageReport report;
+    const auto s = import_surface(folder / "body.stl", {}, &report);
+    ASSERT_TRUE(s) << s.error().message();
+    EXPECT_EQ(measure(report, "given_triangles"), static_cast<double>(body.triangles.size()));
+    EXPECT_LT(rms_off_body_mm(*s), 0.05);
+}
+
 TEST(DenseSurface, ANoisyMeshWithASecondLayerIsStillTheBody) {
     const TemporaryFolder folder;
     Surface body = dense_body(480, 0.3);

@@ -43,7 +43,7 @@ TEST(ImportLabelMapRefuses, PipesAndDevicesWithoutOpeningThem) {
         ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
         expect_refused(import_label_map(pipe), pipe, "is a pipe");
         if (is_volume_file_name(pipe)) {
-            EXPECT_EQ(voxel_bytes_in_header(pipe), 0u);
+            EXPECT_EQ(size_in_headers(pipe).bytes, 0u);
         }
         const std::string device = folder / (std::string("zero_") + name);
         std::filesystem::create_symlink("/dev/zero", device);
@@ -66,7 +66,7 @@ TEST(ImportLabelMapRefuses, PipesAndDevicesThatAHeaderRefersTo) {
              {std::pair{"h.mhd", meta}, std::pair{"h.nhdr", nrrd}, std::pair{"h.nrrd", nrrd}}) {
             const std::string path = folder.write(name, head + data + "\n");
             expect_refused(import_label_map(path), data, what);
-            EXPECT_EQ(voxel_bytes_in_header(path), 0u);
+            EXPECT_EQ(size_in_headers(path).bytes, 0u);
         }
     }
     const std::string list = folder.write("l.mhd", meta + "LIST\npipe.raw\n");
@@ -176,50 +176,6 @@ TEST(ImportLabelMapRefuses, MasksOnDifferentGrids) {
     for (auto& voxel : first.voxels) voxel = voxel != 0;
     folder.write("m/liver.nii", testing::nifti_bytes(first));
     expect_refused(import_label_map(folder / "m"), "spleen.nii", "another grid");
-}
-
-// A folder of slices as an export leaves it when something went wrong on the way.
-class DicomFolder : public ::testing::Test {
-  protected:
-    void write_all_but(int left_out) {
-        for (int k = 0; k < volume_.size.z; ++k)
-            if (k != left_out) write("s" + std::to_string(k), k, "1.2.3.5");
-    }
-    void write(const std::string& name, int k, const std::string& series) {
-        folder_.write("series/" + name + ".dcm", testing::dicom_slice(volume_, k, series));
-    }
-    std::string refusal() const {
-        const auto imported = import_label_map(folder_ / "series");
-        EXPECT_FALSE(imported.has_value());
-        const std::string message = imported ? "" : imported.error().message();
-        EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-        return message;
-    }
-
-    TemporaryFolder folder_;
-    TinyVolume volume_ = ras_volume();
-};
-
-TEST_F(DicomFolder, WithASliceTwiceIsRefused) {
-    write_all_but(-1);
-    write("copy", 7, "1.2.3.5");
-    EXPECT_NE(refusal().find("unevenly spaced"), std::string::npos) << refusal();
-}
-
-TEST_F(DicomFolder, WithASliceOfAnotherSeriesInPlaceOfItsOwnIsRefused) {
-    write_all_but(7);
-    write("s7", 7, "1.2.3.6");
-    EXPECT_NE(refusal().find("unevenly spaced"), std::string::npos) << refusal();
-}
-
-TEST_F(DicomFolder, WithASliceOfAnotherSeriesBesideItsOwnIsReadWithAWarning) {
-    write_all_but(-1);
-    write("other", 7, "1.2.3.6");
-    const auto imported = import_label_map(folder_ / "series");
-    ASSERT_TRUE(imported) << imported.error().message();
-    ASSERT_FALSE(imported->report.warnings.empty());
-    EXPECT_NE(imported->report.warnings[0].find("2 DICOM series"), std::string::npos);
-    EXPECT_EQ(imported->labels.grid.size.z, volume_.size.z);
 }
 
 }  // namespace

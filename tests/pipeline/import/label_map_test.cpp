@@ -214,30 +214,6 @@ TEST(ImportLabelMap, FolderOfMasksIsOneMapAndSmallStructuresWin) {
     EXPECT_NE(imported->report.warnings[0].find("more than one structure"), std::string::npos);
 }
 
-TEST(ImportLabelMap, DicomSeriesIsReadInAnyFileOrder) {
-    const TemporaryFolder folder;
-    const TinyVolume volume = ras_volume();
-    for (int k = 0; k < volume.size.z; ++k) {
-        char name[32];
-        std::snprintf(name, sizeof name, "series/s%03d.dcm", (k * 7) % volume.size.z);
-        folder.write(name, testing::dicom_slice(volume, k, "1.2.3.5"));
-    }
-    expect_body(import_label_map(folder / "series"));
-}
-
-TEST(ImportLabelMap, MissingDicomSliceIsRefused) {
-    const TemporaryFolder folder;
-    const TinyVolume volume = ras_volume();
-    for (int k = 0; k < volume.size.z; ++k)
-        if (k != 7)
-            folder.write("series/s" + std::to_string(k) + ".dcm",
-                         testing::dicom_slice(volume, k, "1.2.3.5"));
-    const auto imported = import_label_map(folder / "series");
-    ASSERT_FALSE(imported.has_value());
-    EXPECT_NE(imported.error().what.find("unevenly spaced"), std::string::npos)
-        << imported.error().message();
-}
-
 TEST(ImportLabelMap, RealSegmentationHasItsPublishedVolumes) {
     const std::string path = std::string(SONOCASE_DATA) + "/ct/labels.nii.gz";
     if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is absent";

@@ -201,7 +201,10 @@ std::string gzip_bytes(const std::string& bytes) {
     return out;
 }
 
-std::string dicom_slice(const TinyVolume& volume, int k, const std::string& series) {
+std::string dicom_slice(const TinyVolume& volume,
+                        int k,
+                        const std::string& series,
+                        const DicomCounts& counts) {
     const std::string instance = series + "." + std::to_string(k + 1);
     const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
     std::string meta = element(2, 1, "OB", std::string("\0\1", 2)) + element(2, 2, "UI", ct) +
@@ -213,7 +216,8 @@ std::string dicom_slice(const TinyVolume& volume, int k, const std::string& seri
     std::string bytes(128, '\0');
     bytes += "DICM" + element(2, 0, "UL", length) + meta;
     const Vector3 x = volume.columns.column(0), y = volume.columns.column(1);
-    const Point3 at = volume.position(0, 0, k);
+    Point3 at = volume.position(0, 0, k);
+    if (counts.round_to_mm > 0) at.z = std::round(at.z / counts.round_to_mm) * counts.round_to_mm;
     const double sx = norm(x), sy = norm(y);
     bytes += element(8, 0x16, "UI", ct) + element(8, 0x18, "UI", instance) +
              element(8, 0x60, "CS", "CT");
@@ -224,6 +228,10 @@ std::string dicom_slice(const TinyVolume& volume, int k, const std::string& seri
     bytes +=
         element(0x20, 0x37, "DS",
                 numbers({-x.x / sx, -x.y / sx, x.z / sx, -y.x / sy, -y.y / sy, y.z / sy}, "\\"));
+    if (counts.in_acquisition > 0)
+        bytes += element(0x20, 0x1002, "IS", std::to_string(counts.in_acquisition));
+    if (counts.in_series > 0)
+        bytes += element(0x20, 0x1209, "IS", std::to_string(counts.in_series));
     bytes += element(0x28, 2, "US", us(1)) + element(0x28, 4, "CS", "MONOCHROME2");
     bytes += element(0x28, 0x10, "US", us(static_cast<std::uint16_t>(volume.size.y))) +
              element(0x28, 0x11, "US", us(static_cast<std::uint16_t>(volume.size.x)));

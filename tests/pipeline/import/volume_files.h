@@ -49,7 +49,15 @@ std::string nrrd_bytes(const TinyVolume& volume,
                        bool gzip = false);
 std::string mha_bytes(const TinyVolume& volume, bool compressed = false);
 std::string gzip_bytes(const std::string& bytes);
+// What a slice's header says beyond its own place.
+struct DicomCounts {
+    int in_acquisition = 0, in_series = 0;  // slices that there are; 0: it does not say
+    double round_to_mm = 0;                 // rounding of the place; 0: none
+};
 // One slice of an uncompressed DICOM series of unsigned 16-bit values, explicit little-endian.
-std::string dicom_slice(const TinyVolume& volume, int k, const std::string& series);
+std::string dicom_slice(const TinyVolume& volume,
+                        int k,
+                        const std::string& series,
+                        const DicomCounts& counts = {});
 
 }  // namespace sonocase::testing

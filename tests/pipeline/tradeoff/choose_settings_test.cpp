@@ -23,6 +23,13 @@ FrontTable table() {
     return t;
 }
 
+// By that law, on a machine of some speed.
+std::function<double(const Settings&)> law(double volume_mm3, double speed) {
+    return [=](const Settings& settings) {
+        return speed * (2 + 1e-6 * volume_mm3 / std::pow(std::stod(settings[0].value), 3));
+    };
+}
+
 TEST(CostModel, RecoversTheLawThatMadeTheRows) {
     const CostModel model = fit_cost_model(table());
     EXPECT_NEAR(model.fixed_s, 2, 1e-9);
@@ -30,27 +37,27 @@ TEST(CostModel, RecoversTheLawThatMadeTheRows) {
 }
 
 TEST(ChooseSettings, CheapestWithinTheTolerance) {
-    const Choice choice = choose_settings(table(), {.tolerance_mm = 1}, 8e6, 1);
+    const Choice choice = choose_settings(table(), {.tolerance_mm = 1}, law(8e6, 1));
     EXPECT_EQ(choice.settings, (Settings{{"resample.voxel_mm", "1"}}));
     EXPECT_NEAR(choice.predicted_seconds, 10, 1e-9);
     EXPECT_TRUE(choice.warning.empty());
 }
 
 TEST(ChooseSettings, TimeFollowsVolumeAndSpeed) {
-    const Choice choice = choose_settings(table(), {.tolerance_mm = 1}, 16e6, 2);
+    const Choice choice = choose_settings(table(), {.tolerance_mm = 1}, law(16e6, 2));
     EXPECT_NEAR(choice.predicted_seconds, 2 * (2 + 16), 1e-9);
 }
 
 TEST(ChooseSettings, BestWithinTheBudget) {
-    EXPECT_EQ(choose_settings(table(), {.time_budget_s = 20}, 8e6, 1).predicted_error_mm, 0.8);
-    EXPECT_EQ(choose_settings(table(), {.time_budget_s = 5}, 8e6, 1).predicted_error_mm, 1.5);
+    EXPECT_EQ(choose_settings(table(), {.time_budget_s = 20}, law(8e6, 1)).predicted_error_mm, 0.8);
+    EXPECT_EQ(choose_settings(table(), {.time_budget_s = 5}, law(8e6, 1)).predicted_error_mm, 1.5);
 }
 
 TEST(ChooseSettings, SaysWhatCannotBeAchieved) {
-    EXPECT_NE(choose_settings(table(), {.tolerance_mm = 0.1}, 8e6, 1).warning.find("0.4 mm"),
+    EXPECT_NE(choose_settings(table(), {.tolerance_mm = 0.1}, law(8e6, 1)).warning.find("0.4 mm"),
               std::string::npos);
-    EXPECT_FALSE(choose_settings(table(), {.time_budget_s = 1}, 8e6, 1).warning.empty());
-    EXPECT_FALSE(choose_settings(table(), {.tolerance_mm = 0.5, .time_budget_s = 5}, 8e6, 1)
+    EXPECT_FALSE(choose_settings(table(), {.time_budget_s = 1}, law(8e6, 1)).warning.empty());
+    EXPECT_FALSE(choose_settings(table(), {.tolerance_mm = 0.5, .time_budget_s = 5}, law(8e6, 1))
                      .warning.empty());
 }
 

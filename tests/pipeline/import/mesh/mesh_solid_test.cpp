@@ -53,6 +53,26 @@ TEST(MendMesh, CapsAnOpeningAndTellsItsLength) {
     EXPECT_GT(solid.triangles.size(), bowl.triangles.size());
 }
 
+// A part is as cheap beside a large one as alone: a table cleared for every part would take hours.
+TEST(MendMesh, TakesNoLongerForEachOfManyParts) {
+    Surface scan = ball_mesh({0, 0, 0}, 100, 300);
+    const auto corners = static_cast<std::uint32_t>(scan.points.size());
+    const int large = static_cast<int>(scan.triangles.size());
+    constexpr std::uint32_t kParts = 100000;
+    for (std::uint32_t n = 0; n < kParts; ++n) {
+        const Point3 at{2.0 * (n % 50), 2.0 * (n / 50 % 50), 200 + 2.0 * (n / 2500)};
+        const std::uint32_t first = corners + 3 * n;
+        scan.points.insert(scan.points.end(), {at, at + Vector3{1, 0, 0}, at + Vector3{0, 1, 0}});
+        scan.triangles.push_back({first, first + 1, first + 2});
+    }
+    MendReport report;
+    const Surface solid = mend_mesh(scan, {}, &report);
+    EXPECT_EQ(report.components, static_cast<int>(kParts) + 1);
+    EXPECT_EQ(report.caps, static_cast<int>(kParts));
+    EXPECT_EQ(solid.triangles.size(), static_cast<std::size_t>(large) + 4 * kParts);
+    EXPECT_NEAR(report.volume_ml, 4.0 / 3 * kPi * 1000, 20);
+}
+
 TEST(WindingNumber, IsOneInsideZeroOutsideAndTheTreeAgrees) {
     const Surface whole = ball_mesh({0, 0, 0}, 20), bowl = without_top(whole, 12);
     const WindingTree tree(bowl, 2), closed(whole, 2);

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// How long a build takes is known before it begins.
+#include "pipeline/cook/build_time.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pipeline/recipe/read_recipe.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+// Processor seconds of whole commands, two threads: the builds that the law was fitted to.
+TEST(BuildTime, IsWithinATenthOfWhatBuildsTook) {
+    const struct {
+        double cooked, labels, processor_s;
+    } measured[] = {{1.47, 3.3, 7.34},  {4.95, 3.3, 8.86},  {11.7, 3.3, 11.6}, {22.9, 3.3, 12.9},
+                    {39.6, 3.3, 16.63}, {93.9, 3.3, 28.36}, {2.81, 1.4, 8.42}, {9.5, 1.4, 10.8},
+                    {22.5, 1.4, 14.06}, {44, 1.4, 18.18},   {76, 1.4, 24.72},  {180, 1.4, 43.68}};
+    for (const auto& m : measured) {
+        const BuildTime time = build_time({m.labels, m.labels, m.cooked}, 64, 1, 2);
+        EXPECT_NEAR(time.processor_s / m.processor_s, 1, 0.1) << m.cooked;
+        EXPECT_LT(time.alone_s, time.processor_s);
+        EXPECT_GT(time.alone_s, time.processor_s / 2);
+    }
+}
+
+// 57.6 s of resampling, and its cooked voxels are those of real-torso.
+TEST(BuildTime, OfALargeMapGoesByItsVoxelsAsWell) {
+    const double small = build_time({1.4, 1.4, 76}, 64, 1, 2).processor_s;
+    const double large = build_time({88.3, 88.3, 76}, 64, 1, 2).processor_s;
+    EXPECT_NEAR(large - small, 57.6 - 12.1, 3);
+}
+
+TEST(BuildTime, FollowsSpeedThreadsAndTextures) {
+    const CaseSize size{1, 1, 40};
+    const BuildTime one = build_time(size, 64, 1, 1), slow = build_time(size, 64, 2, 1);
+    EXPECT_NEAR(slow.processor_s, 2 * one.processor_s, 1e-9);
+    EXPECT_NEAR(slow.alone_s, 2 * one.alone_s, 1e-9);
+    EXPECT_NEAR(one.alone_s, one.processor_s, 1e-9);
+    EXPECT_LE(build_time(size, 64, 1, 2).alone_s, one.alone_s);
+    EXPECT_LT(build_time(size, 32, 1, 1).processor_s, one.processor_s);
+}
+
+TEST(BuildTime, OfARecipeTakesItsVoxel) {
+    const std::vector<EmbeddedExercise> none;
+    const auto recipe = parse_recipe("name = \"a\"\n[analytic]\n[resample]\nvoxel_mm = 2\n",
+                                     "case.toml", {}, &none);
+    ASSERT_TRUE(recipe) << recipe.error().message();
+    const BuildTime time = build_time(*recipe, {1, 1, 40}, 1, 1, 2);
+    EXPECT_NEAR(time.processor_s, build_time({1, 1, 5}, 64, 1, 2).processor_s, 1e-9);
+}
+
+// The machine of a test is fast or slow, and its measure a number.
+TEST(BuildTime, SpeedOfThisMachineIsMeasured) {
+    const double speed = machine_speed();
+    EXPECT_TRUE(std::isfinite(speed));
+    EXPECT_GT(speed, 0.01);
+    EXPECT_LT(speed, 1000);
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Folders of DICOM slices: whole ones, and those that an export leaves when something went wrong.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+#include "pipeline/import/label_map.h"
+#include "support/temporary_folder.h"
+#include "three_boxes.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using testing::TemporaryFolder;
+using testing::TinyVolume;
+
+class DicomFolder : public ::testing::Test {
+  protected:
+    static std::string name_of(int k) {
+        char name[32];
+        std::snprintf(name, sizeof name, "s%04d.dcm", k);
+        return name;
+    }
+    void write(const std::string& name, int k, const std::string& series = "1.2.3.5") {
+        folder_.write("series/" + name, testing::dicom_slice(volume_, k, series, declared_));
+    }
+    void write_all() {
+        for (int k = 0; k < volume_.size.z; ++k) write(name_of(k), k);
+    }
+    void remove(int k) { std::filesystem::remove(folder_ / ("series/" + name_of(k))); }
+    Result<ImportedLabels> imported() const { return import_label_map(folder_ / "series"); }
+    // One line that names the file and says what.
+    void expect_refused(const std::string& file, const std::string& what) const {
+        const auto result = imported();
+        ASSERT_FALSE(result.has_value());
+        const std::string message = result.error().message();
+        EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+        EXPECT_NE(message.find(file), std::string::npos) << message;
+        EXPECT_NE(message.find(what), std::string::npos) << message;
+    }
+
+    TemporaryFolder folder_{/*in_memory=*/true};
+    TinyVolume volume_ = ras_volume();
+    testing::DicomCounts declared_;
+};
+
+TEST_F(DicomFolder, IsReadInAnyFileOrder) {
+    for (int k = 0; k < volume_.size.z; ++k) write(name_of(k * 7 % volume_.size.z), k);
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    EXPECT_EQ(result->labels.grid.size, volume_.size);
+    EXPECT_LT(distance(result->labels.grid.origin_mm, volume_.origin), 1e-9);
+    for (std::size_t n = 0; n < volume_.voxels.size(); ++n) {
+        const int value = result->labels.labels[result->labels.voxels[n]].source_value;
+        ASSERT_EQ(value, volume_.voxels[n]) << n;
+    }
+    EXPECT_TRUE(std::none_of(result->report.warnings.begin(), result->report.warnings.end(),
+                             [](const std::string& w) { return w.find("DICOM") < w.size(); }));
+}
+
+// Places of slices .7 mm apart are no whole numbers, and scanners round them.
+TEST_F(DicomFolder, OfUnroundAndRoundedSpacingIsRead) {
+    for (const double spacing : {0.7, 0.703125, 1.0 / 3}) {
+        volume_ = testing::sample_in_order(
+            {0, 1, 2}, {false, false, false}, {96, 64, 30}, {2, 4, spacing}, {-20.1, 15.3, 300.7},
+            [](Point3 p) { return p.z > 302 && p.z < 328 ? kLiver : 0; });
+        volume_.columns(2, 2) = spacing;
+        for (const double round_to : {0.0, 0.01}) {
+            declared_.round_to_mm = round_to;
+            std::filesystem::remove_all(folder_ / "series");
+            write_all();
+            const auto result = imported();
+            ASSERT_TRUE(result) << result.error().message();
+            EXPECT_NEAR(result->labels.grid.spacing_mm.z, spacing, 1e-3);
+        }
+    }
+}
+
+TEST_F(DicomFolder, WithASliceMissingIsRefused) {
+    write_all();
+    remove(7);
+    expect_refused("s0008.dcm", "1 slice is missing between s0006.dcm and s0008.dcm");
+}
+
+TEST_F(DicomFolder, WithASliceTwiceIsRefused) {
+    write_all();
+    write("z-copy.dcm", 7);
+    expect_refused("z-copy.dcm", "there twice, in s0007.dcm");
+}
+
+TEST_F(DicomFolder, WithEverySliceTwiceIsRefused) {
+    write_all();
+    for (int k = 0; k < volume_.size.z; ++k) write("z" + name_of(k), k);
+    expect_refused("s0000.dcm", "there twice");
+}
+
+TEST_F(DicomFolder, WithASliceOfAnotherSeriesInPlaceOfItsOwnIsRefused) {
+    write_all();
+    write(name_of(7), 7, "1.2.3.6");
+    expect_refused("s0008.dcm", "s0007.dcm, which lies there, is of another series");
+}
+
+TEST_F(DicomFolder, WithASliceOfAnotherSeriesBesideItsOwnIsReadWithAWarning) {
+    write_all();
+    write("other.dcm", 7, "1.2.3.6");
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    ASSERT_FALSE(result->report.warnings.empty());
+    EXPECT_NE(result->report.warnings[0].find("2 DICOM series"), std::string::npos);
+    EXPECT_NE(result->report.warnings[0].find("not other.dcm"), std::string::npos);
+    EXPECT_EQ(result->labels.grid.size.z, volume_.size.z);
+}
+
+// A slice missing at an end leaves even spacing: only a header can tell.
+TEST_F(DicomFolder, WithItsLastSliceMissingIsRefusedWhereAHeaderCounts) {
+    const int last = volume_.size.z - 1;
+    for (const bool in_acquisition : {true, false}) {
+        declared_ = {};
+        (in_acquisition ? declared_.in_acquisition : declared_.in_series) = volume_.size.z;
+        write_all();
+        EXPECT_TRUE(imported().has_value());
+        remove(last);
+        expect_refused("s0000.dcm", "says that there are 16 slices, and there are 15");
+    }
+    declared_ = {};
+    write_all();
+    remove(last);
+    EXPECT_TRUE(imported().has_value());
+}
+
+TEST_F(DicomFolder, WithoutItsFirstSliceIsReadWithAWarning) {
+    write_all();
+    remove(0);
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    ASSERT_FALSE(result->report.warnings.empty());
+    EXPECT_NE(result->report.warnings[0].find("numbered from 2"), std::string::npos);
+}
+
+TEST_F(DicomFolder, WithASliceOffItsPlaceOrTurnedOrCutOffIsRefused) {
+    write_all();
+    volume_.origin.z += 0.6;  // a fifth of the spacing
+    write(name_of(5), 5);
+    volume_.origin.z -= 0.6;
+    expect_refused("s0005.dcm", "unevenly spaced");
+    TinyVolume turned = volume_;
+    turned.columns(0, 0) = 0;
+    turned.columns(2, 0) = 2;
+    folder_.write("series/" + name_of(5), testing::dicom_slice(turned, 5, "1.2.3.5"));
+    expect_refused("s0005.dcm", "turned against s0000.dcm");
+    const std::string whole = testing::dicom_slice(volume_, 5, "1.2.3.5");
+    for (const std::size_t bytes : {1, 2, 13, 100, 1000}) {
+        folder_.write("series/" + name_of(5), whole.substr(0, whole.size() - bytes));
+        expect_refused("s0005.dcm", "cut off");
+    }
+}
+
+// As a clinic's export: 3,000 slices, one wrong. Every reading of their headers takes about a
+// second.
+TEST_F(DicomFolder, OfThreeThousandSlicesNamesTheOneThatIsWrong) {
+    volume_ = testing::sample_in_order({0, 1, 2}, {false, false, false}, {96, 64, 300},
+                                       {12, 8, 0.1}, kCorner, shifted_body);
+    ASSERT_EQ(volume_.size.z, 3000);
+    declared_.in_acquisition = 3000;
+    write_all();
+    const auto whole = imported();
+    ASSERT_TRUE(whole) << whole.error().message();
+    EXPECT_EQ(whole->labels.grid.size.z, 3000);
+    write("t1500.dcm", 1500);
+    expect_refused("t1500.dcm", "there twice, in s1500.dcm");
+    std::filesystem::remove(folder_ / "series/t1500.dcm");
+    remove(1500);
+    expect_refused("s1501.dcm", "1 slice is missing between s1499.dcm and s1501.dcm");
+    write(name_of(1500), 1500, "1.2.3.6");
+    expect_refused("s1501.dcm", "s1500.dcm, which lies there, is of another series");
+    write(name_of(1500), 1500);
+    remove(2999);
+    expect_refused("s0000.dcm", "says that there are 3000 slices, and there are 2999");
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
