@@ -44,9 +44,13 @@ CaseSize case_size(const Recipe& recipe) {
         // Exact for voxels of one byte; for larger ones the estimate is on the safe side.
         size.label_voxels = size.label_mb;
     }
+    const ResampleOptions& resample = recipe.settings.of<ResampleOptions>("resample");
     if (const auto volume = cooked_volume_mm3(recipe))
-        size.cooked_voxels =
-            *volume / std::pow(recipe.settings.of<ResampleOptions>("resample").voxel_mm, 3) / 1e6;
+        size.cooked_voxels = *volume / std::pow(resample.voxel_mm, 3) / 1e6;
+    if (const auto& region = resample.region) {
+        const Vector3 e = region->size_mm;
+        size.cooked_voxels += e.x * e.y * e.z / std::pow(region->voxel_mm, 3) / 1e6;
+    }
     return size;
 }
 
