@@ -74,8 +74,6 @@ HWY_INLINE RegionRow<D> region_row(D d,
     }
     r.at = voxel_address(di, g, index[0], index[1], index[2]);
     r.use = hn::And(here, r.at.inside);
-    r.entry = hn::IfThenElse(r.use, hn::GatherIndex(di, g.table, r.at.brick),
-                             hn::Set(di, static_cast<std::int32_t>(kUniformBrick)));
     return r;
 }
 
@@ -155,6 +153,11 @@ HWY_NOINLINE bool region_chunk(D d, const PhysicalBlock& b, const PhysicalRegion
     const auto none = hn::Set(di, static_cast<std::int32_t>(kNoBoundary));
     const auto flag = hn::Set(di, static_cast<std::int32_t>(kBoundaryFlag));
     const auto case_step = hn::Set(d, b.voxel_mm / 48);
+    // Each loop prefetches what the next one reads.
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    RegionRow<D> rows[kChunkRows];
+    bool takes[kChunkRows] = {};
+    HWY_ALIGN std::int32_t lines[kBeamBlock];
     for (int row = 0; row < c.rows; ++row) {
         hn::Store(case_step, d, c.step_mm.row(row));
         hn::Store(hn::Set(d, -1e9f), d, c.least_mm.row(row));
@@ -163,7 +166,16 @@ HWY_NOINLINE bool region_chunk(D d, const PhysicalBlock& b, const PhysicalRegion
         if (hn::AllFalse(di, marked)) continue;
         const auto here = hn::And(hn::RebindMask(di, in_region(d, g, c, row)), marked);
         if (hn::AllFalse(di, here)) continue;
-        const RegionRow<D> r = region_row(d, b, g, c, row, here);
+        rows[row] = region_row(d, b, g, c, row, here);
+        takes[row] = true;
+        hn::Store(rows[row].at.brick, di, lines);
+        fetch_lanes(g.table, lines, lanes);
+    }
+    for (int row = 0; row < c.rows; ++row) {
+        if (!takes[row]) continue;
+        RegionRow<D>& r = rows[row];
+        r.entry = hn::IfThenElse(r.use, hn::GatherIndex(di, g.table, r.at.brick),
+                                 hn::Set(di, static_cast<std::int32_t>(kUniformBrick)));
         // Where the region's voxel holds no surface, the case's stays in front.
         hn::Store(hn::IfThenElse(hn::RebindMask(d, r.use), hn::Zero(d), hn::Set(d, -1e9f)), d,
                   c.least_mm.row(row));
@@ -171,8 +183,17 @@ HWY_NOINLINE bool region_chunk(D d, const PhysicalBlock& b, const PhysicalRegion
         const auto same =
             hn::And(hn::Lt(r.entry, hn::Zero(di)),
                     hn::Eq(hn::And(r.entry, hn::Set(di, 0xFF)), hn::Load(di, c.label.row(row))));
-        if (hn::AllFalse(di, hn::Or(bounded, hn::AndNot(same, r.use)))) continue;
-        take_from_region(d, b, g, r, bounded, c, row);
+        takes[row] = !hn::AllFalse(di, hn::Or(bounded, hn::AndNot(same, r.use)));
+        if (hn::AllFalse(di, bounded) || g.boundary == nullptr) continue;
+        const auto base = hn::GatherIndex(di, g.table + 2, r.at.brick);
+        hn::Store(hn::IfThenElseZero(bounded, hn::Or(hn::ShiftLeft<6>(base), r.at.cell)), di,
+                  lines);
+        fetch_lanes(g.boundary, lines, lanes);
+    }
+    for (int row = 0; row < c.rows; ++row) {
+        if (!takes[row]) continue;
+        const auto bounded = hn::And(rows[row].use, hn::TestBit(rows[row].entry, flag));
+        take_from_region(d, b, g, rows[row], bounded, c, row);
         surfaces = surfaces || !hn::AllFalse(di, bounded);
     }
     c.bounded = c.bounded || (surfaces && b.boundary != nullptr);
