@@ -6,6 +6,7 @@
 #include "formats/bundle/codec/bundle_parts.h"
 #include "formats/bundle/codec/flow_codec.h"
 #include "formats/bundle/codec/packed_volumes.h"
+#include "formats/bundle/codec/region_codec.h"
 #include "formats/bundle/codec/volume_json.h"
 #include "formats/text/stage_report_json.h"
 
@@ -94,6 +95,7 @@ std::vector<std::uint8_t> write_bundle(const CaseBundle& bundle, JobRunner& jobs
     Json manifest = manifest_of(bundle);
     detail::add_volumes(writer, manifest, bundle.label_bricks, bundle.boundary, bundle.echo_offset,
                         jobs);
+    if (bundle.region) writer.add("region", false, detail::region_bytes(*bundle.region, jobs));
     if (!bundle.textures.empty()) detail::add_textures(writer, bundle.textures);
     if (bundle.speckle.edge != 0) writer.add_array("speckle", false, bundle.speckle.voxels);
     if (!bundle.patient_skin.points.empty())

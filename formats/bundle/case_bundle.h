@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "formats/base/stage_report.h"
 #include "formats/flow/flow_field.h"
 #include "formats/volume/brick_volume.h"
+#include "formats/volume/fine_region.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/solid_texture.h"
 #include "formats/volume/surface.h"
@@ -49,6 +51,7 @@ struct CaseBundle {
     BrickVolume<std::uint8_t> label_bricks;
     BrickVolume<std::int8_t> echo_offset;  // quarter dB, mid-scale structure; may be empty
     BoundaryBricks boundary;               // formats/volume/boundary_record.h; may be empty
+    std::optional<FineRegion> region;      // a part of the case on smaller voxels; most have none
     std::vector<SolidTexture> textures;
     SpeckleVolume speckle;
 

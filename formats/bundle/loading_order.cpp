@@ -14,9 +14,9 @@ namespace sonocase {
 namespace {
 
 // Read whole before the first picture; those that are read block by block; and what may come later.
-constexpr std::array<std::string_view, 9> kAtOnce{"manifest", "vox.kind", "vox.one",
-                                                  "vox.mix",  "vox.pair", "vox.low",
-                                                  "vox.high", "ofs.kind", "ofs.one"};
+constexpr std::array<std::string_view, 10> kAtOnce{"manifest", "vox.kind", "vox.one",  "vox.mix",
+                                                   "vox.pair", "vox.low",  "vox.high", "ofs.kind",
+                                                   "ofs.one",  "region"};
 constexpr std::array<std::string_view, 2> kInBlocks{"vox.fix", "ofs.val"};
 constexpr std::array<std::string_view, 7> kLater{"textures", "flow",     "skin.pat", "skin.fit",
                                                  "speckle",  "skin.man", "preview"};

@@ -9,6 +9,7 @@
 #include "formats/bundle/codec/bundle_parts.h"
 #include "formats/bundle/codec/flow_codec.h"
 #include "formats/bundle/codec/packed_volumes.h"
+#include "formats/bundle/codec/region_codec.h"
 #include "formats/bundle/codec/volume_json.h"
 #include "formats/bundle/streamed_bundle.h"
 #include "formats/text/stage_report_json.h"
@@ -21,10 +22,10 @@ using detail::JsonFault;
 using detail::JsonObject;
 
 constexpr std::string_view kKnownChunks[] = {"manifest", SONOCASE_VOLUME_CHUNKS,
-                                             "textures", "speckle",
-                                             "skin.pat", "skin.fit",
-                                             "skin.man", "flow",
-                                             "preview"};
+                                             "region",   "textures",
+                                             "speckle",  "skin.pat",
+                                             "skin.fit", "skin.man",
+                                             "flow",     "preview"};
 constexpr std::size_t kMaxPreviewBytes = std::size_t{64} << 20;
 
 void read_manifest_into(CaseBundle& bundle, JsonObject& manifest) {
@@ -63,8 +64,9 @@ void read_manifest_into(CaseBundle& bundle, JsonObject& manifest) {
     }
 }
 
-// Textures, surfaces and preview: small enough for one thread, and not needed by the first picture
-// of model `physical`. Each step reads one chunk, and nothing where the bundle has none.
+// Fine region, textures, surfaces and preview: small enough for one thread, and, but for the
+// region, not needed by the first picture of model `physical`. Each step reads one chunk, and
+// nothing where the bundle has none.
 struct SmallPart {
     const char* type;
     Status (*read)(CaseBundle&, const ChunkReader&, JsonObject& manifest);
@@ -78,6 +80,17 @@ Status put(Result<Value> from, Value& to) {
 }
 
 constexpr std::array kSmallParts{
+    SmallPart{"region",
+              [](CaseBundle& b, const ChunkReader& r, JsonObject&) -> Status {
+                  if (!r.has("region")) return Done{};
+                  const auto bytes = r.read("region", detail::kMaxRegionBytes);
+                  if (!bytes) return bytes.error();
+                  auto region = detail::region_from_bytes(
+                      *bytes, b.labels.size(), b.grid.spacing_mm.x, r.where(), serial_jobs());
+                  if (!region) return region.error();
+                  b.region = std::move(*region);
+                  return Done{};
+              }},
     SmallPart{"textures",
               [](CaseBundle& b, const ChunkReader& r, JsonObject& manifest) {
                   return put(detail::read_textures(r, manifest), b.textures);

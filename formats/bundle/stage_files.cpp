@@ -4,6 +4,7 @@
 
 #include "formats/bundle/codec/bundle_parts.h"
 #include "formats/bundle/codec/packed_volumes.h"
+#include "formats/bundle/codec/region_codec.h"
 #include "formats/bundle/codec/volume_json.h"
 #include "formats/bundle/voxel_blocks.h"
 #include "formats/text/stage_report_json.h"
@@ -15,7 +16,7 @@ using detail::Json;
 using detail::JsonFault;
 using detail::JsonObject;
 
-constexpr std::string_view kLabelChunks[] = {"manifest", SONOCASE_VOLUME_CHUNKS};
+constexpr std::string_view kLabelChunks[] = {"manifest", SONOCASE_VOLUME_CHUNKS, "region"};
 constexpr std::string_view kTextureChunks[] = {"manifest", "textures", "speckle"};
 constexpr std::string_view kSurfaceChunks[] = {"manifest", "surface"};
 
@@ -60,6 +61,13 @@ Status fill_labels(LabelFile& file,
     file.volume.voxels = dense_from_bricks(volumes->labels);
     file.boundary = std::move(volumes->boundary);
     file.echo_offset = std::move(volumes->echo_offset);
+    if (!reader.has("region")) return Done{};
+    const auto bytes = reader.read("region", detail::kMaxRegionBytes, jobs);
+    if (!bytes) return bytes.error();
+    auto region = detail::region_from_bytes(*bytes, file.volume.labels.size(),
+                                            file.volume.grid.spacing_mm.x, reader.where(), jobs);
+    if (!region) return region.error();
+    file.region = std::move(*region);
     return Done{};
 }
 
@@ -97,6 +105,7 @@ std::vector<std::uint8_t> write_label_file(const LabelFile& file, JobRunner& job
         bricks_from_dense<std::uint8_t>(file.volume.voxels, file.volume.grid.size);
     ChunkWriter writer("LABL");
     detail::add_volumes(writer, manifest, bricks, file.boundary, file.echo_offset, jobs);
+    if (file.region) writer.add("region", false, detail::region_bytes(*file.region, jobs));
     return writer.write(jobs);
 }
 

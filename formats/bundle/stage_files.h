@@ -3,6 +3,7 @@
 // The files that stages exchange, so that any stage can run alone. docs/format.md, part 3.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
 #include "formats/volume/brick_volume.h"
+#include "formats/volume/fine_region.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/solid_texture.h"
 #include "formats/volume/surface.h"
@@ -26,6 +28,7 @@ struct LabelFile {
     BoundaryBricks boundary;               // formats/volume/boundary_record.h; may be empty
     BrickVolume<std::int8_t> echo_offset;  // quarter dB; may be empty
     std::vector<StageReport> reports;
+    std::optional<FineRegion> region = {};  // of the frame `mannequin`; most have none
 };
 std::vector<std::uint8_t> write_label_file(const LabelFile& file, JobRunner& jobs = serial_jobs());
 Result<LabelFile> read_label_file(std::span<const std::uint8_t> bytes,

@@ -22,9 +22,13 @@ CaseSize case_size(const Recipe& recipe) {
         size.label_mb = static_cast<double>(labels.bytes) / 1e6;
         size.label_voxels = static_cast<double>(labels.voxels) / 1e6;
     }
+    const ResampleOptions& resample = recipe.settings.of<ResampleOptions>("resample");
     if (const auto volume = cooked_volume_mm3(recipe))
-        size.cooked_voxels =
-            *volume / std::pow(recipe.settings.of<ResampleOptions>("resample").voxel_mm, 3) / 1e6;
+        size.cooked_voxels = *volume / std::pow(resample.voxel_mm, 3) / 1e6;
+    if (const auto& region = resample.region) {
+        const Vector3 e = region->size_mm;
+        size.cooked_voxels += e.x * e.y * e.z / std::pow(region->voxel_mm, 3) / 1e6;
+    }
     return size;
 }
 

@@ -121,6 +121,25 @@ Json tissue_json(const Tissue& tissue) {
             {"source", tissue.source}};
 }
 
+Json region_json(const FineRegion& region) {
+    const Box3& b = region.box;
+    return {{"name", region.name},
+            {"voxel_mm", region.grid.spacing_mm.x},
+            {"size", {region.grid.size.x, region.grid.size.y, region.grid.size.z}},
+            {"lower_mm", {b.lower.x, b.lower.y, b.lower.z}},
+            {"upper_mm", {b.upper.x, b.upper.y, b.upper.z}},
+            {"shown_by", {"physical"}}};
+}
+
+std::string region_text(const FineRegion& region) {
+    const Vector3 e = region.box.extent();
+    const Point3 c = region.box.centre();
+    return line(
+               "  region     %s: %.0f x %.0f x %.0f mm round (%.1f, %.1f, %.1f) in voxels of %g mm",
+               region.name.c_str(), e.x, e.y, e.z, c.x, c.y, c.z, region.grid.spacing_mm.x) +
+           "             (models other than physical show the case's own voxels there)\n";
+}
+
 constexpr double kBeat_s = 60.0 / 70;
 
 Json vessel_json(const VesselSummary& v) {
@@ -217,6 +236,7 @@ std::string inspection_json(const CaseBundle& bundle, const Inspection& inspecti
     json["grid"] = {{"size", {grid.size.x, grid.size.y, grid.size.z}},
                     {"voxel_mm", grid.spacing_mm.x},
                     {"origin_mm", {grid.origin_mm.x, grid.origin_mm.y, grid.origin_mm.z}}};
+    if (bundle.region) json["region"] = region_json(*bundle.region);
     json["labels"] = Json::array();
     for (std::size_t i = 0; i < bundle.labels.size(); ++i)
         json["labels"].push_back({{"index", i},
@@ -273,6 +293,7 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
     text += line("  grid       %d x %d x %d voxels of %g mm, origin (%.1f, %.1f, %.1f) mm",
                  grid.size.x, grid.size.y, grid.size.z, grid.spacing_mm.x, grid.origin_mm.x,
                  grid.origin_mm.y, grid.origin_mm.z);
+    if (bundle.region) text += region_text(*bundle.region);
     text += line("  surfaces   patient %zu points, mannequin %zu points",
                  bundle.patient_skin.points.size(), bundle.mannequin_skin.points.size());
     text +=

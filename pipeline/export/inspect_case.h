@@ -31,7 +31,8 @@ struct Inspection {
     NextStep next;
 };
 
-// {"case", "producer", "bytes", "digest", "grid": {"size", "voxel_mm", "origin_mm"}, "labels":
+// {"case", "producer", "bytes", "digest", "grid": {"size", "voxel_mm", "origin_mm"}, "region":
+// {"name", "voxel_mm", "size", "lower_mm", "upper_mm", "shown_by"} where there is one, "labels":
 // [{"index", "name", "tissue", "mechanics": {"stiffness_kpa", "drains", "puncture_n", "rigid"},
 // "volume_ml"}], "tissues": [...], "stages": [{"name", "version",
 // "seconds", "errors": {measure: value}, "warnings"}], "error_budget": {"entries": [{"stage",

@@ -109,6 +109,7 @@ Result<PackResult> pack_case(const PackInput& input) {
     bundle.label_bricks = bricks_from_dense<std::uint8_t>(volume.voxels, volume.grid.size);
     bundle.echo_offset = input.echo_offset;
     bundle.boundary = input.boundary;
+    if (input.region != nullptr) bundle.region = *input.region;
     bundle.textures = input.textures.textures;
     bundle.speckle = input.textures.speckle;
     if (input.ct_skin != nullptr && input.registration != nullptr) {
@@ -148,6 +149,13 @@ Result<PackResult> pack_case(const PackInput& input) {
         {"boundary_mb", brick_bytes(bundle.boundary) / 1e6},
         {"echo_mb", brick_bytes(bundle.echo_offset) / 1e6},
     };
+    if (bundle.region) {
+        report.measures.push_back(
+            {"region_voxels", static_cast<double>(bundle.region->grid.voxel_count())});
+        report.measures.push_back({"region_mb", (brick_bytes(bundle.region->label_bricks) +
+                                                 brick_bytes(bundle.region->boundary)) /
+                                                    1e6});
+    }
     return result;
 }
 

@@ -31,7 +31,8 @@ struct PackInput {
     std::vector<std::uint8_t> skin_unfitted = {};
     // Lesions that were put in; targets of exercises may name them.
     std::vector<KeyTarget> key = {};
-    FlowField flow = {};  // may be empty
+    FlowField flow = {};                 // may be empty
+    const FineRegion* region = nullptr;  // of cooked; null: none
 };
 
 struct PackResult {

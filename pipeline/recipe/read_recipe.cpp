@@ -13,6 +13,7 @@
 #include "pipeline/pathology/pathology.h"
 #include "pipeline/recipe/embedded_scenario.h"
 #include "pipeline/recipe/recipe_sections.h"
+#include "pipeline/segmentation/resample_labels.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -41,6 +42,8 @@ void read_contents(const TomlTable& root, Recipe& recipe, std::vector<std::strin
     if (const auto table = root.table("labels")) read_labels(*table, recipe.labels);
     if (PathologyOptions* pathology = pathology_options(recipe.settings))
         read_pathology(root, pathology->requests, recipe.tissues);
+    if (recipe.settings.table().find("resample") != nullptr)
+        read_region(root, recipe.settings.of<ResampleOptions>("resample").region);
     if (const auto table = root.table("tissues")) read_tissues(*table, recipe.tissues);
 }
 
@@ -143,6 +146,29 @@ Status check_exercises(const Recipe& recipe) {
     return Done{};
 }
 
+// A region round a target: its centre, in the frame of the exercise.
+Status aim_region(Recipe& recipe) {
+    if (recipe.settings.table().find("resample") == nullptr) return Done{};
+    auto& region = recipe.settings.of<ResampleOptions>("resample").region;
+    if (!region || region->target.empty()) return Done{};
+    std::vector<std::string> names;
+    for (const EmbeddedExercise& exercise : recipe.exercises) {
+        const auto framed = strip_frame(exercise.toml, exercise.name);
+        if (!framed) return framed.error();
+        const auto parsed = parse_exercise(framed->toml, exercise.name);
+        if (!parsed) continue;  // its targets are lesions, whose places are not known yet
+        for (const Target& target : parsed->targets) {
+            names.push_back(target.name);
+            if (target.name != region->target) continue;
+            region->centre = target.centre;
+            region->in_ct = framed->in_ct;
+            return Done{};
+        }
+    }
+    return Error{"no target '" + region->target + "' with a centre in the exercises",
+                 recipe.path + ": region.target", suggest_name(region->target, names)};
+}
+
 Status read_text(std::string_view text,
                  const RecipeOverrides& overrides,
                  Recipe& recipe,
@@ -192,6 +218,7 @@ Result<Recipe> parse_recipe(std::string_view text,
     else if (auto status = load_exercises(recipe, named); !status)
         return status.error();
     if (auto status = check_exercises(recipe); !status) return status.error();
+    if (auto status = aim_region(recipe); !status) return status.error();
     return recipe;
 }
 

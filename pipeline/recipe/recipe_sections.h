@@ -4,10 +4,12 @@
 // the tables belong to (formats/text/toml_reader.h).
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "formats/text/toml_reader.h"
 #include "pipeline/pathology/pathology.h"
+#include "pipeline/segmentation/region_request.h"
 #include "pipeline/stage/recipe.h"
 
 namespace sonocase::pipeline {
@@ -23,5 +25,8 @@ void read_figures(const TomlTable& table, Tissue& tissue);
 void read_pathology(const TomlTable& root,
                     std::vector<PathologyRequest>& pathology,
                     std::vector<Tissue>& tissues);
+
+// [[region]]; one at most.
+void read_region(const TomlTable& root, std::optional<RegionRequest>& region);
 
 }  // namespace sonocase::pipeline

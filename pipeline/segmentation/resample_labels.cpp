@@ -16,12 +16,51 @@
 namespace sonocase::pipeline {
 namespace {
 
-// Method `shape`.
-SampledField resample_by_shape(const ResampleInput& input,
+FieldMap map_to(const Grid& grid, const Registration& registration, const InverseMap& inverse_map) {
+    FieldMap map;
+    map.row = [&](int j, int k, float* x, float* y, float* z, MapStatus* status) {
+        inverse_map.invert_row(
+            grid.point_from_voxel({0, static_cast<double>(j), static_cast<double>(k)}),
+            grid.spacing_mm.x * grid.direction.column(0), grid.size.x, x, y, z, status);
+    };
+    map.jacobian = [&](Point3 ct) { return inverse(jacobian(registration, ct)); };
+    map.forward = [&](Point3 ct) { return mannequin_from_ct(registration, ct); };
+    return map;
+}
+
+// The same surfaces, sampled on the region's grid.
+Result<FineRegion> cook_region(const RegionRequest& request,
                                const ResampleOptions& options,
-                               const Grid& grid,
-                               const Progress& progress,
-                               ResampleResult* result) {
+                               const LabelVolume& cooked,
+                               const Registration& registration,
+                               const InverseMap& inverse_map,
+                               LabelField* field,
+                               StageReport* report) {
+    const auto box = region_box(request, cooked, registration);
+    if (!box) return box.error();
+    FineRegion region;
+    region.name = request.name;
+    region.box = *box;
+    region.grid = region_grid(*box, request.voxel_mm);
+    const FieldMap map = map_to(region.grid, registration, inverse_map);
+    SampledField sampled =
+        sample_label_field(field, region.grid, map, {options.record_band_vx, false}, {});
+    if (options.snap_vx > 0 && !sampled.boundary.table.empty())
+        snap_surfaces(&sampled.volume, &sampled.boundary,
+                      {.band_vx = options.record_band_vx, .distance_vx = options.snap_vx});
+    region.label_bricks = bricks_from_dense<std::uint8_t>(sampled.volume.voxels, region.grid.size);
+    region.boundary = std::move(sampled.boundary);
+    report->measures.push_back({"region_voxel_mm", request.voxel_mm});
+    report->measures.push_back({"region_voxels", static_cast<double>(region.grid.voxel_count())});
+    return region;
+}
+
+// Method `shape`.
+Result<SampledField> resample_by_shape(const ResampleInput& input,
+                                       const ResampleOptions& options,
+                                       const Grid& grid,
+                                       const Progress& progress,
+                                       ResampleResult* result) {
     Stopwatch watch;
     LabelFieldOptions field_options;
     field_options.distance = {.sigma_vx = options.sigma_vx,
@@ -40,14 +79,7 @@ SampledField resample_by_shape(const ResampleInput& input,
         &field, [&](Point3 ct) { return determinant(jacobian(registration, ct)); }, correction);
     result->seconds.volumes = watch.lap();
     const InverseMap inverse_map(registration);
-    FieldMap map;
-    map.row = [&](int j, int k, float* x, float* y, float* z, MapStatus* status) {
-        inverse_map.invert_row(
-            grid.point_from_voxel({0, static_cast<double>(j), static_cast<double>(k)}),
-            grid.spacing_mm.x * grid.direction.column(0), grid.size.x, x, y, z, status);
-    };
-    map.jacobian = [&](Point3 ct) { return inverse(jacobian(registration, ct)); };
-    map.forward = [&](Point3 ct) { return mannequin_from_ct(registration, ct); };
+    const FieldMap map = map_to(grid, registration, inverse_map);
     SampledField sampled =
         sample_label_field(&field, grid, map, {options.record_band_vx}, progress);
     StageReport* report = &result->report;
@@ -61,6 +93,13 @@ SampledField resample_by_shape(const ResampleInput& input,
     report->measures.push_back({"slice_factor", static_cast<double>(field.factor())});
     report->measures.push_back({"volume_steps", static_cast<double>(corrected.iterations)});
     report->measures.push_back({"volume_miss", corrected.largest_error});
+    if (options.region) {
+        auto region = cook_region(*options.region, options, sampled.volume, registration,
+                                  inverse_map, &field, report);
+        if (!region) return region.error();
+        result->region = std::move(*region);
+        result->seconds.region = watch.lap();
+    }
     return sampled;
 }
 
@@ -94,6 +133,9 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
         return Error{"blocks of " + std::to_string(options.block_vx) + " nodes",
                      "resample.block_vx", "4, 8 or 16"};
     }
+    if (options.region && !shape)
+        return Error{"method '" + options.method + "' cannot cook a region", "resample.method",
+                     "shape, or a recipe without [[region]]"};
     const auto grid =
         cooked_grid(input.ct_labels, input.registration, {options.voxel_mm, options.margin_mm});
     if (!grid) return grid.error();
@@ -114,11 +156,12 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
             result.report.measures.push_back({"time_step", level_set->time_step});
         }
     } else {
-        SampledField sampled = resample_by_shape(input, options, *grid, progress, &result);
-        result.volume = std::move(sampled.volume);
-        result.boundary = std::move(sampled.boundary);
-        counts = sampled.counts;
-        rescued = std::move(sampled.rescued);
+        auto sampled = resample_by_shape(input, options, *grid, progress, &result);
+        if (!sampled) return sampled.error();
+        result.volume = std::move(sampled->volume);
+        result.boundary = std::move(sampled->boundary);
+        counts = sampled->counts;
+        rescued = std::move(sampled->rescued);
     }
     result.changes = compare_volumes(input.ct_labels.labels,
                                      mapped_volumes_ml(input.ct_labels, input.registration),

@@ -17,6 +17,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,7 @@
 #include "pipeline/base/progress.h"
 #include "pipeline/segmentation/label_changes.h"
 #include "pipeline/segmentation/level_set_smoothing.h"
+#include "pipeline/segmentation/region_request.h"
 
 namespace sonocase::pipeline {
 
@@ -51,26 +53,29 @@ struct ResampleOptions {
     // shape: distances held at a time, MB, besides what else is needed. Less takes longer, since
     // layers of the map are measured again when they come back; the bytes are the same.
     double held_mb = 1e9;
-    LevelSetOptions level_set;  // paper
+    LevelSetOptions level_set;            // paper
+    std::optional<RegionRequest> region;  // shape: cooked on smaller voxels as well
 };
 
 // Incremented whenever the same input and options give different bytes.
 inline constexpr int kResampleVersion = 9;
 
 struct ResampleSeconds {  // method shape; wall clock
-    double distances = 0, volumes = 0, voxels = 0;
+    double distances = 0, volumes = 0, voxels = 0, region = 0;
 };
 
 struct ResampleResult {
     LabelVolume volume;                // `mannequin`, direction the identity
     BoundaryBricks boundary;           // formats/volume/boundary_record.h; empty: no records
+    std::optional<FineRegion> region;  // the same partition of space, on its own grid
     std::vector<LabelChange> changes;  // against the CT's volumes times det J
     StageReport report;
     ResampleSeconds seconds;  // not in the report, whose measures are part of the stage's bytes
 };
 
 // Error: no body in the map, voxel edge or margin out of range, a grid of more than 2^31 voxels, an
-// unknown method or edge of blocks.
+// unknown method or edge of blocks, a region that region_box() refuses or that the method cannot
+// cook.
 Result<ResampleResult> resample_labels(const ResampleInput& input,
                                        const ResampleOptions& options = {},
                                        const Progress& progress = {});

@@ -3,6 +3,7 @@
 // Labels as results: what import, resample, smooth and structure have in common.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,14 +17,17 @@ StageCodec label_codec();
 std::vector<StageReport> label_reports(const StageValue& value);
 
 // The labels of a stage in the frame `mannequin`, with its boundary records and its report.
-// Result: of resample_labels or smooth_labels.
+// Result: of resample_labels, smooth_labels or place_pathology.
 template <class Result>
-StageValue label_value(const std::string& frame, Result&& result) {
+StageValue label_value(const std::string& frame,
+                       Result&& result,
+                       std::optional<FineRegion> region = {}) {
     return StageValue::of(LabelFile{frame,
                                     std::move(result.volume),
                                     std::move(result.boundary),
                                     {},
-                                    {std::move(result.report)}});
+                                    {std::move(result.report)},
+                                    std::move(region)});
 }
 
 // A label file for a verb's flag: a .labels of ours, or any label map that import reads.

@@ -69,6 +69,7 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
                     (*labels)->boundary, (*structure)->offset,  **textures,        (*used)->tissues,
                     std::move(*unfitted)};
     input.flow = (*flow)->field;
+    if ((*labels)->region) input.region = &*(*labels)->region;
     for (const StageReport& report : inputs.reported())
         if (report.stage == "pathology") input.key = targets_of(report, recipe);
     auto packed = pack_case(input);

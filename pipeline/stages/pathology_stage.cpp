@@ -4,7 +4,9 @@
 // this stage where its recipe has such a section.
 #include "pipeline/stages/pathology_stage.h"
 #include "formats/registration/registration.h"
+#include "pipeline/pathology/carry_into_region.h"
 #include "pipeline/pathology/pathology.h"
+#include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/stages/case_tissues.h"
 #include "pipeline/stages/key_text.h"
 #include "pipeline/stages/label_codec.h"
@@ -31,7 +33,13 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
          box.empty() ? Point3{} : box.centre()},
         progress);
     if (!result) return result.error();
-    return label_value((*labels)->frame, std::move(*result));
+    std::optional<FineRegion> region = (*labels)->region;
+    if (region) {
+        const double reach_vx = recipe.settings.of<ResampleOptions>("resample").record_band_vx;
+        carry_into_region({(*labels)->volume, (*labels)->boundary},
+                          {result->volume, result->boundary}, reach_vx, &*region);
+    }
+    return label_value((*labels)->frame, std::move(*result), std::move(region));
 }
 
 std::string request_text(const PathologyRequest& r) {

@@ -7,6 +7,7 @@
 #include "pipeline/export/labels/segmentation_pictures.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/key_text.h"
 #include "pipeline/stages/label_codec.h"
 
 namespace sonocase::pipeline {
@@ -123,7 +124,19 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     options.held_mb = room_for_distances_mb((*ct)->volume, options.voxel_mm);
     auto result = resample_labels({(*ct)->volume, **registration}, options, progress);
     if (!result) return result.error();
-    return label_value("mannequin", std::move(*result));
+    std::optional<FineRegion> region = std::move(result->region);
+    return label_value("mannequin", std::move(*result), std::move(region));
+}
+
+// Nothing where the recipe has no region, so that keys of other cases stay.
+std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests&) {
+    const auto& region = recipe.settings.of<ResampleOptions>("resample").region;
+    if (!region) return {};
+    const Point3 at = region->centre.value_or(Point3{});
+    return {key_text(
+        "region|" + region->name + "|" + region->label,
+        {region->voxel_mm, region->centre ? 1.0 : 0.0, at.x, at.y, at.z, region->in_ct ? 1.0 : 0.0,
+         region->size_mm.x, region->size_mm.y, region->size_mm.z, region->margin_mm})};
 }
 
 StageVerb verb() {
@@ -165,6 +178,7 @@ StageDescriptor resample_stage() {
     stage.takes = {"ct_labels", "registration"};
     stage.provides = "labels";
     stage.options = options();
+    stage.key_texts = key_texts;
     stage.run = run;
     stage.codec = label_codec();
     stage.reports = label_reports;

@@ -79,6 +79,9 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     const auto& options = inputs.options<SmoothStageOptions>("smooth");
     if (options.method == "none")
         return Error{"method none smooths nothing", "", "choose auto, joint or level_set"};
+    if ((*labels)->region)
+        return Error{"the stage smooth would move surfaces away from those of the fine region",
+                     "smooth.method", "auto or none, or a recipe without [[region]]"};
     SmoothOptions smooth = options.smooth;
     smooth.method = options.method == "level_set" ? "level_set" : "joint";
     auto result = smooth_labels((*labels)->volume, smooth, progress);

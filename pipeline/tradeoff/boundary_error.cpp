@@ -34,7 +34,8 @@ BoundaryError measure_boundary_error(const LabelVolume& cooked,
                                      const BrickVolume<std::uint32_t>& boundary,
                                      const Registration& truth,
                                      const AnalyticBody& body,
-                                     int points) {
+                                     int points,
+                                     const Box3* within) {
     // The cooked palette may hold fewer labels, or hold them in another order: compare by name.
     const std::vector<Label> palette = analytic_torso_labels();
     std::map<std::string, int> analytic_index;
@@ -49,7 +50,7 @@ BoundaryError measure_boundary_error(const LabelVolume& cooked,
 
     constexpr double kSegmentMm = 0.5;
     struct Tally {
-        std::size_t inside = 0, wrong = 0, crossings = 0;
+        std::size_t all = 0, inside = 0, wrong = 0, crossings = 0;
     };
     // One tally a block of points, each with its own engine: the same for any number of threads.
     constexpr int kBlock = 2000;
@@ -66,11 +67,14 @@ BoundaryError measure_boundary_error(const LabelVolume& cooked,
                 const Point3 ct = box.lower + Vector3{ux * e.x, uy * e.y, uz * e.z};
                 const double cosine = 2 * uniform() - 1, angle = 6.283185307179586 * uniform();
                 const double sine = std::sqrt(1 - cosine * cosine);
+                const Point3 place = mannequin_from_ct(truth, ct);
+                if (within != nullptr && !within->contains(place)) continue;
+                ++tally.all;
                 const int here = analytic_torso_label(ct, body);
                 const Vector3 step =
                     kSegmentMm * Vector3{sine * std::cos(angle), sine * std::sin(angle), cosine};
                 tally.crossings += analytic_torso_label(ct + step, body) != here;
-                const int seen = label_at_point(cooked, boundary, mannequin_from_ct(truth, ct));
+                const int seen = label_at_point(cooked, boundary, place);
                 tally.inside += here != 0;
                 tally.wrong += analytic_of[static_cast<std::size_t>(seen)] != here;
             }
@@ -78,11 +82,12 @@ BoundaryError measure_boundary_error(const LabelVolume& cooked,
     });
     Tally sum;
     for (const Tally& t : tallies) {
+        sum.all += t.all;
         sum.inside += t.inside;
         sum.wrong += t.wrong;
         sum.crossings += t.crossings;
     }
-    const double count = static_cast<double>(tallies.size()) * kBlock;
+    const double count = static_cast<double>(std::max<std::size_t>(sum.all, 1));
     const double area_per_mm3 = 2 * static_cast<double>(sum.crossings) / count / kSegmentMm;
     BoundaryError error;
     error.wrong_share =

@@ -28,12 +28,14 @@ struct BoundaryError {
 
 // cooked: volume and boundary records in `mannequin`, palette as analytic_torso_labels() names it;
 // truth: the map that made the mannequin. Points whose true preimage lies outside truth.ct_box do
-// not count. Deterministic. Cost: about 1 us per point.
+// not count. within: a box of `mannequin` to which points are confined; null: all. Deterministic.
+// Cost: about 1 us per point.
 BoundaryError measure_boundary_error(const LabelVolume& cooked,
                                      const BrickVolume<std::uint32_t>& boundary,
                                      const Registration& truth,
                                      const AnalyticBody& body = {},
-                                     int points = 200000);
+                                     int points = 200000,
+                                     const Box3* within = nullptr);
 
 // Of a cooked analytic torso.
 BoundaryError measure_boundary_error(const CaseBundle& bundle, const AnalyticInput& torso);

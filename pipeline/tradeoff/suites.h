@@ -33,6 +33,8 @@ Suite render_suite();
 // The press field against the finite element blocks in data/deformation, by the program press_block
 // beside this one.
 Suite press_suite(const std::string& data);
+// Surfaces in a box of the demo torso against the voxels of its region.
+Suite region_suite();
 // Volumes of ten lesions against voxel size.
 Suite pathology_suite();
 // Pulses of colour Doppler and points of the spectral gate, on a tube of known flow, by the program

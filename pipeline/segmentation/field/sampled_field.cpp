@@ -348,7 +348,7 @@ SampledField sample_label_field(LabelField* field,
         out.counts.outside += strip.counts.outside;
         out.counts.no_preimage += strip.counts.no_preimage;
     }
-    restore_lost(field, map, &out);
+    if (options.keep_labels) restore_lost(field, map, &out);
     return out;
 }
 

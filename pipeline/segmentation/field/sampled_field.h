@@ -28,6 +28,7 @@ struct FieldMap {
 
 struct FieldSamplingOptions {
     double record_band_vx = 1.5;  // records within this distance of a surface, [0, 2.6]; 0: none
+    bool keep_labels = true;      // restore labels that the grid is too coarse for
 };
 
 struct SampledField {
@@ -38,9 +39,9 @@ struct SampledField {
     std::vector<int> lost;     // labels whose location is outside the grid
 };
 
-// A label with voxels in the source but none in the result is restored as one voxel, the one where
-// it comes nearest to winning. Calls field->find_candidates() for the band of the records. Same
-// bytes for any number of threads.
+// With keep_labels a label with voxels in the source but none in the result is restored as one
+// voxel, the one where it comes nearest to winning. Calls field->find_candidates() for the band of
+// the records. Same bytes for any number of threads.
 SampledField sample_label_field(LabelField* field,
                                 const Grid& grid,
                                 const FieldMap& map,

@@ -110,13 +110,13 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
         f.origin[a] = first[a];
         f.across[a] = x[a] * px;
         f.down[a] = z[a] * px;
-        f.size[a] = b.grid.size[a];
         f.beam_x[a] = static_cast<float>(x[a]);
         f.beam_z[a] = static_cast<float>(z[a]);
         f.shift_vx[a] = static_cast<float>(look_up.motion().breathing_mm[a] * per_mm);
     }
-    voxels.fill(f);
+    voxels.fill(f, region_rows);
     f.pulse_vx = static_cast<float>(look_up.motion().pulse_mm * per_mm);
+    region_rows.pulse_vx = f.region_per_voxel * f.pulse_vx;
     f.gap_mm = look_up.contact().any_gap ? look_up.contact().gap_mm.data() : nullptr;
     f.per_reach = static_cast<float>(1.4426950408889634 / look_up.contact_reach_mm());
     f.fan = geometry.fan;

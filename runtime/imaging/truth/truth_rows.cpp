@@ -215,6 +215,22 @@ HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) 
                   hn::Sub(p.z, hn::Sub(hz, shift))});
 }
 
+template <class D>
+HWY_INLINE IntOf<D> labels_shown(D d, const TruthFrameRows& f, const Places<D>& p) {
+    const auto label = labels_at(d, f, p);
+    if (f.region == nullptr) return label;
+    auto here = hn::Eq(p.x, p.x);
+    const auto own = [&](auto at, int a) HWY_ATTR {
+        here = hn::And(here, hn::And(hn::Ge(at, hn::Set(d, f.region_lower[a])),
+                                     hn::Lt(at, hn::Set(d, f.region_upper[a]))));
+        return hn::Add(hn::Mul(at, hn::Set(d, f.region_per_voxel)), hn::Set(d, f.region_first[a]));
+    };
+    const Places<D> place{own(p.x, 0), own(p.y, 1), own(p.z, 2)};
+    if (hn::AllFalse(d, here)) return label;
+    const auto mask = hn::RebindMask(hn::RebindToSigned<D>(), here);
+    return hn::IfThenElse(mask, labels_at(d, *f.region, place), label);
+}
+
 // Rays that a hard pixel covers are dark from it on.
 template <class D, class I>
 HWY_INLINE void darken(D,
@@ -279,7 +295,7 @@ void labels_of_run(const TruthFrameRows& f,
             press_back(d, f, run, first, column, p, shut);
         }
         if (f.weight != nullptr) breathe_back(d, f, p);
-        auto label = labels_at(d, f, p);
+        auto label = labels_shown(d, f, p);
         const auto is_shut = hn::Gt(shut, hn::Zero(di));
         if (!hn::AllFalse(di, is_shut))
             label = hn::IfThenElse(is_shut, hn::GatherIndex(di, f.closed_label, label), label);

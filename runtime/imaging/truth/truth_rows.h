@@ -31,6 +31,11 @@ struct TruthFrameRows {
     const std::int32_t* swells;  // # labels: 1 for arteries
     const std::int32_t* hard;    // # labels: 1 for what casts a shadow
 
+    // The fine region, with its own size, words and pulse; null: none. Its box, and its voxel
+    // coordinates: per_voxel * those of the case + first.
+    const TruthFrameRows* region = nullptr;
+    float region_lower[3], region_upper[3], region_per_voxel = 1, region_first[3];
+
     // Contact; null gap: no beam has one. Per ray.
     const float* gap_mm = nullptr;
     float per_reach = 0;         // log2 e / reach, 1/mm

@@ -52,6 +52,7 @@ struct TruthRenderer::Impl {
     const press::PressField* pressed = nullptr;  // of the frame
     std::vector<float> first_hard_mm;
     TruthFrameRows rows{};
+    TruthFrameRows region_rows{};  // of the fine region
     FrameTruth truth;
 };
 

@@ -220,5 +220,54 @@ TEST(Recipe, AnalyticBodiesAndHintsAreNamed) {
     EXPECT_NE(bad.error().message().find("x.toml:3"), std::string::npos) << bad.error().message();
 }
 
+TEST(Recipe, ReadsAFineRegion) {
+    EXPECT_FALSE(resample_of(parse(kGood)).region);
+    const auto boxed =
+        parse(with("[[region]]\nvoxel_mm = 0.25\ncentre = [1, 2, 3]\nsize_mm = [120, 80, 60]"));
+    ASSERT_TRUE(boxed) << boxed.error().message();
+    const auto& region = resample_of(boxed).region;
+    ASSERT_TRUE(region);
+    EXPECT_EQ(region->voxel_mm, 0.25);
+    EXPECT_EQ(region->centre, (Point3{1, 2, 3}));
+    EXPECT_EQ(region->size_mm, (Vector3{120, 80, 60}));
+    EXPECT_FALSE(region->in_ct);
+    const auto label = parse(with("[[region]]\nlabel = \"aorta\"\nmargin_mm = 12"));
+    ASSERT_TRUE(label) << label.error().message();
+    EXPECT_EQ(resample_of(label).region->margin_mm, 12);
+
+    const std::vector<EmbeddedExercise> exercises{
+        {"one",
+         "name = \"one\"\nframe = \"ct\"\n[[targets]]\nname = \"node\"\ncentre = [4, 5, 6]\n"}};
+    const auto round = parse_recipe(with("[[region]]\ntarget = \"node\"\nradius_mm = 30"),
+                                    "dir/case.toml", {}, &exercises);
+    ASSERT_TRUE(round) << round.error().message();
+    EXPECT_EQ(resample_of(round).region->centre, (Point3{4, 5, 6}));
+    EXPECT_TRUE(resample_of(round).region->in_ct);
+    EXPECT_EQ(resample_of(round).region->size_mm, (Vector3{60, 60, 60}));
+    const auto missing = parse_recipe(with("[[region]]\ntarget = \"nod\"\nradius_mm = 30"),
+                                      "dir/case.toml", {}, &exercises);
+    ASSERT_FALSE(missing);
+    EXPECT_NE(missing.error().message().find("node"), std::string::npos);
+}
+
+TEST(Recipe, RefusesFineRegionsThatDoNotAddUp) {
+    const std::pair<const char*, const char*> cases[] = {
+        {"size_mm = [1, 2, 3]", "expected one of centre, label and target"},
+        {"centre = [0, 0, 0]", "expected size_mm = [x, y, z] or radius_mm"},
+        {"centre = [0, 0, 0]\nradius_mm = 5\nsize_mm = [5, 5, 5]", "beside radius_mm"},
+        {"centre = [0, 0, 0]\nlabel = \"liver\"", "beside another place"},
+        {"label = \"liver\"\nvoxel_mm = 0.05", "voxel_mm"},
+        {"label = \"liver\"\nvoxels = 1", "voxel"},
+        {"label = \"liver\"\n[[region]]\nlabel = \"spleen\"", "one [[region]] a case"},
+    };
+    for (const auto& [text, expected] : cases) {
+        const auto recipe = parse(with(std::string("[[region]]\n") + text));
+        ASSERT_FALSE(recipe) << text;
+        EXPECT_NE(recipe.error().message().find(expected), std::string::npos)
+            << recipe.error().message();
+        EXPECT_EQ(recipe.error().message().find('\n'), std::string::npos);
+    }
+}
+
 }  // namespace
 }  // namespace sonocase::pipeline

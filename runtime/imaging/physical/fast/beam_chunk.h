@@ -32,8 +32,11 @@ struct BeamChunk {
     ChunkRows<std::int32_t> entry;         // the brick's label word
     ChunkRows<std::int32_t> echo_word;     // the brick's echo word
     // First the index of the voxel's value in its pool, then the value.
-    ChunkRows<std::int32_t> label;      // also index of a target's look
-    ChunkRows<std::int32_t> record;     // of the voxel's surface; kNoBoundary: none
+    ChunkRows<std::int32_t> label;   // also index of a target's look
+    ChunkRows<std::int32_t> record;  // of the voxel's surface; kNoBoundary: none
+    // Of stretches that meet the fine region:
+    ChunkRows<float> step_mm;           // of the record's distance
+    ChunkRows<float> least_mm;          // distance at rest that the surface has at least
     ChunkRows<std::int32_t> structure;  // baked echo offset, 1/16 dB
     ChunkRows<std::int32_t> look;
     ChunkRows<float> echo_re, echo_im;  // of surfaces
@@ -45,6 +48,7 @@ struct BeamChunk {
     bool echo_pooled = false;  // bricks of more than one echo offset
     bool offsets = false;      // structure is filled in
     bool bounded = false;      // bricks with surfaces
+    bool regional = false;     // samples in the fine region
     bool surfaces = false;     // echo, edge_loss and facing are filled in
     bool refracts = false;     // some edge_loss is not zero
     bool one_label = false;

@@ -17,6 +17,7 @@
 #include "runtime/imaging/physical/fast/beam_light-inl.h"
 #include "runtime/imaging/physical/fast/beam_place-inl.h"
 #include "runtime/imaging/physical/fast/beam_press-inl.h"
+#include "runtime/imaging/physical/fast/beam_region-inl.h"
 #include "runtime/imaging/physical/fast/beam_scatter-inl.h"
 #include "runtime/imaging/physical/fast/beam_streak-inl.h"
 #include "runtime/imaging/physical/fast/beam_surface-inl.h"
@@ -69,10 +70,9 @@ void sample_beams_as(PhysicalBlock& b) {
             place_chunk(d, b, c);
             entry_chunk(d, b, c);
             label_chunk(d, b, c);
-            if (c.bounded) {
-                record_chunk(d, b, c);
-                surface_chunk(d, b, c);
-            }
+            if (c.bounded) record_chunk(d, b, c);
+            c.regional = b.region != nullptr && region_chunk(d, b, *b.region, c);
+            if (c.bounded) surface_chunk(d, b, c);
             if (b.press != nullptr && pressed.any_closed) close_chunk(d, b, c);
             b.boundary_met = b.boundary_met || c.surfaces;
             b.refraction_met = b.refraction_met || c.refracts;

@@ -84,6 +84,7 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     const auto labels = hn::Set(di, b.label_count), byte = hn::Set(di, 0xFF);
     const auto reach = hn::Set(di, static_cast<std::int32_t>(48 * physical::kSurfaceReachVx) + 1);
     const auto rough_mm = hn::Set(d, static_cast<float>(physical::kRoughnessMm) / 32);
+    const auto step_mm = hn::Set(d, b.voxel_mm / 48);
     for (int row = 0; row < c.rows; ++row) {
         const auto record = hn::Load(di, c.record.row(row));
         const auto second = hn::And(record, byte);
@@ -107,8 +108,10 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
         const auto along_normal = hn::Add(hn::Mul(nu, hn::Load(d, c.off_x.row(row))),
                                           hn::Add(hn::Mul(nv, hn::Load(d, c.off_y.row(row))),
                                                   hn::Mul(nz, hn::Load(d, c.off_z.row(row)))));
-        const auto plane = hn::Add(hn::Mul(hn::ConvertTo(d, steps), hn::Set(d, b.voxel_mm / 48)),
-                                   hn::Mul(hn::Mul(along_normal, inverse), hn::Set(d, b.voxel_mm)));
+        auto plane = hn::Add(hn::Mul(hn::ConvertTo(d, steps),
+                                     c.regional ? hn::Load(d, c.step_mm.row(row)) : step_mm),
+                             hn::Mul(hn::Mul(along_normal, inverse), hn::Set(d, b.voxel_mm)));
+        if (c.regional) plane = hn::Max(plane, hn::Load(d, c.least_mm.row(row)));
         const auto shift = hn::Mul(signed_byte<0>(d, rough), rough_mm);
         const auto lower = hn::RebindMask(d, hn::Lt(own, second));
         auto distance = hn::Add(plane, hn::IfThenElse(lower, shift, hn::Neg(shift)));

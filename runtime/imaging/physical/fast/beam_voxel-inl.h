@@ -23,10 +23,10 @@ struct VoxelAddress {
     hn::Mask<DI> inside;
 };
 
-// i, j, l: voxel indices.
-template <class DI>
+// i, j, l: voxel indices. b: what describes the table, a PhysicalBlock or a PhysicalRegion.
+template <class DI, class Table>
 HWY_INLINE VoxelAddress<DI> voxel_address(
-    DI di, const PhysicalBlock& b, hn::Vec<DI> i, hn::Vec<DI> j, hn::Vec<DI> l) {
+    DI di, const Table& b, hn::Vec<DI> i, hn::Vec<DI> j, hn::Vec<DI> l) {
     const hn::RebindToUnsigned<DI> du;
     const auto below = [&](auto index, int size) HWY_ATTR {
         return hn::Lt(hn::BitCast(du, index), hn::Set(du, static_cast<std::uint32_t>(size)));

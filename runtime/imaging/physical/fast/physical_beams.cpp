@@ -189,6 +189,7 @@ void PhysicalFast::set_tables(const PhysicalFrame& f, PhysicalBlock& b) const {
     b.boundary = f.effects.boundaries && scene_.words.has_boundary()
                      ? reinterpret_cast<const std::int32_t*>(bundle.boundary.pool.data())
                      : nullptr;
+    b.region = scene_.region.region != nullptr ? &region_ : nullptr;
     b.looks = frame_looks_.data();
     b.pairs = pairs_word_.data();
     b.rough = reinterpret_cast<const std::int32_t*>(scene_.textures->rough.data());

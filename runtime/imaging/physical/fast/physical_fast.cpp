@@ -45,6 +45,31 @@ std::int32_t pack_pair(const PairEcho& p, double sigma_mm) {
     return word;
 }
 
+PhysicalRegion region_tables(const RegionLookUp& from) {
+    PhysicalRegion out;
+    if (from.region == nullptr) return out;
+    const auto words = [](const auto& values) {
+        return reinterpret_cast<const std::int32_t*>(values.data());
+    };
+    out.table = reinterpret_cast<const std::int32_t*>(from.words.data());
+    out.labels = words(from.region->label_bricks.pool);
+    if (from.words.has_boundary()) out.boundary = words(from.region->boundary.pool);
+    out.size = from.region->grid.size;
+    const Int3 blocks = from.words.blocks();
+    out.blocks_x = blocks.x;
+    out.blocks_xy = blocks.x * blocks.y;
+    out.block_log2 = from.words.edge_log2();
+    for (int axis = 0; axis < 3; ++axis) {
+        out.lower[axis] = static_cast<float>(from.place.lower_vx[axis]);
+        out.upper[axis] = static_cast<float>(from.place.upper_vx[axis]);
+        out.first[axis] = static_cast<float>(from.place.first[axis]);
+    }
+    out.per_voxel = static_cast<float>(from.place.per_voxel);
+    out.voxel_size = static_cast<float>(1 / from.place.per_voxel);
+    out.step_mm = static_cast<float>(from.region->grid.spacing_mm.x / 48);
+    return out;
+}
+
 }  // namespace
 
 PhysicalFast::PhysicalFast(const PhysicalScene& scene,
@@ -58,7 +83,8 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
       tables_(tables),
       noise_(noise),
       context_(context),
-      press_(geometry_, face) {
+      press_(geometry_, face),
+      region_(region_tables(scene.region)) {
     const auto samples = static_cast<std::size_t>(geometry.samples);
     lines_ = (geometry.scanlines + kBeamBlock - 1) / kBeamBlock * kBeamBlock;
     stride_ = kMargin + lines_ + kMargin + kSlack;

@@ -88,6 +88,7 @@ class PhysicalFast {
     ScanConversionTable conversion_;
     int lines_ = 0, stride_ = 0, pair_stride_ = 0, cells_k_ = 0, cells_l_ = 0;
 
+    PhysicalRegion region_;
     std::vector<std::int32_t> looks_, looks_wall_, frame_looks_,
         pairs_word_;  // packed: see physical_kernels.h
     std::vector<float> r_, contact_, elevation_, interface_scale_, gain_;

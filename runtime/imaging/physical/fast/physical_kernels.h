@@ -90,6 +90,18 @@ struct SpeckleCut {
 
 inline constexpr int kFineNumbers = 11;  // of a label's frame
 
+// The fine region: see model/region_look_up.h. Its tables as in PhysicalBlock.
+struct PhysicalRegion {
+    const std::int32_t *table = nullptr, *labels = nullptr, *boundary = nullptr;
+    Int3 size;
+    int blocks_x = 0, blocks_xy = 0, block_log2 = 3;
+    float lower[3] = {0, 0, 0}, upper[3] = {0, 0, 0};  // of the box, voxels of the case
+    float per_voxel = 1,
+          voxel_size = 1;        // voxels of it in one of the case, and the other way round
+    float first[3] = {0, 0, 0};  // its voxel coordinates of the case's voxel (0, 0, 0)
+    float step_mm = 0;           // 1/48 of its voxels
+};
+
 struct PhysicalBlock {
     const float* beams = nullptr;
     int lines = 0, samples = 0;
@@ -112,10 +124,11 @@ struct PhysicalBlock {
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
     const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr;
-    const std::int8_t* fine = nullptr;   // null: off. Four cubes
-    const float* fine_frames = nullptr;  // per label: rows of the frame, offset and last layer
-    const PhysicalWall* wall = nullptr;  // null: off
-    const float* face_mm = nullptr;      // per beam, of gas; null: not known
+    const std::int8_t* fine = nullptr;       // null: off. Four cubes
+    const float* fine_frames = nullptr;      // per label: rows of the frame, offset and last layer
+    const PhysicalRegion* region = nullptr;  // null: the case has none
+    const PhysicalWall* wall = nullptr;      // null: off
+    const float* face_mm = nullptr;          // per beam, of gas; null: not known
     const float *face_peak = nullptr, *cosine = nullptr;
     const float* dome_mm = nullptr;  // null: none
     float dome_scale = 1;

@@ -35,9 +35,17 @@ void use_large_pages(void* memory, std::size_t bytes, bool large) {
 }  // namespace
 
 Result<BrickTable> BrickTable::create(const CaseBundle& bundle) {
+    return create(bundle.label_bricks, &bundle.echo_offset, &bundle.boundary);
+}
+
+Result<BrickTable> BrickTable::create(const BrickVolume<std::uint8_t>& labels,
+                                      const BrickVolume<std::int8_t>* echo,
+                                      const BrickVolume<std::uint32_t>* boundary) {
     BrickTable t;
-    t.bundle_ = &bundle;
-    t.bricks_ = brick_count(bundle.label_bricks.size);
+    t.labels_ = &labels;
+    t.echo_ = echo;
+    t.boundary_ = boundary;
+    t.bricks_ = brick_count(labels.size);
     const auto count = [&] {
         const auto parts = [&](int n) { return (n + (1 << t.edge_log2_) - 1) >> t.edge_log2_; };
         t.blocks_ = {parts(t.bricks_.x), parts(t.bricks_.y), parts(t.bricks_.z)};
@@ -49,11 +57,11 @@ Result<BrickTable> BrickTable::create(const CaseBundle& bundle) {
         ++t.edge_log2_;
         t.left_ = count();
     }
-    const auto same = [&](const auto& volume) {
-        return volume.table.size() == bundle.label_bricks.table.size();
+    const auto same = [&](const auto* volume) {
+        return volume != nullptr && volume->table.size() == labels.table.size();
     };
-    t.has_echo_ = same(bundle.echo_offset);
-    t.has_boundary_ = same(bundle.boundary);
+    t.has_echo_ = same(echo);
+    t.has_boundary_ = same(boundary);
     t.is_loaded_.assign(t.left_, 0);
     t.bytes_ = sizeof(std::uint32_t) * kWords * (t.left_ << 3 * t.edge_log2_);
     void* memory = std::calloc(t.bytes_, 1);  // pages that are never written cost nothing
@@ -86,8 +94,8 @@ void BrickTable::load_all(JobRunner& jobs) {
 
 void BrickTable::fill(Int3 block, std::size_t number) noexcept {
     const int edge = 1 << edge_log2_;
-    const CaseBundle& bundle = *bundle_;
     const Int3 first{block.x << edge_log2_, block.y << edge_log2_, block.z << edge_log2_};
+    const bool marks = !marks_.marked.empty();
     const int columns = std::min(edge, bricks_.x - first.x);
     for (int k = 0; k < std::min(edge, bricks_.z - first.z); ++k) {
         for (int j = 0; j < std::min(edge, bricks_.y - first.y); ++j) {
@@ -101,21 +109,22 @@ void BrickTable::fill(Int3 block, std::size_t number) noexcept {
             std::uint32_t* to = words_.get() + kWords * row;
             for (std::size_t b = brick; b < brick + static_cast<std::size_t>(columns);
                  ++b, to += kWords) {
-                const std::uint32_t label = bundle.label_bricks.table[b];
+                const std::uint32_t label = labels_->table[b];
                 to[0] = label & kUniformBrick
-                            ? kUniformBrick | bundle.label_bricks.uniform[label & ~kUniformBrick]
+                            ? kUniformBrick | labels_->uniform[label & ~kUniformBrick]
                             : label;
+                const int x = first.x + static_cast<int>(b - brick);
+                if (marks && marks_.has({x, first.y + j, first.z + k})) to[0] |= kRegionFlag;
                 to[1] = to[2] = kUniformBrick;
                 if (has_echo_) {
-                    const std::uint32_t e = bundle.echo_offset.table[b];
-                    to[1] =
-                        e & kUniformBrick
-                            ? kUniformBrick | static_cast<std::uint8_t>(
-                                                  bundle.echo_offset.uniform[e & ~kUniformBrick])
-                            : e;
+                    const std::uint32_t e = echo_->table[b];
+                    to[1] = e & kUniformBrick
+                                ? kUniformBrick |
+                                      static_cast<std::uint8_t>(echo_->uniform[e & ~kUniformBrick])
+                                : e;
                 }
                 if (!has_boundary_) continue;
-                const std::uint32_t e = bundle.boundary.table[b];
+                const std::uint32_t e = boundary_->table[b];
                 // A uniform record would be the same plane in 64 voxels: no surface does that.
                 if (e & kUniformBrick) continue;
                 to[2] = e;

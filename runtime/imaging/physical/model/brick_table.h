@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "formats/base/jobs.h"
@@ -19,6 +20,25 @@ namespace sonocase::runtime {
 // In a brick's label word: it holds surfaces.
 inline constexpr std::uint32_t kBoundaryFlag = 0x40000000u;
 
+// In a brick's label word: the fine region may say something else than the brick.
+inline constexpr std::uint32_t kRegionFlag = 0x20000000u;
+
+// Bricks of a box of a volume, x fastest.
+struct BrickMarks {
+    Int3 lower{0, 0, 0}, size{0, 0, 0};  // bricks
+    std::vector<std::uint8_t> marked;    // # product of size; 1: marked
+
+    bool has(Int3 brick) const {
+        const Int3 b{brick.x - lower.x, brick.y - lower.y, brick.z - lower.z};
+        if (b.x < 0 || b.y < 0 || b.z < 0 || b.x >= size.x || b.y >= size.y || b.z >= size.z)
+            return false;
+        return marked[static_cast<std::size_t>(b.x) +
+                      static_cast<std::size_t>(size.x) *
+                          (static_cast<std::size_t>(b.y) +
+                           static_cast<std::size_t>(size.y) * static_cast<std::size_t>(b.z))] != 0;
+    }
+};
+
 class BrickTable {
   public:
     static constexpr int kWords = 4;  // per brick: label, echo, boundary, unused
@@ -26,6 +46,13 @@ class BrickTable {
     BrickTable() = default;
     // Nothing is filled in yet. The bundle must outlive the table. Error: too little memory.
     static Result<BrickTable> create(const CaseBundle& bundle);
+    // The same of volumes that must outlive it. echo, boundary: null or empty where there are none.
+    static Result<BrickTable> create(const BrickVolume<std::uint8_t>& labels,
+                                     const BrickVolume<std::int8_t>* echo,
+                                     const BrickVolume<std::uint32_t>* boundary);
+
+    // Bricks whose label words shall have kRegionFlag. Before anything is filled in.
+    void mark(BrickMarks marks) { marks_ = std::move(marks); }
 
     // Word w of brick (x, y, z) is data()[kWords * ((block << 3 * edge_log2()) + brick) + w];
     // blocks, and the bricks of a block, lie x fastest. A uniform label word is kUniformBrick |
@@ -65,7 +92,10 @@ class BrickTable {
     };
     void fill(Int3 block, std::size_t number) noexcept;
 
-    const CaseBundle* bundle_ = nullptr;
+    BrickMarks marks_;
+    const BrickVolume<std::uint8_t>* labels_ = nullptr;
+    const BrickVolume<std::int8_t>* echo_ = nullptr;
+    const BrickVolume<std::uint32_t>* boundary_ = nullptr;
     Int3 bricks_{0, 0, 0}, blocks_{0, 0, 0};
     int edge_log2_ = 3;
     bool has_echo_ = false, has_boundary_ = false;

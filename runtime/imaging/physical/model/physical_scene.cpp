@@ -213,7 +213,11 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     Result<BrickTable> words = BrickTable::create(bundle);
     if (!words) return words.error();
     s.words = std::move(*words);
+    if (bundle.region) s.words.mark(marks_of_region(bundle));
     if (view.blocks() == nullptr) s.words.load_all(jobs);
+    Result<RegionLookUp> region = make_region_look_up(bundle, jobs);
+    if (!region) return region.error();
+    s.region = std::move(*region);
     s.textures = options.textures ? options.textures
                                   : std::make_shared<const PhysicalTextures>(physical_textures());
     s.fine = make_fine_structure(bundle, jobs);

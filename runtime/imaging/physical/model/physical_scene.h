@@ -18,6 +18,7 @@
 #include "runtime/imaging/physical/model/brick_table.h"
 #include "runtime/imaging/physical/model/fine_structure.h"
 #include "runtime/imaging/physical/model/physical_textures.h"
+#include "runtime/imaging/physical/model/region_look_up.h"
 #include "runtime/imaging/physical/model/tissue_layers.h"
 
 namespace sonocase::runtime {
@@ -66,6 +67,7 @@ struct PhysicalScene {
 
     // Complete where the bundle is; otherwise a frame asks for what it reads.
     BrickTable words;
+    RegionLookUp region;                     // on smaller voxels; complete from the start
     std::vector<AcousticProperties> looks;   // # labels, then one per target
     std::vector<std::int32_t> closed_label;  // 256: what is shown of a lumen that is shut
     std::vector<PairEcho> pairs;             // # labels^2, [own * # labels + second]

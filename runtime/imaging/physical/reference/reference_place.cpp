@@ -53,21 +53,63 @@ Roughness roughness_at(const PhysicalScene& s, Point3 v) {
     return {byte(0) / 32, byte(1) / 32, byte(2) / 127, byte(3) / 127};
 }
 
-Place place_at(const PhysicalScene& s, const PhysicalFrame& f, Point3 v, Point3 near) {
-    Place p;
+namespace {
+
+// The voxel nearest to a point of a volume: its label, and its record if that counts. at: where the
+// plane is extended to.
+struct Voxel {
+    int label = 0;
+    std::uint32_t record = kNoBoundary;
+    Vector3 from_centre;
+    double mm = 1;
+};
+
+Voxel voxel_at(const PhysicalScene& s,
+               const Grid& grid,
+               const BrickVolume<std::uint8_t>& labels,
+               const BrickVolume<std::uint32_t>* boundary,
+               Point3 at,
+               Point3 near) {
     const int i = nearest_integer(near.x), j = nearest_integer(near.y), k = nearest_integer(near.z);
-    p.own = p.label = label_at(s, i, j, k);
-    if (!f.effects.boundaries || !s.words.has_boundary() || !s.grid.contains(i, j, k)) return p;
-    const std::uint32_t bits = s.bundle->boundary.at(i, j, k);
-    if (bits == kNoBoundary || static_cast<int>(bits & 0xFF) >= s.labels()) return p;
-    const BoundaryRecord r = unpack_boundary(bits);
-    if (std::abs(r.distance_vx) > kSurfaceReachVx) return p;
+    Voxel v;
+    v.mm = grid.spacing_mm.x;
+    if (!grid.contains(i, j, k)) return v;
+    v.label = labels.at(i, j, k);
+    v.from_centre = {at.x - i, at.y - j, at.z - k};
+    if (boundary == nullptr) return v;
+    const std::uint32_t bits = boundary->at(i, j, k);
+    if (bits == kNoBoundary || static_cast<int>(bits & 0xFF) >= s.labels()) return v;
+    if (std::abs(unpack_boundary(bits).distance_vx) <= kSurfaceReachVx) v.record = bits;
+    return v;
+}
+
+}  // namespace
+
+Place place_at(const PhysicalScene& s, const PhysicalFrame& f, Point3 v, Point3 near) {
+    const bool bounded = f.effects.boundaries && s.words.has_boundary();
+    Voxel voxel = voxel_at(s, s.grid, s.bundle->label_bricks,
+                           bounded ? &s.bundle->boundary : nullptr, v, near);
+    double least_mm = -1e9;  // distance at rest that the surface has at least
+    if (s.region.region != nullptr && s.region.place.contains(v)) {
+        const FineRegion& region = *s.region.region;
+        const Point3 at = s.region.place.voxel_of(v);
+        const Voxel fine =
+            voxel_at(s, region.grid, region.label_bricks,
+                     bounded && s.region.words.has_boundary() ? &region.boundary : nullptr, at,
+                     at + (near - v));
+        if (fine.record == kNoBoundary) least_mm = 0;
+        if (fine.record != kNoBoundary || voxel.label != fine.label) voxel = fine;
+    }
+    Place p;
+    p.own = p.label = voxel.label;
+    if (voxel.record == kNoBoundary) return p;
+    const BoundaryRecord r = unpack_boundary(voxel.record);
     p.second = r.second_label;
     p.normal = r.normal;
     p.rough = roughness_at(s, v);
-    const Vector3 from_centre{v.x - i, v.y - j, v.z - k};
-    p.distance_mm = (r.distance_vx + dot(r.normal, from_centre)) * s.voxel_mm +
-                    kRoughnessMm * p.rough.shift * (p.own < p.second ? 1 : -1);
+    const double plane_mm = (r.distance_vx + dot(r.normal, voxel.from_centre)) * voxel.mm;
+    p.distance_mm =
+        std::max(plane_mm, least_mm) + kRoughnessMm * p.rough.shift * (p.own < p.second ? 1 : -1);
     const PairEcho& pair = s.pairs[static_cast<std::size_t>(p.own * s.labels() + p.second)];
     p.distance_mm += pair.pulse * f.motion.pulse_mm;
     if (p.distance_mm < 0) p.label = p.second;

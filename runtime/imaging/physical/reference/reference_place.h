@@ -28,6 +28,7 @@ struct Place {
 
 // near: a random point less than a voxel away from v. Its voxel is looked up, and the plane that it
 // stores is extended to v; where no plane is stored, the random step blends neighbouring voxels.
+// Where v lies in the fine region, the step is as many of its voxels.
 Place place_at(const PhysicalScene& scene, const PhysicalFrame& frame, Point3 v, Point3 near);
 
 // Echo offsets, dB: the baked one of the nearest voxel; that of the label's fibres or septa.
