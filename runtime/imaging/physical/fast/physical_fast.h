@@ -71,6 +71,7 @@ class PhysicalFast {
     // Returns the time of the needle, ms.
     double sample_beams(const PhysicalFrame& frame, const BreathingField& breathing, bool keep_all);
     void mirror_rows(float* plane, int reach) const;
+    void join_tails();
     void meet_machine(const PhysicalFrame& frame);
     void filter_rows(const PhysicalFrame& frame);
     void fill_row_task(const PhysicalFrame& frame, int sample, PhysicalRowTask& task) const;

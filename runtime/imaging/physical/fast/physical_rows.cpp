@@ -20,6 +20,39 @@ constexpr int kCellsAtOnce = 2;
 constexpr int kGreyRows = 16;
 }  // namespace
 
+// Beyond the outermost beams a plane is mirrored, `reach` beams far.
+void PhysicalFast::mirror_rows(float* plane, int reach) const {
+    const int lines = geometry_.scanlines;
+    for (int k = 0; k < geometry_.samples; ++k) {
+        float* row = plane + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_;
+        for (int j = 0; j < reach; ++j) {
+            row[-1 - j] = row[std::min(j, lines - 1)];
+            row[lines + j] = row[std::max(lines - 1 - j, 0)];
+        }
+    }
+}
+
+// A tail is seen by the whole aperture, as light is: rows in which a neighbouring block has one,
+// and this block none yet, hold none.
+void PhysicalFast::join_tails() {
+    const std::size_t blocks = tail_from_.size();
+    std::int32_t first = geometry_.samples, before = geometry_.samples;
+    for (std::size_t b = 0; b < blocks; ++b) {
+        const std::int32_t own = tail_from_[b],
+                           next = b + 1 < blocks ? tail_from_[b + 1] : geometry_.samples;
+        const std::int32_t from = std::min({before, own, next});
+        for (std::int32_t k = from; k < own; ++k) {
+            std::fill_n(tail_ + static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin +
+                            static_cast<std::ptrdiff_t>(b) * kBeamBlock,
+                        kBeamBlock, 0.0f);
+        }
+        tail_from_[b] = from;
+        before = own;
+        first = std::min(first, from);
+    }
+    if (first < geometry_.samples) mirror_rows(tail_, 6);
+}
+
 // The inputs of a row's filter across the beams.
 void PhysicalFast::fill_row_task(const PhysicalFrame& f, int k, PhysicalRowTask& t) const {
     const bool tails = f.effects.bone_tail || f.effects.gas_ring_down || f.effects.needle;
@@ -37,8 +70,8 @@ void PhysicalFast::fill_row_task(const PhysicalFrame& f, int k, PhysicalRowTask&
     t.clutter_drawn = static_cast<float>(row.drawn);
     t.tail = tails ? tail_ + at : nullptr;
     t.sample = k;
-    t.clutter_re = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
-    t.clutter_im = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
+    t.clutter_re = noise_.white.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
+    t.clutter_im = noise_.white.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
     t.noise = static_cast<float>(row.noise * all * std::sqrt(0.5) / 32);
     t.noise_rows = f.effects.noise && has_noise(tables_) ? persisted : 0;
     for (int j = 0; j < t.noise_rows; ++j) {
