@@ -38,9 +38,12 @@ struct Shadow {
         double sum = 0, square = 0, product = 0;
         int n = 0;
         for (const std::vector<double>& row : rows) {
+            double level = 0;
+            for (int l = first; l < end; ++l) level += row[static_cast<std::size_t>(l)];
+            level /= end - first;
             for (int l = first; l + lag < end; ++l, ++n) {
-                const double a = row[static_cast<std::size_t>(l)],
-                             b = row[static_cast<std::size_t>(l + lag)];
+                const double a = row[static_cast<std::size_t>(l)] / level,
+                             b = row[static_cast<std::size_t>(l + lag)] / level;
                 sum += 0.5 * (a + b);
                 square += 0.5 * (a * a + b * b);
                 product += a * b;
@@ -49,7 +52,7 @@ struct Shadow {
         const double mean = sum / n;
         return (product / n - mean * mean) / (square / n - mean * mean);
     }
-    std::vector<std::vector<double>> rows;  // amplitudes after TGC, of unit mean
+    std::vector<std::vector<double>> rows;  // amplitudes after TGC
 };
 
 Shadow shadow_of(BlockBench& b) {
@@ -72,7 +75,7 @@ Shadow shadow_of(BlockBench& b) {
 TEST(ShadowOfGas, FadesAcrossTheApertureAndHasTheGrainOfSpeckle) {
     const CaseBundle gas = gas_beside_cyst(), liver = liver_alone();
     BlockBench b(gas, block_exercise());
-    b.frame.effects.gas_ring_down = true;
+    b.frame.effects.gas_ring_down = b.frame.effects.attenuation = true;
     const Shadow s = shadow_of(b);
     double full = 0;
     for (int l = 130; l < 160; ++l) full += s.power[static_cast<std::size_t>(l)] / 30;

@@ -120,12 +120,12 @@ class PhysicalFast {
     std::int32_t* echoes_ = nullptr;  // one plane per look
     std::ptrdiff_t look_stride_ = 0;
     float *light_ = nullptr, *tail_ = nullptr, *power_ = nullptr;
-    float* clutter_ = nullptr;             // null: the machine has none
-    std::vector<std::int32_t> tail_from_;  // per block
-    std::vector<float> work_, ring_;       // per thread
-    std::vector<int> next_row_;            // per thread: the row that its ring is ready for
-    std::vector<float> envelope_, haze_;   // per thread: sum of a row of cells; # cells x stride
-    std::vector<std::uint8_t> shade_;      // per thread: two rows
+    float* clutter_ = nullptr;                             // null: the machine has none
+    std::vector<std::int32_t> tail_from_, own_tail_from_;  // per block; before join_tails()
+    std::vector<float> work_, ring_;                       // per thread
+    std::vector<int> next_row_;           // per thread: the row that its ring is ready for
+    std::vector<float> envelope_, haze_;  // per thread: sum of a row of cells; # cells x stride
+    std::vector<std::uint8_t> shade_;     // per thread: two rows
     std::vector<std::uint16_t> pairs_;
     PassTimes pass_ms_{};
     PhysicalMet met_;

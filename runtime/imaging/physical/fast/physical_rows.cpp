@@ -32,25 +32,29 @@ void PhysicalFast::mirror_rows(float* plane, int reach) const {
     }
 }
 
-// A tail is seen by the whole aperture, as light is: rows in which a neighbouring block has one,
-// and this block none yet, hold none.
+// A tail is seen by the whole aperture, as light is: a block's begins with those of its neighbours,
+// and their rows above their own tails, which theirs in turn may begin, hold none.
 void PhysicalFast::join_tails() {
-    const std::size_t blocks = tail_from_.size();
-    std::int32_t first = geometry_.samples, before = geometry_.samples;
-    for (std::size_t b = 0; b < blocks; ++b) {
-        const std::int32_t own = tail_from_[b],
-                           next = b + 1 < blocks ? tail_from_[b + 1] : geometry_.samples;
-        const std::int32_t from = std::min({before, own, next});
-        for (std::int32_t k = from; k < own; ++k) {
-            std::fill_n(tail_ + static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin +
-                            static_cast<std::ptrdiff_t>(b) * kBeamBlock,
-                        kBeamBlock, 0.0f);
+    const int blocks = static_cast<int>(tail_from_.size());
+    own_tail_from_ = tail_from_;
+    const auto earliest = [&](int block, int reach) {
+        std::int32_t from = geometry_.samples;
+        for (int b = std::max(block - reach, 0); b <= std::min(block + reach, blocks - 1); ++b)
+            from = std::min(from, own_tail_from_[static_cast<std::size_t>(b)]);
+        return from;
+    };
+    bool any = false;
+    for (int b = 0; b < blocks; ++b) {
+        const auto block = static_cast<std::size_t>(b);
+        for (std::int32_t k = earliest(b, 2); k < own_tail_from_[block]; ++k) {
+            std::fill_n(
+                tail_ + static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin + b * kBeamBlock,
+                kBeamBlock, 0.0f);
         }
-        tail_from_[b] = from;
-        before = own;
-        first = std::min(first, from);
+        tail_from_[block] = earliest(b, 1);
+        any = any || own_tail_from_[block] < geometry_.samples;
     }
-    if (first < geometry_.samples) mirror_rows(tail_, 6);
+    if (any) mirror_rows(tail_, 6);
 }
 
 // The inputs of a row's filter across the beams.
