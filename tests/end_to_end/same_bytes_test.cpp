@@ -25,8 +25,8 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Bundles: since the portal vein's flow is weighed against its velocity. Physical frames: since the
-// skirt of the point spread. Paper: commit aa0be5b.
+// Bundles: since the portal vein's flow is weighed against its velocity. Physical frames: since
+// tails and clutter pass through the point spread. Paper: commit aa0be5b.
 constexpr const char* kDraft = "a1eb85faaffc7edfbd90f76d4bbfc9b2";
 constexpr const char* kBalanced = "9fd29c25ec54009bf120ae1a0b30a7e2";
 constexpr const char* kSlender = "8204b8b89df6614c73ec63d12e6efd92";
