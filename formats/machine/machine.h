@@ -17,12 +17,14 @@ namespace sonocase {
 // Widths are full widths at half height of the point spread's amplitude (two-way). A width given
 // here holds at reference_mhz and is scaled by reference_mhz / frequency.
 struct MachineBeam {
-    double frequency_mhz = 0;      // 0: the exercise's; else [0.5, 50]
-    double reference_mhz = 3.5;    // [0.5, 50]
-    double axial_mm = 0.72;        // along the beam; 0: from the frequency alone; [0, 10]
-    double lateral_mm = 1.0;       // along the face, at the focus; 0: from the frequency; [0, 20]
-    double lateral_focus_mm = 60;  // 0: the exercise's; [0, 500]
-    double lateral_range_mm = 60;  // width = lateral_mm sqrt(1 + ((r - focus) / range)^2); [1, 1e4]
+    double frequency_mhz = 0;    // 0: the exercise's; else [0.5, 50]
+    double reference_mhz = 3.5;  // [0.5, 50]
+    double axial_mm = 0.72;      // along the beam; 0: from the frequency alone; [0, 10]
+    // Along the face: width = lateral_mm sqrt(1 + ((r - focus) / range)^2). A dynamic receive focus
+    // keeps it narrow near the face, where its focus therefore lies.
+    double lateral_mm = 0.85;      // at the focus; 0: from the frequency; [0, 20]
+    double lateral_focus_mm = 1;   // 0: the exercise's; [0, 500]
+    double lateral_range_mm = 65;  // [1, 1e4]
     // Skirt of the point spread along the face, as the body wall's aberration leaves it: a second
     // Gaussian, skirt_width times as wide. skirt: root of its power over that of the first.
     double skirt = 0.5;       // 0: none; [0, 4]

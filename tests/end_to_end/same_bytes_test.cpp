@@ -25,15 +25,15 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Bundles: since the portal vein's flow is weighed against its velocity. Physical frames: since the
-// skirt of the point spread. Paper: commit aa0be5b.
+// Bundles: since the portal vein's flow is weighed against its velocity. Physical frames: since
+// tails and clutter pass through the point spread. Paper: commit aa0be5b.
 constexpr const char* kDraft = "a1eb85faaffc7edfbd90f76d4bbfc9b2";
 constexpr const char* kBalanced = "9fd29c25ec54009bf120ae1a0b30a7e2";
 constexpr const char* kSlender = "8204b8b89df6614c73ec63d12e6efd92";
 constexpr const char* kReal = "9028ba28372bd45a21f6605310e88da0";
-constexpr const char* kDraftPhysical = "28fda43bc55bd0c837ba7cbc2bca56b4";
+constexpr const char* kDraftPhysical = "1d8f8ef229e07083c81b7db2a1dbb498";
 constexpr const char* kDraftPaper = "2f241268411ba418106fde0ced219bbb";
-constexpr const char* kRealPhysical = "fa6437f731f37395114f299423de666c";
+constexpr const char* kRealPhysical = "754e0416116301b440c5c94510a00f5f";
 constexpr const char* kRealPaper = "ab88db573d849d9ea988c882a10a9d13";
 
 class SameBytes : public ::testing::Test {

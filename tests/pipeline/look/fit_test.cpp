@@ -101,18 +101,22 @@ TEST(LookFit, ATissuesLevelIsThatOfItsRectangle) {
     truth.near_field.ring_level = 0;
     truth.contact.edge_db = 0;
     const ScanPlace place = clip_fan();
-    BeamImage image = stand_in(truth, place, Parenchyma{}, 3);
-    // A place 6 dB brighter: 40 mm deep, in the middle.
-    for (int k = 110; k < 170; ++k) {
-        for (int l = 100; l < 156; ++l) {
-            float& grey = image.grey[image.index(k, l)];
-            grey = static_cast<float>(
-                grey_of(truth.grey, 2 * amplitude_of(truth.grey, static_cast<double>(grey))));
-        }
-    }
+    // A place 6 dB brighter: 40 mm deep, in the middle. One frame's grain tells its level to 2 dB.
     LookInput input;
-    input.frames = {
-        write_grey(folder, "f.png", picture_from_beam(image, place, kClipWidth, kClipHeight))};
+    BeamImage image;
+    for (const std::uint32_t seed : {3u, 4u, 5u, 6u}) {
+        image = stand_in(truth, place, Parenchyma{}, seed);
+        for (int k = 110; k < 170; ++k) {
+            for (int l = 100; l < 156; ++l) {
+                float& grey = image.grey[image.index(k, l)];
+                grey = static_cast<float>(
+                    grey_of(truth.grey, 2 * amplitude_of(truth.grey, static_cast<double>(grey))));
+            }
+        }
+        input.frames.push_back(
+            write_grey(folder, "f" + std::to_string(seed) + ".png",
+                       picture_from_beam(image, place, kClipWidth, kClipHeight)));
+    }
     const PixelPoint corner = pixel_of(place, image, 115, 106);
     const PixelPoint far = pixel_of(place, image, 160, 146);
     input.rectangles = {{static_cast<int>(corner.x_px), static_cast<int>(corner.y_px),

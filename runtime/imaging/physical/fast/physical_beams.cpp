@@ -247,18 +247,6 @@ PhysicalBlock PhysicalFast::block_of_frame(const PhysicalFrame& f, bool keep_all
     return b;
 }
 
-// Beyond the outermost beams a plane is mirrored, `reach` beams far.
-void PhysicalFast::mirror_rows(float* plane, int reach) const {
-    const int lines = geometry_.scanlines;
-    for (int k = 0; k < geometry_.samples; ++k) {
-        float* row = plane + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_;
-        for (int j = 0; j < reach; ++j) {
-            row[-1 - j] = row[std::min(j, lines - 1)];
-            row[lines + j] = row[std::max(lines - 1 - j, 0)];
-        }
-    }
-}
-
 namespace {
 
 // What the blocks of a frame met, gathered from all threads.
@@ -363,6 +351,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         tail_from_[static_cast<std::size_t>(block)] = b.tail_from;
     });
     mirror_rows(light_, 6);  // for the boxes of the aperture
+    join_tails();
     if (clutter) mirror_rows(clutter_, kMaxHazeReach);
     met_.pressed = f.press != nullptr;
     met_.breathes = f.motion.breathes();

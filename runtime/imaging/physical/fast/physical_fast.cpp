@@ -190,6 +190,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     if (has_clutter(tables)) clutter_ = plane + 3 * area;
     look_stride_ = static_cast<std::ptrdiff_t>(area);
     tail_from_.assign(lines / kBeamBlock, 0);
+    own_tail_from_ = tail_from_;
     const auto threads = static_cast<std::size_t>(context.workers.threads());
     work_.assign(threads * 3 * static_cast<std::size_t>(stride_), 0.0f);
     const auto ring_rows = static_cast<std::size_t>(std::max(2 * tables.axial_reach + 1, 3));

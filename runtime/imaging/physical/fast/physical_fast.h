@@ -71,6 +71,7 @@ class PhysicalFast {
     // Returns the time of the needle, ms.
     double sample_beams(const PhysicalFrame& frame, const BreathingField& breathing, bool keep_all);
     void mirror_rows(float* plane, int reach) const;
+    void join_tails();
     void meet_machine(const PhysicalFrame& frame);
     void filter_rows(const PhysicalFrame& frame);
     void fill_row_task(const PhysicalFrame& frame, int sample, PhysicalRowTask& task) const;
@@ -120,12 +121,12 @@ class PhysicalFast {
     std::int32_t* echoes_ = nullptr;  // one plane per look
     std::ptrdiff_t look_stride_ = 0;
     float *light_ = nullptr, *tail_ = nullptr, *power_ = nullptr;
-    float* clutter_ = nullptr;             // null: the machine has none
-    std::vector<std::int32_t> tail_from_;  // per block
-    std::vector<float> work_, ring_;       // per thread
-    std::vector<int> next_row_;            // per thread: the row that its ring is ready for
-    std::vector<float> envelope_, haze_;   // per thread: sum of a row of cells; # cells x stride
-    std::vector<std::uint8_t> shade_;      // per thread: two rows
+    float* clutter_ = nullptr;                             // null: the machine has none
+    std::vector<std::int32_t> tail_from_, own_tail_from_;  // per block; before join_tails()
+    std::vector<float> work_, ring_;                       // per thread
+    std::vector<int> next_row_;           // per thread: the row that its ring is ready for
+    std::vector<float> envelope_, haze_;  // per thread: sum of a row of cells; # cells x stride
+    std::vector<std::uint8_t> shade_;     // per thread: two rows
     std::vector<std::uint16_t> pairs_;
     PassTimes pass_ms_{};
     PhysicalMet met_;

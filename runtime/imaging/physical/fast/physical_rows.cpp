@@ -20,6 +20,43 @@ constexpr int kCellsAtOnce = 2;
 constexpr int kGreyRows = 16;
 }  // namespace
 
+// Beyond the outermost beams a plane is mirrored, `reach` beams far.
+void PhysicalFast::mirror_rows(float* plane, int reach) const {
+    const int lines = geometry_.scanlines;
+    for (int k = 0; k < geometry_.samples; ++k) {
+        float* row = plane + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_;
+        for (int j = 0; j < reach; ++j) {
+            row[-1 - j] = row[std::min(j, lines - 1)];
+            row[lines + j] = row[std::max(lines - 1 - j, 0)];
+        }
+    }
+}
+
+// A tail is seen by the whole aperture, as light is: a block's begins with those of its neighbours,
+// and their rows above their own tails, which theirs in turn may begin, hold none.
+void PhysicalFast::join_tails() {
+    const int blocks = static_cast<int>(tail_from_.size());
+    own_tail_from_ = tail_from_;
+    const auto earliest = [&](int block, int reach) {
+        std::int32_t from = geometry_.samples;
+        for (int b = std::max(block - reach, 0); b <= std::min(block + reach, blocks - 1); ++b)
+            from = std::min(from, own_tail_from_[static_cast<std::size_t>(b)]);
+        return from;
+    };
+    bool any = false;
+    for (int b = 0; b < blocks; ++b) {
+        const auto block = static_cast<std::size_t>(b);
+        for (std::int32_t k = earliest(b, 2); k < own_tail_from_[block]; ++k) {
+            std::fill_n(
+                tail_ + static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin + b * kBeamBlock,
+                kBeamBlock, 0.0f);
+        }
+        tail_from_[block] = earliest(b, 1);
+        any = any || own_tail_from_[block] < geometry_.samples;
+    }
+    if (any) mirror_rows(tail_, 6);
+}
+
 // The inputs of a row's filter across the beams.
 void PhysicalFast::fill_row_task(const PhysicalFrame& f, int k, PhysicalRowTask& t) const {
     const bool tails = f.effects.bone_tail || f.effects.gas_ring_down || f.effects.needle;
@@ -37,8 +74,8 @@ void PhysicalFast::fill_row_task(const PhysicalFrame& f, int k, PhysicalRowTask&
     t.clutter_drawn = static_cast<float>(row.drawn);
     t.tail = tails ? tail_ + at : nullptr;
     t.sample = k;
-    t.clutter_re = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
-    t.clutter_im = noise_.streak.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
+    t.clutter_re = noise_.white.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
+    t.clutter_im = noise_.white.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
     t.noise = static_cast<float>(row.noise * all * std::sqrt(0.5) / 32);
     t.noise_rows = f.effects.noise && has_noise(tables_) ? persisted : 0;
     for (int j = 0; j < t.noise_rows; ++j) {

@@ -35,14 +35,14 @@ HWY_INLINE hn::Vec<D> mean_clutter(D d, const float* row, int reach) {
     return hn::Mul(sum, hn::Set(d, 1 / (2 * static_cast<float>(reach) + 1)));
 }
 
-// Adds clutter and electronic noise.
+// Adds tails, ringing and reverberation: echoes of their own, which pass through the point spread.
 template <class D, class V>
-HWY_INLINE void add_noise(D d, const PhysicalRowTask& t, int i, V& re, V& im) {
+HWY_INLINE void add_clutter_noise(D d, const PhysicalRowTask& t, int i, V& re, V& im) {
     const auto half = hn::Set(d, 0.5f);
     const auto unit = hn::Set(d, t.inverse_gain / 32);
     auto power = hn::Set(d, t.near_field * t.near_field);
     if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock])
-        power = hn::Add(power, hn::LoadU(d, t.tail + i));
+        power = hn::Add(power, smooth_light(d, t.tail + i));
     if (t.clutter != nullptr) {
         power = hn::Add(power, hn::Mul(mean_clutter(d, t.clutter + i, t.clutter_reach),
                                        hn::Set(d, t.clutter_drawn)));
@@ -50,6 +50,11 @@ HWY_INLINE void add_noise(D d, const PhysicalRowTask& t, int i, V& re, V& im) {
     const auto level = hn::Mul(hn::Sqrt(hn::Mul(half, power)), unit);
     re = hn::Add(re, hn::Mul(level, noise_of(d, t.clutter_re + i)));
     im = hn::Add(im, hn::Mul(level, noise_of(d, t.clutter_im + i)));
+}
+
+// Adds electronic noise, each beam's own.
+template <class D, class V>
+HWY_INLINE void add_electronic_noise(D d, const PhysicalRowTask& t, int i, V& re, V& im) {
     if (t.noise_rows == 0) return;
     const auto noise_level = hn::Set(d, t.noise);
     auto n_re = hn::Zero(d), n_im = hn::Zero(d);
@@ -83,8 +88,10 @@ HWY_INLINE void filter_look(const PhysicalRowTask& t, int look) {
             light = hn::LoadU(d, t.work_light + i);
         }
         const auto echo = hn::LoadU(di, echoes + i);
-        hn::StoreU(hn::Mul(echo_real(d, echo), light), d, mre + i);
-        hn::StoreU(hn::Mul(echo_imaginary(d, echo), light), d, mim + i);
+        auto re = hn::Mul(echo_real(d, echo), light), im = hn::Mul(echo_imaginary(d, echo), light);
+        if constexpr (kFirst) add_clutter_noise(d, t, i, re, im);
+        hn::StoreU(re, d, mre + i);
+        hn::StoreU(im, d, mim + i);
     }
     const int reach = t.point_spread ? t.reach : 0;
     for (int j = 0; j < reach; ++j) {  // mirrored at the sector's edges
@@ -105,7 +112,7 @@ HWY_INLINE void filter_look(const PhysicalRowTask& t, int look) {
             im = hn::Add(
                 im, hn::Mul(hn::Add(hn::LoadU(d, mim + i - j), hn::LoadU(d, mim + i + j)), tap));
         }
-        if constexpr (kFirst) add_noise(d, t, i, re, im);
+        if constexpr (kFirst) add_electronic_noise(d, t, i, re, im);
         hn::StoreU(re, d, out_re + i);
         hn::StoreU(im, d, out_im + i);
     }

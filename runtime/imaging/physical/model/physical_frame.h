@@ -34,8 +34,8 @@ struct PhysicalFrame {
 // starts.
 struct PhysicalNoise {
     std::vector<std::int8_t> fine;    // electronic: a few beams wide
-    std::vector<std::int8_t> streak;  // clutter: many beams wide
-    std::vector<std::int8_t> white;   // each beam its own: where in the slab a sample lies
+    std::vector<std::int8_t> streak;  // haze of side lobes: many beams wide
+    std::vector<std::int8_t> white;   // each beam its own: where a sample lies, clutter
 };
 // normal_levels: of PhysicalTextures. overhang: beams, and what a kernel reads beyond them. Cost: 3
 // ms.

@@ -29,21 +29,26 @@ void for_samples(const ReferenceInput& in, const Work& work) {
     }
 }
 
-// The light is that of the whole aperture, so that shadows have a penumbra: every other beam of
+// What the whole aperture sees of a plane, so that shadows have a penumbra: every other beam of
 // boxes of 10 and 6.
+double seen_by_aperture(const ReferenceInput& in, const Plane& plane, int k, int l) {
+    constexpr std::array<double, 7> kBoxes{1 / 15.0, 2 / 15.0, 3 / 15.0, 3 / 15.0,
+                                           3 / 15.0, 2 / 15.0, 1 / 15.0};
+    double smooth = 0;
+    for (int j = -3; j <= 3; ++j)
+        smooth += kBoxes[static_cast<std::size_t>(j + 3)] *
+                  plane[in.at(k, reflect(l + 2 * j, in.geometry.scanlines))];
+    return smooth;
+}
+
 ComplexPlane light_echoes(const ReferenceInput& in,
                           const Plane& light,
                           const ComplexPlane& echoes) {
-    constexpr std::array<double, 7> kBoxes{1 / 15.0, 2 / 15.0, 3 / 15.0, 3 / 15.0,
-                                           3 / 15.0, 2 / 15.0, 1 / 15.0};
     ComplexPlane out{Plane(in.count()), Plane(in.count())};
     for_samples(in, [&](int k, int l) {
-        double smooth = 0;
-        for (int j = -3; j <= 3; ++j)
-            smooth += kBoxes[static_cast<std::size_t>(j + 3)] *
-                      light[in.at(k, reflect(l + 2 * j, in.geometry.scanlines))];
-        out.re[in.at(k, l)] = echoes.re[in.at(k, l)] * smooth;
-        out.im[in.at(k, l)] = echoes.im[in.at(k, l)] * smooth;
+        const double seen = seen_by_aperture(in, light, k, l);
+        out.re[in.at(k, l)] = echoes.re[in.at(k, l)] * seen;
+        out.im[in.at(k, l)] = echoes.im[in.at(k, l)] * seen;
     });
     return out;
 }
@@ -66,23 +71,30 @@ void spread_across(const ReferenceInput& in, ComplexPlane& echoes) {
     });
 }
 
-// Clutter and electronic noise as they reach the receiver: before the gain and its filter. One look
-// carries them for all.
-void add_noise(const ReferenceInput& in,
-               const Plane& tail,
-               const Plane& clutter,
-               ComplexPlane& echoes) {
-    const PhysicalEffects& on = in.frame.effects;
+// Tails, ringing and reverberation: echoes of their own, before the point spread and the gain. One
+// look carries them for all.
+void add_clutter_noise(const ReferenceInput& in,
+                       const Plane& tail,
+                       const Plane& clutter,
+                       ComplexPlane& echoes) {
     for_samples(in, [&](int k, int l) {
         const Row& row = in.row(k);
-        double &re = echoes.re[in.at(k, l)], &im = echoes.im[in.at(k, l)];
-        const double face = face_clutter(row, on);
-        const double all = std::sqrt(static_cast<double>(row.looks));
-        const double power = tail[in.at(k, l)] + row.drawn * (face * face + clutter[in.at(k, l)]);
-        const double level = all * std::sqrt(0.5 * power) / row.gain;
-        re += level * in.draw(in.noise.streak, NoiseUse::clutter_re, 0, k, l);
-        im += level * in.draw(in.noise.streak, NoiseUse::clutter_im, 0, k, l);
-        if (!on.noise || !has_noise(in.tables)) return;
+        const double face = face_clutter(row, in.frame.effects);
+        const double power =
+            seen_by_aperture(in, tail, k, l) + row.drawn * (face * face + clutter[in.at(k, l)]);
+        const double level =
+            std::sqrt(static_cast<double>(row.looks)) * std::sqrt(0.5 * power) / row.gain;
+        echoes.re[in.at(k, l)] += level * in.draw(in.noise.white, NoiseUse::clutter_re, 0, k, l);
+        echoes.im[in.at(k, l)] += level * in.draw(in.noise.white, NoiseUse::clutter_im, 0, k, l);
+    });
+}
+
+// Electronic noise, each beam's own: before the gain and its filter, in one look for all.
+void add_electronic_noise(const ReferenceInput& in, ComplexPlane& echoes) {
+    const PhysicalEffects& on = in.frame.effects;
+    if (!on.noise || !has_noise(in.tables)) return;
+    for_samples(in, [&](int k, int l) {
+        const Row& row = in.row(k);
         double n_re = 0, n_im = 0;
         for (int j = 0; j < (on.persistence ? in.tables.persisted : 1); ++j) {
             const double w =
@@ -91,8 +103,9 @@ void add_noise(const ReferenceInput& in,
             n_re += w * in.draw(in.noise.fine, NoiseUse::electronic_re, number, k, l);
             n_im += w * in.draw(in.noise.fine, NoiseUse::electronic_im, number, k, l);
         }
-        re += all * row.noise / row.gain * std::sqrt(0.5) * n_re;
-        im += all * row.noise / row.gain * std::sqrt(0.5) * n_im;
+        const double level = std::sqrt(0.5 * row.looks) * row.noise / row.gain;
+        echoes.re[in.at(k, l)] += level * n_re;
+        echoes.im[in.at(k, l)] += level * n_im;
     });
 }
 
@@ -292,8 +305,9 @@ void render_physical_reference(const PhysicalScene& scene,
     for (int look = 0; look < tables.looks; ++look) {
         ComplexPlane echoes =
             light_echoes(in, beams.light, beams.looks[static_cast<std::size_t>(look)]);
+        if (look == 0) add_clutter_noise(in, beams.tail, clutter, echoes);
         if (frame.effects.point_spread) spread_across(in, echoes);
-        if (look == 0) add_noise(in, beams.tail, clutter, echoes);
+        if (look == 0) add_electronic_noise(in, echoes);
         add_look(in, look, envelope_power(in, echoes), power);
     }
     add_steady(in, clutter, power);
