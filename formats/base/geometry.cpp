@@ -4,6 +4,9 @@
 
 #include <algorithm>
 
+#include "formats/base/arc_tangent.h"
+#include "formats/base/portable_math.h"
+
 namespace sonocase {
 
 Vector3 normalized(Vector3 a) {
@@ -89,8 +92,8 @@ Matrix3 nearest_rotation(const Matrix3& r) {
 }
 
 Matrix3 rotation_about(Vector3 u, double angle_rad) {
-    const double s = std::sin(angle_rad);
-    const double h = std::sin(0.5 * angle_rad);
+    const double s = sine(angle_rad);
+    const double h = sine(0.5 * angle_rad);
     const double v = 2 * h * h;  // 1 - cos without cancellation
     return {{1 - v * (u.y * u.y + u.z * u.z), v * u.x * u.y - s * u.z, v * u.x * u.z + s * u.y,
              v * u.x * u.y + s * u.z, 1 - v * (u.x * u.x + u.z * u.z), v * u.y * u.z - s * u.x,
@@ -100,7 +103,7 @@ Matrix3 rotation_about(Vector3 u, double angle_rad) {
 double rotation_angle(const Matrix3& r) {
     // |axis part| = 2 sin, trace - 1 = 2 cos: atan2 is accurate where acos is not.
     const Vector3 axis{r(2, 1) - r(1, 2), r(0, 2) - r(2, 0), r(1, 0) - r(0, 1)};
-    return std::atan2(norm(axis), r(0, 0) + r(1, 1) + r(2, 2) - 1);
+    return arc_tangent(norm(axis), r(0, 0) + r(1, 1) + r(2, 2) - 1);
 }
 
 Matrix3 rotation_from_quaternion(Quaternion q) {

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "formats/base/portable_math.h"
+
 namespace sonocase {
 namespace {
 
@@ -48,7 +50,7 @@ void box(std::vector<float>& cells, Int3 size, int axis, int reach) {
 double pulse_wave(double phase) {
     // A raised cosine over the first fifth, then a nearly exponential fall that ends at zero.
     constexpr double kRise = 0.2;
-    if (phase < kRise) return 0.5 - 0.5 * std::cos(0.5 * kTwoPi * phase / kRise);
+    if (phase < kRise) return 0.5 - 0.5 * cosine(0.5 * kTwoPi * phase / kRise);
     const double t = (phase - kRise) / (1 - kRise);
     return (1 - t) * (1 - t) * (1 + 2 * t);
 }
@@ -58,7 +60,7 @@ MotionState motion_at(const BreathingMotion& breathing, const Pulsation& pulsati
     const double length = norm(breathing.direction);
     if (breathing.amplitude_mm != 0 && breathing.period_s > 0 && length > 0) {
         const double a =
-            breathing.amplitude_mm * 0.5 * (1 - std::cos(kTwoPi * time_s / breathing.period_s));
+            breathing.amplitude_mm * 0.5 * (1 - cosine(kTwoPi * time_s / breathing.period_s));
         m.breathing_mm = (a / length) * breathing.direction;
     }
     if (pulsation.amplitude_mm != 0 && pulsation.rate_per_min > 0) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/base/arc_tangent.h"
 #include "formats/scoring/score_parts.h"
 #include "formats/scoring/session_monitor.h"
 
@@ -25,7 +26,7 @@ void score_guidance(const ScoreInput& input, MetricValues& values) {
         const Vector3 normal = input.session.samples[input.needle.points[i].sample]
                                    .mannequin_from_probe.rotation.column(1);
         const double sine = std::min(std::abs(dot(normal, input.direction(i))), 1.0);
-        angle += dt * kDegrees * std::asin(sine);
+        angle += dt * kDegrees * arc_tangent(sine, std::sqrt((1 - sine) * (1 + sine)));
         const double forward =
             std::max(dot(input.tip(i) - input.tip(i - 1), input.direction(i)), 0.0);
         advance += forward;

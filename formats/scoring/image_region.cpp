@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/base/arc_tangent.h"
+#include "formats/base/portable_math.h"
+
 namespace sonocase {
 namespace {
 
@@ -19,25 +22,26 @@ bool in_image(const Probe& probe, double x, double z) {
         return std::abs(x) <= 0.5 * probe.width_mm && z >= 0 && z <= probe.depth_mm;
     }
     const double radius = radius_of(probe);
-    const double r = std::hypot(x, z + radius);
+    const double r = hypotenuse(x, z + radius);
     return r >= radius && r <= radius + probe.depth_mm &&
-           std::abs(std::atan2(x, z + radius)) <= 0.5 * probe.field_of_view_rad;
+           std::abs(arc_tangent(x, z + radius)) <= 0.5 * probe.field_of_view_rad;
 }
 
 double distance_to_image(const Probe& probe, double x, double z) {
     if (probe.shape == ProbeShape::linear) {
         const double dx = std::max(std::abs(x) - 0.5 * probe.width_mm, 0.0);
         const double dz = std::max({-z, z - probe.depth_mm, 0.0});
-        return std::hypot(dx, dz);
+        return hypotenuse(dx, dz);
     }
     const double radius = radius_of(probe), outer = radius + probe.depth_mm;
     const double half = 0.5 * probe.field_of_view_rad;
     const double u = std::abs(x), w = z + radius;  // the region is the same on both sides
-    const double r = std::hypot(u, w);
-    if (std::atan2(u, w) <= half) return std::max({radius - r, r - outer, 0.0});
+    const double r = hypotenuse(u, w);
+    if (arc_tangent(u, w) <= half) return std::max({radius - r, r - outer, 0.0});
     // Beside the fan: its straight edge runs from the inner arc to the outer.
-    const double along = std::clamp(u * std::sin(half) + w * std::cos(half), radius, outer);
-    return std::hypot(u - along * std::sin(half), w - along * std::cos(half));
+    const double along =
+        std::clamp(u * sonocase::sine(half) + w * sonocase::cosine(half), radius, outer);
+    return hypotenuse(u - along * sonocase::sine(half), w - along * sonocase::cosine(half));
 }
 
 ImageInterval interval_in_image(const Probe& probe, Point3 a, Point3 b, double half_slab_mm) {
@@ -60,8 +64,8 @@ ImageInterval interval_in_image(const Probe& probe, Point3 a, Point3 b, double h
         return {low, high};
     }
     const double radius = radius_of(probe), outer = radius + probe.depth_mm;
-    const double sine = std::sin(0.5 * probe.field_of_view_rad);
-    const double cosine = std::cos(0.5 * probe.field_of_view_rad);
+    const double sine = sonocase::sine(0.5 * probe.field_of_view_rad);
+    const double cosine = sonocase::cosine(0.5 * probe.field_of_view_rad);
     const double w = a.z + radius;
     clip(a.x * cosine - w * sine, d.x * cosine - d.z * sine);
     clip(-a.x * cosine - w * sine, -d.x * cosine - d.z * sine);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "formats/base/portable_math.h"
 #include "formats/scoring/image_region.h"
 #include "formats/scoring/sight.h"
 #include "formats/text/number_text.h"
@@ -76,8 +77,8 @@ bool probe_on_skin(const Anatomy& anatomy, const Probe& probe, const Rigid& mann
         Point3 face{0, 0, kPressMm};
         if (probe.shape == ProbeShape::curvilinear) {
             const double angle = 0.5 * part * probe.field_of_view_rad;
-            face = {probe.radius_mm * std::sin(angle), 0,
-                    probe.radius_mm * (std::cos(angle) - 1) + kPressMm};
+            face = {probe.radius_mm * sine(angle), 0,
+                    probe.radius_mm * (cosine(angle) - 1) + kPressMm};
         } else {
             face.x = 0.5 * part * probe.width_mm;
         }

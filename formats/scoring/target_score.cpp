@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "formats/base/arc_tangent.h"
+#include "formats/base/portable_math.h"
 #include "formats/scoring/image_region.h"
 #include "formats/scoring/score_parts.h"
 #include "formats/scoring/target_tree.h"
@@ -85,7 +86,7 @@ void score_targets_scanned(const ScoreInput& input,
         const auto near = [&](Point3 c, double radius) {
             const Point3 p = probe_from * c;
             return std::abs(p.y) <= radius + slack &&
-                   std::hypot(p.x, p.z) <= reach + radius + slack;
+                   hypotenuse(p.x, p.z) <= reach + radius + slack;
         };
         centres.search(near, [&](std::uint32_t t) {
             const Point3 p = probe_from * input.target_at(t, point.time_s);

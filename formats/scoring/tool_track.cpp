@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "formats/base/portable_math.h"
+
 namespace sonocase {
 namespace {
 
@@ -82,7 +84,7 @@ Point3 smoothed(const std::vector<Knot>& knots, std::size_t at, double filter_s)
     Vector3 b[3];
     for (std::size_t i = first; i <= last; ++i) {
         const double s = (knots[i].time_s - knots[at].time_s) / filter_s;
-        const double w = std::exp(-0.5 * s * s);
+        const double w = exponential(-0.5 * s * s);
         const Vector3 p = knots[i].p - knots[at].p;
         double power = w;
         for (int k = 0; k < 5; ++k, power *= s) m[k] += power;

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 
+#include "formats/base/portable_math.h"
+
 namespace sonocase::runtime {
 
 double needle_constraint_weight(double depth_mm, const NeedleConstraintOptions& options) {
     const double l = std::max(depth_mm, 0.0);
     return options.max_weight /
-           (1 + std::exp(-options.steepness_per_mm * (l - options.midpoint_mm)));
+           (1 + exponential(-options.steepness_per_mm * (l - options.midpoint_mm)));
 }
 
 Vector3 constrain_needle_direction(Vector3 entry_world,

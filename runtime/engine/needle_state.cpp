@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "formats/base/arc_tangent.h"
 #include "formats/scoring/anatomy.h"
 
 namespace sonocase::runtime {
@@ -16,7 +17,7 @@ Matrix3 turned_onto(const Matrix3& measured, Vector3 z) {
     const Vector3 axis = cross(from, z);
     const double sine = norm(axis);
     if (!(sine > 1e-12)) return measured;
-    return rotation_about(axis / sine, std::atan2(sine, dot(from, z))) * measured;
+    return rotation_about(axis / sine, arc_tangent(sine, dot(from, z))) * measured;
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "formats/base/portable_math.h"
+
 namespace sonocase::runtime {
 namespace {
 
@@ -52,7 +54,7 @@ bool probe_in_contact(const Skin& skin, const Probe& probe, const Rigid& mannequ
         Point3 face{part * probe.width_mm, 0, 0};
         if (probe.shape == ProbeShape::curvilinear) {
             const double angle = part * probe.field_of_view_rad;
-            face = {probe.radius_mm * std::sin(angle), 0, probe.radius_mm * (std::cos(angle) - 1)};
+            face = {probe.radius_mm * sine(angle), 0, probe.radius_mm * (cosine(angle) - 1)};
         }
         const Point3 p = mannequin_from_probe * face;
         for (double depth = 0; depth <= kGelMm; depth += 1) {
