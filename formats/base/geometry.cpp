@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "formats/base/arc_tangent.h"
-#include "formats/base/portable_math.h"
 
 namespace sonocase {
 
@@ -92,9 +91,11 @@ Matrix3 nearest_rotation(const Matrix3& r) {
 }
 
 Matrix3 rotation_about(Vector3 u, double angle_rad) {
-    const double s = sine(angle_rad);
-    const double h = sine(0.5 * angle_rad);
-    const double v = 2 * h * h;  // 1 - cos without cancellation
+    const double h = std::sin(0.5 * angle_rad);
+    return rotation_about(u, std::sin(angle_rad), 2 * h * h);  // 1 - cos without cancellation
+}
+
+Matrix3 rotation_about(Vector3 u, double s, double v) {
     return {{1 - v * (u.y * u.y + u.z * u.z), v * u.x * u.y - s * u.z, v * u.x * u.z + s * u.y,
              v * u.x * u.y + s * u.z, 1 - v * (u.x * u.x + u.z * u.z), v * u.y * u.z - s * u.x,
              v * u.x * u.z - s * u.y, v * u.y * u.z + s * u.x, 1 - v * (u.x * u.x + u.y * u.y)}};

@@ -109,6 +109,9 @@ Matrix3 nearest_rotation(const Matrix3& r);
 
 // Rotation by angle_rad about a unit axis, right-handed (Rodrigues).
 Matrix3 rotation_about(Vector3 unit_axis, double angle_rad);
+// The same from the angle's sine and from 1 less its cosine, without trigonometry: the same bits on
+// every platform.
+Matrix3 rotation_about(Vector3 unit_axis, double sine, double one_less_cosine);
 // Angle of a rotation in [0, pi], accurate at both ends.
 double rotation_angle(const Matrix3& r);
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "formats/base/arc_tangent.h"
 #include "formats/scoring/anatomy.h"
 
 namespace sonocase::runtime {
@@ -17,7 +16,10 @@ Matrix3 turned_onto(const Matrix3& measured, Vector3 z) {
     const Vector3 axis = cross(from, z);
     const double sine = norm(axis);
     if (!(sine > 1e-12)) return measured;
-    return rotation_about(axis / sine, arc_tangent(sine, dot(from, z))) * measured;
+    // Without cancellation up to a right angle, beyond which the difference has none.
+    const double cosine = dot(from, z);
+    const double less = cosine > 0 ? sine * sine / (1 + cosine) : 1 - cosine;
+    return rotation_about(axis / sine, sine, less) * measured;
 }
 
 }  // namespace
