@@ -5,7 +5,7 @@ import {readFileSync, writeFileSync} from 'node:fs';
 import {createServer} from 'node:http';
 import {join} from 'node:path';
 import {site_server} from '../../../scripts/web-serve.mjs';
-import {Browser, expect, expect_equal, expect_same_scores, folder, run, run_tests} from './support.mjs';
+import {Browser, expect, expect_equal, folder, run, run_tests} from './support.mjs';
 
 const [program, bin] = process.argv.slice(2);
 const work = folder();
@@ -89,7 +89,7 @@ await run_tests({
         const {recording, text} = await page.value('({recording: [...sonoplay.app.attempt.recording], text: sonoplay.app.attempt.score_text})');
         const file = join(work, 'attempt.igs.mha');
         writeFileSync(file, Buffer.from(recording));
-        expect_same_scores(text, run(join(bin, 'web_oracle'), 'score', case_file, file));
+        expect_equal(text, run(join(bin, 'web_oracle'), 'score', case_file, file), 'scores');
         expect(JSON.parse(text).insertions.length === 1, 'one insertion');
         // Kept for the next visit.
         await page.until('sonoplay.app.settled === sonoplay.app.started');
@@ -190,7 +190,7 @@ await run_tests({
         const file = join(work, 'doppler.igs.mha');
         writeFileSync(file, Buffer.from(recording));
         expect(Buffer.from(recording).includes('vessel'), 'the recording names the vessel');
-        expect_same_scores(text, run(join(bin, 'web_oracle'), 'score', case_file, file));
+        expect_equal(text, run(join(bin, 'web_oracle'), 'score', case_file, file), 'scores');
         expect_equal(page.errors.join(), '', 'errors on the console');
         await page.close();
     },

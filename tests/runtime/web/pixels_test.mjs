@@ -5,7 +5,7 @@
 import {readFileSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {pathToFileURL} from 'node:url';
-import {expect, expect_equal, expect_same_scores, folder, run, run_tests} from './support.mjs';
+import {expect, expect_equal, folder, run, run_tests} from './support.mjs';
 
 const [program, bin, given_case, given_session] = process.argv.slice(2);
 const {Core, kDopplerModes} = await import(pathToFileURL(join(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '../../../runtime/web/page/core.js')));
@@ -109,7 +109,7 @@ await run_tests({
         const finished = core.finish_attempt();
         const recording = join(work, 'attempt.igs.mha');
         writeFileSync(recording, finished.recording);
-        expect_same_scores(finished.score_text, run(oracle, 'score', case_file, recording));
+        expect_equal(finished.score_text, run(oracle, 'score', case_file, recording), 'scores');
         expect(finished.score.insertions.length >= 1, 'the needle went in');
     },
     async refuses_what_is_no_case() {

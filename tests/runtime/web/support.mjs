@@ -13,18 +13,6 @@ export function expect_equal(is, wanted, words) {
     expect(is === wanted, `${words}: ${JSON.stringify(is)} instead of ${JSON.stringify(wanted)}`);
 }
 
-// Scores, as JSON texts: the same words and verdicts, and numbers of which the last digit alone may differ, as the two
-// systems' libraries round angles and cosines in their own ways.
-export function expect_same_scores(is, wanted) {
-    const same = (a, b) => {
-        if (typeof a === 'number' && typeof b === 'number') return Math.abs(a - b) <= 1e-12 * Math.max(Math.abs(a), Math.abs(b), 1);
-        if (a === null || b === null || typeof a !== 'object' || typeof b !== 'object') return a === b;
-        const names = Object.keys(a);
-        return names.join() === Object.keys(b).join() && names.every((name) => same(a[name], b[name]));
-    };
-    expect(same(JSON.parse(is), JSON.parse(wanted)), `scores: ${is} instead of ${wanted}`);
-}
-
 // Runs named tests one after another; the process fails if one does.
 export async function run_tests(tests) {
     let failed = 0;
