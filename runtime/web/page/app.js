@@ -78,7 +78,9 @@ class App {
             const inside = inside_page('program');
             try {
                 const module = inside ? await WebAssembly.compile(inside) : await compile_from(`${name}.wasm`);
-                return await Core.create(module);
+                const core = await Core.create(module);
+                performance.mark('program-here');
+                return core;
             } catch (error) {
                 if (error instanceof PlainError) throw error;
                 throw new PlainError('The program did not load. Check the network and load the page again.');
@@ -128,6 +130,7 @@ class App {
         const arriving = new ArrivingCase(program, entry, () => this.scan.touched());
         signal.addEventListener('abort', () => arriving.stop());
         await arriving.begin(progress);
+        performance.mark('case-arrived');
         const description = arriving.core.open(entry.title);
         this.arriving_case = arriving;
         return description;
@@ -176,6 +179,7 @@ class App {
             const description = await how(program, progress, loading.signal);
             this.core = await program;
             if (loading.signal.aborted) return;
+            performance.mark('case-open');
             this.description = description;
             const index = description.exercises.findIndex((one) => one.name === exercise);
             if (exercise && index < 0) this.scan.notice(`This case has no exercise named ${exercise}.`);
@@ -198,6 +202,7 @@ class App {
         this.show('scan');
         try {
             this.core.choose_exercise(this.exercise, this.scan.side());
+            performance.mark('exercise-chosen');
         } catch (error) {
             this.show('start');
             this.say(error);

@@ -41,6 +41,7 @@ async function first_picture(page, words) {
         return `${(ms / 1000).toFixed(2)} s, ${(bytes_until((origin + ms) / 1000) / 1e6).toFixed(2)} MB`;
     };
     console.log(`${words}: ${await at('first-picture')}; with all its blocks ${await at('complete-picture')}`);
+    for (const mark of ['program-here', 'case-arrived', 'case-open', 'exercise-chosen']) console.log(`    ${mark}: ${await at(mark)}`);
 }
 const sorted = (ms) => ms.sort((a, b) => a - b);
 
@@ -78,6 +79,12 @@ for (const paper of [false, true]) {
     })()`));
     console.log(`${paper ? 'paper' : 'physical'} 512 x 512: fastest ${ms[0].toFixed(2)}, median ${ms[60].toFixed(2)}, slowest ${ms[119].toFixed(2)} ms`);
 }
+const depths = sorted(await page.value(`Array.from({length: 15}, (unused, n) => {
+    const {core} = sonoplay.app, start = performance.now();
+    core.set_image({...core.values(), model_paper: false, depth_mm: n % 2 ? 120 : 150});
+    return performance.now() - start;
+})`));
+console.log(`change of depth: median ${depths[7].toFixed(0)} ms`);
 console.log(`memory of the program: ${(await page.value('sonoplay.app.core.memory.buffer.byteLength') / 1e6).toFixed(0)} MB; `
     + `of scripts: ${(await page.value('performance.memory?.usedJSHeapSize ?? NaN') / 1e6).toFixed(0)} MB`);
 

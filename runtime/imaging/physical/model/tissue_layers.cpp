@@ -56,6 +56,30 @@ std::vector<std::uint8_t> kinds_of_labels(const CaseBundle& bundle) {
     return kinds;
 }
 
+// Where the voxels lie in bricks that stand for the cells along one axis, `samples` for each cell.
+// `brick` is a place in the table and `inside` one in a brick, each by the axis' own stride.
+struct Sample {
+    std::uint32_t brick = 0, inside = 0;
+};
+using Samples = std::array<std::vector<Sample>, 3>;
+
+Samples samples_of(const BrickVolume<std::uint8_t>& labels, const Cells& c, int samples) {
+    const Int3 bricks = brick_count(labels.size);
+    const Int3 brick_stride{1, bricks.x, bricks.x * bricks.y};
+    const Int3 inside_stride{1, kBrickEdge, kBrickEdge * kBrickEdge};
+    Samples out;
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int n = 0; n < samples * c.size[axis]; ++n) {
+            const int in_cell = c.edge * (2 * (n % samples) + 1) / (2 * samples);
+            const int voxel = std::min(n / samples * c.edge + in_cell, labels.size[axis] - 1);
+            out[static_cast<std::size_t>(axis)].push_back(
+                {static_cast<std::uint32_t>(voxel / kBrickEdge * brick_stride[axis]),
+                 static_cast<std::uint32_t>(voxel % kBrickEdge * inside_stride[axis])});
+        }
+    }
+    return out;
+}
+
 // Shares of body, organ and wall in each cell: from eight of its voxels, and from 64 where those
 // differ.
 void find_shares(const CaseBundle& bundle,
@@ -66,22 +90,30 @@ void find_shares(const CaseBundle& bundle,
                  Field& wall) {
     const std::vector<std::uint8_t> kinds = kinds_of_labels(bundle);
     const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
+    const Samples few = samples_of(labels, c, 2), many = samples_of(labels, c, 4);
     struct Shares {
         float body = 0, organ = 0, wall = 0;
     };
-    const auto shares_of = [&](Int3 first, int samples) {
+    const auto kind_at = [&](Sample x, Sample y, Sample z) {
+        const std::uint32_t entry = labels.table[x.brick + y.brick + z.brick];
+        return kinds[entry & kUniformBrick ? labels.uniform[entry & ~kUniformBrick]
+                                           : labels.pool[std::size_t{entry} * kBrickVoxels +
+                                                         x.inside + y.inside + z.inside]];
+    };
+    const auto shares_of = [&](const Samples& places, int samples, int i, int j, int k) {
+        const Sample *x = &places[0][static_cast<std::size_t>(samples * i)],
+                     *y = &places[1][static_cast<std::size_t>(samples * j)],
+                     *z = &places[2][static_cast<std::size_t>(samples * k)];
         int inside = 0, organs = 0, walls = 0;
-        const auto place = [&](int at, int n, int size) {
-            return std::min(at + c.edge * (2 * n + 1) / (2 * samples), size - 1);
-        };
-        for (int n = 0; n < samples * samples * samples; ++n) {
-            const std::uint8_t kind =
-                kinds[labels.at(place(first.x, n % samples, labels.size.x),
-                                place(first.y, n / samples % samples, labels.size.y),
-                                place(first.z, n / samples / samples, labels.size.z))];
-            inside += kind & 1;
-            organs += kind >> 1 & 1;
-            walls += kind >> 2;
+        for (int w = 0; w < samples; ++w) {
+            for (int v = 0; v < samples; ++v) {
+                for (int u = 0; u < samples; ++u) {
+                    const std::uint8_t kind = kind_at(x[u], y[v], z[w]);
+                    inside += kind & 1;
+                    organs += kind >> 1 & 1;
+                    walls += kind >> 2;
+                }
+            }
         }
         const float unit = 1 / static_cast<float>(samples * samples * samples);
         return Shares{unit * static_cast<float>(inside), unit * static_cast<float>(organs),
@@ -94,10 +126,9 @@ void find_shares(const CaseBundle& bundle,
                         for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
                             for (int j = 0; j < c.size.y; ++j) {
                                 for (int i = 0; i < c.size.x; ++i, ++at) {
-                                    const Int3 first{i * c.edge, j * c.edge, k * c.edge};
-                                    Shares s = shares_of(first, 2);
+                                    Shares s = shares_of(few, 2, i, j, k);
                                     if (mixed(s.body) || mixed(s.organ) || mixed(s.wall))
-                                        s = shares_of(first, 4);
+                                        s = shares_of(many, 4, i, j, k);
                                     body[at] = s.body;
                                     organ[at] = s.organ;
                                     wall[at] = s.wall;
@@ -109,21 +140,26 @@ void find_shares(const CaseBundle& bundle,
 
 // The mean of three neighbours along each axis; the border repeats.
 void smooth(const Cells& c, Field& f) {
-    Field line(static_cast<std::size_t>(std::max({c.size.x, c.size.y, c.size.z})));
-    for (int axis = 0; axis < 3; ++axis) {
-        const int n = c.size[axis];
-        const std::ptrdiff_t step = c.stride(axis);
-        const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
-        for (int b = 0; b < c.size[v]; ++b) {
-            for (int a = 0; a < c.size[u]; ++a) {
-                float* first = f.data() + a * c.stride(u) + b * c.stride(v);
-                for (int i = 0; i < n; ++i) line[static_cast<std::size_t>(i)] = first[i * step];
-                for (int i = 0; i < n; ++i) {
-                    const auto at = [&](int j) {
-                        return line[static_cast<std::size_t>(std::clamp(j, 0, n - 1))];
-                    };
-                    first[i * step] = (at(i - 1) + at(i) + at(i + 1)) * (1 / 3.0f);
-                }
+    const auto width = static_cast<std::size_t>(c.size.x);
+    const auto mean = [](float a, float b, float c3) { return (a + b + c3) * (1 / 3.0f); };
+    Field before(width), here(width);  // a row as it was
+    for (std::size_t row = 0; row < f.size(); row += width) {
+        float* p = f.data() + row;
+        std::copy(p, p + width, here.begin());
+        for (std::size_t i = 0; i < width; ++i)
+            p[i] = mean(here[i > 0 ? i - 1 : 0], here[i], here[std::min(i + 1, width - 1)]);
+    }
+    // Row by row along y, then along z: each needs the one before it as it was.
+    for (const int axis : {1, 2}) {
+        const int lines = axis == 1 ? c.size.z : c.size.y;
+        for (int line = 0; line < lines; ++line) {
+            float* p = f.data() + line * c.stride(3 - axis);
+            for (int n = 0; n < c.size[axis]; ++n, p += c.stride(axis)) {
+                const float* after = n + 1 < c.size[axis] ? p + c.stride(axis) : p;
+                std::copy(p, p + width, here.begin());
+                if (n == 0) before = here;
+                for (std::size_t i = 0; i < width; ++i) p[i] = mean(before[i], here[i], after[i]);
+                std::swap(before, here);
             }
         }
     }
@@ -148,7 +184,19 @@ void march(const Cells& c, const std::vector<std::uint8_t>& open, Field& u) {
     const auto h = static_cast<float>(c.mm);
     constexpr auto kFar = static_cast<float>(kLayerFarMm);
     const std::ptrdiff_t sy = c.stride(1), sz = c.stride(2);
-    for (int order = 0; order < 8; ++order) {
+    const Field beyond(static_cast<std::size_t>(c.size.x), kFar);  // a row outside of the volume
+    // Of each row, where the open cells begin and end.
+    std::vector<std::array<int, 2>> open_in(static_cast<std::size_t>(c.size.y * c.size.z));
+    for (std::size_t row = 0; row < open_in.size(); ++row) {
+        const std::uint8_t* p = open.data() + row * static_cast<std::size_t>(c.size.x);
+        int begin = 0, end = c.size.x;
+        while (begin < end && !p[begin]) ++begin;
+        while (end > begin && !p[end - 1]) --end;
+        open_in[row] = {begin, end};
+    }
+    bool changed = true;  // an order that changes nothing leaves nothing for those after it
+    for (int order = 0; order < 8 && changed; ++order) {
+        changed = false;
         const auto index = [&](int i, int axis) {
             return order >> axis & 1 ? c.size[axis] - 1 - i : i;
         };
@@ -156,22 +204,43 @@ void march(const Cells& c, const std::vector<std::uint8_t>& open, Field& u) {
             const int k = index(k0, 2);
             for (int j0 = 0; j0 < c.size.y; ++j0) {
                 const int j = index(j0, 1);
-                for (int i0 = 0; i0 < c.size.x; ++i0) {
-                    const int i = index(i0, 0);
-                    const std::ptrdiff_t at = i + j * sy + k * sz;
-                    if (!open[static_cast<std::size_t>(at)]) continue;
-                    float* p = u.data() + at;
-                    const auto least = [&](int n, int size, std::ptrdiff_t step) {
-                        return std::min(n > 0 ? p[-step] : kFar, n < size - 1 ? p[step] : kFar);
-                    };
-                    const float a = least(i, c.size.x, 1), b = least(j, c.size.y, sy),
-                                d = least(k, c.size.z, sz);
-                    if (std::min({a, b, d}) >= kFar) continue;
-                    *p = std::min({*p, upwind(a, b, d, h), kFar});
+                const auto [begin, end] = open_in[static_cast<std::size_t>(k * c.size.y + j)];
+                const std::ptrdiff_t first = j * sy + k * sz;
+                float* row = u.data() + first;
+                const std::uint8_t* open_row = open.data() + first;
+                const float *before_y = j > 0 ? row - sy : beyond.data(),
+                            *after_y = j < c.size.y - 1 ? row + sy : beyond.data(),
+                            *before_z = k > 0 ? row - sz : beyond.data(),
+                            *after_z = k < c.size.z - 1 ? row + sz : beyond.data();
+                for (int n = 0; n < end - begin; ++n) {
+                    const int i = order & 1 ? end - 1 - n : begin + n;
+                    if (!open_row[i]) continue;
+                    const float x = std::min(i > 0 ? row[i - 1] : kFar,
+                                             i < c.size.x - 1 ? row[i + 1] : kFar);
+                    const float y = std::min(before_y[i], after_y[i]);
+                    const float z = std::min(before_z[i], after_z[i]);
+                    // A front that comes from farther away does not bring the cell nearer.
+                    if (std::min({x, y, z}) >= row[i]) continue;
+                    const float nearer = upwind(x, y, z, h);
+                    if (nearer >= row[i]) continue;
+                    row[i] = nearer;
+                    changed = true;
                 }
             }
         }
     }
+}
+
+// The share is all or nothing, and that of the neighbours too.
+bool is_flat(const Cells& c, const Field& share, std::size_t at, Int3 cell) {
+    const float* p = share.data() + at;
+    if (*p != 0 && *p != 1) return false;
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::ptrdiff_t step = c.stride(axis);
+        if (cell[axis] > 0 && p[-step] != *p) return false;
+        if (cell[axis] + 1 < c.size[axis] && p[step] != *p) return false;
+    }
+    return true;
 }
 
 // Distance into the side where `share` is large, mm; on the other side the negative distance down
@@ -188,6 +257,10 @@ Field distance_into(const Cells& c, const Field& share, const Field* wanted) {
             for (int i = 0; i < c.size.x; ++i, ++at) {
                 const float s = share[at];
                 u[at] = s >= 0.5f ? kFar : -kBand;
+                if (is_flat(c, share, at, {i, j, k})) {  // most cells: far from the surface
+                    open[at] = s >= 0.5f && (wanted == nullptr || (*wanted)[at] > 0.05f);
+                    continue;
+                }
                 const auto slope = [&](int n, int axis) {
                     const int last = c.size[axis] - 1;
                     const float* p = share.data() + at;
@@ -246,8 +319,10 @@ void keep_what_reaches_out(const Cells& c, const Field& body, Field& above) {
     }
 }
 
-std::int16_t packed(double value, double unit) {
-    return static_cast<std::int16_t>(std::lround(std::clamp(value * unit, -32767.0, 32767.0)));
+// To the nearest, halves away from zero.
+std::int16_t packed(float value, double unit) {
+    const double scaled = std::clamp(static_cast<double>(value) * unit, -32767.0, 32767.0);
+    return static_cast<std::int16_t>(scaled + std::copysign(0.5, scaled));
 }
 
 }  // namespace
@@ -320,10 +395,9 @@ TissueLayers make_tissue_layers(const CaseBundle& bundle, JobRunner& jobs) {
             for (int i = 0; i < c.size.x; ++i, ++at) {
                 const std::size_t n = static_cast<std::size_t>(
                     i % kNoiseEdge + kNoiseEdge * (j % kNoiseEdge + kNoiseEdge * (k % kNoiseEdge)));
-                layers.cells_[at] = {packed(static_cast<double>(depth[at]), kDistanceUnit),
-                                     packed(static_cast<double>(above[at]), kDistanceUnit),
-                                     packed(static_cast<double>(wave[n]), kNoiseUnit),
-                                     packed(static_cast<double>(strength[n]), kNoiseUnit)};
+                layers.cells_[at] = {
+                    packed(depth[at], kDistanceUnit), packed(above[at], kDistanceUnit),
+                    packed(wave[n], kNoiseUnit), packed(strength[n], kNoiseUnit)};
             }
         }
     }
