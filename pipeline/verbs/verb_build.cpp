@@ -212,7 +212,7 @@ int build_one(const BuildOptions& options) {
         build_time(*recipe, need.size, recipe->settings.of<ResampleOptions>("resample").voxel_mm,
                    speed, options.common.threads),
         say};
-    if (!options.common.quiet)
+    if (!options.common.quiet && need.size.cooked_voxels > 0)  // 0: inputs that cannot be read
         std::printf(
             "to cook: %.1f million voxels, about %.0f MB (%s), %.2g s of processors, %.2g s on "
             "this machine with nothing else to do\n",
