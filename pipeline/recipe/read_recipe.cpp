@@ -169,6 +169,19 @@ Status aim_region(Recipe& recipe) {
                  recipe.path + ": region.target", suggest_name(region->target, names)};
 }
 
+// What a stage cannot do is said before any of them runs.
+Status check_stages(const Recipe& recipe) {
+    for (const StageDescriptor& stage : recipe.settings.table().stages) {
+        if (!stage.can_do || (stage.active && !stage.active(recipe))) continue;
+        if (auto status = stage.can_do(recipe); !status) {
+            Error error = status.error();
+            error.where = recipe.path + ": " + error.where;
+            return error;
+        }
+    }
+    return Done{};
+}
+
 Status read_text(std::string_view text,
                  const RecipeOverrides& overrides,
                  Recipe& recipe,
@@ -219,6 +232,7 @@ Result<Recipe> parse_recipe(std::string_view text,
         return status.error();
     if (auto status = check_exercises(recipe); !status) return status.error();
     if (auto status = aim_region(recipe); !status) return status.error();
+    if (auto status = check_stages(recipe); !status) return status.error();
     return recipe;
 }
 

@@ -13,6 +13,43 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+RegisterResult align(const FitContext& s,
+                     const RegisterOptions& options,
+                     std::chrono::steady_clock::time_point start,
+                     const Progress& progress) {
+    const PoseChoice choice = choose_pose(s, options, progress);
+    const Rigid pose =
+        refine_rigid_robust(s.fine, s.target, choice.best.rigid.target_from_skin, s.hints, 6, 4);
+    RegisterResult result;
+    result.registration = in_frames(s, RigidQuadratic::from_rigid(pose));
+    result.registration.min_det_jacobian = 1;
+    result.rigid_fit = result.quadratic_fit = result.fit =
+        measure_fit(s.skin, s.target, result.registration);
+    result.runners_up = choice.runners_up;
+    result.report = align_report(s, choice, result.fit, seconds_since(start));
+    result.registration.reports = {result.report};
+    return result;
+}
+
+RegisterResult warp(const FitContext& s,
+                    const Rigid& mannequin_from_ct,
+                    const RegisterOptions& options,
+                    std::chrono::steady_clock::time_point start,
+                    const Progress& progress) {
+    const Rigid pose{mannequin_from_ct.rotation,
+                     mannequin_from_ct * s.fine.origin - s.target.origin};
+    const WarpFit w = fit_warp(s, pose, options, progress);
+    RegisterResult result;
+    result.registration = w.registration;
+    result.rigid_fit = w.rigid_fit;
+    result.quadratic_fit = w.quadratic_fit;
+    result.fit = w.fit;
+    result.organs = w.organs;
+    result.report = warp_report(s, w, options, seconds_since(start));
+    result.registration.reports = {result.report};
+    return result;
+}
+
 }  // namespace
 
 Result<RegisterResult> align_surfaces(const RegisterInput& input,
@@ -21,18 +58,7 @@ Result<RegisterResult> align_surfaces(const RegisterInput& input,
     const auto start = std::chrono::steady_clock::now();
     Result<FitContext> s = prepare_fit(input, options);
     if (!s) return s.error();
-    const PoseChoice choice = choose_pose(*s, options, progress);
-    const Rigid pose =
-        refine_rigid_robust(s->fine, s->target, choice.best.rigid.target_from_skin, s->hints, 6, 4);
-    RegisterResult result;
-    result.registration = in_frames(*s, RigidQuadratic::from_rigid(pose));
-    result.registration.min_det_jacobian = 1;
-    result.rigid_fit = result.quadratic_fit = result.fit =
-        measure_fit(s->skin, s->target, result.registration);
-    result.runners_up = choice.runners_up;
-    result.report = align_report(*s, choice, result.fit, seconds_since(start));
-    result.registration.reports = {result.report};
-    return result;
+    return align(*s, options, start, progress);
 }
 
 Result<RegisterResult> warp_surfaces(const RegisterInput& input,
@@ -42,32 +68,20 @@ Result<RegisterResult> warp_surfaces(const RegisterInput& input,
     const auto start = std::chrono::steady_clock::now();
     Result<FitContext> s = prepare_fit(input, options);
     if (!s) return s.error();
-    const Rigid pose{mannequin_from_ct.rotation,
-                     mannequin_from_ct * s->fine.origin - s->target.origin};
-    const WarpFit w = fit_warp(*s, pose, options, progress);
-    RegisterResult result;
-    result.registration = w.registration;
-    result.rigid_fit = w.rigid_fit;
-    result.quadratic_fit = w.quadratic_fit;
-    result.fit = w.fit;
-    result.organs = w.organs;
-    result.report = warp_report(*s, w, options, seconds_since(start));
-    result.registration.reports = {result.report};
-    return result;
+    return warp(*s, mannequin_from_ct, options, start, progress);
 }
 
 Result<RegisterResult> register_surfaces(const RegisterInput& input,
                                          const RegisterOptions& options,
                                          const Progress& progress) {
     const auto start = std::chrono::steady_clock::now();
-    Result<RegisterResult> aligned = align_surfaces(input, options, progress);
-    if (!aligned) return aligned.error();
-    Result<RegisterResult> warped =
-        warp_surfaces(input, aligned->registration.mannequin_from_ct, options, progress);
-    if (!warped) return warped.error();
-    RegisterResult result = std::move(*warped);
-    result.runners_up = aligned->runners_up;
-    const StageReport align_stage = aligned->report, warp_stage = result.report;
+    Result<FitContext> s = prepare_fit(input, options);
+    if (!s) return s.error();
+    const RegisterResult aligned = align(*s, options, start, progress);
+    RegisterResult result = warp(*s, aligned.registration.mannequin_from_ct, options,
+                                 std::chrono::steady_clock::now(), progress);
+    result.runners_up = aligned.runners_up;
+    const StageReport align_stage = aligned.report, warp_stage = result.report;
     result.registration.reports = {align_stage, warp_stage};
     result.report = warp_stage;
     result.report.stage = "register";

@@ -11,7 +11,7 @@
 // paper    `nearest`, then the level sets of eq. (10) per label (level_set_smoothing.h).
 //
 // A label whose anatomy is smaller than a voxel is kept as one voxel and named in the report. Cost
-// of `shape`: real torso (1.4 M voxels of 3 mm, 67 labels) into 1 mm, about 9 s of processor time
+// of `shape`: real torso (1.4 M voxels of 3 mm, 67 labels) into 1 mm, about 8 s of processor time
 // and 0.34 GB; maps of tens of millions of voxels are measured in tiles, and distances come and go
 // by layers where memory is short (docs/farm.md). Same bytes for any number of threads.
 #pragma once

@@ -17,8 +17,10 @@ int StageCost::memory_mb(const CaseSize& size) const {
     double voxels_mb = per_label_voxel * size.label_voxels;
     if (large_mb > 0)
         voxels_mb = std::min(voxels_mb, large_mb + per_large_voxel * size.label_voxels);
-    return static_cast<int>(std::ceil(base_mb + per_label_mb * size.label_mb + voxels_mb +
-                                      per_cooked_voxel * size.cooked_voxels));
+    const double apart_mb = per_interpolated_node * std::min(10.0, size.interpolated_nodes);
+    return static_cast<int>(
+        std::ceil(base_mb + std::max(apart_mb, per_label_mb * size.label_mb + voxels_mb +
+                                                   per_cooked_voxel * size.cooked_voxels)));
 }
 
 int StageCost::least_mb(const CaseSize& size) const {

@@ -63,6 +63,8 @@ struct CaseSize {
     double label_mb = 0;       // voxels of the label map in the file's own type
     double label_voxels = 0;   // millions
     double cooked_voxels = 0;  // millions
+    // Millions of nodes between thick slices that are interpolated; 0: none are.
+    double interpolated_nodes = 0;
 };
 
 // Cores that a stage's job asks a build farm for, and its peak memory in MB:
@@ -74,6 +76,7 @@ struct StageCost {
     double base_mb = 240, per_label_mb = 0, per_label_voxel = 0, per_cooked_voxel = 0;
     double large_mb = 0, per_large_voxel = 0;  // large_mb 0: no map is worked through in pieces
     double per_streamed_voxel = 0;  // in place of per_large_voxel where memory is short; 0: as that
+    double per_interpolated_node = 0;  // beside base_mb and no other, up to ten million nodes
 
     int memory_mb(const CaseSize& size) const;
     int least_mb(const CaseSize& size) const;  // where memory is short
@@ -127,6 +130,9 @@ struct StageDescriptor {
         key_texts;
     // Whether a case has the stage. Empty: every case has it.
     std::function<bool(const Recipe& recipe)> active;
+    // What the recipe asks of the stage that it cannot do; asked where the case has the stage, when
+    // the recipe is read. Empty: nothing.
+    std::function<Status(const Recipe& recipe)> can_do;
 
     std::function<Result<StageValue>(StageInputs& inputs, const Progress& progress)> run;
 

@@ -112,7 +112,15 @@ OptionGroup options() {
 double room_for_distances_mb(const LabelVolume& ct, double voxel_mm) {
     const double voxels = static_cast<double>(ct.grid.voxel_count()) / 1e6;
     const double cooked = voxels * ct.grid.voxel_volume_mm3() / (voxel_mm * voxel_mm * voxel_mm);
-    return std::min(1e9, 0.95 * memory_limit_mb()) - (660 + 9 * voxels + 3 * cooked);
+    return std::min(1e9, 0.95 * memory_limit_mb()) - (660 + 8 * voxels + 3 * cooked);
+}
+
+Status can_do(const Recipe& recipe) {
+    const auto& resample = recipe.settings.of<ResampleOptions>("resample");
+    if (resample.region && resample.method != "shape")
+        return Error{"method '" + resample.method + "' cannot cook a region", "resample.method",
+                     "shape, or a recipe without [[region]]"};
+    return Done{};
 }
 
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
@@ -179,11 +187,12 @@ StageDescriptor resample_stage() {
     stage.provides = "labels";
     stage.options = options();
     stage.key_texts = key_texts;
+    stage.can_do = can_do;
     stage.run = run;
     stage.codec = label_codec();
     stage.reports = label_reports;
     stage.share = 0.4;
-    stage.cost = {2, 260, 0, 85, 3, 400, 23.5, 20};
+    stage.cost = {2, 250, 0, 85, 3, 155, 21.4, 17, 86};
     stage.verb = verb();
     return stage;
 }

@@ -73,15 +73,23 @@ bool active(const Recipe& recipe) {
     return recipe.settings.of<ResampleOptions>("resample").method == "nearest";
 }
 
+Error region_is_in_the_way() {
+    return {"the stage smooth would move surfaces away from those of the fine region",
+            "smooth.method", "auto or none, or a recipe without [[region]]"};
+}
+
+Status can_do(const Recipe& recipe) {
+    if (recipe.settings.of<ResampleOptions>("resample").region) return region_is_in_the_way();
+    return Done{};
+}
+
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     const auto labels = inputs.get<LabelFile>("labels");
     if (!labels) return labels.error();
     const auto& options = inputs.options<SmoothStageOptions>("smooth");
     if (options.method == "none")
         return Error{"method none smooths nothing", "", "choose auto, joint or level_set"};
-    if ((*labels)->region)
-        return Error{"the stage smooth would move surfaces away from those of the fine region",
-                     "smooth.method", "auto or none, or a recipe without [[region]]"};
+    if ((*labels)->region) return region_is_in_the_way();
     SmoothOptions smooth = options.smooth;
     smooth.method = options.method == "level_set" ? "level_set" : "joint";
     auto result = smooth_labels((*labels)->volume, smooth, progress);
@@ -124,6 +132,7 @@ StageDescriptor smooth_stage() {
     stage.provides = "labels";
     stage.options = options();
     stage.active = active;
+    stage.can_do = can_do;
     stage.run = run;
     stage.codec = label_codec();
     stage.reports = label_reports;

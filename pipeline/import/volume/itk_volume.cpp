@@ -111,8 +111,12 @@ VolumeSize size_in_file_header(const std::string& path) {
         const itk::ImageIOBase::Pointer io = reader_for(path);
         io->SetFileName(path);
         io->ReadImageInformation();
-        return {static_cast<std::uint64_t>(io->GetImageSizeInPixels()),
-                static_cast<std::uint64_t>(io->GetImageSizeInBytes())};
+        VolumeSize size{static_cast<std::uint64_t>(io->GetImageSizeInPixels()),
+                        static_cast<std::uint64_t>(io->GetImageSizeInBytes()),
+                        {}};
+        if (io->GetNumberOfDimensions() >= 3)
+            size.spacing_mm = {io->GetSpacing(0), io->GetSpacing(1), io->GetSpacing(2)};
+        return size;
     } catch (const std::exception&) {  // reading the voxels will report it
         return {};
     }

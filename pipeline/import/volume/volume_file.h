@@ -38,6 +38,7 @@ Result<LabelLayers> read_label_layers(const std::string& path);
 // cannot be read.
 struct VolumeSize {
     std::uint64_t voxels = 0, bytes = 0;
+    Vector3 spacing_mm{0, 0, 0};  // along the file's axes; 0: not known
 };
 VolumeSize size_in_headers(const std::string& path);
 

@@ -43,6 +43,15 @@ Int3 sum(Int3 a, Int3 b) {
     return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
 
+// The axis of the largest spacing.
+int slice_axis(const Grid& g) {
+    int thick = 2;
+    for (const int a : {1, 0}) {
+        if (g.spacing_mm[a] > g.spacing_mm[thick] * 1.0001) thick = a;
+    }
+    return thick;
+}
+
 Int3 reach_of(const BoxKernels& kernels) {
     return {kernels.reach(0), kernels.reach(1), kernels.reach(2)};
 }
@@ -51,10 +60,7 @@ Int3 reach_of(const BoxKernels& kernels) {
 
 LabelVolume slices_last(const LabelVolume& labels) {
     const Grid& g = labels.grid;
-    int thick = 2;
-    for (const int a : {1, 0}) {
-        if (g.spacing_mm[a] > g.spacing_mm[thick] * 1.0001) thick = a;
-    }
+    const int thick = slice_axis(g);
     if (thick == 2) return labels;
     // A cyclic exchange of axes keeps the frame right-handed.
     const int from[3] = {(thick + 1) % 3, (thick + 2) % 3, thick};
@@ -82,7 +88,10 @@ LabelVolume slices_last(const LabelVolume& labels) {
 }
 
 LabelDistance::LabelDistance(const LabelVolume& labels, const LabelDistanceOptions& options)
-    : labels_(slices_last(labels)), options_(options) {
+    : turned_(slice_axis(labels.grid) == 2 ? nullptr
+                                           : std::make_unique<LabelVolume>(slices_last(labels))),
+      labels_(turned_ ? *turned_ : labels),
+      options_(options) {
     const Vector3 h = labels_.grid.spacing_mm;
     const double pixel = std::max(h.x, h.y);
     nodes_ = labels_.grid;
@@ -201,27 +210,34 @@ VoxelBox LabelDistance::distance(const LabelSet& labels,
     if (box.empty()) {
         phi->clear();
     } else {
-        distance_on(labels, box, phi, scratch);
+        distance_on(labels, box, nullptr, &scratch->phi, scratch);
+        to_plain(scratch->phi, phi);
     }
     return box;
 }
 
 void LabelDistance::distance_on(const LabelSet& labels,
                                 const VoxelBox& part,
-                                std::vector<float>* phi,
+                                const NodeBlocks* needed,
+                                SparseBox* phi,
                                 Scratch* scratch) const {
+    if (factor_ > 1) needed = nullptr;
     const VoxelBox whole = reach(labels);
     const Margins margin = margins();
     const VoxelBox measured = grown_within(part, margin.measured, whole);
+    SparseBox &raw = scratch->raw, &smooth = scratch->smooth, &wide = scratch->wide,
+              &other = scratch->other;
     if (factor_ > 1) {
         assert(part.size.z == whole.size.z);
-        shape_interpolated(labels, measured, phi, scratch);
+        shape_interpolated(labels, measured, &scratch->plain, scratch);
+        const auto limit = static_cast<float>(limit_mm_);
+        to_sparse(measured, scratch->plain, limit, -limit, &raw);
+        scratch->slices_done();
     } else {
-        signed_distance(labels_, labels, measured, limit_mm_, {true, true, true}, phi,
-                        {&scratch->other, &scratch->weight});
+        sparse_distance(labels_, labels, measured, limit_mm_, &raw, {&smooth, &wide, &other});
     }
     if (levels_.empty()) {
-        shrink(measured, part, phi);
+        crop(raw, part, phi);
         return;
     }
     // Each step is done on the nodes that the next ones need and no others.
@@ -229,127 +245,25 @@ void LabelDistance::distance_on(const LabelSet& labels,
                    widened = grown_within(part, margin.widened, whole),
                    detailed = grown_within(part, margin.detailed, whole),
                    blended = grown_within(part, margin.blended, whole);
-    std::vector<float>&smooth = scratch->smooth, &wide = scratch->wide;
-    shrink(measured, smoothed, phi);
-    smooth = *phi;
-    smooth_box(smoothed, levels_[0].kernels, &smooth, &scratch->other);
-    crop(smoothed, smooth, widened, &wide);
-    smooth_box(widened, wide_.kernels, &wide, &scratch->other);
-    shrink(widened, blended, &wide);
-    shrink(smoothed, detailed, phi);
-    shrink(smoothed, detailed, &smooth);
-    add_detail(labels, detailed, *phi, 0, &smooth, scratch);
-    shrink(detailed, blended, &smooth);
-    const std::vector<std::size_t> strays = find_strays(labels, blended, wide, wide_.tolerance_vx);
-    phi->swap(wide);
-    if (!strays.empty()) blend(blended, wide_.spread, strays, blended, smooth, phi, scratch);
-    shrink(blended, part, phi);
-}
-
-std::vector<std::size_t> LabelDistance::find_strays(const LabelSet& labels,
-                                                    const VoxelBox& box,
-                                                    const std::vector<float>& phi,
-                                                    double tolerance_vx) const {
-    const float pixel = static_cast<float>(std::max(nodes_.spacing_mm.x, nodes_.spacing_mm.y));
-    const float tolerance = static_cast<float>(tolerance_vx) * pixel;
-    const Grid& g = labels_.grid;
-    const std::ptrdiff_t step[3] = {1, g.size.x, static_cast<std::ptrdiff_t>(g.size.x) * g.size.y};
-    std::array<bool, 256> member;
-    for (std::size_t l = 0; l < member.size(); ++l) member[l] = labels[l];
-    // A structure one voxel thick has no depth to lose. Between thick slices, shape interpolation
-    // preserves thin structures.
-    const auto limit_of = [&](Int3 v) {
-        if (factor_ > 1) return tolerance;
-        const std::uint8_t* at = labels_.voxels.data() + g.index(v.x, v.y, v.z);
-        for (int a = 0; a < 3; ++a) {  // a label continues beyond the border
-            if (v[a] == 0 || v[a] + 1 == g.size[a]) continue;
-            const std::uint8_t before = at[-step[a]], after = at[step[a]];
-            if (before != *at && after != *at) return 0.0f;
-        }
-        return tolerance;
+    const auto shrink = [&](const VoxelBox& box, SparseBox* values) {
+        if (box.count() == values->box().count()) return;
+        crop(*values, box, &other);
+        values->swap(other);
     };
-    std::vector<std::size_t> strays;
-    for (int k = 0; k < box.size.z; ++k) {
-        if ((box.first.z + k) % factor_ != 0) continue;  // only slices hold voxels of the map
-        for (int j = 0; j < box.size.y; ++j) {
-            const Int3 start{box.first.x, box.first.y + j, (box.first.z + k) / factor_};
-            const std::uint8_t* row = labels_.voxels.data() + g.index(start.x, start.y, start.z);
-            const std::size_t at = box.index(0, j, k);
-            for (int i = 0; i < box.size.x; ++i) {
-                const float value = phi[at + static_cast<std::size_t>(i)];
-                const float across = member[row[i]] ? value : -value;
-                if (across > 0 && across > limit_of({start.x + i, start.y, start.z}))
-                    strays.push_back(at + static_cast<std::size_t>(i));
-            }
-        }
-    }
-    return strays;
-}
-
-void LabelDistance::add_detail(const LabelSet& labels,
-                               const VoxelBox& box,
-                               const std::vector<float>& raw,
-                               std::size_t level,
-                               std::vector<float>* phi,
-                               Scratch* scratch) const {
-    if (level + 1 >= levels_.size()) return;
-    const std::vector<std::size_t> strays =
-        find_strays(labels, box, *phi, levels_[level].tolerance_vx);
-    if (strays.empty()) return;
-    const Level& finer = levels_[level + 1];
-    Int3 low = box.size, high{-1, -1, -1};
-    for (const std::size_t s : strays) {
-        const auto nx = static_cast<std::size_t>(box.size.x),
-                   ny = static_cast<std::size_t>(box.size.y);
-        const Int3 v{static_cast<int>(s % nx), static_cast<int>(s / nx % ny),
-                     static_cast<int>(s / nx / ny)};
-        for (int a = 0; a < 3; ++a) {
-            low[a] = std::min(low[a], v[a]);
-            high[a] = std::max(high[a], v[a]);
-        }
-    }
-    VoxelBox part;
-    for (int a = 0; a < 3; ++a) {
-        const int reach = levels_[level].spread.reach(a) + finer.kernels.reach(a);
-        const int first = std::max(0, low[a] - reach);
-        part.first[a] = box.first[a] + first;
-        part.size[a] = std::min(box.size[a], high[a] + reach + 1) - first;
-    }
-    std::vector<float>&part_raw = scratch->raw[level], &fine = scratch->fine[level];
-    crop(box, raw, part, &part_raw);
-    fine = part_raw;
-    smooth_box(part, finer.kernels, &fine, &scratch->other);
-    add_detail(labels, part, part_raw, level + 1, &fine, scratch);
-    blend(box, levels_[level].spread, strays, part, fine, phi, scratch);
-}
-
-void LabelDistance::blend(const VoxelBox& box,
-                          const BoxKernels& spread,
-                          const std::vector<std::size_t>& strays,
-                          const VoxelBox& part,
-                          const std::vector<float>& fine,
-                          std::vector<float>* phi,
-                          Scratch* scratch) const {
-    std::vector<float>& weight = scratch->weight;
-    weight.assign(part.count(), 0.0f);
-    const auto nx = static_cast<std::size_t>(box.size.x), ny = static_cast<std::size_t>(box.size.y);
-    for (const std::size_t s : strays) {
-        weight[part.index(static_cast<int>(s % nx) + box.first.x - part.first.x,
-                          static_cast<int>(s / nx % ny) + box.first.y - part.first.y,
-                          static_cast<int>(s / nx / ny) + box.first.z - part.first.z)] = 1;
-    }
-    smooth_box(part, spread, &weight, &scratch->other);
-    for (int k = 0; k < part.size.z; ++k) {
-        for (int j = 0; j < part.size.y; ++j) {
-            const std::size_t from = part.index(0, j, k);
-            float* to =
-                phi->data() + box.index(part.first.x - box.first.x, part.first.y - box.first.y + j,
-                                        part.first.z - box.first.z + k);
-            for (std::size_t i = 0; i < static_cast<std::size_t>(part.size.x); ++i) {
-                to[i] += std::min(1.0f, weight[from + i]) * (fine[from + i] - to[i]);
-            }
-        }
-    }
+    shrink(smoothed, &raw);
+    smooth_sparse(raw, levels_[0].kernels, &smooth, &other);
+    const bool cut = widened.count() < smoothed.count();
+    if (cut) crop(smooth, widened, phi);
+    smooth_sparse(cut ? *phi : smooth, wide_.kernels, &wide, &other, needed, margin.blended);
+    shrink(blended, &wide);
+    shrink(detailed, &raw);
+    shrink(detailed, &smooth);
+    add_detail(labels, raw, 0, &smooth, scratch);
+    shrink(blended, &smooth);
+    const std::vector<std::size_t> strays = find_strays(labels, wide, wide_.tolerance_vx);
+    if (!strays.empty()) blend(wide_.spread, strays, smooth, needed, &wide, scratch);
+    shrink(part, &wide);
+    phi->swap(wide);
 }
 
 }  // namespace sonocase::pipeline

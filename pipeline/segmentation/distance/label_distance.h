@@ -16,12 +16,14 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "formats/volume/label_volume.h"
 #include "pipeline/segmentation/distance/box_smoothing.h"
 #include "pipeline/segmentation/distance/signed_distance.h"
 #include "pipeline/segmentation/distance/slice_groups.h"
+#include "pipeline/segmentation/distance/sparse_box.h"
 
 namespace sonocase::pipeline {
 
@@ -43,7 +45,9 @@ struct LabelDistanceOptions {
 
 class LabelDistance {
   public:
+    // `labels` must outlive it.
     LabelDistance(const LabelVolume& labels, const LabelDistanceOptions& options);
+    LabelDistance(LabelVolume&&, const LabelDistanceOptions&) = delete;
 
     const LabelVolume& labels() const { return labels_; }  // slices along k
     const Grid& nodes() const { return nodes_; }           // k refined by factor()
@@ -54,10 +58,15 @@ class LabelDistance {
     // Scratch space of one thread. Kept from call to call: the system clears newly allocated
     // memory, which takes as long as the smoothing does.
     struct Scratch {
-        std::vector<float> smooth, wide, other, weight;
-        std::array<std::vector<float>, 3> raw, fine;  // per level
-        std::vector<float> flat, within;              // slices
+        SparseBox raw, smooth, wide, phi, other, marked, weight;
+        std::array<SparseBox, 3> part_raw, fine;  // per level
+        // Of slices that are interpolated.
+        std::vector<float> plain, flat, within, first, second;
         std::vector<std::uint8_t> capped;
+        void slices_done() {
+            for (std::vector<float>* v : {&plain, &flat, &within, &first, &second})
+                std::vector<float>().swap(*v);
+        }
     };
     // The box of nodes outside which the distance to a union of labels exceeds the limit; empty:
     // the union has no voxels.
@@ -65,13 +74,15 @@ class LabelDistance {
     // Smooth phi (negative inside, mm) of a union of labels on reach(labels), which is returned;
     // phi: # box.count(). Thread-safe, with one Scratch per thread.
     VoxelBox distance(const LabelSet& labels, std::vector<float>* phi, Scratch* scratch) const;
-    // The same on a part of it alone, in memory that goes with the part and not with the map. Along
+    // The same on a part of it alone, in memory that goes with the part and not with the map, and
+    // on the needed blocks alone, null: everywhere. Along
     // the axis of slices that are interpolated the part must be as long as reach(labels). Equal to
     // distance() but where structures too fine for the second width end beside the part's margin:
     // which of them count as strays there depends on where smoothing stops.
     void distance_on(const LabelSet& labels,
                      const VoxelBox& part,
-                     std::vector<float>* phi,
+                     const NodeBlocks* needed,
+                     SparseBox* phi,
                      Scratch* scratch) const;
 
   private:
@@ -95,7 +106,8 @@ class LabelDistance {
                      std::vector<float>* phi) const;
     bool touches(const SliceGroup& group, const VoxelBox& box) const;
 
-    LabelVolume labels_;
+    std::unique_ptr<LabelVolume> turned_;  // null: the slices are last as they were given
+    const LabelVolume& labels_;
     LabelDistanceOptions options_;
     Grid nodes_;
     int factor_ = 1;
@@ -117,26 +129,23 @@ class LabelDistance {
     double largest_sigma_nodes(int axis) const;
     void add_level(double sigma_vx, double tolerance_vx);
     // Voxels of the map that phi puts on the wrong side of the surface: indices of their nodes in
-    // `box`.
+    // its box.
     std::vector<std::size_t> find_strays(const LabelSet& labels,
-                                         const VoxelBox& box,
-                                         const std::vector<float>& phi,
+                                         const SparseBox& phi,
                                          double tolerance_vx) const;
-    // Replaces phi, smoothed by `level`, by finer levels near its strays.
+    // Replaces phi, which is `raw` smoothed by `level`, by finer levels near its strays.
     void add_detail(const LabelSet& labels,
-                    const VoxelBox& box,
-                    const std::vector<float>& raw,
+                    const SparseBox& raw,
                     std::size_t level,
-                    std::vector<float>* phi,
+                    SparseBox* phi,
                     Scratch* scratch) const;
-    // Replaces phi on `box` by `fine`, given on `part` of it, near the strays, with a smooth
-    // transition.
-    void blend(const VoxelBox& box,
-               const BoxKernels& spread,
+    // Replaces phi by `fine`, given on a part of its box, near the strays, with a smooth
+    // transition; on the needed blocks, null: everywhere.
+    void blend(const BoxKernels& spread,
                const std::vector<std::size_t>& strays,
-               const VoxelBox& part,
-               const std::vector<float>& fine,
-               std::vector<float>* phi,
+               const SparseBox& fine,
+               const NodeBlocks* needed,
+               SparseBox* phi,
                Scratch* scratch) const;
 
     std::vector<Level> levels_;  // coarse to fine

@@ -264,7 +264,7 @@ void LabelDistance::shape_interpolated(const LabelSet& labels,
     const VoxelBox in_slices{{box.first.x, box.first.y, first}, {box.size.x, box.size.y, slices}};
     std::vector<float>& flat = scratch->flat;
     signed_distance(labels_, labels, in_slices, limit_mm_, {true, true, false}, &flat,
-                    {&scratch->other, &scratch->weight});
+                    {&scratch->first, &scratch->second});
     scratch->capped.assign(flat.size(), 0);
     // Groups of other labels first, which are cut out of the union; then those of its own labels.
     const auto each_group = [&](const auto& body) {

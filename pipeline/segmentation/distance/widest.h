@@ -8,7 +8,7 @@
 // Sanitizers run before the choice is made, and clang chooses in another way.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define SONOCASE_WIDEST __attribute__((target_clones("avx2", "default")))
+#define SONOCASE_WIDEST __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define SONOCASE_WIDEST
 #endif

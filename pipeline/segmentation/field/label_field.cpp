@@ -17,6 +17,8 @@ namespace {
 // A label can win in a block if one of its voxels lies within this many voxels of the block.
 constexpr int kReach = 3;
 
+constexpr std::size_t kManyNodes = 30'000'000;  // from which memory decides the size of blocks
+
 constexpr int kTile = 128;  // nodes along an edge of the tiles that large distances are cut into
 
 // First and last of the voxels within reach of a block.
@@ -43,6 +45,7 @@ LabelField::LabelField(const LabelVolume& labels,
     room_ = options.held_mb * 1'000'000 / sizeof(float);
     assert(options.block == 4 || options.block == 8 || options.block == 16);
     shift_ = options.block == 4 ? 2 : options.block == 8 ? 3 : 4;
+    if (shift_ == 3 && nodes_.voxel_count() > kManyNodes) shift_ = 4;
     const int edge = block_edge(), field_nodes = edge + 3;
     row_ = static_cast<std::size_t>(field_nodes);
     plane_ = row_ * static_cast<std::size_t>(field_nodes);
@@ -216,10 +219,10 @@ VoxelBox LabelField::nodes_of(const std::vector<std::uint32_t>& blocks, const Vo
     return out;
 }
 
-// Copies the nodes of one block, with the rim that the spline needs, from a distance on `box`.
-// Nodes outside `box` get the value `beyond`.
-void LabelField::copy_phi(
-    const VoxelBox& box, const std::vector<float>& phi, float beyond, Int3 first, float* to) const {
+// Copies the nodes of one block, with the rim that the spline needs, from a distance on a box.
+// Nodes outside the box get the value `beyond`.
+void LabelField::copy_phi(const SparseBox& phi, float beyond, Int3 first, float* to) const {
+    const VoxelBox& box = phi.box();
     const int field_nodes = block_edge() + 3;
     for (int k = 0; k < field_nodes; ++k) {
         const int z = std::clamp(first.z - 1 + k, 0, nodes_.size.z - 1) - box.first.z;
@@ -230,7 +233,7 @@ void LabelField::copy_phi(
                 to + static_cast<std::size_t>(k) * plane_ + static_cast<std::size_t>(j) * row_;
             for (int i = 0; i < field_nodes; ++i) {
                 const int x = std::clamp(first.x - 1 + i, 0, nodes_.size.x - 1) - box.first.x;
-                row[i] = in && x >= 0 && x < box.size.x ? phi[box.index(x, y, z)] : beyond;
+                row[i] = in && x >= 0 && x < box.size.x ? phi.value(x, y, z) : beyond;
             }
         }
     }

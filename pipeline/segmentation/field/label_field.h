@@ -39,8 +39,9 @@ namespace sonocase::pipeline {
 
 struct LabelFieldOptions {
     LabelDistanceOptions distance;
-    // Nodes per edge of a block: 4, 8 or 16. Small blocks repeat much of their rims; large blocks
-    // hold distances to labels that are far from most of their nodes.
+    // Nodes per edge of a block: 4, 8 or 16; of more than 30 million nodes 8 counts as 16, which
+    // takes less memory there. Small blocks repeat much of their rims; large blocks hold distances
+    // to labels that are far from most of their nodes.
     int block = 8;
     // Distances held at a time, MB; two layers are held whatever they take. Affects time and memory
     // alone.
@@ -51,9 +52,11 @@ struct LabelFieldOptions {
 
 class LabelField {
   public:
+    // `labels` must outlive it.
     LabelField(const LabelVolume& labels,
                const LabelFieldOptions& options,
                const Progress& progress = {});
+    LabelField(LabelVolume&&, const LabelFieldOptions&, const Progress& = {}) = delete;
 
     const Grid& nodes() const { return nodes_; }
     const LabelVolume& source() const { return distance_.labels(); }  // slices along k
@@ -156,11 +159,7 @@ class LabelField {
     void list_pieces();
     void cut_into_pieces(const std::vector<std::vector<std::uint32_t>>& blocks_of);
     VoxelBox nodes_of(const std::vector<std::uint32_t>& blocks, const VoxelBox& box) const;
-    void copy_phi(const VoxelBox& box,
-                  const std::vector<float>& phi,
-                  float beyond,
-                  Int3 first,
-                  float* to) const;
+    void copy_phi(const SparseBox& phi, float beyond, Int3 first, float* to) const;
     // label_layers.cpp: layers of blocks, of which some are held.
     struct Layer {
         std::size_t size = 0;  // floats

@@ -111,15 +111,22 @@ void LabelField::measure(const std::vector<int>& layers) {
     // Each thread takes the next piece until all are taken, and keeps its scratch space.
     std::atomic<std::size_t> next{0};
     parallel_for(pieces.size(), 1, [&](std::size_t, std::size_t) {
-        std::vector<float> phi;
+        SparseBox phi;
         LabelDistance::Scratch scratch;
+        NodeBlocks needed;
+        needed.edge = block_edge();
         for (std::size_t p = next++; p < pieces.size(); p = next++) {
             const Piece& piece = *pieces[p];
             const bool own = piece.distance >= label_count;
             const auto l = static_cast<std::uint8_t>(piece.distance % label_count);
+            phi.begin(piece.part, beyond, beyond);
             if (!piece.part.empty()) {
-                distance_.distance_on(own ? one_label(l) : tree_.members[l], piece.part, &phi,
-                                      &scratch);
+                needed.first.clear();
+                for (const std::uint32_t b : piece.blocks) {
+                    if (in_layers(b)) needed.first.push_back(blocks_[b].first);
+                }
+                distance_.distance_on(own ? one_label(l) : tree_.members[l], piece.part, &needed,
+                                      &phi, &scratch);
             }
             for (const std::uint32_t b : piece.blocks) {
                 if (!in_layers(b)) continue;
@@ -129,7 +136,7 @@ void LabelField::measure(const std::vector<int>& layers) {
                                            std::find(held.begin(), held.end(), l) - held.begin()) +
                                        (own ? block.edges.size() : 0);
                 Layer& layer = layers_[static_cast<std::size_t>(layer_of(b))];
-                copy_phi(piece.part, phi, beyond, block.first,
+                copy_phi(phi, beyond, block.first,
                          layer.values.get() + (block.values - layer.values.get()) + at * phi_);
             }
         }

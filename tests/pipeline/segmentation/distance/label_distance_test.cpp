@@ -61,6 +61,7 @@ LabelVolume clutter(Vector3 spacing_mm, Int3 size) {
 double compare_parts(const LabelVolume& volume, const LabelSet& labels, Int3 edge) {
     const LabelDistance distance(volume, {});
     LabelDistance::Scratch scratch;
+    SparseBox sparse;
     std::vector<float> whole, piece;
     const VoxelBox box = distance.distance(labels, &whole, &scratch);
     EXPECT_EQ(whole.size(), box.count());
@@ -73,7 +74,8 @@ double compare_parts(const LabelVolume& volume, const LabelSet& labels, Int3 edg
                     {box.first.x + x, box.first.y + y, box.first.z + z},
                     {std::min(edge.x, box.size.x - x), std::min(edge.y, box.size.y - y),
                      std::min(edge.z, box.size.z - z)}};
-                distance.distance_on(labels, part, &piece, &scratch);
+                distance.distance_on(labels, part, nullptr, &sparse, &scratch);
+                to_plain(sparse, &piece);
                 EXPECT_EQ(piece.size(), part.count());
                 std::size_t n = 0;
                 for (int k = 0; k < part.size.z; ++k) {

@@ -54,7 +54,8 @@ class LabelFieldOf : public ::testing::TestWithParam<double> {};
 
 TEST_P(LabelFieldOf, CandidatesOfACellAnswerLikeAllCandidates) {
     constexpr float kReach = 2;
-    LabelField field(crowded(GetParam()), {});
+    const LabelVolume labels = crowded(GetParam());
+    LabelField field(labels, {});
     Random random(5);
     for (float& offset : field.volume_offsets_mm())
         offset = static_cast<float>(random.uniform(-0.4, 0.4));
@@ -125,7 +126,8 @@ TEST_P(LabelFieldOf, AnswersDoNotDependOnTheEdgeOfBlocks) {
 // smoothing of its neighbour's own distance. Offsets that counted once on one side and twice on the
 // other made steps of 0.3 mm.
 TEST_P(LabelFieldOf, NothingJumpsFromBlockToBlock) {
-    LabelField field(crowded(GetParam()), {});
+    const LabelVolume labels = crowded(GetParam());
+    LabelField field(labels, {});
     Random random(7);
     for (float& offset : field.volume_offsets_mm())
         offset = static_cast<float>(random.uniform(-0.4, 0.4));
