@@ -30,6 +30,8 @@ Suite calibrate_suite();
 Suite look_suite();
 // Frames of the player beside this program, against its finest sampling.
 Suite render_suite();
+// The same with a linear probe, whose pictures have plates and grounds of their own.
+Suite linear_suite();
 // The press field against the finite element blocks in data/deformation, by the program press_block
 // beside this one.
 Suite press_suite(const std::string& data);

@@ -70,6 +70,7 @@ std::vector<NamedSuite> suites() {
         {"calibrate", calibrate_suite},
         {"look", look_suite},
         {"render", render_suite},
+        {"linear", linear_suite},
         {"region", region_suite},
         {"pathology", pathology_suite},
         {"case", [] { return case_suite({}, kTimedBody); }},

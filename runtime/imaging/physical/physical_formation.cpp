@@ -157,7 +157,8 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
         if (job == 0) {  // the longer one, on the caller's thread, whose memory it keeps
             const Machine machine = machine_of(input);
             scene = make_physical_scene(input.bundle, shown_lesions(input.exercise),
-                                        {&jobs, textures, machine.tissue_db, machine.structures});
+                                        {&jobs, textures, machine.tissue_db, machine.structures,
+                                         physical::shows_fine(machine, input.exercise.probe)});
         } else {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,
                                         input.scanlines + kNoiseSlack);

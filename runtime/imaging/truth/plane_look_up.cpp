@@ -94,7 +94,7 @@ void PlaneLookUp::find_gaps_of_rays() {
     PhysicalFrame frame;
     frame.volume_from_probe = pose_;
     find_gaps(scene, geometry_, frame, 0, geometry_.scanlines, raw_);
-    contact_.touching = smooth_gaps(geometry_.scanlines, raw_, gaps_);
+    contact_.touching = smooth_gaps(geometry_, raw_, gaps_);
     if (press_ != nullptr) press_gaps(*press_, geometry_, gaps_);
     const auto rays = contact_.gap_mm.size();
     for (std::size_t i = 0; i < rays; ++i) {

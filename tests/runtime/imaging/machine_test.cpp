@@ -115,6 +115,25 @@ TEST(MachineInTheRenderer, BothRenderersAgreeAtAnyDepthAndWithoutStructure) {
     expect_agreement(phantom_exercise(), options_of({}), "no structure", Phantom(plain).bundle());
 }
 
+// Plates, their ripples, and the grounds between them.
+TEST(MachineInTheRenderer, BothRenderersAgreeOnLinearPicturesAtAnyDepthAndFrequency) {
+    const auto agree = [](double depth_mm, double mhz, const CaseBundle& bundle, const char* what) {
+        Exercise exercise = phantom_linear_exercise();
+        exercise.probe.depth_mm = depth_mm;
+        exercise.probe.focus_mm = 0.5 * depth_mm;
+        exercise.probe.frequency_mhz = mhz;
+        expect_agreement(exercise, options_of(*built_in_machine("modern-linear")), what, bundle);
+    };
+    agree(20, 9, phantom(), "20 mm");
+    agree(60, 9, phantom(), "60 mm");
+    agree(36, 18, phantom(), "18 MHz");
+    agree(36, 6.01, phantom(), "just fine");
+    PhantomOptions plain;
+    plain.voxel_mm = 2;
+    plain.boundaries = plain.structure = false;
+    agree(36, 9, Phantom(plain).bundle(), "linear, no structure");
+}
+
 double mean_of(const std::vector<std::uint8_t>& pixels) {
     double sum = 0;
     for (const std::uint8_t p : pixels) sum += p;

@@ -134,6 +134,71 @@ TEST(Septa, AMachineThatShowsNoStreaksAndAFanShowNone) {
     EXPECT_TRUE(plates(organs).empty());
 }
 
+TEST(Septa, EchoVariesAlongAPlateAboutItsMean) {
+    BlockBench b(fat_over_liver(), fine_exercise());
+    for (const Streak& s : plates(b)) {
+        ASSERT_GT(s.ripple, 0);
+        double sum = 0;
+        for (int i = 0; i < 2000; ++i) {
+            const double ripple = streak_ripple(s, i / 10.0);
+            EXPECT_LE(std::abs(ripple), s.ripple + 1e-9);
+            sum += ripple / 2000;
+        }
+        EXPECT_NEAR(sum, 0, 0.1 * s.ripple);
+    }
+    BlockBench fan(fat_over_liver(), block_exercise());
+    for (const Streak& s : plates(fan)) EXPECT_EQ(s.ripple, 0);
+}
+
+// What the fine pulse shows of a bundle; a machine without plates keeps the strands of a fan.
+TEST(Septa, MuscleAndFatAreGroundBetweenPlatesWhereTheMachineShowsThem) {
+    const Machine linear = *built_in_machine("modern-linear"),
+                  classic = *built_in_machine("classic");
+    EXPECT_TRUE(shows_fine(linear, fine_exercise().probe));
+    EXPECT_FALSE(shows_fine(classic, fine_exercise().probe));
+    EXPECT_FALSE(shows_fine({}, phantom_exercise().probe));
+    PhysicalSceneOptions options;
+    const PhysicalScene coarse = *make_physical_scene(fat_over_liver(), {}, options);
+    options.fine = true;
+    const PhysicalScene fine = *make_physical_scene(fat_over_liver(), {}, options);
+    const auto fat = static_cast<std::size_t>(Phantom::fat),
+               liver = static_cast<std::size_t>(Phantom::liver);
+    EXPECT_EQ(coarse.fine.frames[fat].cube, kSeptaCube);
+    EXPECT_EQ(fine.fine.frames[fat].cube, kFineFatCube);
+    EXPECT_EQ(fine.fine.frames[liver].cube, coarse.fine.frames[liver].cube);
+    EXPECT_TRUE(coarse.structure_most_db.empty());
+    EXPECT_EQ(fine.structure_most_db[fat], 0);
+    EXPECT_GT(fine.structure_most_db[liver], 30);
+    EXPECT_LT(fine.roughness_mm, coarse.roughness_mm);
+    EXPECT_TRUE(fine.has_septa);
+}
+
+// Skin that rises in steps of a voxel is no wave of the layers below it.
+TEST(Septa, AFlatFaceClosesASlopedGapEvenlyAndBridgesNoWideOne) {
+    const CaseBundle sloped =
+        block_of(2, [](Point3 p) { return p.z < 0.2 * p.x ? Phantom::outside : Phantom::fat; });
+    BlockBench b(sloped, fine_exercise());
+    b.frame.volume_from_probe.translation = {0, 0, -5};
+    const auto lines = static_cast<std::size_t>(b.geometry.scanlines);
+    std::vector<float> raw(lines), gaps(lines);
+    const auto find = [&] {
+        find_gaps(b.scene, b.geometry, b.frame, 0, b.geometry.scanlines, raw);
+        return smooth_gaps(b.geometry, raw, gaps);
+    };
+    EXPECT_EQ(find(), b.geometry.scanlines);
+    float raw_step = 0, step = 0;
+    for (std::size_t l = 1; l < lines; ++l) {
+        raw_step = std::max(raw_step, std::abs(raw[l] - raw[l - 1]));
+        step = std::max(step, std::abs(gaps[l] - gaps[l - 1]));
+    }
+    EXPECT_GE(raw_step, 1.5f);
+    EXPECT_LT(step, 0.2f);
+    b.frame.volume_from_probe.translation = {0, 0, -9};
+    const int touching = find();  // where the skin is within 10 mm
+    EXPECT_GT(touching, 0);
+    EXPECT_LT(touching, b.geometry.scanlines);
+}
+
 // Held still, nothing moves: the machine rejects its receiver's noise.
 TEST(Septa, AProbeHeldStillShowsTheSamePicture) {
     RenderOptions options;

@@ -50,10 +50,12 @@ HWY_NOINLINE void structure_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
             const auto voxel = pool_byte(di, b.echo, hn::Load(di, c.structure.row(row)));
             offset = hn::IfThenElse(hn::Lt(word, hn::Zero(di)), word, voxel);
         }
-        const auto tissue = hn::Lt(hn::Load(di, c.label.row(row)), hn::Set(di, b.label_count));
-        hn::Store(hn::IfThenElseZero(
-                      tissue, hn::ShiftLeft<2>(hn::ShiftRight<24>(hn::ShiftLeft<24>(offset)))),
-                  di, c.structure.row(row));
+        const auto label = hn::Load(di, c.label.row(row));
+        auto sixteenths = hn::ShiftLeft<2>(hn::ShiftRight<24>(hn::ShiftLeft<24>(offset)));
+        if (b.structure_most != nullptr)
+            sixteenths = hn::Min(sixteenths, hn::GatherIndex(di, b.structure_most, label));
+        const auto tissue = hn::Lt(label, hn::Set(di, b.label_count));
+        hn::Store(hn::IfThenElseZero(tissue, sixteenths), di, c.structure.row(row));
     }
 }
 

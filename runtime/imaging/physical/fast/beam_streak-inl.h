@@ -2,6 +2,8 @@
 
 // Effect streaks: the plates that meet a block of beams; model/streak_plates.h has the sum.
 #include "runtime/imaging/physical/fast/beam_surface-inl.h"
+//
+#include "runtime/imaging/physical/model/streak_plates.h"
 
 #if defined(SONOCASE_BEAM_STREAK_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SONOCASE_BEAM_STREAK_INL_H
@@ -12,6 +14,19 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
+
+// physical::streak_ripple().
+template <class D, class V>
+HWY_INLINE V streak_ripple(D d, const PhysicalStreak& s, V along) {
+    const auto wave = [&](auto turns) HWY_ATTR {
+        const auto large = hn::Set(d, 12582912.0f);  // 3 2^22: the sum has no fraction
+        return hn::Abs(hn::Sub(turns, hn::Sub(hn::Add(turns, large), large)));
+    };
+    const auto turns = hn::Add(hn::Mul(along, hn::Set(d, s.per_ripple)), hn::Set(d, s.phase));
+    const auto second = hn::Mul(turns, hn::Set(d, static_cast<float>(physical::kSecondRipple)));
+    return hn::Mul(hn::Set(d, 2 * s.ripple),
+                   hn::Sub(hn::Add(wave(turns), wave(second)), hn::Set(d, 0.5f)));
+}
 
 template <class D>
 HWY_INLINE void streak_row(
@@ -29,8 +44,9 @@ HWY_INLINE void streak_row(
     const auto off =
         hn::Sub(hn::Mul(hn::Add(hn::Mul(x, nx), hn::Mul(z, nz)), hn::Set(d, s.per_width)),
                 hn::Mul(square, hn::Set(d, s.bend)));
-    const auto exponent =
+    auto exponent =
         hn::Mul(hn::Add(hn::Mul(off, off), hn::Mul(square, square)), hn::Set(d, -0.72134752f));
+    if (s.ripple > 0) exponent = hn::Add(exponent, streak_ripple(d, s, along));
     const auto soft =
         hn::RebindMask(d, hn::Eq(hn::And(hn::Load(di, c.look.row(row)), hn::Set(di, 7 << 16)),
                                  hn::Set(di, static_cast<std::int32_t>(kPackedSoft) << 16)));

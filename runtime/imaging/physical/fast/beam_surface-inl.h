@@ -83,7 +83,7 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     const auto zero = hn::Zero(d);
     const auto labels = hn::Set(di, b.label_count), byte = hn::Set(di, 0xFF);
     const auto reach = hn::Set(di, static_cast<std::int32_t>(48 * physical::kSurfaceReachVx) + 1);
-    const auto rough_mm = hn::Set(d, static_cast<float>(physical::kRoughnessMm) / 32);
+    const auto rough_mm = hn::Set(d, b.roughness_mm / 32);
     const auto step_mm = hn::Set(d, b.voxel_mm / 48);
     for (int row = 0; row < c.rows; ++row) {
         const auto record = hn::Load(di, c.record.row(row));

@@ -70,8 +70,7 @@ HWY_INLINE void target_row(
     }
     const auto rough = rough_at(d, b, c, row);
     distance =
-        hn::Add(distance, hn::Mul(signed_byte<0>(d, rough),
-                                  hn::Set(d, static_cast<float>(physical::kRoughnessMm) / 32)));
+        hn::Add(distance, hn::Mul(signed_byte<0>(d, rough), hn::Set(d, b.roughness_mm / 32)));
     const auto at = [&](int axis)
                         HWY_ATTR { return hn::LoadU(d, b.beams + (kBeam + axis) * b.lines + v); };
     const auto cosine =

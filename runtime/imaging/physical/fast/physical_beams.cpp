@@ -21,7 +21,7 @@ void PhysicalFast::find_contact(const PhysicalFrame& f) {
         const int first = block * kBeamBlock;
         find_gaps(scene_, geometry_, f, first, std::min(first + kBeamBlock, lines), raw_gaps_);
     });
-    met_.beams_in_contact = smooth_gaps(lines, raw_gaps_, gaps_);
+    met_.beams_in_contact = smooth_gaps(geometry_, raw_gaps_, gaps_);
     if (f.press != nullptr) press_gaps(*f.press, geometry_, gaps_);
     if (!f.effects.contact) std::fill(gaps_.begin(), gaps_.end(), 0.0f);
     met_.gap =
@@ -131,6 +131,9 @@ int PhysicalFast::choose_streaks(int first, std::span<PhysicalStreak> out) const
                                                   static_cast<float>(2 / s.length_mm),
                                                   static_cast<float>(s.bend),
                                                   static_cast<float>(s.amplitude),
+                                                  static_cast<float>(s.ripple),
+                                                  static_cast<float>(s.per_ripple),
+                                                  static_cast<float>(s.phase),
                                                   s.sample_begin,
                                                   s.sample_end};
     }
@@ -195,6 +198,7 @@ void PhysicalFast::set_tables(const PhysicalFrame& f, PhysicalBlock& b) const {
     b.rough = reinterpret_cast<const std::int32_t*>(scene_.textures->rough.data());
     b.fine =
         f.effects.fine_structure || f.effects.parenchyma ? scene_.textures->fine.data() : nullptr;
+    b.structure_most = structure_most_.empty() ? nullptr : structure_most_.data();
     b.fine_frames = fine_frames_.data();
     b.targets = near_targets_.data();
     b.target_count = static_cast<int>(near_targets_.size());
@@ -205,6 +209,7 @@ void PhysicalFast::set_tables(const PhysicalFrame& f, PhysicalBlock& b) const {
     b.block_log2 = scene_.words.edge_log2();
     b.label_count = scene_.labels();
     b.voxel_mm = static_cast<float>(scene_.voxel_mm);
+    b.roughness_mm = static_cast<float>(scene_.roughness_mm);
     b.rough_per_voxel = static_cast<float>(scene_.voxel_mm / kRoughVoxelMm);
     b.dim = dim_.data();
     b.dim_off = dim_off_.data();

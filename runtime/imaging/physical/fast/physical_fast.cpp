@@ -119,6 +119,9 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
             static_cast<float>(frame.cube * kFineEdge * kFineEdge * kFineEdge);
         fine_frames_[kFineNumbers * l + 10] = static_cast<float>(kFineLayers[frame.cube] - 1);
     }
+    for (const double most : scene.structure_most_db)
+        structure_most_.push_back(static_cast<std::int32_t>(std::lround(16 * most)));
+    if (!structure_most_.empty()) structure_most_.resize(256, 0);
     for (const TargetBall& t : scene.targets) {
         const auto shape = [&](int row, int column) {
             return static_cast<float>(t.shape(row, column));
@@ -142,7 +145,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     for (const Row& row : tables.rows) {
         r_.push_back(static_cast<float>(row.r_mm));
         contact_.push_back(static_cast<float>(row.contact));
-        elevation_.push_back(static_cast<float>(row.elevation_mm / 32));
+        elevation_.push_back(static_cast<float>(row.label_mm / 32));
         interface_scale_.push_back(static_cast<float>(row.interface_scale));
         gain_.push_back(static_cast<float>(row.gain));
         per_spacing_.push_back(static_cast<float>(tables.cell_mm / row.spacing_mm));

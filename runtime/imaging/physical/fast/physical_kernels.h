@@ -66,6 +66,7 @@ struct PhysicalStreak {
     float per_width = 1, per_length = 1;             // 1 / deviation; 2 / length
     float bend = 0;                                  // deviations, at half its length
     float amplitude = 0;
+    float ripple = 0, per_ripple = 0, phase = 0;  // log2; cycles in half its length
     int sample_begin = 0, sample_end = 0;
 };
 inline constexpr int kBlockStreaks = 192;  // in a block of beams
@@ -124,7 +125,8 @@ struct PhysicalBlock {
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
     const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr;
-    const std::int8_t* fine = nullptr;       // null: off. Four cubes
+    const std::int8_t* fine = nullptr;             // null: off. Four cubes
+    const std::int32_t* structure_most = nullptr;  // per label, 1/16 dB; null: no limit
     const float* fine_frames = nullptr;      // per label: rows of the frame, offset and last layer
     const PhysicalRegion* region = nullptr;  // null: the case has none
     const PhysicalWall* wall = nullptr;      // null: off
@@ -153,7 +155,7 @@ struct PhysicalBlock {
         float bone = 0, bone_slow = 0, bone_floor = 0, gas = 0;
     } decay;                 // of the tails, per sample
     float reverb_mm = 0.5f;  // half the width of a line
-    float voxel_mm = 1, rough_per_voxel = 2, step_mm = 0.3f;
+    float voxel_mm = 1, rough_per_voxel = 2, roughness_mm = 0.28f, step_mm = 0.3f;
     bool structure = true, speckled = true, interfaces = true, edge_shadow = true,
          attenuation = true;
     bool bone_tail = true, gas_tail = true;

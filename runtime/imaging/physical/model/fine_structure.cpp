@@ -178,6 +178,14 @@ FineFrame frame_along(Vector3 along, int cube, double voxel_mm) {
 
 }  // namespace
 
+FineStructure ground_of(FineStructure structure) {
+    for (FineFrame& f : structure.frames) {
+        if (f.cube == kFibreCube) f.cube = kFineMuscleCube;
+        if (f.cube == kSeptaCube) f.cube = kFineFatCube;
+    }
+    return structure;
+}
+
 FineStructure make_fine_structure(const CaseBundle& bundle, JobRunner& jobs) {
     FineStructure f;
     f.frames.resize(bundle.labels.size());

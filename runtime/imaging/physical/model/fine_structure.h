@@ -13,11 +13,12 @@
 
 #include "formats/base/jobs.h"
 #include "formats/bundle/case_bundle.h"
+#include "runtime/imaging/physical/model/physical_model.h"
 
 namespace sonocase::runtime {
 
 struct FineFrame {
-    int cube = -1;  // 0 fibres, 1 septa, 2 parenchyma, 3 nerve; negative: none
+    int cube = -1;  // 0 fibres, 1 septa, 2 parenchyma, 3 nerve, 4 and 5 grounds; < 0: none
     // Rows of the matrix that takes voxel coordinates to the cube's, without an offset.
     std::array<float, 9> cube_from_voxel{};
 };
@@ -25,6 +26,15 @@ struct FineFrame {
 struct FineStructure {
     std::vector<FineFrame> frames;  // # labels
 };
+
+inline bool is_muscle_cube(int cube) {
+    return cube == physical::kFibreCube || cube == physical::kFineMuscleCube;
+}
+inline bool is_fat_cube(int cube) {
+    return cube == physical::kSeptaCube || cube == physical::kFineFatCube;
+}
+// Muscle and fat as the ground between plates (kFineMuscleCube, kFineFatCube).
+FineStructure ground_of(FineStructure structure);
 
 // Cost: one pass over the brick table, in two jobs.
 FineStructure make_fine_structure(const CaseBundle& bundle, JobRunner& jobs);

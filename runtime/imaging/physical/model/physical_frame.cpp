@@ -106,6 +106,7 @@ void find_gaps(const PhysicalScene& scene,
         constexpr int kShift = 1 << 18;
         return static_cast<int>(v + (kShift + 0.5)) - kShift;
     };
+    const double most_mm = g.fan ? physical::kMaxGapMm : physical::kMaxFlatGapMm;
     for (int l = first; l < last; ++l) {
         float& gap = raw[static_cast<std::size_t>(l)];
         gap = -1;
@@ -114,7 +115,7 @@ void find_gaps(const PhysicalScene& scene,
         const Vector3 v = (physical::kGapStepMm / scene.voxel_mm) *
                           (frame.volume_from_probe.rotation * Vector3{d.x, 0, d.z});
         if (!(std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5 && std::abs(p.z) < 1e5)) continue;
-        for (int step = 0; step * physical::kGapStepMm <= physical::kMaxGapMm; ++step) {
+        for (int step = 0; step * physical::kGapStepMm <= most_mm; ++step) {
             const Point3 q = p + static_cast<double>(step) * v;
             const int label = label_at(scene, nearest(q.x), nearest(q.y), nearest(q.z));
             if (label == 0) continue;
@@ -124,7 +125,9 @@ void find_gaps(const PhysicalScene& scene,
     }
 }
 
-int smooth_gaps(int scanlines, std::span<const float> raw, std::span<float> gaps) {
+int smooth_gaps(const ScanGeometry& g, std::span<const float> raw, std::span<float> gaps) {
+    const int scanlines = g.scanlines;
+    const int reach = std::max(g.fan ? 0 : static_cast<int>(physical::kGapMeanMm / g.line_step), 4);
     int touching = 0;
     for (int l = 0; l < scanlines; ++l) {
         gaps[static_cast<std::size_t>(l)] = -1;
@@ -132,7 +135,7 @@ int smooth_gaps(int scanlines, std::span<const float> raw, std::span<float> gaps
         ++touching;
         float sum = 0;
         int n = 0;
-        for (int j = std::max(l - 4, 0); j <= std::min(l + 4, scanlines - 1); ++j) {
+        for (int j = std::max(l - reach, 0); j <= std::min(l + reach, scanlines - 1); ++j) {
             const float gap = raw[static_cast<std::size_t>(j)];
             if (gap < 0) continue;
             sum += gap;

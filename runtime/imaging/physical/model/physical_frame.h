@@ -67,8 +67,10 @@ void find_gaps(const PhysicalScene& scene,
                int first,
                int last,
                std::span<float> raw);
-// The mean over neighbouring beams that have skin. Returns the number of beams in contact.
-int smooth_gaps(int scanlines, std::span<const float> raw, std::span<float> gaps);
+// The mean over neighbouring beams that have skin: four to each side; under a flat face those
+// within kGapMeanMm, whose beams are finer than the voxels of the skin. Returns the number of beams
+// in contact.
+int smooth_gaps(const ScanGeometry& geometry, std::span<const float> raw, std::span<float> gaps);
 
 // While something is pressed, a gap ends at the skin as it is now. Beams in air stay there.
 void press_gaps(const press::PressField& field,

@@ -13,8 +13,10 @@ inline constexpr double kDbPerLog2 = 6.020599913279624;  // amplitude: 20 log10(
 // Contact: a gap of at most kMaxGapMm between the probe's face and the skin closes under pressure,
 // and the shift of the tissue decays with depth.
 inline constexpr double kMaxGapMm = 25;
+inline constexpr double kMaxFlatGapMm = 10;  // a flat face bridges less
 inline constexpr double kGapReachMm = 45;
 inline constexpr double kGapStepMm = 0.5;
+inline constexpr double kGapMeanMm = 2.5;  // to each side, flat face
 
 // A beam as dark as this (log2 of its amplitude: -96 dB) counts as dead: it lights nothing below.
 inline constexpr double kDeadLog2 = -16;
@@ -24,6 +26,8 @@ inline constexpr double kSurfaceReachVx = 2.0;
 
 // Boundary roughness (mm) and the texture that carries it.
 inline constexpr double kRoughnessMm = 0.28;
+// Above kSeptaFrequencyMhz, where fasciae show as smooth lines.
+inline constexpr double kFineRoughnessMm = 0.1;
 inline constexpr int kRoughEdge = 32;  // 128 kB: stays in the second-level cache
 inline constexpr double kRoughVoxelMm = 1.4;
 
@@ -99,7 +103,13 @@ inline constexpr int kNerveCube = 3;
 inline constexpr int kNerveBundle = 8;
 // Layers of each cube that are looked up along its strands, which hardly change on the way: small
 // enough for a second-level cache, where most of the time of fine structure goes.
-inline constexpr int kFineLayers[] = {16, 32, 64, 4};
+inline constexpr int kFineLayers[] = {16, 32, 64, 4, 16, 32};
+// What a pulse above kSeptaFrequencyMhz shows of muscle and fat instead of the first two: their
+// strands and sheets are plates then (streak_plates.h), and the cubes the ground between them.
+inline constexpr int kFineMuscleCube = 4, kFineFatCube = 5;
+inline constexpr double kSeptaFrequencyMhz = 6;
+// Of the slab, where labels are looked up: a sample is too small to average many places.
+inline constexpr double kFineLabelShare = 0.35;
 // Plates in organs, and the diaphragm: deviation of their thickness (streak_plates.h, gas_faces.h).
 inline constexpr double kStreakMm = 0.25, kDomeMm = 1.5;
 

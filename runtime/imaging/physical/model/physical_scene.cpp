@@ -89,6 +89,13 @@ void add_lining(const Label& la, const Tissue& a, const Label& lb, const Tissue&
     if (is_parenchyma(a) != is_parenchyma(b) && !e.hard && !fluid) e.split_mm = kCapsuleMm;
 }
 
+// A fine pulse shows the dermis as sheets of its own (wall_sheets.h); the lower face of a label of
+// whole voxels is no mirror.
+void soften_skin(const Tissue& a, const Tissue& b, PairEcho& e) {
+    constexpr double kSkinFace = 0.25;
+    if (a.name == "skin" || b.name == "skin") e.amplitude *= kSkinFace;
+}
+
 // What a target that shows is made of.
 struct TargetTissue {
     AcousticProperties look{-8, 0.6, TissueKind::soft};
@@ -189,6 +196,7 @@ void add_tissues(const CaseBundle& bundle,
             if (a == b) continue;
             PairEcho& pair = s.pairs[a * count + b];
             pair = pair_echo(bundle.labels[a], tissue(a), bundle.labels[b], tissue(b));
+            if (options.fine && options.structures.wall) soften_skin(tissue(a), tissue(b), pair);
             if (options.structures.linings)
                 add_lining(bundle.labels[a], tissue(a), bundle.labels[b], tissue(b), pair);
         }
@@ -220,12 +228,20 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.region = std::move(*region);
     s.textures = options.textures ? options.textures
                                   : std::make_shared<const PhysicalTextures>(physical_textures());
+    if (options.fine) s.roughness_mm = kFineRoughnessMm;
     s.fine = make_fine_structure(bundle, jobs);
+    if (options.fine) {
+        s.fine = ground_of(std::move(s.fine));
+        constexpr double kNoLimit = 127;
+        for (const FineFrame& f : s.fine.frames)
+            s.structure_most_db.push_back(is_muscle_cube(f.cube) || is_fat_cube(f.cube) ? 0
+                                                                                        : kNoLimit);
+    }
     s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
                                    [](const FineFrame& f) { return f.cube == kParenchymaCube; });
     if (s.has_parenchyma && options.structures.streaks) s.plate_cells = find_plate_cells(s);
     s.has_septa = std::any_of(s.fine.frames.begin(), s.fine.frames.end(), [](const FineFrame& f) {
-        return f.cube == kFibreCube || f.cube == kSeptaCube;
+        return is_muscle_cube(f.cube) || is_fat_cube(f.cube);
     });
     if (options.structures.wall || options.structures.diaphragm ||
         (options.structures.streaks && s.has_septa))

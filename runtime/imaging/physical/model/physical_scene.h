@@ -17,6 +17,7 @@
 #include "formats/machine/machine.h"
 #include "runtime/imaging/physical/model/brick_table.h"
 #include "runtime/imaging/physical/model/fine_structure.h"
+#include "runtime/imaging/physical/model/physical_model.h"
 #include "runtime/imaging/physical/model/physical_textures.h"
 #include "runtime/imaging/physical/model/region_look_up.h"
 #include "runtime/imaging/physical/model/tissue_layers.h"
@@ -64,6 +65,7 @@ struct PhysicalScene {
     const CaseBundle* bundle = nullptr;
     Grid grid;
     double voxel_mm = 1;
+    double roughness_mm = physical::kRoughnessMm;  // of surfaces, deviation
 
     // Complete where the bundle is; otherwise a frame asks for what it reads.
     BrickTable words;
@@ -77,6 +79,9 @@ struct PhysicalScene {
 
     std::shared_ptr<const PhysicalTextures> textures;
     FineStructure fine;
+    // Most that a baked offset adds, dB, # labels: plates draw the septa of muscle and fat, which
+    // voxels show as grains. Empty: no limit.
+    std::vector<double> structure_most_db;
     bool has_parenchyma = false;  // some label has its cube
     PlateCells plate_cells;       // of effect streaks
     bool has_septa = false;       // some label is fat or muscle
@@ -92,6 +97,7 @@ struct PhysicalSceneOptions {
     std::shared_ptr<const PhysicalTextures> textures;  // null: made here
     std::map<std::string, double> tissue_db;           // of labels, instead of the bundle's own
     MachineStructures structures;                      // that the machine shows
+    bool fine = false;                                 // physical::shows_fine()
 };
 
 // targets: of the exercise, with its findings; those that only mark a place do not show in the

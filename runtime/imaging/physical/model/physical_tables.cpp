@@ -181,6 +181,10 @@ void set_frame_tables(const ScanGeometry& g, Tables& t) {
 
 }  // namespace
 
+bool shows_fine(const Machine& machine, const Probe& probe) {
+    return machine.structures.streaks && frequency_of(machine.beam, probe) > kSeptaFrequencyMhz;
+}
+
 Machine default_machine(const Probe& probe) {
     if (probe.shape != ProbeShape::linear) return {};
     return *built_in_machine("modern-linear");
@@ -248,6 +252,7 @@ Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometr
         const double spread = g.fan ? 60.0 : 25.0, off = r - probe.focus_mm;
         row.elevation_mm =
             elevation_mm * kSigmaPerFwhm * std::sqrt(1 + off * off / (spread * spread));
+        row.label_mm = row.elevation_mm * (shows_fine(machine, probe) ? kFineLabelShare : 1);
         row.spacing_mm = std::max(kSliceReach * row.elevation_mm, t.cell_mm);
         row.looks = looks_at(machine.looks, r);
         row.drawn = 1 / std::sqrt(static_cast<double>(row.looks));

@@ -27,6 +27,7 @@ struct Row {
     double drawn = 1;            // share of clutter that varies: the looks average the rest
     double noise = 0;            // amplitude of the electronic noise
     double elevation_mm = 0;     // standard deviation of the beam across the plane
+    double label_mm = 0;         // of the places where labels are looked up
     double spacing_mm = 1;       // of a column's scatterers, along the scan plane's normal
     double speckle = 1;          // makes the power of the filtered field 1
     int looks = 1;               // fields that are detected and averaged here
@@ -111,6 +112,10 @@ inline double face_clutter(const Row& row, const PhysicalEffects& on) {
 
 // The machine that an exercise's probe is drawn with where none is named.
 Machine default_machine(const Probe& probe);
+
+// Whether the machine shows septa and perimysium as plates, and with them all that is finer than
+// the pulse of a fan.
+bool shows_fine(const Machine& machine, const Probe& probe);
 
 // Samples along a beam that the machine's point spread needs: two to its width along the beam, in
 // steps of a stretch; at least three for four pixels of a picture 512 high, at most one each.

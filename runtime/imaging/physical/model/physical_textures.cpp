@@ -108,7 +108,7 @@ void make_nerve(std::int8_t* out) {
 
 std::vector<std::int8_t> make_cubes() {
     const std::size_t cube = static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge;
-    std::vector<std::int8_t> cubes(4 * cube + kGatherSlack);
+    std::vector<std::int8_t> cubes(6 * cube + kGatherSlack);
     const RawVector<float> a = smooth_periodic_noise(kFineEdge, 2, 21),
                            b = smooth_periodic_noise(kFineEdge, 5, 22),
                            c = smooth_periodic_noise(kFineEdge, 5, 23);
@@ -130,6 +130,12 @@ std::vector<std::int8_t> make_cubes() {
     store(db, cubes.data() + cube);
     make_parenchyma(cubes.data() + 2 * cube);
     make_nerve(cubes.data() + kNerveCube * cube);
+    // The ground between plates: uneven over some tenths of a millimetre and over some millimetres.
+    for (std::size_t i = 0; i < cube; ++i)
+        db[i] = 7 * std::clamp(a[i] + 0.3f * c[i] - 0.35f, 0.0f, 1.9f) + 1.5f * b[i];
+    store(db, cubes.data() + kFineMuscleCube * cube);
+    for (std::size_t i = 0; i < cube; ++i) db[i] = 1.5f * a[i] + 2 * b[i];
+    store(db, cubes.data() + kFineFatCube * cube);
     return cubes;
 }
 

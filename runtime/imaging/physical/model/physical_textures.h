@@ -26,8 +26,9 @@ struct PhysicalTextures {
     // Roughness and glint of surfaces, kRoughEdge^3, x fastest: byte 0 roughness (/ 32), byte 1
     // log2 of the glint (/ 32), bytes 2 and 3 cosine and sine of its phase (/ 127); all signed.
     std::vector<std::uint32_t> rough;
-    // Strands of muscle, septa of fat, the echo of parenchyma, nerves: four cubes of kFineEdge^3
-    // echo offsets, quarter dB, in the order of fine_index(), and slack for look-ups of four bytes.
+    // Strands of muscle, septa of fat, the echo of parenchyma, nerves, and the grounds of muscle
+    // and fat: six cubes of kFineEdge^3 echo offsets, quarter dB, in the order of fine_index(), and
+    // slack for look-ups of four bytes.
     std::vector<std::int8_t> fine;
     std::vector<double> normal_levels;  // for tiles of noise
 };

@@ -59,8 +59,9 @@ struct Search {
                                    static_cast<int>(std::floor(v.y + 0.5)),
                                    static_cast<int>(std::floor(v.z + 0.5)));
         const int cube = scene.fine.frames[static_cast<std::size_t>(label)].cube;
-        return (septa ? cube == kFibreCube || cube == kSeptaCube : cube == kParenchymaCube) ? label
-                                                                                            : -1;
+        const bool holds =
+            septa ? is_muscle_cube(cube) || is_fat_cube(cube) : cube == kParenchymaCube;
+        return holds ? label : -1;
     }
 
     // Where a point of the tissue shows, in the probe's frame, before anything is pressed.
@@ -118,7 +119,7 @@ void Search::add_cell(int i, int j, int k) {
     const auto least = static_cast<float>(1 - widest * widest);
     // What septa line up with: the normal of the skin, or the direction of the fibres.
     const FineFrame& fine = scene.fine.frames[static_cast<std::size_t>(label)];
-    const bool fibres = septa && fine.cube == kFibreCube;
+    const bool fibres = septa && is_muscle_cube(fine.cube);
     Vector3 guide;
     if (fibres) {
         guide = normalized(Vector3{static_cast<double>(fine.cube_from_voxel[0]),
@@ -210,6 +211,9 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     constexpr std::array<double, 4> kBends{-1, -0.4, 0.4, 1};
     const double sunk_mm = kind.most_bend * kBends[draw >> 8 & 3] * 0.125 * length * length;
     s.bend = sunk_mm / s.width_mm;
+    s.ripple = kind.ripple;
+    s.per_ripple = 0.5 * length / kind.ripple_mm;
+    s.phase = (draw & 15) / 16.0 + (draw >> 4 & 7) / 128.0;
     // Beyond 0.9 L from its middle a plate is 0.5 % of itself, beyond three widths 1 %.
     const double reach = 0.9 * length + 3 * s.width_mm;
     const double slope = std::sqrt(std::max(1 - cosine * cosine * in_plane * in_plane, 0.0));
@@ -228,8 +232,15 @@ const PlateKind& plate_kind(double frequency_mhz) {
     static constexpr PlateKind kOrgans{
         8, 44, 0.5, 12, 6, {0.41, 0.61, 0.75, 0.9, 1.1, 1.33, 1.64, 2.45}, 1, 0.01, 0};
     static constexpr PlateKind kSepta{
-        4, 9, 0.45, 1.5, 4, {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5}, 1.4, 0.04, 0.3};
+        4,   24,   0.45, 1.5, 3,  {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5},
+        1.3, 0.04, 0.3,  1.2, 1.4};
     return frequency_mhz > kSeptaFrequencyMhz ? kSepta : kOrgans;
+}
+
+double streak_ripple(const Streak& plate, double along) {
+    const auto wave = [](double turns) { return std::abs(turns - std::nearbyint(turns)); };
+    const double turns = along * plate.per_ripple + plate.phase;
+    return 2 * plate.ripple * (wave(turns) + wave(kSecondRipple * turns) - 0.5);
 }
 
 PlateCells find_plate_cells(const PhysicalScene& scene) {

@@ -31,8 +31,9 @@ struct PlateKind {
     double length_scale = 1;         // of a mean length of 4 mm
     double most_bend = 0;            // curvature in the picture, 1/mm
     double scatter = 0;              // of the normals of septa about the skin's
+    double ripple = 0;               // log2 by which the echo along a plate varies
+    double ripple_mm = 2;            // over such a length
 };
-inline constexpr double kSeptaFrequencyMhz = 6;
 const PlateKind& plate_kind(double frequency_mhz);
 inline constexpr int kMostStreaks = 512;  // in a frame
 
@@ -43,8 +44,14 @@ struct Streak {
     double width_mm = 0.25;  // deviation along the normal
     double bend = 0;         // deviations of the width that the plate has sunk at half its length
     double amplitude = 0;
+    double ripple = 0, per_ripple = 0, phase = 0;                        // streak_ripple()
     int line_begin = 0, line_end = 0, sample_begin = 0, sample_end = 0;  // that can show it
 };
+
+// log2 of a plate's echo at `along` half lengths from its middle, over its mean: two triangular
+// waves, per_ripple and kSecondRipple as many to half a length, each within `ripple`.
+inline constexpr double kSecondRipple = 1.7;
+double streak_ripple(const Streak& plate, double along);
 
 // Which cells hold plates, for PhysicalScene::plate_cells. Cost: 1 ms for a torso.
 PlateCells find_plate_cells(const PhysicalScene& scene);

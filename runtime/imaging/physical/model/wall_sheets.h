@@ -20,8 +20,8 @@ namespace sonocase::runtime::physical {
 
 inline constexpr double kWallWaveMm = 0.4;     // deviation of a sheet from its even course
 inline constexpr double kWallMostDb = 4;       // its echo along it varies up to so much more
-inline constexpr double kWallStructureDb = 4;  // coarse structure of the wall is no brighter
 inline constexpr double kWallBlendMm = 3;      // between sheets of the skin and of the organs
+inline constexpr double kWallStructureDb = 4;  // coarse structure of the wall is no brighter
 inline constexpr double kWallDepthMm = 60;     // nothing is drawn deeper along a beam
 inline constexpr double kWallFatDb = -3;       // fat between sheets is dark
 inline constexpr double kWallSkinDb = -8;      // the skin's own scatterers, where sheets draw it

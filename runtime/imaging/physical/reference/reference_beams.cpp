@@ -135,7 +135,7 @@ class Beams {
         if (f.effects.contact) {
             std::vector<float> raw(gaps_.size());
             find_gaps(in_.scene, in_.geometry, f, 0, in_.geometry.scanlines, raw);
-            smooth_gaps(in_.geometry.scanlines, raw, gaps_);
+            smooth_gaps(in_.geometry, raw, gaps_);
             if (f.press != nullptr) press_gaps(*f.press, in_.geometry, gaps_);
         }
         if (f.effects.breathing && f.motion.breathes())
@@ -249,7 +249,7 @@ class Beams {
             const double off =
                 (x * s.normal.x + z * s.normal.z) / s.width_mm - s.bend * along * along;
             p.re += s.amplitude * std::exp(-0.5 * (off * off + std::pow(along, 4))) *
-                    p.row.interface_scale;
+                    std::exp2(streak_ripple(s, along)) * p.row.interface_scale;
         }
     }
 
@@ -281,7 +281,7 @@ class Beams {
 
         const double jitter = in_.draw(in_.noise.white, NoiseUse::elevation, 0, k, l);
         const double jitter2 = in_.draw(in_.noise.white, NoiseUse::lookup, 0, k, l);
-        const Point3 slab = f.effects.elevation ? x + (p.row.elevation_mm * jitter) * across : x;
+        const Point3 slab = f.effects.elevation ? x + (p.row.label_mm * jitter) * across : x;
         p.v = s.grid.voxel_from_point(slab);
         p.looked_up = s.grid.voxel_from_point(slab + (kLookupJitter * s.voxel_mm) *
                                                          (jitter2 * sideways + jitter * beam));
@@ -301,7 +301,10 @@ class Beams {
         double echo_db = look.echo_db + (on.wall ? look.wall_db : 0);
         if (p.look_index == p.place.label) {
             if (on.structure) {
-                const double baked = echo_offset_db(in_.scene, p.looked_up);
+                double baked = echo_offset_db(in_.scene, p.looked_up);
+                const std::vector<double>& most = in_.scene.structure_most_db;
+                if (!most.empty())
+                    baked = std::min(baked, most[static_cast<std::size_t>(p.place.label)]);
                 echo_db += in_wall ? std::min(baked, kWallStructureDb) : baked;
             }
             echo_db += fine_offset_db(

@@ -109,7 +109,7 @@ Place place_at(const PhysicalScene& s, const PhysicalFrame& f, Point3 v, Point3 
     p.rough = roughness_at(s, v);
     const double plane_mm = (r.distance_vx + dot(r.normal, voxel.from_centre)) * voxel.mm;
     p.distance_mm =
-        std::max(plane_mm, least_mm) + kRoughnessMm * p.rough.shift * (p.own < p.second ? 1 : -1);
+        std::max(plane_mm, least_mm) + s.roughness_mm * p.rough.shift * (p.own < p.second ? 1 : -1);
     const PairEcho& pair = s.pairs[static_cast<std::size_t>(p.own * s.labels() + p.second)];
     p.distance_mm += pair.pulse * f.motion.pulse_mm;
     if (p.distance_mm < 0) p.label = p.second;

@@ -35,7 +35,7 @@ NearTarget near_target(const ReferenceInput& in, const TargetBall& t, Point3 v) 
     NearTarget near;
     near.reached = smooth <= kTargetReachMm;
     if (!near.reached) return near;
-    near.distance_mm = smooth + kRoughnessMm * roughness_at(in.scene, v).shift;
+    near.distance_mm = smooth + in.scene.roughness_mm * roughness_at(in.scene, v).shift;
     near.normal = slope / std::max(norm(slope), 1e-3);
     return near;
 }
