@@ -183,7 +183,7 @@ class Beams {
             const bool dome = past > -1;
             const double line = dome_echo(face, past);
             const WallEcho wall = meet_wall(k, l, look);
-            echo_of_tissue(look, wall.in_wall, line, p);
+            echo_of_tissue(look, wall, line, p);
             p.re += p.row.interface_scale * wall.amplitude;
             if (look.kind == TissueKind::soft) meet_streaks(o, d, p);
             meet_surface(in_, beam, p);
@@ -294,7 +294,7 @@ class Beams {
     // Echo and attenuation of the tissue itself.
     // dome: what the diaphragm adds to the scatterers, amplitude.
     void echo_of_tissue(const AcousticProperties& look,
-                        bool in_wall,
+                        const WallEcho& wall,
                         double dome,
                         Sample& p) const {
         const PhysicalEffects& on = in_.frame.effects;
@@ -302,8 +302,10 @@ class Beams {
         if (p.look_index == p.place.label) {
             if (on.structure) {
                 const double baked = echo_offset_db(in_.scene, p.looked_up);
-                echo_db += in_wall ? std::min(baked, kWallStructureDb) : baked;
+                const double most = in_.tables.wall.structure_db;
+                echo_db += wall.in_wall ? std::min(baked, most) : baked;
             }
+            echo_db += wall.ground_db;
             echo_db += fine_offset_db(
                 in_.scene, on, p.place.label,
                 in_.scene.grid.voxel_from_point(in_.scene.grid.origin_mm + p.from_origin));
