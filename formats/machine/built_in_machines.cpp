@@ -14,6 +14,7 @@ Machine classic() {
     m.beam.axial_mm = m.beam.lateral_mm = 0;
     m.beam.lateral_focus_mm = 0;
     m.beam.skirt = 0;
+    m.beam.aperture_mm = 0;
     m.looks = {1, 1, 0};
     m.grey = {GreyMap::log, 0, 131.5, 1, 255, 1, 60};
     m.noise = {-70, false};
@@ -39,6 +40,7 @@ Machine modern_linear() {
     m.beam.lateral_range_mm = 25;
     m.beam.skirt = 1;
     m.beam.skirt_width = 5.2;
+    m.beam.aperture_mm = 0;
     m.looks = {4, 5, 8};
     m.grey.floor = 3;
     m.grey.level = 76;

@@ -30,6 +30,9 @@ struct MachineBeam {
     double skirt = 0.5;       // 0: none; [0, 4]
     double skirt_width = 3;   // [1, 10]
     double elevation_mm = 0;  // slice thickness at the focus; 0: the exercise's; [0, 50]
+    // Width of the face that listens: what blocks a part of it casts a shadow whose edges soften on
+    // the way down. 0: they stay as they are; [0, 100].
+    double aperture_mm = 17;
     bool operator==(const MachineBeam&) const = default;
 };
 
@@ -63,9 +66,9 @@ struct MachineNoise {
 
 struct MachineGain {
     double tgc_db_per_cm_mhz = 0;  // one way; 0: by the probe's shape; [0, 3]
-    double far_from_mm = 95;       // beyond it the gain falls again, [0, 500]
-    double far_db_per_cm = 2;      // by so much, [0, 30]
-    double far_limit_db = 14;      // and no further, [0, 120]
+    double far_from_mm = 100;      // beyond it the gain falls again, [0, 500]
+    double far_db_per_cm = 1.6;    // by so much, [0, 30]
+    double far_limit_db = 11;      // and no further, [0, 120]
     bool operator==(const MachineGain&) const = default;
 };
 

@@ -29,6 +29,7 @@ void visit_machine(M& m, V& v) {
     v.number("skirt", m.beam.skirt, 0, 4);
     v.number("skirt_width", m.beam.skirt_width, 1, 10);
     v.number("elevation_mm", m.beam.elevation_mm, 0.01, 50, true);
+    v.number("aperture_mm", m.beam.aperture_mm, 0, 100);
     v.table("looks");
     v.whole("count", m.looks.count, 1, 16);
     v.whole("near_count", m.looks.near_count, 1, 16);

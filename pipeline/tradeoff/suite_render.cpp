@@ -88,6 +88,13 @@ Result<std::vector<ExampleImage>> play(const Player& player,
             if (s.value == "on") command += " --truth " + quoted(player.folder + "/truth");
             continue;
         }
+        if (name == "aperture_mm") {
+            const std::string machine = player.folder + "/machine.toml";
+            const std::string text = "[machine.beam]\naperture_mm = " + s.value + "\n";
+            if (const Status w = write_file(machine, text); !w) return w.error();
+            command += " --machine " + quoted(machine);
+            continue;
+        }
         command += " --" + name + "=" + quoted(s.value);
     }
     if (std::system((command + " >/dev/null 2>&1").c_str()) != 0) {
@@ -226,6 +233,13 @@ Suite render_suite() {
          "speckle fields that are averaged",
          "grain of the speckle",
          "a look costs as much as a sixth of a frame; fewer make the speckle more contrasty"},
+        {"render.aperture_mm",
+         {"0", "8", "17", "30"},
+         "17",
+         "",
+         "width of the face that listens",
+         "the penumbra of shadows",
+         "costs one pass over the light of all samples, as much at every width but 0"},
         {"render.effects",
          {"auto", "-deformation", "-wall", "-streaks", "-parenchyma,-fine_structure", "-clutter",
           "-boundaries"},

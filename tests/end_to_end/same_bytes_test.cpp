@@ -26,14 +26,14 @@ using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
 // Bundles: since the portal vein's flow is weighed against its velocity. Physical frames: since
-// tails and clutter pass through the point spread. Paper: commit aa0be5b.
+// light spreads on the way down and the wall has its ground. Paper: commit aa0be5b.
 constexpr const char* kDraft = "a1eb85faaffc7edfbd90f76d4bbfc9b2";
 constexpr const char* kBalanced = "9fd29c25ec54009bf120ae1a0b30a7e2";
 constexpr const char* kSlender = "8204b8b89df6614c73ec63d12e6efd92";
 constexpr const char* kReal = "9028ba28372bd45a21f6605310e88da0";
-constexpr const char* kDraftPhysical = "1d8f8ef229e07083c81b7db2a1dbb498";
+constexpr const char* kDraftPhysical = "8ad9e76072486df3e05447b388be9b0e";
 constexpr const char* kDraftPaper = "2f241268411ba418106fde0ced219bbb";
-constexpr const char* kRealPhysical = "754e0416116301b440c5c94510a00f5f";
+constexpr const char* kRealPhysical = "dec088ab0ddaa85f5f77e69e8d0b6902";
 constexpr const char* kRealPaper = "ab88db573d849d9ea988c882a10a9d13";
 
 class SameBytes : public ::testing::Test {

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <vector>
 
 #include "block_bench.h"
@@ -111,6 +112,79 @@ TEST(ShadowOfGas, IsTheSameWhateverWasDrawnBefore) {
     again.run();
     once.run();
     EXPECT_EQ(once.pixels, again.pixels);
+}
+
+// Variance, mm2, of the edge of a shadow at a depth, if it is a Gaussian's integral: half the way
+// from 16 to 84 percent of its step is a standard deviation.
+double edge_variance(const BlockBench& b, double depth_mm) {
+    std::vector<double> level(192, 0.0);
+    for (int row = b.row_of(depth_mm - 2); row < b.row_of(depth_mm + 2); ++row) {
+        for (int l = 0; l < 192; ++l) level[static_cast<std::size_t>(l)] += b.envelope(row, l);
+    }
+    const auto mean = [&](int first) {
+        return std::accumulate(level.begin() + first, level.begin() + first + 20, 0.0) / 20;
+    };
+    const double low = mean(8), high = mean(164);
+    const auto crossing = [&](double part) {
+        const double wanted = low + part * (high - low);
+        for (std::size_t l = 30; l < 164; ++l) {
+            if (level[l] >= wanted)
+                return static_cast<double>(l) - (level[l] - wanted) / (level[l] - level[l - 1]);
+        }
+        return 0.0;
+    };
+    const double sigma = 0.5 * (crossing(0.8413) - crossing(0.1587)) * b.geometry.line_step;
+    return sigma * sigma;
+}
+
+// Muscle over the left half takes 3.5 dB more than liver; liver below it.
+CaseBundle muscle_over_liver() {
+    return block_of(1, [](Point3 p) {
+        return p.z < 0                          ? Phantom::outside
+               : p.z > 5 && p.z < 15 && p.x < 0 ? Phantom::muscle
+                                                : Phantom::liver;
+    });
+}
+
+TEST(Shadow, ItsEdgeSoftensOnTheWayDownAsAnAperturesPenumbra) {
+    const CaseBundle bundle = muscle_over_liver();
+    Machine machine;
+    double of_point_spread = 0;  // what grows without an aperture
+    for (const double aperture : {0.0, 8.0, 17.0}) {
+        machine.beam.aperture_mm = aperture;
+        BlockBench b(bundle, block_exercise());
+        const physical::Tables t = physical::make_tables(b.exercise.probe, machine, b.geometry);
+        b.tables.spread_beams = t.spread_beams;
+        b.tables.spread_share = t.spread_share;
+        b.frame.effects.attenuation = true;
+        b.run();
+        const double below = edge_variance(b, 20), deep = edge_variance(b, 50);
+        const double expected = aperture * aperture / 12 * 30 / physical::kPenumbraMm;
+        std::printf("aperture %.0f mm: %.2f mm2 at 20 mm, %.2f at 50, expected %.2f more\n",
+                    aperture, below, deep, expected);
+        if (aperture == 0) of_point_spread = deep - below;
+        EXPECT_NEAR(deep - below - of_point_spread, expected, 0.1 * expected);
+        EXPECT_LT(of_point_spread, 1);
+    }
+}
+
+TEST(Shadow, LightSpreadsOverAFewBeamsAtEveryGeometry) {
+    Machine machine;
+    for (const double aperture : {0.0, 0.1, 17.0, 100.0}) {
+        machine.beam.aperture_mm = aperture;
+        for (const double depth : {30.0, 300.0}) {
+            for (const int lines : {2, 32, 192, 768}) {
+                Exercise e = block_exercise();
+                e.probe.depth_mm = depth;
+                const ScanGeometry g = make_scan_geometry(e.probe, lines, 512, 64, 64);
+                const physical::Tables t = physical::make_tables(e.probe, machine, g);
+                EXPECT_EQ(t.spread_beams > 0, aperture > 0);
+                EXPECT_LE(t.spread_beams, physical::kMaxSpread);
+                EXPECT_GE(t.spread_share, 0);
+                EXPECT_LE(t.spread_share, 0.2);
+            }
+        }
+    }
 }
 
 }  // namespace

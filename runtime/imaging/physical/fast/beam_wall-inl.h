@@ -46,6 +46,10 @@ HWY_NOINLINE void wall_chunk(D d, PhysicalBlock& b, BeamChunk& c) {
             c.surfaces = true;
             for (int r = 0; r < c.rows; ++r) clear_surface_row(d, c, r);
         }
+        if (!c.offsets && wall.ground != 0) {
+            c.offsets = true;
+            for (int r = 0; r < c.rows; ++r) hn::Store(hn::Zero(di), di, c.structure.row(r));
+        }
         b.wall_met = true;
         const auto part = hn::Set(d, static_cast<float>(k % wall.every) * wall.per_row);
         const auto between = [&](const float* plane, auto& slope) HWY_ATTR {
@@ -73,12 +77,21 @@ HWY_NOINLINE void wall_chunk(D d, PhysicalBlock& b, BeamChunk& c) {
                                      hn::Set(di, static_cast<std::int32_t>(kPackedSoft) << 16)));
         const auto echo = hn::IfThenElseZero(
             soft, hn::Mul(hn::Mul(sum, level), hn::Set(d, b.interface_scale[k])));
-        if (b.structure) {
-            const auto most = hn::Set(di, static_cast<std::int32_t>(16 * kWallStructureDb));
+        if (c.offsets) {
+            const auto most = hn::Set(di, wall.structure);
             const auto baked = hn::Load(di, c.structure.row(row));
             const auto in_wall = hn::RebindMask(di, hn::And(hn::Gt(above, zero), soft));
-            hn::Store(hn::IfThenElse(in_wall, hn::Min(baked, most), baked), di,
-                      c.structure.row(row));
+            auto offset = hn::Min(baked, most);
+            if (wall.ground != 0) {
+                const auto within = hn::Min(hn::Sub(depth, hn::Set(d, float(kWallSkinMm))), above);
+                const auto risen = hn::Min(
+                    hn::Max(hn::Mul(within, hn::Set(d, float(1 / kWallGroundMm))), zero), one);
+                const auto ground = hn::NearestInt(hn::Mul(risen, hn::Set(d, wall.ground)));
+                const auto tissue =
+                    hn::Lt(hn::Load(di, c.label.row(row)), hn::Set(di, b.label_count));
+                offset = hn::Add(offset, hn::IfThenElseZero(tissue, ground));
+            }
+            hn::Store(hn::IfThenElse(in_wall, offset, baked), di, c.structure.row(row));
         }
         float* re = c.echo_re.row(row);
         hn::Store(hn::Add(hn::Load(d, re), echo), d, re);

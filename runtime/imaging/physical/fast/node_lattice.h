@@ -53,7 +53,7 @@ struct LayerSearch {
     const NodeLattice* nodes = nullptr;
     int first = 0, rows = 0;
     const TissueLayers* layers = nullptr;
-    float wave_mm = 0, strength_db = 0;  // of WallTables
+    float wave_mm = 0, own_wave_mm = 0, strength_db = 0;  // of WallTables
     float *depth = nullptr, *above = nullptr, *strength = nullptr;
 };
 void search_layers(SimdTarget simd, const LayerSearch& search);

@@ -355,7 +355,11 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         }
         tail_from_[static_cast<std::size_t>(block)] = b.tail_from;
     });
-    mirror_rows(light_, 6);  // for the boxes of the aperture
+    if (tables_.spread_beams > 0) {
+        spread_light();
+    } else {
+        mirror_rows(light_, 6);  // for the boxes of the aperture
+    }
     join_tails();
     if (clutter) mirror_rows(clutter_, kMaxHazeReach);
     met_.pressed = f.press != nullptr;

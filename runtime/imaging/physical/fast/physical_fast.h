@@ -70,7 +70,9 @@ class PhysicalFast {
     void place_wall(bool keep_all, int first, PhysicalWall& wall);
     // Returns the time of the needle, ms.
     double sample_beams(const PhysicalFrame& frame, const BreathingField& breathing, bool keep_all);
+    void mirror_row(float* row, int reach) const;
     void mirror_rows(float* plane, int reach) const;
+    void spread_light();
     void join_tails();
     void meet_machine(const PhysicalFrame& frame);
     void filter_rows(const PhysicalFrame& frame);

@@ -58,6 +58,8 @@ struct PhysicalWall {
     int outer_size = 0, inner_size = 0;
     int every = 1, rows = 0;        // samples between nodes; samples that can show a sheet
     float per_row = 1, per_mm = 1;  // one over samples, and over mm, between nodes
+    float ground = 0;               // of the ground between sheets, 1/16 dB
+    std::int32_t structure = 64;    // most of coarse structure, 1/16 dB
 };
 
 // Effect streaks: a plate, see model/streak_plates.h.
@@ -200,6 +202,16 @@ struct PhysicalRowTask {
     const std::int8_t* noise_re[physical::kMaxPersisted] = {};
     const std::int8_t* noise_im[physical::kMaxPersisted] = {};
     float noise_weight[physical::kMaxPersisted] = {};
+};
+
+// A row's light, and that of the row above it after it has spread (model/physical_tables.h).
+struct PhysicalSpreadTask {
+    int lines = 0;
+    const float* above = nullptr;  // with margins
+    float* light = nullptr;        // in: as the tissue leaves it; out: spread
+    float* was = nullptr;          // in: the row above as the tissue leaves it; out: this row
+    int beams = 1;
+    float share = 0;
 };
 
 // A row's filter along the beams; the envelope's power.

@@ -36,6 +36,8 @@ void PhysicalFast::prepare_nodes(const Tables& tables) {
                       static_cast<int>(kWallDepthMm / geometry_.step_mm) / w.every * w.every);
     w.per_row = 1 / static_cast<float>(w.every);
     w.per_mm = 1 / static_cast<float>(w.every * geometry_.step_mm);
+    w.ground = static_cast<float>(16 * tables_.wall.ground_db);
+    w.structure = 16 * tables_.wall.structure_db;
     w.outer = sheets.outer.data();
     w.inner = sheets.inner.data();
     w.outer_size = static_cast<int>(sheets.outer.size());
@@ -135,10 +137,11 @@ void PhysicalFast::search_nodes(const PhysicalFrame& f, const PhysicalBlock& bas
         if (!wall_shows_) return;
         float* out = layer_nodes_.data();
         const std::size_t plane = nodes_.at(nodes_.rows, 0);
-        search_layers(context_.simd, {&nodes_, first, wall_node_rows(), &scene_.layers,
-                                      static_cast<float>(tables_.wall.wave_mm),
-                                      static_cast<float>(tables_.wall.strength_db), out,
-                                      out + plane, out + 2 * plane});
+        search_layers(
+            context_.simd,
+            {&nodes_, first, wall_node_rows(), &scene_.layers,
+             static_cast<float>(tables_.wall.wave_mm), static_cast<float>(tables_.wall.own_wave_mm),
+             static_cast<float>(tables_.wall.strength_db), out, out + plane, out + 2 * plane});
     });
     if (faces_found_) join_faces(geometry_, nodes_.spacing, faces_of_nodes_, faces_);
 }

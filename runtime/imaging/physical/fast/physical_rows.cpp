@@ -20,15 +20,38 @@ constexpr int kCellsAtOnce = 2;
 constexpr int kGreyRows = 16;
 }  // namespace
 
-// Beyond the outermost beams a plane is mirrored, `reach` beams far.
-void PhysicalFast::mirror_rows(float* plane, int reach) const {
+// Beyond the outermost beams a row is mirrored, `reach` beams far.
+void PhysicalFast::mirror_row(float* row, int reach) const {
     const int lines = geometry_.scanlines;
+    for (int j = 0; j < reach; ++j) {
+        row[-1 - j] = row[std::min(j, lines - 1)];
+        row[lines + j] = row[std::max(lines - 1 - j, 0)];
+    }
+}
+
+void PhysicalFast::mirror_rows(float* plane, int reach) const {
+    for (int k = 0; k < geometry_.samples; ++k)
+        mirror_row(plane + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_, reach);
+}
+
+// Light spreads to neighbouring beams on its way down. Row by row, since each needs the one above:
+// a small part of a frame, which one thread does.
+void PhysicalFast::spread_light() {
+    constexpr int kReach = std::max(kMaxSpread, 6);  // 6: the boxes of the aperture
+    PhysicalSpreadTask t;
+    t.lines = lines_;
+    t.beams = tables_.spread_beams;
+    t.share = static_cast<float>(tables_.spread_share);
+    t.was = work_.data() + kRowMargin;
     for (int k = 0; k < geometry_.samples; ++k) {
-        float* row = plane + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_;
-        for (int j = 0; j < reach; ++j) {
-            row[-1 - j] = row[std::min(j, lines - 1)];
-            row[lines + j] = row[std::max(lines - 1 - j, 0)];
+        t.light = light_ + kRowMargin + static_cast<std::ptrdiff_t>(k) * stride_;
+        if (k == 0) {
+            std::copy_n(t.light, lines_, t.was);
+        } else {
+            spread_light_row(context_.simd, t);
         }
+        mirror_row(t.light, kReach);
+        t.above = t.light;
     }
 }
 

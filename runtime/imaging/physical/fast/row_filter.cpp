@@ -123,6 +123,23 @@ void filter_across(const PhysicalRowTask& t) {
     for (int look = 1; look < t.looks; ++look) filter_look<false>(t, look);
 }
 
+// Light that remains of the light above, after neighbouring beams have shared that.
+void spread_light(const PhysicalSpreadTask& t) {
+    const hn::CappedTag<float, kBeamBlock> d;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const auto own = hn::Set(d, 1 - 2 * t.share), share = hn::Set(d, t.share);
+    const auto least = hn::Set(d, static_cast<float>(kLeastLight));
+    for (int i = 0; i < t.lines; i += lanes) {
+        const auto light = hn::LoadU(d, t.light + i), was = hn::LoadU(d, t.was + i);
+        const auto beside =
+            hn::Add(hn::LoadU(d, t.above + i - t.beams), hn::LoadU(d, t.above + i + t.beams));
+        const auto above = hn::Add(hn::Mul(hn::LoadU(d, t.above + i), own), hn::Mul(beside, share));
+        const auto lit = hn::And(hn::Gt(was, hn::Zero(d)), hn::Gt(above, least));
+        hn::StoreU(light, d, t.was + i);
+        hn::StoreU(hn::IfThenElseZero(lit, hn::Mul(above, hn::Div(light, was))), d, t.light + i);
+    }
+}
+
 // Point spread along the beam and gain; the envelope's power, the mean of all looks.
 void make_power(const PhysicalPowerTask& t) {
     const hn::CappedTag<float, kBeamBlock> d;
@@ -174,12 +191,16 @@ namespace sonocase::runtime {
 
 HWY_EXPORT(filter_across);
 HWY_EXPORT(make_power);
+HWY_EXPORT(spread_light);
 
 void filter_row_across(SimdTarget simd, const PhysicalRowTask& task) {
     HWY_DISPATCH_TABLE(filter_across)[simd.index](task);
 }
 void make_power_row(SimdTarget simd, const PhysicalPowerTask& task) {
     HWY_DISPATCH_TABLE(make_power)[simd.index](task);
+}
+void spread_light_row(SimdTarget simd, const PhysicalSpreadTask& task) {
+    HWY_DISPATCH_TABLE(spread_light)[simd.index](task);
 }
 
 }  // namespace sonocase::runtime

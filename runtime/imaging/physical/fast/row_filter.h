@@ -8,6 +8,9 @@
 
 namespace sonocase::runtime {
 
+// Light of a row, which its neighbours above share.
+void spread_light_row(SimdTarget simd, const PhysicalSpreadTask& task);
+
 // Light of the aperture times echoes, point spread across the beams, clutter and noise.
 void filter_row_across(SimdTarget simd, const PhysicalRowTask& task);
 

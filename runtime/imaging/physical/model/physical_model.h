@@ -79,6 +79,11 @@ inline constexpr double kLookupJitter = 0.4;
 inline constexpr int kMaxPersisted = 8;  // frames
 inline constexpr int kMaxHazeReach = 8;  // beams to each side
 
+// The light of a beam spreads to its neighbours on the way down, as far at this depth below an
+// obstacle as the penumbra of the whole aperture; without one that is dimmer than kLeastLight.
+inline constexpr double kPenumbraMm = 90, kLeastLight = 1e-9;
+inline constexpr int kMaxSpread = 8;  // beams to each side, of a sample
+
 inline constexpr int kMaxLateral = 12;  // taps to each side
 inline constexpr int kMaxAxial = 10;
 

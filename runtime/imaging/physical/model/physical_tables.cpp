@@ -165,9 +165,25 @@ std::vector<double> edge_contact(const MachineContact& contact, int scanlines) {
     return edge;
 }
 
+// The deviation that light gains from a sample to the next, so that at kPenumbraMm it is that of an
+// aperture, evenly wide.
+void set_spread(const ScanGeometry& g, double aperture_mm, Tables& t) {
+    const double pitch = g.fan ? g.radius_mm * g.line_step : g.line_step;
+    const double beams = aperture_mm / pitch;
+    const double variance = beams * beams / 12 * g.step_mm / kPenumbraMm;
+    if (!(variance > 0)) return;
+    constexpr double kMostShare = 0.2;
+    const auto share = [&] { return 0.5 * variance / (t.spread_beams * t.spread_beams); };
+    do {
+        ++t.spread_beams;
+    } while (share() > kMostShare && t.spread_beams < kMaxSpread);
+    t.spread_share = std::min(share(), kMostShare);
+}
+
 void set_frame_tables(const ScanGeometry& g, Tables& t) {
     const Machine& m = t.machine;
     t.edge = edge_contact(m.contact, g.scanlines);
+    set_spread(g, m.beam.aperture_mm, t);
     t.haze_keep = std::exp(-g.step_mm / m.haze.decay_mm);
     t.haze_gain = m.haze.fraction * (1 - t.haze_keep);
     t.persisted = std::clamp(static_cast<int>(m.persistence.size()), 1, kMaxPersisted);

@@ -51,8 +51,11 @@ struct Tables {
     int looks = 1;                            // the most of any row
     Machine machine;
     std::vector<double> edge;  // # scanlines: amplitude that the contact of a beam leaves
-    double haze_keep = 0;      // of the clutter, from a sample to the next
-    double haze_gain = 0;      // of a sample's power
+    // Each sample's light is that above it, a share of which comes from so many beams to each side.
+    int spread_beams = 0;  // 0: light does not spread
+    double spread_share = 0;
+    double haze_keep = 0;  // of the clutter, from a sample to the next
+    double haze_gain = 0;  // of a sample's power
     // Weights of the frames whose electronic noise persistence blends, newest first.
     std::array<double, kMaxPersisted> persistence{};
     int persisted = 1;

@@ -3,7 +3,10 @@
 #include "runtime/imaging/physical/model/wall_sheets.h"
 
 #include <cmath>
+#include <cstdint>
 #include <span>
+
+#include "runtime/imaging/noise/noise.h"
 
 namespace sonocase::runtime::physical {
 namespace {
@@ -17,13 +20,18 @@ constexpr double kDoubleDb = -4;
 
 // Below the skin: its two faces, then sheets of the fat.
 constexpr Sheet kOuter[] = {
-    {0.8, 9, 1.1},        {2.8, 8, 1.0}, {7.0, 10, 1.2, 1.4}, {12.4, 9, 1.1},
-    {17.8, 10, 1.4, 1.7}, {25, 8, 1.3},  {33, 8, 1.4},
+    {0.8, 8, 1.1},        {2.8, 8, 1.0}, {7.4, 16, 1.2, 1.4}, {13.2, 10, 1.1},
+    {16.6, 15, 1.4, 1.7}, {25, 12, 1.3}, {33, 12, 1.4},
 };
 // Above the organs: the peritoneum, then the sheets of three muscles.
 constexpr Sheet kInner[] = {
-    {1.4, 18, 1.5}, {4.6, 12, 1.2, 1.3}, {8.6, 12, 1.3}, {12.6, 11, 1.3, 1.5}, {17, 8, 1.2},
+    {1.4, 21, 1.5}, {4.1, 12, 1.2}, {7.6, 18, 1.3, 1.3}, {13.4, 14, 1.3, 1.7}, {16.9, 11, 1.2},
 };
+// Lamellae of fat and muscle between them: faint, at random distances.
+constexpr double kLamellaDb = -1, kLamellaSpreadDb = 8;
+constexpr double kLamellaApartMm = 0.7, kLamellaApartSpreadMm = 1.2;
+constexpr double kLamellaMm = 0.9, kLamellaSpreadMm = 0.5;
+
 // What a pulse of a third of the length shows: septa of fat and fasciae, thin and many.
 constexpr Sheet kOuterFine[] = {
     {0.5, 12, 0.9},
@@ -38,11 +46,30 @@ constexpr Sheet kInnerFine[] = {
 };
 constexpr double kFineMhz = 6;
 
+// Faint sheets from the first to beyond the last of `sheets`.
+void add_lamellae(std::span<const Sheet> sheets, std::vector<Sheet>& out) {
+    std::uint32_t drawn = 71 * static_cast<std::uint32_t>(sheets.size());
+    const auto uniform = [&] { return (hash32(++drawn) >> 8) / 16777216.0; };
+    double at_mm = sheets.front().at_mm + 3;
+    while (at_mm < sheets.back().at_mm + 3) {
+        const double db = kLamellaDb + kLamellaSpreadDb * (uniform() - 0.5);
+        out.push_back({at_mm, db, kLamellaMm + kLamellaSpreadMm * uniform()});
+        at_mm += kLamellaApartMm + kLamellaApartSpreadMm * uniform();
+    }
+}
+
+std::vector<Sheet> with_lamellae(std::span<const Sheet> sheets) {
+    std::vector<Sheet> all(sheets.begin(), sheets.end());
+    add_lamellae(sheets, all);
+    return all;
+}
+
 std::vector<float> table_of(std::span<const Sheet> sheets,
                             double scale,
                             double axial_mm,
                             const std::function<double(double)>& layer_scale) {
-    const double last = sheets.back().at_mm + 5;
+    double last = 0;
+    for (const Sheet& s : sheets) last = std::max(last, s.at_mm + 5);
     std::vector<float> table(static_cast<std::size_t>((last + kWallBeforeMm) * kWallSteps), 0.0f);
     const auto add = [&](double at_mm, double db, double width_mm) {
         // The picture shows the sheet and the pulse together.
@@ -72,14 +99,21 @@ WallTables make_wall_tables(double frequency_mhz,
     const bool fine = frequency_mhz > kFineMhz;
     const double scale = std::pow(3.5 / frequency_mhz, 0.7);
     WallTables t;
-    t.outer =
-        table_of(fine ? std::span<const Sheet>(kOuterFine) : kOuter, scale, axial_mm, layer_scale);
-    t.inner =
-        table_of(fine ? std::span<const Sheet>(kInnerFine) : kInner, scale, axial_mm, layer_scale);
+    const auto table = [&](std::span<const Sheet> sheets) {
+        return table_of(sheets, scale, axial_mm, layer_scale);
+    };
     if (fine) {
+        t.outer = table(kOuterFine);
+        t.inner = table(kInnerFine);
         t.wave_mm = 0.15;
         t.strength_db = 12;
         t.node_mm = 1.25;
+    } else {
+        t.outer = table(with_lamellae(kOuter));
+        t.inner = table(with_lamellae(kInner));
+        t.own_wave_mm = 0.4;
+        t.ground_db = 10;
+        t.structure_db = 0;
     }
     return t;
 }

@@ -5,9 +5,12 @@
 //
 // Echo of a sample, amplitude, added to its surfaces':
 //     (outer(depth) w + inner(above) (1 - w)) 10^(strength / 20) interface_scale
+// Scatterers of the ground between sheets are ground(above) dB brighter than the tissue's.
 // outer, inner: tables of sheets by depth below the skin and by height above the organs, each times
 // |cosine|^8 of the beam to the sheet; w = 1/2 + (above - depth) / 3, within 0 to 1.
-// Depths include the wave. Source: recipe 5 of the living sweep; places (a).
+// Depths include the wave; sheets above the organs have one of their own besides, so that the two
+// kinds do not run side by side. Source: recipe 5 of the living sweep, and the level of its ground;
+// places (a).
 #pragma once
 
 #include <algorithm>
@@ -18,13 +21,14 @@
 
 namespace sonocase::runtime::physical {
 
-inline constexpr double kWallWaveMm = 0.4;     // deviation of a sheet from its even course
-inline constexpr double kWallMostDb = 4;       // its echo along it varies up to so much more
-inline constexpr double kWallBlendMm = 3;      // between sheets of the skin and of the organs
-inline constexpr double kWallStructureDb = 4;  // coarse structure of the wall is no brighter
-inline constexpr double kWallDepthMm = 60;     // nothing is drawn deeper along a beam
-inline constexpr double kWallFatDb = -3;       // fat between sheets is dark
-inline constexpr double kWallSkinDb = -8;      // the skin's own scatterers, where sheets draw it
+inline constexpr double kWallWaveMm = 0.4;  // deviation of a sheet from its even course
+inline constexpr double kWallMostDb = 4;    // its echo along it varies up to so much more
+inline constexpr double kWallBlendMm = 3;   // between sheets of the skin and of the organs
+inline constexpr double kWallDepthMm = 60;  // nothing is drawn deeper along a beam
+inline constexpr double kWallSkinMm = 2;    // below it begins the ground between sheets
+inline constexpr double kWallGroundMm = 2;  // and has its level so far below, and above the organs
+inline constexpr double kWallFatDb = -3;    // fat between sheets is dark
+inline constexpr double kWallSkinDb = -8;   // the skin's own scatterers, where sheets draw it
 
 // Amplitude by distance, in steps of 1/kWallSteps mm from -kWallBeforeMm on; 0 at both ends.
 inline constexpr int kWallSteps = 32;
@@ -33,6 +37,9 @@ inline constexpr double kWallBeforeMm = 4;
 struct WallTables {
     std::vector<float> outer, inner;
     double wave_mm = kWallWaveMm;
+    double own_wave_mm = 0;    // of the sheets above the organs
+    double ground_db = 0;      // of the ground over its tissue
+    int structure_db = 4;      // coarse structure of the wall is no brighter
     double strength_db = 3.5;  // deviation of a sheet's echo along it
     double node_mm = 2.5;      // between nodes along a beam, at most
 };
@@ -55,8 +62,14 @@ struct WallPlace {
 };
 inline WallPlace wall_place(const TissueLayers& layers, const WallTables& wall, Point3 voxel) {
     const LayerPoint p = layers.at(voxel);
-    return {p.depth + wall.wave_mm * p.wave, p.above_organs + wall.wave_mm * p.wave,
+    return {p.depth + wall.wave_mm * p.wave,
+            p.above_organs + wall.wave_mm * p.wave + wall.own_wave_mm * p.strength,
             std::min(wall.strength_db * p.strength, kWallMostDb)};
+}
+
+inline double wall_ground_db(const WallTables& wall, double depth_mm, double above_mm) {
+    return wall.ground_db *
+           std::clamp(std::min(depth_mm - kWallSkinMm, above_mm) / kWallGroundMm, 0.0, 1.0);
 }
 
 }  // namespace sonocase::runtime::physical

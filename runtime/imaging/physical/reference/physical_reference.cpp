@@ -41,6 +41,25 @@ double seen_by_aperture(const ReferenceInput& in, const Plane& plane, int k, int
     return smooth;
 }
 
+// Light that remains of the light above it, after neighbouring beams have shared that.
+Plane spread_light(const ReferenceInput& in, const Plane& light) {
+    const int beams = in.tables.spread_beams, lines = in.geometry.scanlines;
+    if (beams == 0) return light;
+    const double share = in.tables.spread_share;
+    Plane out = light;
+    for (int k = 1; k < in.geometry.samples; ++k) {
+        for (int l = 0; l < lines; ++l) {
+            const double was = light[in.at(k - 1, l)];
+            const double above = (1 - 2 * share) * out[in.at(k - 1, l)] +
+                                 share * (out[in.at(k - 1, reflect(l - beams, lines))] +
+                                          out[in.at(k - 1, reflect(l + beams, lines))]);
+            const bool lit = was > 0 && above > kLeastLight;
+            out[in.at(k, l)] = lit ? above * (light[in.at(k, l)] / was) : 0;
+        }
+    }
+    return out;
+}
+
 ComplexPlane light_echoes(const ReferenceInput& in,
                           const Plane& light,
                           const ComplexPlane& echoes) {
@@ -300,11 +319,10 @@ void render_physical_reference(const PhysicalScene& scene,
                                std::span<std::uint8_t> pixels) {
     const ReferenceInput in{scene, geometry, tables, noise, frame};
     const BeamSamples beams = reference_beams(in);
-    const Plane clutter = mean_clutter(in, beams.clutter);
+    const Plane clutter = mean_clutter(in, beams.clutter), light = spread_light(in, beams.light);
     Plane power(in.count(), 0.0);
     for (int look = 0; look < tables.looks; ++look) {
-        ComplexPlane echoes =
-            light_echoes(in, beams.light, beams.looks[static_cast<std::size_t>(look)]);
+        ComplexPlane echoes = light_echoes(in, light, beams.looks[static_cast<std::size_t>(look)]);
         if (look == 0) add_clutter_noise(in, beams.tail, clutter, echoes);
         if (frame.effects.point_spread) spread_across(in, echoes);
         if (look == 0) add_electronic_noise(in, echoes);

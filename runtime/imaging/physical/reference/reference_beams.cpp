@@ -183,7 +183,7 @@ class Beams {
             const bool dome = past > -1;
             const double line = dome_echo(face, past);
             const WallEcho wall = meet_wall(k, l, look);
-            echo_of_tissue(look, wall.in_wall, line, p);
+            echo_of_tissue(look, wall, line, p);
             p.re += p.row.interface_scale * wall.amplitude;
             if (look.kind == TissueKind::soft) meet_streaks(o, d, p);
             meet_surface(in_, beam, p);
@@ -294,7 +294,7 @@ class Beams {
     // Echo and attenuation of the tissue itself.
     // dome: what the diaphragm adds to the scatterers, amplitude.
     void echo_of_tissue(const AcousticProperties& look,
-                        bool in_wall,
+                        const WallEcho& wall,
                         double dome,
                         Sample& p) const {
         const PhysicalEffects& on = in_.frame.effects;
@@ -305,8 +305,9 @@ class Beams {
                 const std::vector<double>& most = in_.scene.structure_most_db;
                 if (!most.empty())
                     baked = std::min(baked, most[static_cast<std::size_t>(p.place.label)]);
-                echo_db += in_wall ? std::min(baked, kWallStructureDb) : baked;
+                echo_db += wall.in_wall ? std::min(baked, double{in_.tables.wall.structure_db}) : baked;
             }
+            echo_db += wall.ground_db;
             echo_db += fine_offset_db(
                 in_.scene, on, p.place.label,
                 in_.scene.grid.voxel_from_point(in_.scene.grid.origin_mm + p.from_origin));

@@ -23,7 +23,7 @@ WallEcho wall_echo(
                  inner = sheet(sheets.inner, here.above, before.above, after.above);
     const double share = std::clamp(0.5 + (here.above - here.depth) / kWallBlendMm, 0.0, 1.0);
     return {(outer * share + inner * (1 - share)) * std::exp2(here.strength_db / kDbPerLog2),
-            here.above > 0};
+            here.above > 0, wall_ground_db(sheets, here.depth, here.above)};
 }
 
 }  // namespace sonocase::runtime

@@ -10,6 +10,7 @@ namespace sonocase::runtime {
 struct WallEcho {
     double amplitude = 0;  // before Row::interface_scale
     bool in_wall = false;  // above the organs
+    double ground_db = 0;
 };
 
 // Echo of the wall's sheets at a sample. voxel: of the
