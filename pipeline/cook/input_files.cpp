@@ -14,7 +14,8 @@ Result<std::string> digest_of_input(
     const std::string& path,
     const std::function<Result<std::string>(const std::string&)>& of_file) {
     std::error_code code;
-    if (!fs::exists(path, code)) return Error{"no such file or folder", path,
+    if (!fs::exists(path, code))
+        return Error{"no such file or folder", path,
                      "check the path, or say with --data where the recipe's inputs are"};
     if (!fs::is_directory(path, code)) return of_file(path);
     std::vector<std::string> files;

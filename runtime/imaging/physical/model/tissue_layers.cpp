@@ -215,8 +215,8 @@ void march(const Cells& c, const std::vector<std::uint8_t>& open, Field& u) {
                 for (int n = 0; n < end - begin; ++n) {
                     const int i = order & 1 ? end - 1 - n : begin + n;
                     if (!open_row[i]) continue;
-                    const float x = std::min(i > 0 ? row[i - 1] : kFar,
-                                             i < c.size.x - 1 ? row[i + 1] : kFar);
+                    const float x =
+                        std::min(i > 0 ? row[i - 1] : kFar, i < c.size.x - 1 ? row[i + 1] : kFar);
                     const float y = std::min(before_y[i], after_y[i]);
                     const float z = std::min(before_z[i], after_z[i]);
                     // A front that comes from farther away does not bring the cell nearer.
@@ -395,9 +395,9 @@ TissueLayers make_tissue_layers(const CaseBundle& bundle, JobRunner& jobs) {
             for (int i = 0; i < c.size.x; ++i, ++at) {
                 const std::size_t n = static_cast<std::size_t>(
                     i % kNoiseEdge + kNoiseEdge * (j % kNoiseEdge + kNoiseEdge * (k % kNoiseEdge)));
-                layers.cells_[at] = {
-                    packed(depth[at], kDistanceUnit), packed(above[at], kDistanceUnit),
-                    packed(wave[n], kNoiseUnit), packed(strength[n], kNoiseUnit)};
+                layers.cells_[at] = {packed(depth[at], kDistanceUnit),
+                                     packed(above[at], kDistanceUnit), packed(wave[n], kNoiseUnit),
+                                     packed(strength[n], kNoiseUnit)};
             }
         }
     }

@@ -305,7 +305,9 @@ class Beams {
                 const std::vector<double>& most = in_.scene.structure_most_db;
                 if (!most.empty())
                     baked = std::min(baked, most[static_cast<std::size_t>(p.place.label)]);
-                echo_db += wall.in_wall ? std::min(baked, double{in_.tables.wall.structure_db}) : baked;
+                echo_db += wall.in_wall
+                               ? std::min(baked, static_cast<double>(in_.tables.wall.structure_db))
+                               : baked;
             }
             echo_db += wall.ground_db;
             echo_db += fine_offset_db(
