@@ -267,6 +267,10 @@ Result<StreamedBundle> stream_bundle(RawVector<std::uint8_t> bytes,
     return out;
 }
 
+void rehearse_opening(std::span<const std::uint8_t> bytes, const Arrivals& arrivals) {
+    (void)read_packed(bytes, &arrivals, "", serial_jobs());
+}
+
 Result<StreamedBundle> stream_bundle_in_parts(RawVector<std::uint8_t> bytes,
                                               Arrivals arrivals,
                                               const std::string& where,

@@ -105,6 +105,10 @@ Result<StreamedBundle> stream_bundle_in_parts(RawVector<std::uint8_t> bytes,
                                               const std::string& where,
                                               JobRunner& jobs = serial_jobs());
 
+// Opens as far as the segments reach, and drops it: for a player whose code is compiled while it
+// runs, as in a browser, so that opening is fast once they are there.
+void rehearse_opening(std::span<const std::uint8_t> bytes, const Arrivals& arrivals);
+
 // What of a file must be there before it can be opened in parts, rising and apart from each other.
 // bytes: a whole bundle's. Error: bytes that are not a bundle.
 Result<std::vector<ByteRange>> parts_to_open(std::span<const std::uint8_t> bytes,

@@ -61,7 +61,7 @@ export class ArrivingCase {
             };
         });
         await Promise.all(groups.map((group) => this.from_cache(group)));
-        if (lacking.size > 0) this.warm_up(() => lacking.size > 0);
+        if (lacking.size > 0) this.warm_up(() => lacking.size / wanted.length);
         try {
             await Promise.all(runs_of(wanted.filter((n) => !this.here[n])).map((run) => this.fetch_run(run)));
         } catch (error) {
@@ -73,12 +73,17 @@ export class ArrivingCase {
         this.on_segment = undefined;
     }
     // A browser compiles for speed what it has seen run: pictures of the program's own small case, while the real one
-    // is on its way.
-    async warm_up(waits) {
+    // is on its way; and that is opened as far as it goes, once half of it is here.
+    async warm_up(lacking) {
         const {calls} = this.core;
-        for (let n = 0; n < kWarmUp && waits() && !this.stopping.signal.aborted; ++n) {
-            calls.warm_up(n);
+        let rehearsed = false;
+        for (let n = 0; n < kWarmUp || !rehearsed; ++n) {
             await new Promise((done) => setTimeout(done, 10));
+            if (!lacking() || this.stopping.signal.aborted) break;
+            if (n < kWarmUp) calls.warm_up(n);
+            if (rehearsed || lacking() > 0.5) continue;
+            calls.rehearse();
+            rehearsed = true;
         }
         calls.warm_up(-1);
     }

@@ -132,6 +132,11 @@ export class Core {
         const side = this.values().side;
         return new Uint8Array(this.memory.buffer, this.calls.pixels(), side * side);
     }
+    // The same as words of a screen: red, green, blue, 255.
+    screen() {
+        const side = this.values().side;
+        return new Uint32Array(this.memory.buffer, this.calls.screen(), side * side);
+    }
     // probe, needle: 16 numbers, rows of mannequin_from_...; needle may be null.
     put_tools(now_s, probe, needle) {
         const at = this.calls.poses(), to = new Float64Array(this.memory.buffer, at, 32);

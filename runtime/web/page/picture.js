@@ -10,7 +10,6 @@ export class Picture {
         this.canvas = canvas;
         this.overlay = overlay;
         this.context = canvas.getContext('2d', {alpha: false});
-        this.grey = new Uint32Array(256).map((unused, grey) => 0xff000000 | grey << 16 | grey << 8 | grey);
     }
 
     // Side of the picture in pixels of the screen, for the room that the page has.
@@ -38,11 +37,11 @@ export class Picture {
         this.overlay.style.height = `${height}px`;
     }
 
-    // pixels: # side * side, grey; overlay: indices into colours, 0 for grey, or null
-    show(pixels, overlay, colours) {
-        const {words, grey} = this;
-        if (overlay) for (let n = 0; n < pixels.length; ++n) words[n] = overlay[n] ? colours[overlay[n]] : grey[pixels[n]];
-        else for (let n = 0; n < pixels.length; ++n) words[n] = grey[pixels[n]];
+    // screen: # side * side of red, green, blue, 255; overlay: indices into colours, 0 for grey, or null
+    show(screen, overlay, colours) {
+        const {words} = this;
+        words.set(screen);
+        if (overlay) for (let n = 0; n < words.length; ++n) if (overlay[n]) words[n] = colours[overlay[n]];
         this.context.putImageData(this.image, 0, 0);
     }
 

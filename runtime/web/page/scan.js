@@ -159,7 +159,7 @@ export class ScanPage {
         const before = performance.now();
         this.status = this.frozen ? this.core.calls.frame_again(this.back) : this.core.calls.frame(now_s);
         this.values = this.core.values();
-        this.picture.show(this.core.pixels(), this.core.overlay(), this.doppler.colours());
+        this.picture.show(this.core.screen(), this.core.overlay(), this.doppler.colours());
         this.doppler.picture_drawn();
         this.view3d.picture_drawn(now_s);
         this.frame_ms = performance.now() - before;

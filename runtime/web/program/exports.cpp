@@ -173,6 +173,11 @@ SONOCASE_EXPORT(ask_again) void ask_again(std::uint32_t first, std::uint32_t cou
 SONOCASE_EXPORT(prepare) void prepare() {
     PagePlayer::prepare();
 }
+// Opens the case as far as it is here, and drops it: the browser has compiled most of what opening
+// runs when the rest comes.
+SONOCASE_EXPORT(rehearse) void rehearse() {
+    if (page.arrivals) rehearse_opening(page.incoming, *page.arrivals);
+}
 // A picture of the program's own small case; frame 0 makes it, a negative one ends it.
 SONOCASE_EXPORT(warm_up) void warm_up(int frame) {
     if (frame < 0) page.warming.reset();
@@ -221,6 +226,15 @@ SONOCASE_EXPORT(kept_age_s) double kept_age_s(int back) {
 }
 SONOCASE_EXPORT(pixels) const std::uint8_t* pixels() {
     return page.player->pixels().data();
+}
+
+// The picture's pixels as words of a screen: red, green and blue from the lowest byte up, 255.
+SONOCASE_EXPORT(screen) const std::uint32_t* screen() {
+    const std::span<const std::uint8_t> pixels = page.player->pixels();
+    page.screen.resize(pixels.size());
+    for (std::size_t n = 0; n < pixels.size(); ++n)
+        page.screen[n] = 0xff000000u | pixels[n] * 0x10101u;
+    return page.screen.data();
 }
 
 SONOCASE_EXPORT(slide) void slide(double x_mm, double y_mm) {

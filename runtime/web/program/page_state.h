@@ -62,6 +62,7 @@ struct Page {
     ImageSettings settings;
     std::string text;
     std::vector<std::uint8_t> bytes;
+    std::vector<std::uint32_t> screen;
     std::array<double, kValueCount> values{};
     std::array<double, 32> poses{};
     std::vector<double> numbers;  // of what was asked for last: targets, marks

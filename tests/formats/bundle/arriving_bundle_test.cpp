@@ -83,6 +83,21 @@ TEST(ArrivingBundle, ArrangedHoldsTheSameInAnotherOrder) {
     EXPECT_FALSE(parts_to_open(Bytes(200, 7), "holiday"));
 }
 
+// Under the sanitizers: nothing is read that is not there.
+TEST(ArrivingBundle, IsRehearsedWithAnyPartOfIt) {
+    Link link(arranged(testing::curved_case()));
+    const auto parts = parts_to_open(link.file, "curved");
+    ASSERT_TRUE(parts);
+    rehearse_opening(link.here, link.arrivals);
+    for (const ByteRange& r : *parts) {
+        for (std::size_t n = r.at / kSegment; n * kSegment < r.end(); ++n) {
+            link.bring(n);
+            rehearse_opening(link.here, link.arrivals);
+        }
+    }
+    EXPECT_TRUE(stream_bundle_in_parts(link.here, link.arrivals, "curved"));
+}
+
 TEST(ArrivingBundle, OpensWithLittleAndIsWholeInTheEnd) {
     const CaseBundle bundle = testing::curved_case();
     Link link(arranged(bundle));
