@@ -85,14 +85,25 @@ TEST_F(WindowModes, ColourSpectrumAndMotionAreShownAndRecorded) {
 
 // A replay shows the modes that were in use, and gives back those before it.
 TEST_F(WindowModes, AReplayShowsTheModeOfTheAttempt) {
+    // It runs by the clock, of which a frame takes more on a busy machine: one of the pictures
+    // falls into the stretch with the gate.
+    constexpr int kPictures = 8;
+    const auto name = [](int n) { return "replay" + std::to_string(n); };
+    std::string replay = "key p\n";
+    for (int n = 0; n < kPictures; ++n) replay += "wait 6\n" + shot(name(n));
     const CommandResult result =
         run("--model paper",
             "wait 4\nhold e 118\nkey b\nwait 6\nkey 3 shift\nwait 60\nkey 1 shift\n"
-            "wait 20\nkey b\nwait 4\nkey p\nwait 50\n" +
-                shot("replay") + "key p\nwait 4\nkey escape\nwait 4\n" + shot("scan") + "quit\n");
+            "wait 20\nkey b\nwait 4\n" +
+                replay + "key p\nwait 4\nkey escape\nwait 4\n" + shot("scan") + "quit\n");
     ASSERT_EQ(result.status, 0) << result.error;
-    EXPECT_TRUE(says("replay", " gate\n"));
-    EXPECT_TRUE(says("replay", " time\n"));
+    int with_gate = 0;
+    for (int n = 0; n < kPictures; ++n) {
+        if (!says(name(n), " gate\n")) continue;
+        ++with_gate;
+        EXPECT_TRUE(says(name(n), " time\n"));
+    }
+    EXPECT_GT(with_gate, 0);
     EXPECT_FALSE(says("scan", " gate\n"));
 }
 
