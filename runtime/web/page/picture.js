@@ -10,6 +10,7 @@ export class Picture {
         this.canvas = canvas;
         this.overlay = overlay;
         this.context = canvas.getContext('2d', {alpha: false});
+        this.grey = new Uint32Array(256).map((unused, grey) => 0xff000000 | grey << 16 | grey << 8 | grey);  // of a strip
     }
 
     // Side of the picture in pixels of the screen, for the room that the page has.
