@@ -168,6 +168,27 @@ TEST(Shadow, ItsEdgeSoftensOnTheWayDownAsAnAperturesPenumbra) {
     }
 }
 
+// Beams that part on the way down are as far from each other as halfway to kPenumbraMm: there the
+// penumbra of a small face is the aperture's, and that of a wide one at most twice as wide.
+TEST(Shadow, PenumbraDoesNotDependOnHowSmallTheFaceIs) {
+    Machine machine;
+    for (const double radius_mm : {0.0, 1.0, 10.0, 50.0, 60.0}) {
+        Exercise e = block_exercise();
+        e.probe.shape = radius_mm > 0 ? ProbeShape::curvilinear : ProbeShape::phased;
+        e.probe.field_of_view_rad = 1;
+        e.probe.radius_mm = radius_mm;
+        const ScanGeometry g = make_scan_geometry(e.probe, 192, 512, 64, 64);
+        const physical::Tables t = physical::make_tables(e.probe, machine, g);
+        const double samples = physical::kPenumbraMm / g.step_mm,
+                     variance = 2 * t.spread_share * t.spread_beams * t.spread_beams * samples,
+                     halfway_mm = (g.radius_mm + 0.5 * physical::kPenumbraMm) * g.line_step *
+                                  std::sqrt(variance);
+        const double wanted_mm = machine.beam.aperture_mm / std::sqrt(12);
+        EXPECT_GT(halfway_mm, 0.95 * wanted_mm) << radius_mm;
+        EXPECT_LT(halfway_mm, 2.1 * wanted_mm) << radius_mm;
+    }
+}
+
 TEST(Shadow, LightSpreadsOverAFewBeamsAtEveryGeometry) {
     Machine machine;
     for (const double aperture : {0.0, 0.1, 17.0, 100.0}) {

@@ -166,9 +166,11 @@ std::vector<double> edge_contact(const MachineContact& contact, int scanlines) {
 }
 
 // The deviation that light gains from a sample to the next, so that at kPenumbraMm it is that of an
-// aperture, evenly wide.
+// aperture, evenly wide. Beams of a fan are as far apart as on the face, or, from a small face,
+// halfway down.
 void set_spread(const ScanGeometry& g, double aperture_mm, Tables& t) {
-    const double pitch = g.fan ? g.radius_mm * g.line_step : g.line_step;
+    const double pitch =
+        g.fan ? std::max(g.radius_mm, 0.5 * kPenumbraMm) * g.line_step : g.line_step;
     const double beams = aperture_mm / pitch;
     const double variance = beams * beams / 12 * g.step_mm / kPenumbraMm;
     if (!(variance > 0)) return;
