@@ -147,6 +147,25 @@ HWY_INLINE ShiftLanes<D> shift_lanes(D d, const PressView& v, const PlaceLanes<D
     if (!v.pressed) return {hn::Neg(by), hn::Neg(aside)};
     const ScanGeometry& g = *v.geometry;
     const auto number = [&](double x) HWY_ATTR { return hn::Set(d, static_cast<float>(x)); };
+    if (!v.columns_follow_beams) {
+        // Beams from one point: near it a small shift is a large turn. Sine and cosine of the turn
+        // to the beam of the place at rest; its arc sine is good to 0.01 within 45 degrees.
+        const auto on = hn::Sub(p.r, by);
+        const auto length =
+            hn::Max(hn::Sqrt(hn::Add(hn::Mul(on, on), hn::Mul(aside, aside))), number(1e-3));
+        const auto cosine = hn::Div(on, length), sine = hn::Neg(hn::Div(aside, length));
+        const auto square = hn::Mul(sine, sine);
+        const auto turn = hn::Mul(
+            sine, hn::Add(number(1), hn::Mul(square, hn::Add(number(1 / 6.0),
+                                                             hn::Mul(square, number(0.075))))));
+        const auto node =
+            hn::Mul(hn::Add(p.line, hn::Mul(turn, number(1 / g.line_step))), number(1.0 / v.every));
+        const auto sample = hn::Sub(hn::Mul(length, number(1 / g.step_mm)), number(0.5));
+        const auto along = at_place(d, v, v.along, node, sample),
+                   side = at_place(d, v, v.side, node, sample);
+        return {hn::Sub(hn::Sub(hn::Mul(along, cosine), hn::Mul(side, sine)), by),
+                hn::Sub(hn::Add(hn::Mul(along, sine), hn::Mul(side, cosine)), aside)};
+    }
     const auto pitch_mm = g.fan ? hn::Mul(hn::Max(hn::Add(p.r, number(g.radius_mm)), number(1e-3)),
                                           number(g.line_step))
                                 : number(g.line_step);
