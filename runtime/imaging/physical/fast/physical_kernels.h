@@ -127,7 +127,7 @@ struct PhysicalBlock {
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
     const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr;
-    const std::int8_t* fine = nullptr;             // null: off. Four cubes
+    const std::int8_t* fine = nullptr;             // null: off. Six cubes
     const std::int32_t* structure_most = nullptr;  // per label, 1/16 dB; null: no limit
     const float* fine_frames = nullptr;      // per label: rows of the frame, offset and last layer
     const PhysicalRegion* region = nullptr;  // null: the case has none
