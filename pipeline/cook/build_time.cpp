@@ -40,7 +40,8 @@ BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int t
     const double cooked = size.cooked_voxels;
     BuildTime time;
     time.processor_s = speed * (kFixed_s + kTexture_s * std::pow(texture_edge / 64.0, 3) +
-                                kVolume_s * cooked + kSurface_s * std::cbrt(cooked * cooked) +
+                                kVolume_s * (cooked + size.region_voxels) +
+                                kSurface_s * std::cbrt(cooked * cooked) +
                                 kLabels_s * std::max(0.0, size.label_voxels - kLabelsWithin));
     const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     const double serial =

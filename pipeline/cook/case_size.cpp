@@ -9,6 +9,7 @@
 #include "pipeline/import/volume/volume_file.h"
 #include "pipeline/segmentation/distance/label_distance.h"
 #include "pipeline/segmentation/resample_labels.h"
+#include "pipeline/stages/import_inputs.h"
 #include "pipeline/stages/mannequin_surface.h"
 
 namespace sonocase::pipeline {
@@ -22,6 +23,31 @@ double nodes_between_slices(Vector3 spacing_mm, double voxels) {
     const LabelDistanceOptions options;
     if (!(h[0] > 0) || h[2] < options.thick_ratio * h[1]) return 0;
     return voxels / 1e6 * std::max(2.0, std::round(h[2] / h[1]));
+}
+
+// The map as it will be imported; of the analytic torso a coarse one, whose boxes are as large.
+// Organ meshes are not turned into voxels twice.
+Result<LabelVolume> labels_of(const Recipe& recipe) {
+    if (recipe.inputs.analytic)
+        return sample_analytic_torso(analytic_torso_grid({4, 4, 4}), recipe.inputs.torso.body);
+    if (is_mesh_source(recipe.resolve(recipe.inputs.labels)))
+        return Error{"organ meshes have no voxels yet", recipe.inputs.labels, ""};
+    auto imported = import_inputs(recipe, {}, {});
+    if (!imported) return imported.error();
+    return std::move(imported->labels);
+}
+
+// Millions. Round a label: of its box in the map; how far the warp stretches it is not known.
+double region_voxels(const Recipe& recipe, const RegionRequest& region) {
+    Vector3 e = region.size_mm;
+    if (!region.label.empty()) {
+        const auto labels = labels_of(recipe);
+        if (!labels) return 0;
+        const Box3 box = box_of_label(*labels, region.label, region.margin_mm);
+        if (box.empty()) return 0;
+        e = box.extent();
+    }
+    return e.x * e.y * e.z / std::pow(region.voxel_mm, 3) / 1e6;
 }
 
 }  // namespace
@@ -44,10 +70,7 @@ CaseSize case_size(const Recipe& recipe) {
     const ResampleOptions& resample = recipe.settings.of<ResampleOptions>("resample");
     if (const auto volume = cooked_volume_mm3(recipe))
         size.cooked_voxels = *volume / std::pow(resample.voxel_mm, 3) / 1e6;
-    if (const auto& region = resample.region) {
-        const Vector3 e = region->size_mm;
-        size.cooked_voxels += e.x * e.y * e.z / std::pow(region->voxel_mm, 3) / 1e6;
-    }
+    if (resample.region) size.region_voxels = region_voxels(recipe, *resample.region);
     return size;
 }
 

@@ -9,7 +9,8 @@
 
 namespace sonocase::pipeline {
 
-// From headers and the mannequin's extent; what cannot be read counts as nothing.
+// From headers and the mannequin's extent; what cannot be read counts as nothing. A region round a
+// label needs the label map itself, which costs as much as its import.
 CaseSize case_size(const Recipe& recipe);
 
 // Volume of the grid that cooking would fill, from the mannequin's extent alone. Errors: those of

@@ -35,8 +35,9 @@ Status check_memory(const MemoryNeed& need, double limit_mb) {
     if (need.mb <= limit) return Done{};
     return Error{text("stage '%s' needs about %.0f MB for %.1f million voxels of the label map and "
                       "%.1f million cooked ones, and %.0f MB are %s",
-                      need.stage.c_str(), need.mb, need.size.label_voxels, need.size.cooked_voxels,
-                      limit, given ? "allowed" : "in this machine"),
+                      need.stage.c_str(), need.mb, need.size.label_voxels,
+                      need.size.cooked_voxels + need.size.region_voxels, limit,
+                      given ? "allowed" : "in this machine"),
                  "--memory-mb",
                  "a larger resample.voxel_mm, a coarser or cropped label map, or more memory"};
 }

@@ -8,8 +8,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-// Round the voxels of a label; empty where it has none.
-Box3 box_of_label(const LabelVolume& volume, std::uint8_t label, double margin_mm) {
+Box3 box_of_value(const LabelVolume& volume, std::uint8_t label, double margin_mm) {
     Box3 box;
     const Grid& g = volume.grid;
     for (int k = 0; k < g.size.z; ++k) {
@@ -35,6 +34,14 @@ Box3 box_of_label(const LabelVolume& volume, std::uint8_t label, double margin_m
 
 }  // namespace
 
+Box3 box_of_label(const LabelVolume& volume, const std::string& label, double margin_mm) {
+    const auto found = std::find_if(volume.labels.begin(), volume.labels.end(),
+                                    [&](const Label& l) { return l.name == label; });
+    if (found == volume.labels.end()) return {};
+    return box_of_value(volume, static_cast<std::uint8_t>(found - volume.labels.begin()),
+                        margin_mm);
+}
+
 Result<Box3> region_box(const RegionRequest& request,
                         const LabelVolume& cooked,
                         const Registration& registration) {
@@ -48,12 +55,7 @@ Result<Box3> region_box(const RegionRequest& request,
     }
     Box3 box;
     if (!request.label.empty()) {
-        const auto found =
-            std::find_if(cooked.labels.begin(), cooked.labels.end(),
-                         [&](const Label& label) { return label.name == request.label; });
-        if (found != cooked.labels.end())
-            box = box_of_label(cooked, static_cast<std::uint8_t>(found - cooked.labels.begin()),
-                               request.margin_mm);
+        box = box_of_label(cooked, request.label, request.margin_mm);
         if (box.empty())
             return Error{"the case has no label '" + request.label + "'", where,
                          "a label of the case, or centre and size_mm"};

@@ -20,7 +20,8 @@ int StageCost::memory_mb(const CaseSize& size) const {
     const double apart_mb = per_interpolated_node * std::min(10.0, size.interpolated_nodes);
     return static_cast<int>(
         std::ceil(base_mb + std::max(apart_mb, per_label_mb * size.label_mb + voxels_mb +
-                                                   per_cooked_voxel * size.cooked_voxels)));
+                                                   per_cooked_voxel * size.cooked_voxels +
+                                                   per_region_voxel * size.region_voxels)));
 }
 
 int StageCost::least_mb(const CaseSize& size) const {

@@ -62,21 +62,23 @@ std::vector<StageReport> without_seconds(std::vector<StageReport> reports);
 struct CaseSize {
     double label_mb = 0;       // voxels of the label map in the file's own type
     double label_voxels = 0;   // millions
-    double cooked_voxels = 0;  // millions
+    double cooked_voxels = 0;  // millions, without those of a region
     // Millions of nodes between thick slices that are interpolated; 0: none are.
     double interpolated_nodes = 0;
+    double region_voxels = 0;  // millions
 };
 
-// Cores that a stage's job asks a build farm for, and its peak memory in MB:
-// base + a * MB of the label file + b * million voxels of the label map + c * million cooked
-// voxels; for a stage that works through large maps piece by piece, the voxels count at most
-// large_mb + d * million voxels. docs/farm.md has the measurements.
+// Cores that a stage's job asks a build farm for, and its peak memory in MB: base + a * MB of the
+// label file + b * million voxels of the label map + c * million cooked voxels + d * million voxels
+// of the region; for a stage that works through large maps piece by piece, the voxels count at most
+// large_mb + e * million voxels. docs/farm.md has the measurements.
 struct StageCost {
     int threads = 1;
     double base_mb = 240, per_label_mb = 0, per_label_voxel = 0, per_cooked_voxel = 0;
     double large_mb = 0, per_large_voxel = 0;  // large_mb 0: no map is worked through in pieces
     double per_streamed_voxel = 0;  // in place of per_large_voxel where memory is short; 0: as that
     double per_interpolated_node = 0;  // beside base_mb and no other, up to ten million nodes
+    double per_region_voxel = 0;
 
     int memory_mb(const CaseSize& size) const;
     int least_mb(const CaseSize& size) const;  // where memory is short

@@ -104,6 +104,7 @@ StageDescriptor pack_stage() {
     };
     stage.share = 0.05;
     stage.cost = {1, 240, 0, 0, 4.5};
+    stage.cost.per_region_voxel = 1.5;
     return stage;
 }
 

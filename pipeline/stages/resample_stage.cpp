@@ -193,6 +193,7 @@ StageDescriptor resample_stage() {
     stage.reports = label_reports;
     stage.share = 0.4;
     stage.cost = {2, 250, 0, 85, 3, 155, 21.4, 17, 86};
+    stage.cost.per_region_voxel = 1.5;
     stage.verb = verb();
     return stage;
 }

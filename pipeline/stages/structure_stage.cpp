@@ -135,6 +135,7 @@ StageDescriptor structure_stage() {
     stage.reports = [](const StageValue& value) { return value.as<EchoOffsets>().reports; };
     stage.share = 0.2;
     stage.cost = {2, 240, 0, 0, 5};
+    stage.cost.per_region_voxel = 1.5;
     stage.verb = verb();
     return stage;
 }

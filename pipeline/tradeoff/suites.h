@@ -43,6 +43,8 @@ Suite pathology_suite();
 // doppler_trial beside this one.
 Suite colour_suite();
 Suite spectrum_suite();
+// What a build says of its cost before it begins against what it took, by commands of their own.
+Suite cost_suite();
 // The whole chain on the demo torso, or another body of the same family.
 Suite case_suite(const AnalyticBody& body, const std::string& body_name);
 // The whole chain on a user's case, against its own finest setting.

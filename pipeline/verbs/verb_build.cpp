@@ -216,8 +216,8 @@ int build_one(const BuildOptions& options) {
         std::printf(
             "to cook: %.1f million voxels, about %.0f MB (%s), %.2g s of processors, %.2g s on "
             "this machine with nothing else to do\n",
-            need.size.cooked_voxels, need.mb, need.stage.c_str(), expected.time.processor_s,
-            expected.time.alone_s);
+            need.size.cooked_voxels + need.size.region_voxels, need.mb, need.stage.c_str(),
+            expected.time.processor_s, expected.time.alone_s);
     const auto cooked = cook(options, *recipe);
     if (!cooked) return fail("build", cooked.error());
     if (!cooked->digest.empty()) {  // stopped before the bundle

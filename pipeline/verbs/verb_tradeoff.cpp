@@ -73,6 +73,7 @@ std::vector<NamedSuite> suites() {
         {"linear", linear_suite},
         {"region", region_suite},
         {"pathology", pathology_suite},
+        {"cost", cost_suite},
         {"case", [] { return case_suite({}, kTimedBody); }},
         {"case", [] { return case_suite(*analytic_body("slender"), "slender"); }},
     };

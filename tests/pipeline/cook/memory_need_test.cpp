@@ -10,6 +10,7 @@
 #include <limits>
 #include <vector>
 
+#include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/base/memory_limit.h"
 #include "pipeline/recipe/read_recipe.h"
 
@@ -75,6 +76,32 @@ TEST(MemoryNeed, GrowsWithTheCookedVoxels) {
 
 // Resampling of a large map measures distances again rather than hold them all; what it then needs
 // is what it is given, down to two layers of distances.
+// Round a label: the box that the analytic liver has in the map, and twice the margin. The cooked
+// region, turned and warped, is another tenth larger or smaller.
+TEST(MemoryNeed, CountsARegionRoundALabel) {
+    const std::string head = "name = \"a\"\n[analytic]\nvoxel_mm = 3\nslice_mm = 3\n",
+                      region = "[[region]]\nvoxel_mm = 0.4\nmargin_mm = 10\nlabel = ";
+    const MemoryNeed need = need_of(head + region + "\"liver\""),
+                     finer = need_of(head + region + "\"liver\"\n[resample]\nvoxel_mm = 0.8\n");
+    const double liver = need.size.region_voxels;
+    Box3 box;
+    const LabelVolume map = sample_analytic_torso(analytic_torso_grid({3, 3, 3}));
+    const auto index =
+        static_cast<std::uint8_t>(std::find_if(map.labels.begin(), map.labels.end(),
+                                               [](const Label& l) { return l.name == "liver"; }) -
+                                  map.labels.begin());
+    for (int k = 0; k < map.grid.size.z; ++k)
+        for (int j = 0; j < map.grid.size.y; ++j)
+            for (int i = 0; i < map.grid.size.x; ++i)
+                if (map.voxels[map.grid.index(i, j, k)] == index)
+                    box.include(map.grid.point_from_voxel({double(i), double(j), double(k)}));
+    const Vector3 e = box.extent() + Vector3{20, 20, 20};
+    EXPECT_NEAR(liver / (e.x * e.y * e.z / std::pow(0.4, 3) / 1e6), 1, 0.1);  // voxels of 4 mm
+    EXPECT_EQ(finer.size.region_voxels, liver);
+    EXPECT_GT(need.mb, need_of(head).mb);
+    EXPECT_EQ(need_of(head + region + "\"no such\"").size.region_voxels, 0);
+}
+
 TEST(MemoryNeed, OfALargeMapFollowsTheLimitDownToItsLeast) {
     const std::string map = "name = \"a\"\n[analytic]\nvoxel_mm = 0.7\nslice_mm = 0.7\n";
     const double all = need_of(map, 1e9).mb, least = need_of(map, 1).mb;
