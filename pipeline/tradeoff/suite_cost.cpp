@@ -1,37 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include <cmath>
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "formats/files/atomic_file.h"
 #include "pipeline/base/line_text.h"
 #include "pipeline/tradeoff/program_beside.h"
 #include "pipeline/tradeoff/suites.h"
+#include "pipeline/tradeoff/temporary_folder.h"
 
 namespace sonocase::pipeline {
 namespace {
-
-// A folder for the recipe and the bundle, gone with the suite.
-struct Workplace {
-    std::string folder;
-
-    Workplace() {
-        folder = (std::filesystem::temp_directory_path() /
-                  ("sonocase-cost-" + std::to_string(std::random_device{}())))
-                     .string();
-        std::error_code ignored;
-        std::filesystem::create_directories(folder, ignored);
-    }
-    Workplace(const Workplace&) = delete;
-    Workplace& operator=(const Workplace&) = delete;
-    ~Workplace() {
-        std::error_code ignored;
-        std::filesystem::remove_all(folder, ignored);
-    }
-};
 
 std::string recipe_text(const Settings& settings) {
     std::string map = "2", cooked = "1.5", region;
@@ -46,13 +26,16 @@ std::string recipe_text(const Settings& settings) {
 }
 
 // One command from its start to the bundle on the disk, with nothing in the cache.
-Result<Measured> build(const Workplace& place, const Settings& settings) {
-    const std::string recipe = place.folder + "/case.toml", report = place.folder + "/report.json";
+Result<Measured> build(TemporaryFolder& folder, const Settings& settings) {
+    if (folder.path().empty())
+        if (const Status s = folder.make("sonocase-cost"); !s) return s.error();
+    const std::string recipe = folder.path() + "/case.toml",
+                      report = folder.path() + "/report.json";
     if (const Status s = write_file(recipe, recipe_text(settings)); !s) return s.error();
     const auto done =
         output_of_program_beside("sonocase",
                                  text("build '%s' -o '%s/cost.sonocase' --report '%s' --quiet 2>&1",
-                                      recipe.c_str(), place.folder.c_str(), report.c_str()),
+                                      recipe.c_str(), folder.path().c_str(), report.c_str()),
                                  "cost");
     if (!done) return done.error();
     const auto written = read_text_file(report);
@@ -74,7 +57,7 @@ Result<Measured> build(const Workplace& place, const Settings& settings) {
 }  // namespace
 
 Suite cost_suite() {
-    auto place = std::make_shared<Workplace>();
+    auto folder = std::make_shared<TemporaryFolder>();
     Suite suite;
     suite.name = "cost";
     suite.title = "What a build is said to cost";
@@ -108,7 +91,7 @@ Suite cost_suite() {
          "surfaces in the region (suite region)",
          why},
     };
-    suite.measure = [place](const Settings& settings) { return build(*place, settings); };
+    suite.measure = [folder](const Settings& settings) { return build(*folder, settings); };
     return suite;
 }
 

@@ -6,7 +6,6 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "formats/files/atomic_file.h"
 #include "formats/files/bundle_file.h"
@@ -14,6 +13,7 @@
 #include "pipeline/recipe/read_recipe.h"
 #include "pipeline/texture/example/read_example.h"
 #include "pipeline/tradeoff/suites.h"
+#include "pipeline/tradeoff/temporary_folder.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -22,14 +22,10 @@ constexpr int kFrames = 12;
 
 // The player runs as a program of its own: pipeline and runtime do not link each other.
 struct Player {
-    std::string program, folder, bundle;
+    std::string program, bundle;
+    TemporaryFolder folder;
     std::vector<ExampleImage> finest;
     bool linear = false;  // a linear probe in place of each exercise's own
-
-    ~Player() {
-        std::error_code ignored;
-        if (!folder.empty()) std::filesystem::remove_all(folder, ignored);
-    }
 };
 
 std::string quoted(const std::string& text) {
@@ -56,11 +52,7 @@ Status start(Player& player) {
         return Error{"the player is not beside this program", player.program,
                      "build or install sonoplay, or leave --suite render out"};
     }
-    player.folder = std::filesystem::temp_directory_path() /
-                    ("sonocase-render-" + std::to_string(std::random_device{}()));
-    std::filesystem::create_directories(player.folder, failed);
-    if (failed)
-        return Error{failed.message(), player.folder, "check the folder for temporary files"};
+    if (const Status s = player.folder.make("sonocase-render"); !s) return s.error();
     auto recipe = embedded_recipe();
     if (!recipe) return recipe.error();
     auto cooked = cook_case(*recipe);
@@ -69,7 +61,7 @@ Status start(Player& player) {
         for (EmbeddedExercise& exercise : cooked->bundle.exercises)
             exercise.toml = with_linear_probe(exercise.toml);
     }
-    player.bundle = player.folder + "/demo.sonocase";
+    player.bundle = player.folder.path() + "/demo.sonocase";
     return save_bundle(cooked->bundle, player.bundle);
 }
 
@@ -78,18 +70,19 @@ Status start(Player& player) {
 Result<std::vector<ExampleImage>> play(const Player& player,
                                        const Settings& settings,
                                        double* seconds) {
-    const std::string out = player.folder + "/frames", stats = player.folder + "/stats.json";
+    const std::string out = player.folder.path() + "/frames",
+                      stats = player.folder.path() + "/stats.json";
     std::string command = quoted(player.program) + " " + quoted(player.bundle) +
                           " --headless --tracker sweep:tour --frames " + std::to_string(kFrames) +
                           " --out " + quoted(out) + " --stats " + quoted(stats);
     for (const Setting& s : settings) {
         const std::string name = s.key.substr(s.key.find('.') + 1);
         if (name == "labels") {
-            if (s.value == "on") command += " --truth " + quoted(player.folder + "/truth");
+            if (s.value == "on") command += " --truth " + quoted(player.folder.path() + "/truth");
             continue;
         }
         if (name == "aperture_mm") {
-            const std::string machine = player.folder + "/machine.toml";
+            const std::string machine = player.folder.path() + "/machine.toml";
             const std::string text = "[machine.beam]\naperture_mm = " + s.value + "\n";
             if (const Status w = write_file(machine, text); !w) return w.error();
             command += " --machine " + quoted(machine);
