@@ -45,6 +45,7 @@ Machine modern_linear() {
     m.grey.floor = 3;
     m.grey.level = 76;
     m.grey.exponent = 0.6;
+    m.noise.grain_db = 1.3;
     m.gain = {0, 11, 3.5, 12};
     m.near_field = {1, 0.9, 0, 9, 3, 0.3, 0.8, 4, 2.2, 0.35, 0.5, 1.5};
     m.haze = {0.2, 1.6, 0.8, -120};

@@ -61,6 +61,9 @@ struct MachineGrey {
 struct MachineNoise {
     double level_db = -70;  // of the receiver, amplitude relative to e = 1, [-200, 20]
     bool reject = true;     // nothing is drawn below the grey floor, noise neither
+    // Deviation of each sample's own gain, dB: a grain finer than the point spread that grows with
+    // the echo and stays in its place in the picture. 0: none; [0, 3].
+    double grain_db = 0;
     bool operator==(const MachineNoise&) const = default;
 };
 

@@ -45,6 +45,7 @@ void visit_machine(M& m, V& v) {
     v.table("noise");
     v.number("level_db", m.noise.level_db, -200, 20);
     v.flag("reject", m.noise.reject);
+    v.number("grain_db", m.noise.grain_db, 0, 3);
     v.table("gain");
     v.number("tgc_db_per_cm_mhz", m.gain.tgc_db_per_cm_mhz, 0, 3);
     v.number("far_from_mm", m.gain.far_from_mm, 0, 500);

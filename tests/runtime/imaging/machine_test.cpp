@@ -79,6 +79,12 @@ TEST(MachineInTheRenderer, BothRenderersAgreeAtTheLimits) {
              m.noise = {-40, false};
              m.persistence = {1, 1, 1, 1, 1, 1, 1, 1};
          }},
+        {"strong grain", [](Machine& m) { m.noise.grain_db = 3; }},
+        {"grain of a filtered logarithm",
+         [](Machine& m) {
+             m = *built_in_machine("classic");
+             m.noise.grain_db = 1.3;
+         }},
         {"strong reverberation",
          [](Machine& m) {
              m.haze = {10, 40, 30, -10};
@@ -157,6 +163,46 @@ TEST(MachineInTheRenderer, StructuresThatAMachineDoesNotShowAreLeftOut) {
     for (const EffectCost& cost : renderer->costs())
         none += !cost.ran && std::string(cost.skipped_because) == "the machine shows none";
     EXPECT_EQ(none, 4);
+}
+
+// It grows with the echo, leaves the level and black as they are, and stays where it is.
+TEST(MachineInTheRenderer, GrainGrowsWithTheEchoAndBelongsToThePicture) {
+    Machine machine = *built_in_machine("modern-linear");
+    const Exercise exercise = phantom_linear_exercise();
+    const auto drawn = [&](double grain_db, std::uint32_t frame) {
+        machine.noise.grain_db = grain_db;
+        FrameInput input;
+        input.frame = frame;
+        return draw(exercise, options_of(machine), input);
+    };
+    const auto none = drawn(0, 0), weak = drawn(1, 0), strong = drawn(2, 0);
+    EXPECT_NEAR(mean_of(strong), mean_of(none), 0.03 * mean_of(none));
+    double dark = 0, bright = 0, all_weak = 0, all_strong = 0;
+    int darks = 0, brights = 0;
+    for (std::size_t i = 0; i < none.size(); ++i) {
+        const double off = strong[i] - none[i], square = off * off;
+        all_strong += square;
+        all_weak += (weak[i] - none[i]) * (weak[i] - none[i]);
+        if (none[i] <= machine.grey.floor) {
+            EXPECT_LE(off, 1);
+        }
+        if (none[i] > 10 && none[i] < 20) {
+            dark += square;
+            ++darks;
+        }
+        if (none[i] > 60) {
+            bright += square;
+            ++brights;
+        }
+    }
+    ASSERT_GT(darks, 100);
+    ASSERT_GT(brights, 100);
+    EXPECT_GT(bright / brights, 6 * dark / darks);
+    EXPECT_NEAR(std::sqrt(all_strong / all_weak), 2, 0.2);
+    EXPECT_TRUE(drawn(2, 3) == strong);  // nothing moves while the probe is held
+    RenderOptions off = options_of(machine);
+    off.effects = {"-noise"};
+    EXPECT_TRUE(draw(exercise, off, {}) == none);
 }
 
 TEST(MachineInTheRenderer, TheConsoleActsOnEveryMap) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "block_bench.h"
+#include "runtime/imaging/physical/model/lobule_walls.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
 
 namespace sonocase::runtime {
@@ -123,6 +124,122 @@ TEST(Septa, BreatheWithTheTissue) {
         return {p.x + 1.5 * field.weight({p.x, 0, p.z}), p.z};
     };
     EXPECT_GT(share_found(rest, plates(b, &field), 0.3, moved), 0.8);
+}
+
+std::vector<LobuleWall> walls_of_block(Vector3 skin, Vector3 beam, double most_sin) {
+    std::vector<LobuleWall> all;
+    std::array<LobuleWall, kMostLobuleWalls> walls;
+    for (int k = -4; k < 4; ++k) {
+        for (int j = -4; j < 4; ++j) {
+            for (int i = -4; i < 4; ++i) {
+                const int n =
+                    find_lobule_walls({i, j, k}, 4, {}, {skin, beam, most_sin, {}}, walls);
+                all.insert(all.end(), walls.begin(), walls.begin() + n);
+            }
+        }
+    }
+    return all;
+}
+
+// Of rays from places near the block's middle, the share that a plate stops within reach_mm.
+double share_stopped(const std::vector<LobuleWall>& walls, double reach_mm) {
+    int rays = 0, stopped = 0;
+    for (int n = 0; n < 2000; ++n) {
+        const auto uniform = [&](std::uint32_t use) {
+            return hash32(7 * static_cast<std::uint32_t>(n) + use) / 4294967296.0 - 0.5;
+        };
+        const Point3 from = Point3{} + 8 * Vector3{uniform(1), uniform(2), uniform(3)};
+        const Vector3 to{uniform(4), uniform(5), uniform(6)};
+        const Vector3 ray = reach_mm * normalized(to);
+        ++rays;
+        stopped += std::any_of(walls.begin(), walls.end(), [&](const LobuleWall& w) {
+            const double along = dot(w.normal, w.middle - from) / dot(w.normal, ray);
+            return along > 0 && along < 1 &&
+                   norm(from + along * ray - w.middle) < 0.5 * w.length_mm;
+        });
+    }
+    return static_cast<double>(stopped) / rays;
+}
+
+TEST(Septa, WallsOfLobulesAreFlatAndEncloseMoreThanCrossingPlatesDo) {
+    const Vector3 skin = normalized(Vector3{0.2, -0.3, 1});
+    const std::vector<LobuleWall> walls = walls_of_block(skin, skin, 1);
+    const double per_cell = static_cast<double>(walls.size()) / 512;
+    double along = 0, length = 0;
+    for (const LobuleWall& w : walls) {
+        along += std::abs(dot(w.normal, skin)) / norm(w.normal) / static_cast<double>(walls.size());
+        length += w.length_mm / static_cast<double>(walls.size());
+    }
+    // As many plates of the same size and directions at random places.
+    std::vector<LobuleWall> random = walls;
+    for (std::size_t i = 0; i < random.size(); ++i) {
+        const auto uniform = [&](std::uint32_t use) {
+            return hash32(static_cast<std::uint32_t>(i) * 3 + use + 99) / 4294967296.0 - 0.5;
+        };
+        random[i].middle = Point3{} + 32 * Vector3{uniform(0), uniform(1), uniform(2)};
+    }
+    const double closed = share_stopped(walls, 5), open = share_stopped(random, 5);
+    std::printf("walls: %.1f a cell, %.2f along the skin, %.1f mm; stopped %.3f, random %.3f\n",
+                per_cell, along, length, closed, open);
+    EXPECT_GT(per_cell, 3);
+    EXPECT_LT(per_cell, 9);
+    EXPECT_GT(along, 0.7);
+    EXPECT_GT(closed, open + 0.05);
+}
+
+TEST(Septa, WallsOfLobulesAreThoseThatFaceTheBeamAndKnowNoSkinAtNeed) {
+    const Vector3 skin{0, 0, 1}, beam = normalized(Vector3{0.5, 0, 1});
+    const std::vector<LobuleWall> all = walls_of_block(skin, beam, 1),
+                                  some = walls_of_block(skin, beam, 0.3);
+    EXPECT_LT(some.size(), all.size());
+    for (const LobuleWall& w : some) {
+        EXPECT_GT(std::abs(dot(w.normal, beam)) / norm(w.normal), std::sqrt(1 - 0.3 * 0.3) - 1e-9);
+        EXPECT_TRUE(std::any_of(all.begin(), all.end(),
+                                [&](const LobuleWall& a) { return a.draw == w.draw; }));
+    }
+    for (const LobuleWall& w : walls_of_block({}, beam, 1)) {
+        EXPECT_TRUE(std::isfinite(w.length_mm) && w.length_mm > 0);
+        EXPECT_GT(norm(w.normal), 0);
+    }
+}
+
+// Perimysium: long along its fibres, dashes across them, and no bare ground at a slant.
+TEST(Septa, MuscleShowsLongLinesAlongItsFibresAndDashesAtASlant) {
+    const CaseBundle muscle =
+        block_of(2, [](Point3 p) { return p.z < 0 ? Phantom::outside : Phantom::muscle; });
+    BlockBench b(muscle, fine_exercise());
+    const auto& m = b.scene.fine.frames[Phantom::muscle].cube_from_voxel;
+    const Vector3 fibres = normalized(
+        Vector3{static_cast<double>(m[0]), static_cast<double>(m[1]), static_cast<double>(m[2])});
+    const auto seen = [&](Vector3 lateral, Vector3 beam, double& length_mm) {
+        Matrix3 rotation;
+        const Vector3 across = cross(beam, lateral);
+        for (int r = 0; r < 3; ++r) {
+            rotation(r, 0) = lateral[r];
+            rotation(r, 1) = across[r];
+            rotation(r, 2) = beam[r];
+        }
+        b.frame.volume_from_probe.rotation = rotation;
+        b.frame.volume_from_probe.translation = {0, 0, 30};
+        const std::vector<Streak> found = plates(b);
+        length_mm = 0;
+        for (const Streak& s : found) length_mm += s.length_mm / static_cast<double>(found.size());
+        return static_cast<int>(found.size());
+    };
+    const Vector3 side =
+        normalized(cross(fibres, std::abs(fibres.z) < 0.7 ? Vector3{0, 0, 1} : Vector3{1, 0, 0}));
+    const Vector3 other = cross(fibres, side);
+    double along_mm = 0, across_mm = 0, slant_mm = 0;
+    const int along = seen(fibres, side, along_mm), across = seen(other, side, across_mm);
+    const double angle = 35 * 3.14159265358979 / 180;
+    const Vector3 beam = std::cos(angle) * side + std::sin(angle) * fibres;
+    const int slant = seen(std::cos(angle) * fibres - std::sin(angle) * side, beam, slant_mm);
+    std::printf("perimysium: along %d of %.1f mm, across %d of %.1f mm, slanted %d of %.1f mm\n",
+                along, along_mm, across, across_mm, slant, slant_mm);
+    EXPECT_GT(along_mm, 1.8 * across_mm);
+    EXPECT_GT(across, 20);
+    EXPECT_GT(slant, 20);
+    EXPECT_LT(slant, along);
 }
 
 TEST(Septa, AMachineThatShowsNoStreaksAndAFanShowNone) {

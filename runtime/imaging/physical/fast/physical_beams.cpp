@@ -280,7 +280,7 @@ void PhysicalFast::meet_machine(const PhysicalFrame& f) {
     const Machine& m = tables_.machine;
     met_.edge_contact = m.contact.edge_db > 0 && m.contact.edge_fraction > 0;
     met_.compounding = tables_.looks > 1;
-    met_.receiver_noise = has_noise(tables_);
+    met_.receiver_noise = has_noise(tables_) || m.noise.grain_db > 0;
     met_.blending = has_noise(tables_) && f.effects.noise && tables_.persisted > 1;
     met_.reverberation = has_clutter(tables_);
     met_.side_lobes = has_side_lobes(tables_);

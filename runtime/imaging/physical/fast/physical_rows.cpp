@@ -234,6 +234,10 @@ void PhysicalFast::fill_grey_task(const PhysicalFrame& f, int k, PhysicalGreyTas
     t.per_log2 = static_cast<float>(grey.per_db * 0.5 * kDbPerLog2);
     t.offset = static_cast<float>(grey.of_unit + grey.per_db * gain_db);
     t.power = power_ + static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
+    const double grain = grain_of(tables_, f.effects);
+    t.grain =
+        grain > 0 ? noise_.white.data() + noise_start(f.seed, NoiseUse::grain, 0, k) : nullptr;
+    t.grain_log2 = static_cast<float>(grain / 32);
     t.haze_above = nullptr;
     if (f.effects.haze && has_side_lobes(tables_)) {
         const double at = std::clamp((k + 0.5) / kHazeCell - 0.5, 0.0, cells_k_ - 1.0);

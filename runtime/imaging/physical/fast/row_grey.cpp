@@ -38,9 +38,10 @@ void make_grey_row(const PhysicalGreyTask& t) {
                 hn::Mul(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), hn::Set(d, 0.5f / 1024));
             power = hn::Add(power, hn::Mul(hn::Mul(haze, haze), draw));
         }
-        auto g = hn::Add(
-            hn::Set(d, t.offset),
-            hn::Mul(log2_of(d, hn::Add(power, hn::Set(d, 1e-12f))), hn::Set(d, t.per_log2)));
+        auto level = log2_of(d, hn::Add(power, hn::Set(d, 1e-12f)));
+        if (t.grain != nullptr)
+            level = hn::Add(level, hn::Mul(noise_of(d, t.grain + i), hn::Set(d, t.grain_log2)));
+        auto g = hn::Add(hn::Set(d, t.offset), hn::Mul(level, hn::Set(d, t.per_log2)));
         if (!t.logarithm) {
             const auto most = hn::Set(d, 12.0f);  // 4096 grey
             const auto knee = hn::Set(d, t.knee);

@@ -52,7 +52,8 @@ enum class NoiseUse : std::uint32_t {
     clutter_re,
     clutter_im,
     haze_re,
-    haze_im
+    haze_im,
+    grain
 };
 inline std::uint32_t noise_start(std::uint32_t seed, NoiseUse use, std::uint32_t frame, int row) {
     return noise_row_start(seed + 0x51ED270Bu * static_cast<std::uint32_t>(use), frame,

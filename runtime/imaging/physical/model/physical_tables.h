@@ -65,6 +65,10 @@ struct Tables {
 inline bool has_noise(const Tables& t) {
     return !t.machine.noise.reject && t.machine.noise.level_db > -200;
 }
+// Log2 of power that each sample's own gain adds per unit of its draw.
+inline double grain_of(const Tables& t, const PhysicalEffects& on) {
+    return on.noise ? 2 * t.machine.noise.grain_db / kDbPerLog2 : 0;
+}
 inline bool has_side_lobes(const Tables& t) {
     return t.machine.haze.side_lobe_db > -120;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "runtime/imaging/noise/noise.h"
+#include "runtime/imaging/physical/model/lobule_walls.h"
 
 namespace sonocase::runtime::physical {
 namespace {
@@ -13,7 +14,10 @@ namespace {
 // Sixteen equally likely values of a gamma distribution of mean 4 and shape 2.5.
 constexpr std::array<double, 16> kLengthsMm{0.74, 1.25, 1.63, 1.97, 2.3,  2.63, 2.96, 3.3,
                                             3.67, 4.06, 4.51, 5.01, 5.62, 6.4,  7.53, 9.82};
-constexpr std::uint32_t kHashX = 0x9E3779B1u, kHashY = 0x85EBCA77u, kHashZ = 0xC2B2AE3Du;
+constexpr std::uint32_t kHashPlace = 0x85EBCA77u;
+
+// Of a plate of muscle: its length across the fibres over that along them (a).
+constexpr double kAcrossFibres = 0.35;
 
 // (1 - x)^4, close to a Gaussian, 0 from x = 1 on.
 double bump(double x) {
@@ -35,6 +39,15 @@ Vector3 layer_normal(const PhysicalScene& scene, Point3 x) {
     const double size = norm(n);  // 0: not known
     return size > 1e-6 ? n / size : Vector3{};
 }
+
+// A plate in the tissue, frame of the volume.
+struct Plate {
+    Point3 centre;
+    Vector3 normal;          // not unit
+    double length_mm = 4;    // along the fibres, if it has any
+    std::uint32_t draw = 0;  // random bits
+    Vector3 fibres;          // unit; zero: as long in every direction
+};
 
 struct Search {
     const PlateKind& kind;
@@ -92,8 +105,19 @@ struct Search {
         return guide + (kind.scatter / 64) * any;
     }
 
+    // Sine of the angle to the beam at which a plate shows nothing.
+    double widest_sin(bool fibrous) const { return fibrous ? kind.diffuse_sin : kind.face_sin; }
+    // Share of its echo that a plate sends back, by the square of that sine.
+    double facing(double sine2, bool fibrous) const {
+        const double mirror = bump(sine2 / (kind.face_sin * kind.face_sin));
+        if (!fibrous) return mirror;
+        const double all_ways = 1 - sine2 / (kind.diffuse_sin * kind.diffuse_sin);
+        return mirror + kind.diffuse * (1 - mirror) * std::max(all_ways, 0.0);
+    }
+
     void add_cell(int i, int j, int k);
-    void add_plate(Point3 centre, Vector3 normal, std::uint32_t draw);
+    void add_lobule(Int3 cell, const LobuleView& view);
+    void add_plate(const Plate& plate);
 };
 
 // normal: not unit, at most 127 long, in steps of 1, frame of the volume.
@@ -113,13 +137,13 @@ void Search::add_cell(int i, int j, int k) {
     const Vector3 along = frame.volume_from_probe.rotation * Vector3{beam.x, 0, beam.z};
     const auto bx = static_cast<float>(along.x), by = static_cast<float>(along.y),
                bz = static_cast<float>(along.z);
-    // Within a cell beams turn by as much as its size over their distance from the fan's centre.
-    const double turn = kind.cell_mm / (g.fan ? std::max(g.radius_mm + r, kind.cell_mm) : 1e9);
-    const double widest = std::min(kind.face_sin + turn, 1.0);
-    const auto least = static_cast<float>(1 - widest * widest);
     // What septa line up with: the normal of the skin, or the direction of the fibres.
     const FineFrame& fine = scene.fine.frames[static_cast<std::size_t>(label)];
     const bool fibres = septa && is_muscle_cube(fine.cube);
+    // Within a cell beams turn by as much as its size over their distance from the fan's centre.
+    const double turn = kind.cell_mm / (g.fan ? std::max(g.radius_mm + r, kind.cell_mm) : 1e9);
+    const double widest = std::min(widest_sin(fibres) + turn, 1.0);
+    const auto least = static_cast<float>(1 - widest * widest);
     Vector3 guide;
     if (fibres) {
         guide = normalized(Vector3{static_cast<double>(fine.cube_from_voxel[0]),
@@ -128,10 +152,15 @@ void Search::add_cell(int i, int j, int k) {
     } else if (septa) {
         guide = layer_normal(scene, middle);
     }
-    const std::uint32_t cell =
-        hash32(static_cast<std::uint32_t>(i) * kHashX ^ static_cast<std::uint32_t>(j) * kHashY ^
-               static_cast<std::uint32_t>(k) * kHashZ);
-    for (std::uint32_t t = 0; t < static_cast<std::uint32_t>(kind.tries); ++t) {
+    const bool lobules = septa && !fibres;
+    if (lobules) {
+        // Beyond two deviations of the slab a plate is too faint.
+        const Vector3 across = frame.volume_from_probe.rotation * Vector3{0, 1, 0};
+        add_lobule({i, j, k}, {guide, along, widest, across, p.y, 2.5 * thickest_mm + 0.5});
+    }
+    const std::uint32_t cell = hash_of_cell(i, j, k);
+    const int tries = lobules ? kind.tries_beside_lobules : kind.tries;
+    for (std::uint32_t t = 0; t < static_cast<std::uint32_t>(tries); ++t) {
         const std::uint32_t h = hash32(cell + t);
         const auto nx = static_cast<float>(static_cast<std::int8_t>(h)),
                    ny = static_cast<float>(static_cast<std::int8_t>(h >> 8)),
@@ -147,15 +176,36 @@ void Search::add_cell(int i, int j, int k) {
         } else if (!(cosine * cosine > least * square)) {
             continue;
         }
-        const std::uint32_t place = hash32(h ^ (cell + t) * kHashY);
+        const std::uint32_t place = hash32(h ^ (cell + t) * kHashPlace);
         const auto part = [&](int shift) { return (place >> shift & 0x3FF) / 1024.0; };
-        add_plate(corner + kind.cell_mm * Vector3{part(0), part(10), part(20)}, normal,
-                  h >> 24 | (place >> 30) << 8);
+        const std::uint32_t draw = h >> 24 | (place >> 30) << 8;
+        add_plate({corner + kind.cell_mm * Vector3{part(0), part(10), part(20)}, normal,
+                   kind.length_scale * kLengthsMm[draw & 15], draw, fibres ? guide : Vector3{}});
     }
 }
 
-void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
-    const double length = kind.length_scale * kLengthsMm[draw & 15], own = 0.25 * length;
+void Search::add_lobule(Int3 cell, const LobuleView& view) {
+    std::array<LobuleWall, kMostLobuleWalls> walls;
+    const int count = find_lobule_walls(cell, kind.cell_mm, scene.grid.origin_mm, view, walls);
+    for (int n = 0; n < count; ++n) {
+        const LobuleWall& w = walls[static_cast<std::size_t>(n)];
+        add_plate({w.middle, w.normal, w.length_mm, w.draw & 0x3FF, {}});
+    }
+}
+
+// The part of its length along the fibres that a plate has in the picture: normal in the probe's
+// frame, fibres as well, both unit.
+double length_in_plane(Vector3 normal, Vector3 fibres) {
+    const double square = normal.x * normal.x + normal.z * normal.z;
+    const double run = fibres.x * normal.z - fibres.z * normal.x;
+    const double along = std::min(run * run / std::max(square, 1e-9), 1.0);
+    return kAcrossFibres / std::sqrt(kAcrossFibres * kAcrossFibres * along + 1 - along);
+}
+
+void Search::add_plate(const Plate& plate) {
+    const auto [centre, normal, longest_mm, draw, fibres] = plate;
+    const bool fibrous = dot(fibres, fibres) > 0;
+    const double own = 0.25 * longest_mm;
     Point3 p = seen_at_rest(centre);
     if (frame.press != nullptr) {
         // Pressing moves nothing across the plane, and costs most for plates that are too far.
@@ -167,9 +217,8 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
         const Vector3 n = probe_from_volume.rotation * normal;
         const double along = n.x * at_rest.x + n.z * at_rest.z;
         const double away =
-            std::max(std::sqrt(std::max(1 - along * along / dot(n, n), 0.0)) - turned, 0.0) /
-            kind.face_sin;
-        if (in_slab * bump(away * away) < 0.1) return;
+            std::max(std::sqrt(std::max(1 - along * along / dot(n, n), 0.0)) - turned, 0.0);
+        if (in_slab * facing(away * away, fibrous) < 0.1) return;
         p = pressed(p);
     }
     double r = 0;
@@ -177,12 +226,11 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     const double inverse = 1 / norm(normal);
     const Vector3 n = probe_from_volume.rotation * (inverse * normal);
     const double cosine = n.x * beam.x + n.z * beam.z;
-    const double facing =
-        bump(std::max(1 - cosine * cosine, 0.0) / (kind.face_sin * kind.face_sin));
+    const double facing_beam = facing(std::max(1 - cosine * cosine, 0.0), fibrous);
     // Most plates are too far from the plane or turned away: their most comes before their place.
     const auto level_in = [&](double slab) {
         const double off = p.y / (2.9 * std::sqrt(slab * slab + own * own));
-        return bump(off * off) * facing;
+        return bump(off * off) * facing_beam;
     };
     if (level_in(thickest_mm) < 0.1) return;
     double line = 0, sample = 0;
@@ -201,6 +249,8 @@ void Search::add_plate(Point3 centre, Vector3 normal, std::uint32_t draw) {
     const Row& row = row_at(shown);
     const double level = level_in(row.elevation_mm);
     if (level < 0.1 || found >= static_cast<int>(out.size()) || plates_at(centre) < 0) return;
+    const double length =
+        longest_mm * (fibrous ? length_in_plane(n, probe_from_volume.rotation * fibres) : 1.0);
     Streak& s = out[static_cast<std::size_t>(found)];
     s.centre = {p.x + (shown - r) * beam.x, p.z + (shown - r) * beam.z};
     const double in_plane = 1 / std::sqrt(n.x * n.x + n.z * n.z);
@@ -232,8 +282,8 @@ const PlateKind& plate_kind(double frequency_mhz) {
     static constexpr PlateKind kOrgans{
         8, 44, 0.5, 12, 6, {0.41, 0.61, 0.75, 0.9, 1.1, 1.33, 1.64, 2.45}, 1, 0.01, 0};
     static constexpr PlateKind kSepta{
-        4,   24,   0.45, 1.5, 3,  {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5},
-        1.3, 0.04, 0.3,  1.2, 1.4};
+        4,   18,  0.45, 1.5,  3, {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5}, 1.3, 0.04, 0.3,
+        1.6, 2.0, 0.25, 0.85, 6};
     return frequency_mhz > kSeptaFrequencyMhz ? kSepta : kOrgans;
 }
 

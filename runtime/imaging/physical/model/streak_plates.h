@@ -19,8 +19,9 @@
 namespace sonocase::runtime::physical {
 
 // What plates a picture shows. At the frequencies of a fan: those of organs. Above
-// kSeptaFrequencyMhz, where the pulse is finer than they are: septa of fat, which follow the skin,
-// and the perimysium of muscle, which follows its fibres.
+// kSeptaFrequencyMhz, where the pulse is finer than they are: septa of fat, most of them walls
+// between lobules (lobule_walls.h), and the perimysium of muscle, which follows its fibres and is
+// longer along them than across.
 struct PlateKind {
     double cell_mm = 8;
     int tries = 44;                  // per cell; pi / 6 of them are plates
@@ -33,9 +34,12 @@ struct PlateKind {
     double scatter = 0;              // of the normals of septa about the skin's
     double ripple = 0;               // log2 by which the echo along a plate varies
     double ripple_mm = 2;            // over such a length
+    // What perimysium scatters in all directions shows up to diffuse_sin: so much of its echo.
+    double diffuse = 0, diffuse_sin = 0;
+    int tries_beside_lobules = 0;  // in fat, besides the walls of lobules
 };
 const PlateKind& plate_kind(double frequency_mhz);
-inline constexpr int kMostStreaks = 512;  // in a frame
+inline constexpr int kMostStreaks = 768;  // in a frame
 
 struct Streak {
     PlanePoint centre;  // of the plate, as seen: contact and breathing have moved it

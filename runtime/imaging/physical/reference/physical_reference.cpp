@@ -262,8 +262,11 @@ Plane grey_of(const ReferenceInput& in, const Plane& power) {
     const GreyLine line = grey_line(map, in.frame.dynamic_range_db);
     const bool logarithm = has_logarithm(in.tables);
     Plane grey(in.count());
+    const double grain_db = 0.5 * kDbPerLog2 * grain_of(in.tables, in.frame.effects);
     for_samples(in, [&](int k, int l) {
-        const double db = 10 * std::log10(power[in.at(k, l)] + 1e-12) + in.row(k).unit_db +
+        const double own_db =
+            grain_db > 0 ? grain_db * in.draw(in.noise.white, NoiseUse::grain, 0, k, l) : 0;
+        const double db = 10 * std::log10(power[in.at(k, l)] + 1e-12) + own_db + in.row(k).unit_db +
                           static_cast<double>(in.frame.row_gain_db[static_cast<std::size_t>(k)]);
         double g = line.of_unit + line.per_db * db;
         if (!logarithm) {
