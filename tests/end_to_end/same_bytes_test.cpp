@@ -31,9 +31,9 @@ constexpr const char* kDraft = "a1eb85faaffc7edfbd90f76d4bbfc9b2";
 constexpr const char* kBalanced = "9fd29c25ec54009bf120ae1a0b30a7e2";
 constexpr const char* kSlender = "8204b8b89df6614c73ec63d12e6efd92";
 constexpr const char* kReal = "9028ba28372bd45a21f6605310e88da0";
-constexpr const char* kDraftPhysical = "8ad9e76072486df3e05447b388be9b0e";
+constexpr const char* kDraftPhysical = "101dea1f9f593f9fe7308651f17a0505";
 constexpr const char* kDraftPaper = "2f241268411ba418106fde0ced219bbb";
-constexpr const char* kRealPhysical = "dec088ab0ddaa85f5f77e69e8d0b6902";
+constexpr const char* kRealPhysical = "4c135be2edcdc6678bda7e8dfafcf8fb";
 constexpr const char* kRealPaper = "ab88db573d849d9ea988c882a10a9d13";
 
 class SameBytes : public ::testing::Test {

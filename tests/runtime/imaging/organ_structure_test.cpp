@@ -79,10 +79,25 @@ TEST(Streaks, AreAsManyAsTheirDensitySays) {
     std::vector<Streak> out(kMostStreaks);
     double found = 0;
     int frames = 0;
-    for (double y = -18; y <= 18; y += 9) {
-        for (double x = -24; x <= 24; x += 12, ++frames) {
-            b.frame.volume_from_probe.translation = {x, y, 0};
-            found += find_streaks(b.scene, b.geometry, b.tables, b.frame, nullptr, gaps, out);
+    const auto count = [&](const Matrix3& rotation, Vector3 at) {
+        b.frame.volume_from_probe = {rotation, at};
+        const int all = find_streaks(b.scene, b.geometry, b.tables, b.frame, nullptr, gaps, out);
+        found += static_cast<double>(std::count_if(out.begin(), out.begin() + all,
+                                                   [](const Streak& s) { return !s.tract; }));
+        ++frames;
+    };
+    const Matrix3 straight = rotation_about({0, 0, 1}, 0);
+    // From three sides: other plates face the beams.
+    constexpr double kQuarter = 1.5707963267948966;
+    for (double across = -24; across <= 24; across += 12) {
+        for (double x = -39; x <= 39; x += 39) {
+            count(straight, {x, across, 0});
+            count(straight, {x, across, 59});
+            count(rotation_about({1, 0, 0}, -kQuarter), {x, -30, 60 + 2 * across});
+        }
+        for (double z = 22; z <= 106; z += 42) {
+            count(rotation_about({0, 1, 0}, kQuarter), {-60, across, z});
+            count(rotation_about({0, 1, 0}, kQuarter), {0, across, z});
         }
     }
     const PlateKind& kind = plate_kind(b.tables.frequency_mhz);
@@ -105,8 +120,122 @@ TEST(Streaks, AreAsManyAsTheirDensitySays) {
     }
     const double expected_per_cm2 = plates_per_mm3 * 20 * shown / kDraws * 100;
     std::printf("streaks: %.2f per cm2, expected %.2f\n", found / area_cm2, expected_per_cm2);
-    // The slab is up to a tenth thicker away from the focus; some 300 plates are counted.
+    // The slab is up to a tenth thicker away from the focus; some 100 plates are counted.
     EXPECT_NEAR(found / area_cm2, expected_per_cm2, 0.25 * expected_per_cm2);
+}
+
+// Walls of tracts: the two of a piece face the beam and each other, and pieces crowd.
+TEST(PortalTracts, StandInPairsAndCrowd) {
+    BlockBench b(liver_block(), block_exercise());
+    const std::vector<float> gaps(192, 0.0f);
+    std::vector<Streak> out(kMostStreaks);
+    const PlateKind& kind = plate_kind(b.tables.frequency_mhz);
+    int walls = 0, pairs = 0, close = 0, frames = 0;
+    double most_slope = 0;
+    for (double y = -18; y <= 18; y += 9) {
+        for (double x = -24; x <= 24; x += 12, ++frames) {
+            b.frame.volume_from_probe.translation = {x, y, 0};
+            const int n = find_streaks(b.scene, b.geometry, b.tables, b.frame, nullptr, gaps, out);
+            for (int i = 0; i < n; ++i) {
+                const Streak& s = out[static_cast<std::size_t>(i)];
+                if (!s.tract) continue;
+                ++walls;
+                most_slope = std::max(most_slope, std::abs(s.normal.x));
+                bool pair = false;
+                for (int j = 0; j < n; ++j) {
+                    const Streak& t = out[static_cast<std::size_t>(j)];
+                    const double away =
+                        std::hypot(t.centre.x - s.centre.x, t.centre.z - s.centre.z);
+                    if (i == j || !t.tract || away > 10) continue;
+                    const bool own = t.normal.x == s.normal.x && t.normal.z == s.normal.z;
+                    pair = pair || (own && away < 4.1);
+                    close += !own;
+                }
+                pairs += pair;
+            }
+        }
+    }
+    const double per_cm2 = walls / (frames * 4.0 * (6.0 - 0.1 * kind.first_mm));
+    const double by_chance = per_cm2 * 3.14159265;  // within 10 mm, were they anywhere
+    std::printf("walls of tracts: %.2f per cm2, %.1f others within 10 mm, by chance %.1f\n",
+                per_cm2, static_cast<double>(close) / walls, by_chance);
+    EXPECT_GT(per_cm2, 0.3);
+    EXPECT_LT(per_cm2, 2.5);
+    // A piece at the picture's edge can have lost one wall.
+    EXPECT_GT(pairs, 0.9 * walls);
+    EXPECT_LT(most_slope, kind.face_sin);
+    EXPECT_GT(static_cast<double>(close) / walls, 1.2 * by_chance);
+}
+
+// They come and go as slowly as the slab is thick.
+TEST(PortalTracts, FadeAsThePlaneMovesAcross) {
+    BlockBench b(liver_block(), block_exercise());
+    const std::vector<float> gaps(192, 0.0f);
+    std::vector<Streak> out(kMostStreaks);
+    const double full = plate_kind(b.tables.frequency_mhz).amplitude * b.tables.streak_scale;
+    std::vector<std::pair<double, double>> before;  // place along the face, level
+    double most = 0, steps = 0;
+    for (double y = -6; y < 6; y += 0.1) {
+        b.frame.volume_from_probe.translation = {0, y, 0};
+        const int n = find_streaks(b.scene, b.geometry, b.tables, b.frame, nullptr, gaps, out);
+        double sum = 0;
+        for (int i = 0; i < n; ++i) {
+            if (out[static_cast<std::size_t>(i)].tract)
+                sum += out[static_cast<std::size_t>(i)].amplitude / full;
+        }
+        before.emplace_back(y, sum);
+        if (before.size() > 1) {
+            const double step = std::abs(sum - before[before.size() - 2].second);
+            most = std::max(most, step);
+            steps += step;
+        }
+    }
+    double mean = 0;
+    for (const auto& [y, sum] : before) mean += sum / static_cast<double>(before.size());
+    std::printf("tracts: level %.1f, a step of 0.1 mm changes it by %.2f, at most %.2f\n", mean,
+                steps / static_cast<double>(before.size() - 1), most);
+    EXPECT_GT(mean, 1);
+    // What begins to show does so at a tenth of itself.
+    EXPECT_LT(most, 0.25 * mean);
+}
+
+// What the pipeline bakes into the liver as its noise is left to the cube; vessels stay.
+TEST(Parenchyma, DrawsTheNoiseOfAnOrganInPlaceOfTheBakedOne) {
+    const auto power_with = [](int offset_db, const char* label, bool parenchyma = true) {
+        CaseBundle bundle = liver_block();
+        const std::vector<std::int8_t> baked(bundle.grid.voxel_count(),
+                                             static_cast<std::int8_t>(4 * offset_db));
+        bundle.echo_offset = bricks_from_dense<std::int8_t>(baked, bundle.grid.size);
+        for (Tissue& t : bundle.tissues) {
+            if (t.name == "liver") t.name = label;
+        }
+        bundle.labels[Phantom::liver].tissue = label;
+        BlockBench b(bundle, block_exercise());
+        b.frame.effects.speckle = b.frame.effects.structure = true;
+        b.frame.effects.parenchyma = parenchyma;
+        b.run();
+        double power = 0;
+        for (int k = b.row_of(20); k < b.row_of(40); ++k) {
+            for (int l = 32; l < 160; ++l)
+                power += static_cast<double>(b.renderer->power_row(k)[l]);
+        }
+        return 10 * std::log10(power);
+    };
+    const double even = power_with(0, "liver");
+    EXPECT_NEAR(power_with(2, "liver"), even, 0.01);
+    EXPECT_NEAR(power_with(-3, "liver"), even, 0.01);
+    EXPECT_NEAR(power_with(-20, "liver"), even - 20 + 3.9, 0.1);
+    // What is no parenchyma keeps it, and so does an organ without that effect.
+    EXPECT_NEAR(power_with(2, "liver", false), power_with(0, "liver", false) + 2, 0.1);
+    EXPECT_NEAR(power_with(2, "tendon"), power_with(0, "tendon") + 2, 0.1);
+
+    PhysicalSceneOptions plain;
+    plain.structures.parenchyma = false;
+    EXPECT_TRUE(make_physical_scene(liver_block(), {}, plain)->structure_dead_db.empty());
+    const PhysicalScene scene = *make_physical_scene(liver_block());
+    EXPECT_NEAR(scene.structure_dead_db[Phantom::liver], 3 * 1.3, 1e-9);
+    EXPECT_EQ(scene.structure_dead_db[Phantom::kidney], 0);
+    EXPECT_EQ(scene.structure_dead_db[Phantom::muscle], 0);
 }
 
 TEST(Streaks, StayWhereTheyAreInTheTissue) {

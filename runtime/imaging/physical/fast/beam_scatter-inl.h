@@ -54,6 +54,10 @@ HWY_NOINLINE void structure_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
         auto sixteenths = hn::ShiftLeft<2>(hn::ShiftRight<24>(hn::ShiftLeft<24>(offset)));
         if (b.structure_most != nullptr)
             sixteenths = hn::Min(sixteenths, hn::GatherIndex(di, b.structure_most, label));
+        if (b.structure_dead != nullptr && c.fine) {
+            const auto dead = hn::GatherIndex(di, b.structure_dead, label);
+            sixteenths = hn::Sub(sixteenths, hn::Max(hn::Min(sixteenths, dead), hn::Neg(dead)));
+        }
         const auto tissue = hn::Lt(label, hn::Set(di, b.label_count));
         hn::Store(hn::IfThenElseZero(tissue, sixteenths), di, c.structure.row(row));
     }

@@ -117,7 +117,8 @@ void PhysicalFast::choose_targets(const PhysicalFrame& f, bool keep_all) {
     }
 }
 
-// Plates that the block's beams can show.
+// Plates that the block's beams can show; few beams can show all.
+static_assert(kBlockStreaks == kMostStreaks);
 int PhysicalFast::choose_streaks(int first, std::span<PhysicalStreak> out) const {
     int count = 0;
     for (int n = 0; n < streak_count_ && count < static_cast<int>(out.size()); ++n) {
@@ -199,6 +200,8 @@ void PhysicalFast::set_tables(const PhysicalFrame& f, PhysicalBlock& b) const {
     b.fine =
         f.effects.fine_structure || f.effects.parenchyma ? scene_.textures->fine.data() : nullptr;
     b.structure_most = structure_most_.empty() ? nullptr : structure_most_.data();
+    b.structure_dead =
+        f.effects.parenchyma && !structure_dead_.empty() ? structure_dead_.data() : nullptr;
     b.fine_frames = fine_frames_.data();
     b.targets = near_targets_.data();
     b.target_count = static_cast<int>(near_targets_.size());

@@ -122,6 +122,9 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     for (const double most : scene.structure_most_db)
         structure_most_.push_back(static_cast<std::int32_t>(std::lround(16 * most)));
     if (!structure_most_.empty()) structure_most_.resize(256, 0);
+    for (const double dead : scene.structure_dead_db)
+        structure_dead_.push_back(static_cast<std::int32_t>(std::lround(16 * dead)));
+    if (!structure_dead_.empty()) structure_dead_.resize(256, 0);
     for (const TargetBall& t : scene.targets) {
         const auto shape = [&](int row, int column) {
             return static_cast<float>(t.shape(row, column));

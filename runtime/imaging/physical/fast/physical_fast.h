@@ -96,7 +96,7 @@ class PhysicalFast {
         pairs_word_;  // packed: see physical_kernels.h
     std::vector<float> r_, contact_, elevation_, interface_scale_, gain_;
     std::vector<float> elevation_off_, fine_frames_;
-    std::vector<std::int32_t> structure_most_;
+    std::vector<std::int32_t> structure_most_, structure_dead_;
     std::vector<float> dim_, dim_off_;  // per look: light that one sample leaves
     std::vector<PhysicalTarget> targets_, near_targets_;
     std::vector<std::uint32_t> elevation_start_, lookup_start_, clutter_start_, haze_start_,

@@ -71,7 +71,7 @@ struct PhysicalStreak {
     float ripple = 0, per_ripple = 0, phase = 0;  // log2; cycles in half its length
     int sample_begin = 0, sample_end = 0;
 };
-inline constexpr int kBlockStreaks = 192;  // in a block of beams
+inline constexpr int kBlockStreaks = 768;  // in a block of beams: all that a frame shows
 
 struct PhysicalTarget {
     float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels
@@ -128,6 +128,7 @@ struct PhysicalBlock {
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
     const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr;
     const std::int8_t* fine = nullptr;             // null: off. Six cubes
+    const std::int32_t* structure_dead = nullptr;  // per label, 1/16 dB; null: none
     const std::int32_t* structure_most = nullptr;  // per label, 1/16 dB; null: no limit
     const float* fine_frames = nullptr;      // per label: rows of the frame, offset and last layer
     const PhysicalRegion* region = nullptr;  // null: the case has none

@@ -6,12 +6,11 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/imaging/noise/noise.h"
+#include "runtime/imaging/physical/model/cell_hash.h"
 
 namespace sonocase::runtime::physical {
 namespace {
 
-constexpr std::uint32_t kHashX = 0x9E3779B1u, kHashY = 0x85EBCA77u, kHashZ = 0xC2B2AE3Du;
 constexpr double kMostMm = 5;  // of a wall, from the middle of its seeds and along it
 constexpr double kLeastMm = 1;
 constexpr double kShiftMm =
@@ -67,11 +66,6 @@ Seeds seeds_around(Int3 cell, double cell_mm, Point3 corner, Vector3 skin) {
 }
 
 }  // namespace
-
-std::uint32_t hash_of_cell(int i, int j, int k) {
-    return hash32(static_cast<std::uint32_t>(i) * kHashX ^ static_cast<std::uint32_t>(j) * kHashY ^
-                  static_cast<std::uint32_t>(k) * kHashZ);
-}
 
 int find_lobule_walls(Int3 cell,
                       double cell_mm,

@@ -33,9 +33,6 @@ struct LobuleView {
     double reach_mm = 1e9;  // of walls from it: those further away may be left out
 };
 
-// Random bits of a cell.
-std::uint32_t hash_of_cell(int i, int j, int k);
-
 // Walls between the lobule of a cell and those of half of its neighbours, so that each wall belongs
 // to one cell. corner: of cell 0 0 0. Returns how many of `out` it filled.
 int find_lobule_walls(Int3 cell,

@@ -203,6 +203,20 @@ void add_tissues(const CaseBundle& bundle,
     }
 }
 
+// What the pipeline bakes into an organ: noise of its own, vessels far beyond it. A kidney's
+// pyramids are little more than its noise, which therefore stays.
+void add_dead_zones(const CaseBundle& bundle, PhysicalScene& s) {
+    constexpr double kDeviations = 3;
+    const std::vector<int> tissue_of = tissue_of_label(bundle);
+    s.structure_dead_db.assign(bundle.labels.size(), 0.0);
+    for (std::size_t l = 1; l < bundle.labels.size(); ++l) {
+        if (s.fine.frames[l].cube != kParenchymaCube) continue;
+        const Tissue& tissue = bundle.tissues[static_cast<std::size_t>(tissue_of[l])];
+        if (tissue.name != "kidney_cortex")
+            s.structure_dead_db[l] = kDeviations * tissue.structure_db;
+    }
+}
+
 }  // namespace
 
 Result<PhysicalScene> make_physical_scene(CaseView view,
@@ -239,6 +253,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     }
     s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
                                    [](const FineFrame& f) { return f.cube == kParenchymaCube; });
+    if (s.has_parenchyma && options.structures.parenchyma) add_dead_zones(bundle, s);
     if (s.has_parenchyma && options.structures.streaks) s.plate_cells = find_plate_cells(s);
     s.has_septa = std::any_of(s.fine.frames.begin(), s.fine.frames.end(), [](const FineFrame& f) {
         return is_muscle_cube(f.cube) || is_fat_cube(f.cube);

@@ -82,6 +82,10 @@ struct PhysicalScene {
     // Most that a baked offset adds, dB, # labels: plates draw the septa of muscle and fat, which
     // voxels show as grains. Empty: no limit.
     std::vector<double> structure_most_db;
+    // A baked offset of an organ as small as this is its own noise, which the cube of parenchyma
+    // draws while that effect is on, and is left out; a larger one loses so much. dB, # labels.
+    // Empty: none.
+    std::vector<double> structure_dead_db;
     bool has_parenchyma = false;  // some label has its cube
     PlateCells plate_cells;       // of effect streaks
     bool has_septa = false;       // some label is fat or muscle

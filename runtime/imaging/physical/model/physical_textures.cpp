@@ -60,7 +60,7 @@ void store(const RawVector<float>& db, std::int8_t* out) {
     }
 }
 
-// Echo of parenchyma at middle scale: 2 dB over 6 mm, 1.2 dB over 1.3 mm whose depth itself
+// Echo of parenchyma at middle scale: 2 dB over 6 mm, 0.6 dB over 1.3 mm whose depth itself
 // varies over 6 mm, and shading of 3.2 dB over 26 mm (recipe 7 of the living sweep).
 void make_parenchyma(std::int8_t* out) {
     const RawVector<float> fine = smooth_periodic_noise(kFineEdge, 0, 31),
@@ -70,7 +70,7 @@ void make_parenchyma(std::int8_t* out) {
     RawVector<float> db(fine.size());
     for (std::size_t i = 0; i < db.size(); ++i)
         db[i] = 2 * middle[i] +
-                1.2f * static_cast<float>(std::exp(0.3 * static_cast<double>(depth[i]))) * fine[i] +
+                0.6f * static_cast<float>(std::exp(0.3 * static_cast<double>(depth[i]))) * fine[i] +
                 3.2f * shading[i];
     store(db, out);
 }

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/imaging/noise/noise.h"
 #include "runtime/imaging/physical/model/lobule_walls.h"
+#include "runtime/imaging/physical/model/streak_search.h"
 
 namespace sonocase::runtime::physical {
 namespace {
@@ -14,16 +14,9 @@ namespace {
 // Sixteen equally likely values of a gamma distribution of mean 4 and shape 2.5.
 constexpr std::array<double, 16> kLengthsMm{0.74, 1.25, 1.63, 1.97, 2.3,  2.63, 2.96, 3.3,
                                             3.67, 4.06, 4.51, 5.01, 5.62, 6.4,  7.53, 9.82};
-constexpr std::uint32_t kHashPlace = 0x85EBCA77u;
 
 // Of a plate of muscle: its length across the fibres over that along them (a).
 constexpr double kAcrossFibres = 0.35;
-
-// (1 - x)^4, close to a Gaussian, 0 from x = 1 on.
-double bump(double x) {
-    const double y = std::max(1 - x, 0.0);
-    return y * y * y * y;
-}
 
 // Where the skin's surface lies: the direction in which the depth below it grows most.
 Vector3 layer_normal(const PhysicalScene& scene, Point3 x) {
@@ -40,88 +33,19 @@ Vector3 layer_normal(const PhysicalScene& scene, Point3 x) {
     return size > 1e-6 ? n / size : Vector3{};
 }
 
-// A plate in the tissue, frame of the volume.
-struct Plate {
-    Point3 centre;
-    Vector3 normal;          // not unit
-    double length_mm = 4;    // along the fibres, if it has any
-    std::uint32_t draw = 0;  // random bits
-    Vector3 fibres;          // unit; zero: as long in every direction
-};
+// The part of its length along the fibres that a plate has in the picture: normal in the probe's
+// frame, fibres as well, both unit.
+double length_in_plane(Vector3 normal, Vector3 fibres) {
+    const double square = normal.x * normal.x + normal.z * normal.z;
+    const double run = fibres.x * normal.z - fibres.z * normal.x;
+    const double along = std::min(run * run / std::max(square, 1e-9), 1.0);
+    return kAcrossFibres / std::sqrt(kAcrossFibres * kAcrossFibres * along + 1 - along);
+}
 
-struct Search {
-    const PlateKind& kind;
-    bool septa;
-    const PhysicalScene& scene;
-    const ScanGeometry& g;
-    const Tables& tables;
-    const PhysicalFrame& frame;
-    const BreathingField* breathing;
-    std::span<const float> gaps;
-    std::span<Streak> out;
-    Rigid probe_from_volume;
-    double thickest_mm = 0;  // of the slab: deviation at the face or at the far end
-    double pressed_mm = 0;   // tissue shows so much nearer to the face than it lies at rest
-    double turned = 0;       // by pressing: sine of the most that the beam at a place turns
-    int found = 0;
-
-    // The label that holds plates there; negative: none.
-    int plates_at(Point3 x) const {
-        const Point3 v = scene.grid.voxel_from_point(x);
-        const int label = label_at(scene, static_cast<int>(std::floor(v.x + 0.5)),
-                                   static_cast<int>(std::floor(v.y + 0.5)),
-                                   static_cast<int>(std::floor(v.z + 0.5)));
-        const int cube = scene.fine.frames[static_cast<std::size_t>(label)].cube;
-        const bool holds =
-            septa ? is_muscle_cube(cube) || is_fat_cube(cube) : cube == kParenchymaCube;
-        return holds ? label : -1;
-    }
-
-    // Where a point of the tissue shows, in the probe's frame, before anything is pressed.
-    Point3 seen_at_rest(Point3 x) const {
-        if (breathing != nullptr) x = x + breathing->weight(x) * frame.motion.breathing_mm;
-        return probe_from_volume * x;
-    }
-    Point3 pressed(Point3 p) const {
-        const PlanePoint q = press::shown_point(*frame.press, {p.x, p.z});
-        return {q.x, p.y, q.z};
-    }
-
-    // The beam at a place: its direction, and how far the place lies along it.
-    PlanePoint beam_at(PlanePoint p, double& r) const {
-        if (!g.fan) {
-            r = p.z;
-            return {0, 1};
-        }
-        const double x = p.x, z = p.z + g.radius_mm;
-        const double from_centre = std::max(std::sqrt(x * x + z * z), 1e-9);
-        r = from_centre - g.radius_mm;
-        return {x / from_centre, z / from_centre};
-    }
-
-    // A normal of a septum: about the skin's in fat, across the fibres in muscle.
-    Vector3 lined_up(Vector3 any, Vector3 guide, bool fibres) const {
-        if (fibres) return any - dot(any, guide) * guide;
-        return guide + (kind.scatter / 64) * any;
-    }
-
-    // Sine of the angle to the beam at which a plate shows nothing.
-    double widest_sin(bool fibrous) const { return fibrous ? kind.diffuse_sin : kind.face_sin; }
-    // Share of its echo that a plate sends back, by the square of that sine.
-    double facing(double sine2, bool fibrous) const {
-        const double mirror = bump(sine2 / (kind.face_sin * kind.face_sin));
-        if (!fibrous) return mirror;
-        const double all_ways = 1 - sine2 / (kind.diffuse_sin * kind.diffuse_sin);
-        return mirror + kind.diffuse * (1 - mirror) * std::max(all_ways, 0.0);
-    }
-
-    void add_cell(int i, int j, int k);
-    void add_lobule(Int3 cell, const LobuleView& view);
-    void add_plate(const Plate& plate);
-};
+}  // namespace
 
 // normal: not unit, at most 127 long, in steps of 1, frame of the volume.
-void Search::add_cell(int i, int j, int k) {
+void StreakSearch::add_cell(int i, int j, int k) {
     const Point3 corner =
         scene.grid.origin_mm + kind.cell_mm * Vector3{double(i), double(j), double(k)};
     const Point3 middle = corner + 0.5 * kind.cell_mm * Vector3{1, 1, 1};
@@ -131,7 +55,8 @@ void Search::add_cell(int i, int j, int k) {
     const Point3 p = seen_at_rest(middle);
     double r = 0;
     const PlanePoint beam = beam_at({p.x, p.z}, r);
-    if (r < kind.first_mm - kind.cell_mm || r > g.depth_mm + kind.cell_mm + pressed_mm) return;
+    const double beyond = kind.cell_mm + (kind.tract_share > 0 ? kTractReachMm : 0);
+    if (r < kind.first_mm - beyond || r > g.depth_mm + beyond + pressed_mm) return;
     const int label = septa ? plates_at(middle) : 0;
     if (label < 0) return;
     const Vector3 along = frame.volume_from_probe.rotation * Vector3{beam.x, 0, beam.z};
@@ -159,6 +84,11 @@ void Search::add_cell(int i, int j, int k) {
         add_lobule({i, j, k}, {guide, along, widest, across, p.y, 2.5 * thickest_mm + 0.5});
     }
     const std::uint32_t cell = hash_of_cell(i, j, k);
+    if (kind.tract_share > 0) {
+        add_tracts(corner, cell);
+        constexpr double kPlateReachMm = 6;  // what of a cell's own plates shows
+        if (std::abs(p.y) > kPlateReachMm + 0.87 * kind.cell_mm) return;
+    }
     const int tries = lobules ? kind.tries_beside_lobules : kind.tries;
     for (std::uint32_t t = 0; t < static_cast<std::uint32_t>(tries); ++t) {
         const std::uint32_t h = hash32(cell + t);
@@ -176,7 +106,7 @@ void Search::add_cell(int i, int j, int k) {
         } else if (!(cosine * cosine > least * square)) {
             continue;
         }
-        const std::uint32_t place = hash32(h ^ (cell + t) * kHashPlace);
+        const std::uint32_t place = hash32(h ^ (cell + t) * kHashY);
         const auto part = [&](int shift) { return (place >> shift & 0x3FF) / 1024.0; };
         const std::uint32_t draw = h >> 24 | (place >> 30) << 8;
         add_plate({corner + kind.cell_mm * Vector3{part(0), part(10), part(20)}, normal,
@@ -184,7 +114,7 @@ void Search::add_cell(int i, int j, int k) {
     }
 }
 
-void Search::add_lobule(Int3 cell, const LobuleView& view) {
+void StreakSearch::add_lobule(Int3 cell, const LobuleView& view) {
     std::array<LobuleWall, kMostLobuleWalls> walls;
     const int count = find_lobule_walls(cell, kind.cell_mm, scene.grid.origin_mm, view, walls);
     for (int n = 0; n < count; ++n) {
@@ -193,16 +123,7 @@ void Search::add_lobule(Int3 cell, const LobuleView& view) {
     }
 }
 
-// The part of its length along the fibres that a plate has in the picture: normal in the probe's
-// frame, fibres as well, both unit.
-double length_in_plane(Vector3 normal, Vector3 fibres) {
-    const double square = normal.x * normal.x + normal.z * normal.z;
-    const double run = fibres.x * normal.z - fibres.z * normal.x;
-    const double along = std::min(run * run / std::max(square, 1e-9), 1.0);
-    return kAcrossFibres / std::sqrt(kAcrossFibres * kAcrossFibres * along + 1 - along);
-}
-
-void Search::add_plate(const Plate& plate) {
+void StreakSearch::add_plate(const Plate& plate) {
     const auto [centre, normal, longest_mm, draw, fibres] = plate;
     const bool fibrous = dot(fibres, fibres) > 0;
     const double own = 0.25 * longest_mm;
@@ -233,26 +154,15 @@ void Search::add_plate(const Plate& plate) {
         return bump(off * off) * facing_beam;
     };
     if (level_in(thickest_mm) < 0.1) return;
-    double line = 0, sample = 0;
-    g.locate({p.x, p.z}, line, sample);
-    const int nearest = static_cast<int>(std::clamp(line + 0.5, 0.0, g.scanlines - 1.0));
-    const double gap = static_cast<double>(gaps[static_cast<std::size_t>(nearest)]);
-    if (gap < 0) return;
-    // The gap to the skin closes: the plate shows that much closer to the face.
-    const auto row_at = [&](double depth) -> const Row& {
-        const int k = static_cast<int>(std::clamp(depth / g.step_mm, 0.0, g.samples - 1.0));
-        return tables.rows[static_cast<std::size_t>(k)];
-    };
-    double shown = r;
-    for (int step = 0; step < 3; ++step) shown = r - gap * row_at(shown).contact;
-    if (shown < kind.first_mm || shown > g.depth_mm) return;
-    const Row& row = row_at(shown);
-    const double level = level_in(row.elevation_mm);
+    Shown shown;
+    if (!show({p.x, p.z}, shown)) return;
+    const double level = level_in(row_at(shown.depth).elevation_mm);
     if (level < 0.1 || found >= static_cast<int>(out.size()) || plates_at(centre) < 0) return;
     const double length =
         longest_mm * (fibrous ? length_in_plane(n, probe_from_volume.rotation * fibres) : 1.0);
     Streak& s = out[static_cast<std::size_t>(found)];
-    s.centre = {p.x + (shown - r) * beam.x, p.z + (shown - r) * beam.z};
+    s = {};
+    s.centre = shown.at;
     const double in_plane = 1 / std::sqrt(n.x * n.x + n.z * n.z);
     s.normal = {n.x * in_plane, n.z * in_plane};
     s.length_mm = length;
@@ -264,23 +174,13 @@ void Search::add_plate(const Plate& plate) {
     s.ripple = kind.ripple;
     s.per_ripple = 0.5 * length / kind.ripple_mm;
     s.phase = (draw & 15) / 16.0 + (draw >> 4 & 7) / 128.0;
-    // Beyond 0.9 L from its middle a plate is 0.5 % of itself, beyond three widths 1 %.
-    const double reach = 0.9 * length + 3 * s.width_mm;
-    const double slope = std::sqrt(std::max(1 - cosine * cosine * in_plane * in_plane, 0.0));
-    const double deep = 0.9 * length * slope + 3 * s.width_mm + g.step_mm + 3.3 * std::abs(sunk_mm);
-    const double pitch = g.fan ? (g.radius_mm + shown) * g.line_step : g.line_step;
-    s.line_begin = std::max(static_cast<int>(line - reach / pitch), 0);
-    s.line_end = std::min(static_cast<int>(line + reach / pitch) + 2, g.scanlines);
-    s.sample_begin = std::max(static_cast<int>((shown - deep) / g.step_mm), 0);
-    s.sample_end = std::min(static_cast<int>((shown + deep) / g.step_mm) + 1, g.samples);
-    if (s.line_begin < s.line_end && s.sample_begin < s.sample_end) ++found;
+    keep(shown, std::abs(sunk_mm), s);
 }
-
-}  // namespace
 
 const PlateKind& plate_kind(double frequency_mhz) {
     static constexpr PlateKind kOrgans{
-        8, 44, 0.5, 12, 6, {0.41, 0.61, 0.75, 0.9, 1.1, 1.33, 1.64, 2.45}, 1, 0.01, 0};
+        8, 16, 0.5, 12, 6,   {0.41, 0.61, 0.75, 0.9, 1.1, 1.33, 1.64, 2.45}, 1, 0.01, 0, 0,
+        2, 0,  0,   0,  0.18};
     static constexpr PlateKind kSepta{
         4,   18,  0.45, 1.5,  3, {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5}, 1.3, 0.04, 0.3,
         1.6, 2.0, 0.25, 0.85, 6};
@@ -328,17 +228,18 @@ int find_streaks(const PhysicalScene& scene,
     const bool septa = tables.frequency_mhz > kSeptaFrequencyMhz;
     if (septa ? !scene.has_septa : scene.plate_cells.holds.empty()) return 0;
     const PlateKind& kind = plate_kind(tables.frequency_mhz);
-    Search search{kind,
-                  septa,
-                  scene,
-                  g,
-                  tables,
-                  f,
-                  breathing,
-                  gaps,
-                  out,
-                  inverse(f.volume_from_probe),
-                  std::max(tables.rows.front().elevation_mm, tables.rows.back().elevation_mm)};
+    StreakSearch search{
+        kind,
+        septa,
+        scene,
+        g,
+        tables,
+        f,
+        breathing,
+        gaps,
+        out,
+        inverse(f.volume_from_probe),
+        std::max(tables.rows.front().elevation_mm, tables.rows.back().elevation_mm)};
     if (f.press != nullptr) {
         search.pressed_mm = f.press->farthest_mm();
         const double aside_mm = search.pressed_mm - f.press->state().deepest_mm;
@@ -368,6 +269,9 @@ int find_streaks(const PhysicalScene& scene,
             upper[axis] = std::max(upper[axis], at[axis]);
         }
     }
+    const double beyond = kind.tract_share > 0 ? kTractReachMm : 0;
+    lower = lower - beyond * Vector3{1, 1, 1};
+    upper = upper + beyond * Vector3{1, 1, 1};
     const Vector3 box =
         scene.voxel_mm *
         Vector3{double(scene.grid.size.x), double(scene.grid.size.y), double(scene.grid.size.z)};
@@ -375,9 +279,10 @@ int find_streaks(const PhysicalScene& scene,
         return static_cast<int>(std::floor(std::clamp(mm, 0.0, box[axis]) / kind.cell_mm));
     };
     const Vector3 origin = f.volume_from_probe * Point3{0, 0, 0} - scene.grid.origin_mm;
-    // Half the slab, half the longest plate, and the cell's own extent along the normal.
+    // Half the slab, half the longest plate or the reach of a tract beyond its cell, and the cell's
+    // own extent along the normal.
     const double thick =
-        4 + shift_mm +
+        std::max(4.0, beyond) + shift_mm +
         0.5 * kind.cell_mm * (std::abs(normal[u]) + std::abs(normal[v])) / std::abs(normal[a]);
     for (int j = cell(lower[v], v); j <= cell(upper[v], v); ++j) {
         for (int i = cell(lower[u], u); i <= cell(upper[u], u); ++i) {

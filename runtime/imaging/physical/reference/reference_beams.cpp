@@ -305,6 +305,11 @@ class Beams {
                 const std::vector<double>& most = in_.scene.structure_most_db;
                 if (!most.empty())
                     baked = std::min(baked, most[static_cast<std::size_t>(p.place.label)]);
+                const std::vector<double>& dead = in_.scene.structure_dead_db;
+                if (on.parenchyma && !dead.empty()) {
+                    const double own = dead[static_cast<std::size_t>(p.place.label)];
+                    baked -= std::clamp(baked, -own, own);
+                }
                 echo_db += wall.in_wall
                                ? std::min(baked, static_cast<double>(in_.tables.wall.structure_db))
                                : baked;
