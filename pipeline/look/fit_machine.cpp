@@ -4,57 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "formats/image_scores/smooth.h"
 #include "formats/text/number_text.h"
+#include "pipeline/look/fit_gain.h"
 #include "pipeline/look/fit_texture.h"
+#include "pipeline/look/look_simulation.h"
 
 namespace sonocase::pipeline {
 namespace {
 
 double db(double amplitude) {
     return 20 * std::log10(std::max(amplitude, 1e-6));
-}
-
-// Level of the even patches by depth: flat, then falling from some depth on.
-void fit_far_gain(const LookMeasures& m, FittedMachine& fit) {
-    std::vector<double> depth, level;
-    for (const LookBand& band : m.bands) {
-        depth.push_back(band.depth_mm);
-        level.push_back(db(amplitude_of(fit.machine.grey, band.mean)));
-    }
-    const auto rest_of = [&](double from, double slope, double& top) {
-        top = 0;
-        for (std::size_t i = 0; i < depth.size(); ++i)
-            top += (level[i] + slope * std::max(depth[i] - from, 0.0)) /
-                   static_cast<double>(depth.size());
-        double rest = 0;
-        for (std::size_t i = 0; i < depth.size(); ++i)
-            rest += std::pow(top - slope * std::max(depth[i] - from, 0.0) - level[i], 2);
-        return rest;
-    };
-    const double span = depth.empty() ? 0 : depth.back() - depth.front();
-    if (depth.size() < 5 || span < 40) {
-        fit.kept.push_back("gain (far gain): too little parenchyma at depth");
-        return;
-    }
-    double top = 0;
-    const double flat = rest_of(1e9, 0, top);
-    double best = flat, from = 0, slope = 0;
-    for (std::size_t i = 1; i + 2 < depth.size(); ++i) {
-        for (double s = 0.02; s <= 0.6; s += 0.02) {  // dB per mm
-            const double rest = rest_of(depth[i], s, top);
-            if (rest < best) {
-                best = rest;
-                from = depth[i];
-                slope = s;
-            }
-        }
-    }
-    MachineGain& gain = fit.machine.gain;
-    if (best > 0.5 * flat) slope = 0;  // no knee stands out
-    gain.far_db_per_cm = 10 * slope;
-    if (slope > 0) gain.far_from_mm = from;
 }
 
 // Peaks of the profile under the face that stand still and lie at equal distances.
@@ -95,10 +57,58 @@ bool fit_face_lines(const std::vector<double>& e,
     return true;
 }
 
-void fit_near_field(const LookMeasures& m, const BeamImage& grid, FittedMachine& fit) {
+// Darkness at the face and the level of the ringing, whose decay is the base's, together: either
+// would be taken for the other. The ringing gives the profile its mean, the darkness its shape.
+void fit_ring(const std::vector<double>& e,
+              double sample_mm,
+              double reach_mm,
+              MachineNearField& near) {
+    const auto count =
+        std::min(e.size(), static_cast<std::size_t>(std::max(reach_mm / sample_mm - 0.5, 0.0)) + 1);
+    std::vector<double> ring;
+    for (std::size_t i = 0; i < count; ++i) {
+        const double r = (static_cast<double>(i) + 0.5) * sample_mm;
+        double lines = 1;
+        for (int k = 0; k < near.lines; ++k) {
+            const double z = (r - near.first_mm - k * near.spacing_mm) / (near.line_mm / 2.3548);
+            lines += std::pow(10.0, (near.line_db - k * near.line_step_db) / 20) *
+                     std::exp(-0.5 * z * z);
+        }
+        ring.push_back(std::exp(-r / near.ring_decay_mm) * lines);
+    }
+    double best = std::numeric_limits<double>::infinity();
+    MachineNearField found = near;
+    for (int step = 0; step <= 100; ++step) {
+        const double start = 0.01 * step;
+        const auto ramp = [&](std::size_t i) {
+            return std::min(1.0,
+                            start + (static_cast<double>(i) + 0.5) * sample_mm / near.start_mm);
+        };
+        double missing = 0, of_one = 0, rest = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            missing += e[i] - ramp(i);
+            of_one += ramp(i) * ring[i];
+        }
+        const double level = of_one > 0 ? std::clamp(missing / of_one, 0.0, 100.0) : 0;
+        for (std::size_t i = 0; i < count; ++i)
+            rest += std::pow(e[i] - ramp(i) * (1 + level * ring[i]), 2);
+        if (rest >= best) continue;
+        best = rest;
+        found.start = start;
+        found.ring_level = level;
+    }
+    near = found;
+    near.tail_level = 0;
+}
+
+// `parenchyma`: the amplitude that the grey map gives parenchyma's mean grey.
+void fit_near_field(const LookMeasures& m,
+                    const BeamImage& grid,
+                    double parenchyma,
+                    FittedMachine& fit) {
     MachineNearField& near = fit.machine.near_field;
     std::vector<double> e;
-    for (const double grey : m.near) e.push_back(amplitude_of(fit.machine.grey, grey));
+    for (const double grey : m.near) e.push_back(amplitude_of(fit.machine.grey, grey) / parenchyma);
     const double scale = grid.fan ? 1 : 0.3;  // a linear probe rings over a third of the depth
     const auto mean_of = [&](double from_mm, double to_mm) {
         double sum = 0, n = 0;
@@ -110,36 +120,16 @@ void fit_near_field(const LookMeasures& m, const BeamImage& grid, FittedMachine&
         }
         return n > 0 ? sum / n : 0;
     };
-    const double first = mean_of(0, 0.8 * scale), next = mean_of(0.8 * scale, 4.5 * scale);
-    if (!(next > 0)) {
+    if (!(mean_of(0.8 * scale, 4.5 * scale) > 0)) {
         fit.kept.push_back("near_field: the first millimetres are black");
         return;
     }
-    near.start = std::clamp(first / next - 0.4 * scale / near.start_mm, 0.0, 1.0);
     if (!m.moves || m.near_still < 0.5 || !fit_face_lines(e, grid.sample_mm, 14 * scale, near))
         fit.kept.push_back(
             m.moves ? "near_field.lines: no regular still lines under the face"
                     : "near_field.lines: frames of a moving probe are needed to tell lines of the "
                       "probe from tissue");
-    // The ringing's level, its decay being the base's: mean over the first 4 mm.
-    const auto mean_with = [&](double level) {
-        double sum = 0, n = 0;
-        for (double r = 0.5 * grid.sample_mm; r < 4 * scale; r += grid.sample_mm, ++n) {
-            double lines = 1;
-            for (int i = 0; i < near.lines; ++i) {
-                const double z =
-                    (r - near.first_mm - i * near.spacing_mm) / (near.line_mm / 2.3548);
-                lines += std::pow(10.0, (near.line_db - i * near.line_step_db) / 20) *
-                         std::exp(-0.5 * z * z);
-            }
-            sum += std::min(1.0, near.start + r / near.start_mm) *
-                   (1 + level * std::exp(-r / near.ring_decay_mm) * lines);
-        }
-        return sum / n;
-    };
-    const double wanted = mean_of(0, 4 * scale), none = mean_with(0), one = mean_with(1);
-    near.ring_level = std::clamp((wanted - none) / std::max(one - none, 1e-9), 0.0, 100.0);
-    near.tail_level = 0;
+    fit_ring(e, grid.sample_mm, 4 * scale, near);
 }
 
 void fit_contact(const LookMeasures& m, FittedMachine& fit) {
@@ -151,8 +141,9 @@ void fit_contact(const LookMeasures& m, FittedMachine& fit) {
                                level.end() - static_cast<std::ptrdiff_t>(n / 4));
     const double ground = median_of(middle);
     double edge = 0;
-    for (std::size_t i = 0; i < n / 40 + 1; ++i)
-        edge += (level[i] + level[n - 1 - i]) / 2 / static_cast<double>(n / 40 + 1);
+    const std::size_t outer = n / 40 + 1;
+    for (std::size_t i = 0; i < outer; ++i)
+        edge += (level[i] + level[n - 1 - i]) / 2 / static_cast<double>(outer);
     MachineContact& contact = fit.machine.contact;
     contact.edge_db = std::clamp(ground - edge, 0.0, 40.0);
     if (contact.edge_db < 3) {
@@ -171,12 +162,26 @@ void fit_contact(const LookMeasures& m, FittedMachine& fit) {
 // between processors.
 void round_values(Machine& m) {
     const auto tidy = [](double& v) { (void)parse_number(number_text(v, 3), v); };
-    for (double* v : {&m.beam.axial_mm, &m.beam.lateral_mm, &m.beam.lateral_focus_mm,
-                      &m.beam.lateral_range_mm, &m.grey.floor, &m.grey.level, &m.grey.exponent,
-                      &m.grey.knee, &m.grey.dynamic_range_db, &m.gain.far_from_mm,
-                      &m.gain.far_db_per_cm, &m.near_field.ring_level, &m.near_field.first_mm,
-                      &m.near_field.spacing_mm, &m.near_field.line_db, &m.near_field.line_step_db,
-                      &m.near_field.start, &m.contact.edge_db, &m.contact.edge_fraction})
+    for (double* v : {&m.beam.axial_mm,
+                      &m.beam.lateral_mm,
+                      &m.beam.lateral_focus_mm,
+                      &m.beam.lateral_range_mm,
+                      &m.grey.floor,
+                      &m.grey.level,
+                      &m.grey.exponent,
+                      &m.grey.knee,
+                      &m.grey.dynamic_range_db,
+                      &m.gain.far_from_mm,
+                      &m.gain.far_db_per_cm,
+                      &m.gain.far_limit_db,
+                      &m.near_field.ring_level,
+                      &m.near_field.first_mm,
+                      &m.near_field.spacing_mm,
+                      &m.near_field.line_db,
+                      &m.near_field.line_step_db,
+                      &m.near_field.start,
+                      &m.contact.edge_db,
+                      &m.contact.edge_fraction})
         tidy(*v);
     for (auto& [tissue, level_db] : m.tissue_db) tidy(level_db);
 }
@@ -189,13 +194,15 @@ FittedMachine fit_machine(const LookMeasures& measures,
                           int height_px,
                           const FitOptions& options) {
     FittedMachine fit;
+    const BeamImage grid = beam_grid(place);
+    double parenchyma_db = 0;
     Machine& machine = fit.machine = options.base;
     machine.grey.floor = measures.black;
     machine.noise.reject = measures.black_seen;
     if (!measures.black_seen) {
         fit.warnings.push_back(
-            "No black region was seen: the grey floor is the darkest hundredth of the scan. Add "
-            "frames that show fluid, a shadow or air.");
+            "No black region was seen: the grey floor is what the contrast of the speckle tells, "
+            "and levels are uncertain by a sixth. Add frames that show fluid, a shadow or air.");
     }
     constexpr int kFewPatches = 4;
     if (measures.patches < kFewPatches) {
@@ -206,13 +213,18 @@ FittedMachine fit_machine(const LookMeasures& measures,
         fit.kept.push_back("beam, looks, grey map: no even parenchyma");
     } else {
         fit_texture(measures, place, width_px, height_px, options, fit);
-        machine.looks.near_count = std::min(16, 2 * machine.looks.count);
-        fit_far_gain(measures, fit);
+        machine.looks.near_count = near_looks(machine.looks.count);
+        // The mean grey of parenchyma is not the grey of its mean amplitude.
+        parenchyma_db = db(amplitude_of(machine.grey, measures.texture.mean));
+        fit_far_gain(measures, grid, fit);
     }
-    fit_near_field(measures, beam_grid(place), fit);
+    fit_near_field(measures, grid, std::pow(10.0, parenchyma_db / 20), fit);
     fit_contact(measures, fit);
-    for (const auto& [tissue, grey] : measures.tissue_grey)
-        machine.tissue_db[tissue] = std::clamp(db(amplitude_of(machine.grey, grey)), -60.0, 60.0);
+    for (const auto& [tissue, grey] : measures.tissue_grey) {
+        const double level = db(amplitude_of(machine.grey, grey)) - parenchyma_db +
+                             far_fall_db(machine.gain, measures.tissue_depth_mm.at(tissue));
+        machine.tissue_db[tissue] = std::clamp(level, -60.0, 60.0);
+    }
     fit.kept.push_back("haze, persistence, elevation, frequency: stills do not show them");
     round_values(machine);
     return fit;

@@ -24,6 +24,7 @@ struct LooksChoice {
     GreyMap map = GreyMap::power;
     double exponent = 1;           // power
     double dynamic_range_db = 60;  // log
+    double floor = 0;              // grey; the measured one, if black was seen
     double misfit = 0;             // in units of what a score differs between parts of one clip
 };
 

@@ -8,109 +8,13 @@
 
 #include "formats/image_scores/smooth.h"
 #include "pipeline/base/parallel.h"
+#include "pipeline/look/look_simulation.h"
 
 namespace sonocase::pipeline {
 namespace {
 
 constexpr std::array<int, 7> kLooks{1, 2, 3, 4, 5, 6, 8};
 constexpr std::array<int, 3> kFirstLooks{1, 3, 8};  // of the first round, which is corrected
-
-// Rows of a grid that the real patches span, as a grid of their own.
-struct Window {
-    BeamImage grid;          // of the whole scan, no grey
-    int first = 0, end = 0;  // rows
-};
-
-Window window_of(const LookMeasures& m, const ScanPlace& place) {
-    Window w;
-    w.grid = beam_grid(place);
-    w.first = std::clamp(w.grid.sample_of(m.lowest_mm) - kPatch / 2, 0,
-                         std::max(w.grid.samples - kPatch, 0));
-    w.end = std::clamp(w.grid.sample_of(m.highest_mm) + kPatch / 2 + 2, w.first + kPatch,
-                       w.grid.samples);
-    return w;
-}
-
-// Draws beam-space grey on the picture's pixels and samples it again, as real frames were: what the
-// pixels blur is blurred in the stand-in as well. Where each pixel lies is worked out once.
-class PixelPassage {
-  public:
-    PixelPassage(const ScanPlace& place, const Window& window, int width_px, int height_px)
-        : place_(place), width_px_(width_px), height_px_(height_px) {
-        for (int y = 0; y < height_px; ++y) {
-            for (int x = 0; x < width_px; ++x) {
-                const BeamPoint p =
-                    beam_of(place, window.grid, {static_cast<double>(x), static_cast<double>(y)});
-                if (!in_grid(window.grid, p) || p.sample < window.first - 2 ||
-                    p.sample > window.end + 2)
-                    continue;
-                pixels_.push_back(static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) +
-                                  static_cast<std::size_t>(x));
-                points_.push_back(p);
-            }
-        }
-    }
-    BeamImage operator()(const BeamImage& image) const {
-        std::vector<std::uint8_t> picture(static_cast<std::size_t>(width_px_) *
-                                          static_cast<std::size_t>(height_px_));
-        for (std::size_t i = 0; i < pixels_.size(); ++i)
-            picture[pixels_[i]] = static_cast<std::uint8_t>(
-                std::lround(std::clamp(grey_at(image, points_[i]), 0.0, 255.0)));
-        return beam_from_picture(picture, width_px_, height_px_, place_, image.lines,
-                                 image.sample_mm);
-    }
-
-  private:
-    ScanPlace place_;
-    int width_px_, height_px_;
-    std::vector<std::size_t> pixels_;
-    std::vector<BeamPoint> points_;
-};
-
-struct Simulation {
-    const LookMeasures& measures;
-    const ScanPlace& place;
-    const FitOptions& options;
-    Window window;
-    PixelPassage passage;
-
-    // Amplitude fields, mean 1, for each of kLooks.
-    std::vector<std::vector<float>> amplitudes(const Machine& machine,
-                                               std::span<const int> looks,
-                                               std::uint64_t draw = 0) const {
-        std::vector<std::vector<float>> fields(looks.size());
-        parallel_for(looks.size(), 1, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                std::vector<float> power = speckle_power(machine, window.grid, options.tissue, 0,
-                                                         looks[i], options.seed + draw);
-                add_streaks(window.grid, machine, options.tissue, options.seed + draw, power);
-                double mean = 0;
-                for (float& p : power) {
-                    p = std::sqrt(p);
-                    mean += static_cast<double>(p);
-                }
-                mean /= static_cast<double>(power.size());
-                for (float& p : power) p = static_cast<float>(static_cast<double>(p) / mean);
-                fields[i] = std::move(power);
-            }
-        });
-        return fields;
-    }
-
-    std::vector<PatchScores> scores(const std::vector<float>& amplitude,
-                                    const MachineGrey& map) const {
-        BeamImage image = window.grid;
-        image.grey.resize(amplitude.size());
-        for (std::size_t i = 0; i < amplitude.size(); ++i)
-            image.grey[i] = static_cast<float>(grey_of(map, static_cast<double>(amplitude[i])));
-        image = passage(image);
-        std::vector<PatchScores> scores;
-        for (const PatchPlace p : patch_places(image, window.first, window.end, image.lines / 16,
-                                               image.lines - image.lines / 16, 32))
-            scores.push_back(score_patch(image, p));
-        return scores;
-    }
-};
 
 // The level that gives the real mean, for a map whose other values are set.
 void set_level(const std::vector<float>& amplitude, double mean_grey, MachineGrey& map) {
@@ -126,35 +30,91 @@ void set_level(const std::vector<float>& amplitude, double mean_grey, MachineGre
     map.level = std::clamp(map.level, 1.0, 255.0);
 }
 
-// Differences of the four scores in units of how much they differ between parts of one clip
-// (docs/realism.md: blocks of six frames).
-double misfit(const PatchScores& real, const PatchScores& ours, double black) {
-    const auto ratio = [&](const PatchScores& s) {
-        return s.local_sd / std::max(s.mean - black, 1.0);
-    };
-    const double contrast = std::log(ratio(ours) / ratio(real)) / 0.1,
-                 skew = (ours.local_skew - real.local_skew) / 0.2,
+// Contrast of each band of the stand-in over that of the real one, as logarithms. Power: contrast
+// is local sd over the level above the floor, which no gain changes; log: the sd itself.
+struct BandContrast {
+    double weight = 0, real_mean = 0, real_sd = 0, own = 0;
+};
+
+std::vector<BandContrast> band_contrasts(const LookSimulation& sim,
+                                         const std::vector<PatchScores>& patches,
+                                         const MachineGrey& map) {
+    std::vector<BandContrast> contrasts;
+    for (const LookBand& band : sim.contrast_bands()) {
+        const PatchScores own = sim.scores_at(patches, band);
+        const double over = map.map == GreyMap::log ? 1 : std::max(own.mean - map.floor, 1.0);
+        contrasts.push_back({std::sqrt(static_cast<double>(band.patches)), band.mean,
+                             std::max(band.local_sd, 0.01), std::max(own.local_sd, 0.01) / over});
+    }
+    return contrasts;
+}
+
+// Differences in units of what blocks of one clip differ by: square of their mean, and mean square.
+struct ContrastMisfit {
+    double mean_squared = 0, squares = 0;
+};
+
+ContrastMisfit contrast_misfit(const std::vector<BandContrast>& bands, bool log_map, double floor) {
+    constexpr double kUnit = 0.1;
+    double sum = 0, squares = 0, weight = 0;
+    for (const BandContrast& b : bands) {
+        const double over = log_map ? 1 : std::max(b.real_mean - floor, 1.0);
+        const double off = std::log(b.real_sd / over / b.own) / kUnit;
+        sum += b.weight * off;
+        squares += b.weight * off * off;
+        weight += b.weight;
+    }
+    if (!(weight > 0)) return {};
+    return {sum / weight * sum / weight, squares / weight};
+}
+
+// Floor at which the real contrasts are the stand-in's, at most `highest`.
+double best_floor(const std::vector<BandContrast>& bands, double highest) {
+    double best = highest, least = contrast_misfit(bands, false, highest).squares;
+    for (double floor = 0; floor < highest; floor += 0.25) {
+        const double misfit = contrast_misfit(bands, false, floor).squares;
+        if (misfit >= least) continue;
+        least = misfit;
+        best = floor;
+    }
+    return best;
+}
+
+// Differences of contrast, skew and kurtosis in units of how much they differ between parts of one
+// clip (docs/realism.md: blocks of six frames).
+double misfit(const PatchScores& real, const PatchScores& ours, double contrast_squared) {
+    const double skew = (ours.local_skew - real.local_skew) / 0.2,
                  kurtosis = (std::log1p(std::max(ours.local_kurtosis, -0.5) / 3) -
                              std::log1p(std::max(real.local_kurtosis, -0.5) / 3)) /
                             0.3;
-    return std::sqrt((contrast * contrast + skew * skew + kurtosis * kurtosis) / 3);
+    return std::sqrt((contrast_squared + skew * skew + kurtosis * kurtosis) / 3);
 }
 
-LooksChoice best_map(const Simulation& sim,
+LooksChoice best_map(const LookSimulation& sim,
                      const std::vector<float>& amplitude,
                      int looks,
                      MachineGrey map) {
-    LooksChoice best{looks, map.map, map.exponent, map.dynamic_range_db, 1e9};
-    const PatchScores& real = sim.measures.texture;
+    LooksChoice best{looks, map.map, map.exponent, map.dynamic_range_db, map.floor, 1e9};
+    const LookMeasures& measures = sim.measures();
+    const PatchScores& real = measures.texture;
     const auto attempt = [&] {
         set_level(amplitude, real.mean, map);
         const auto patches = sim.scores(amplitude, map);
-        const double m = misfit(real, median_scores(patches), map.floor);
-        if (m < best.misfit) best = {looks, map.map, map.exponent, map.dynamic_range_db, m};
+        const auto bands = band_contrasts(sim, patches, map);
+        const bool log = map.map == GreyMap::log;
+        const bool floor_known = log || measures.black_seen;
+        const double floor = floor_known ? map.floor : best_floor(bands, measures.black);
+        const ContrastMisfit contrast = contrast_misfit(bands, log, floor);
+        // What a floor is fitted to, counts; else bands of living tissue differ by themselves.
+        const double m = misfit(real, sim.middle_scores(patches),
+                                floor_known ? contrast.mean_squared : contrast.squares);
+        if (m < best.misfit) best = {looks, map.map, map.exponent, map.dynamic_range_db, floor, m};
     };
     // Log compression gives dark dots on grey (skew below 0), which no power map does.
     if (real.local_skew < 0.1) {
         map.map = GreyMap::log;
+        // No contrast tells where a logarithm is cut off.
+        if (!measures.black_seen) map.floor = std::min(map.floor, sim.base_floor());
         for (map.dynamic_range_db = 40; map.dynamic_range_db <= 110; map.dynamic_range_db += 5)
             attempt();
         return best;
@@ -212,44 +172,40 @@ void fit_lateral(const std::vector<LookBand>& bands,
     }
 }
 
-void fit_widths(const Simulation& sim, Machine& machine) {
+void fit_widths(const LookSimulation& sim, Machine& machine) {
     const double scale = machine.beam.frequency_mhz > 0
                              ? machine.beam.reference_mhz / machine.beam.frequency_mhz
                              : 1;
-    const auto& bands = sim.measures.bands;
+    const LookMeasures& measures = sim.measures();
+    const auto& bands = measures.bands;
     std::vector<double> widths;
     for (const LookBand& band : bands)
-        widths.push_back(lateral_width_mm(machine, sim.window.grid, band.depth_mm));
+        widths.push_back(lateral_width_mm(machine, sim.grid(), band.depth_mm));
     constexpr int kRounds = 3;
     for (int round = 0; round < kRounds; ++round) {
-        const int looks[] = {machine.looks.count};
-        // Two draws: the chance of one would be taken for a difference of width.
-        std::vector<PatchScores> patches;
-        for (const std::uint64_t draw : {0, 1}) {
-            const auto amplitude = sim.amplitudes(machine, looks, draw);
-            MachineGrey map = machine.grey;
-            set_level(amplitude[0], sim.measures.texture.mean, map);
-            const auto own = sim.scores(amplitude[0], map);
-            patches.insert(patches.end(), own.begin(), own.end());
-        }
-        const PatchScores all = median_scores(patches);
-        machine.beam.axial_mm =
-            std::clamp(corrected(machine.beam.axial_mm, sim.measures.texture.grain_along_mm,
-                                 all.grain_along_mm),
-                       0.02, 10.0);
-        for (std::size_t i = 0; i < bands.size(); ++i) {
-            std::vector<PatchScores> near;
-            const double reach = kPatch * sim.window.grid.sample_mm * 0.7;
-            for (const PatchScores& p : patches) {
-                if (std::abs(p.depth_mm - bands[i].depth_mm) < reach) near.push_back(p);
+        // Several draws: the chance of one would be taken for a difference of width.
+        constexpr std::size_t kDraws = 4;
+        std::array<std::vector<PatchScores>, kDraws> drawn;
+        parallel_for(kDraws, 1, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t draw = begin; draw < end; ++draw) {
+                const auto amplitude = sim.amplitude(machine, machine.looks.count, draw);
+                MachineGrey map = machine.grey;
+                set_level(amplitude, measures.texture.mean, map);
+                drawn[draw] = sim.scores(amplitude, map);
             }
-            if (near.empty()) continue;
-            widths[i] =
-                corrected(widths[i], bands[i].grain_across_mm, median_scores(near).grain_across_mm);
-        }
+        });
+        std::vector<PatchScores> patches;
+        for (const auto& own : drawn) patches.insert(patches.end(), own.begin(), own.end());
+        machine.beam.axial_mm =
+            std::clamp(corrected(machine.beam.axial_mm, measures.texture.grain_along_mm,
+                                 sim.middle_scores(patches).grain_along_mm),
+                       0.02, 10.0);
+        for (std::size_t i = 0; i < bands.size(); ++i)
+            widths[i] = corrected(widths[i], bands[i].grain_across_mm,
+                                  sim.scores_at(patches, bands[i]).grain_across_mm);
         std::vector<double> at_reference;
         for (const double w : widths) at_reference.push_back(w / scale);
-        if (!bands.empty()) fit_lateral(bands, at_reference, sim.window.grid, machine.beam);
+        if (!bands.empty()) fit_lateral(bands, at_reference, sim.grid(), machine.beam);
         machine.beam.lateral_mm = std::clamp(machine.beam.lateral_mm, 0.02, 20.0);
     }
 }
@@ -279,9 +235,7 @@ void fit_texture(const LookMeasures& measures,
                  const FitOptions& options,
                  FittedMachine& fit) {
     Machine& machine = fit.machine;
-    const Window window = window_of(measures, place);
-    const Simulation sim{measures, place, options, window,
-                         PixelPassage(place, window, width_px, height_px)};
+    const LookSimulation sim(measures, place, width_px, height_px, options);
     if (machine.beam.axial_mm == 0) machine.beam.axial_mm = 0.6;
     if (machine.beam.lateral_mm == 0) machine.beam.lateral_mm = 1.5;
     constexpr int kRounds = 2;  // widths and grey map change each other's scores a little
@@ -302,6 +256,7 @@ void fit_texture(const LookMeasures& measures,
         machine.grey.map = best->map;
         machine.grey.exponent = best->exponent;
         machine.grey.dynamic_range_db = best->dynamic_range_db;
+        machine.grey.floor = best->floor;
         set_level(amplitudes[static_cast<std::size_t>(best - fit.choices.begin())],
                   measures.texture.mean, machine.grey);
     }

@@ -14,7 +14,7 @@
 
 namespace sonocase::pipeline {
 
-inline constexpr int kLookVersion = 1;  // raised when the same frames give another machine
+inline constexpr int kLookVersion = 2;  // raised when the same frames give another machine
 
 struct LookInput {
     std::vector<std::string> frames;  // files and folders

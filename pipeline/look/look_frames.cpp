@@ -33,6 +33,31 @@ std::vector<std::uint8_t> widened(const std::vector<std::uint8_t>& mask,
     return out;
 }
 
+// Clears groups of touching pixels of fewer than `least`.
+void drop_small_groups(const FramePile& pile, int least, std::vector<std::uint8_t>& mask) {
+    std::vector<std::uint8_t> open = mask;
+    std::vector<std::size_t> group;
+    for (std::size_t start = 0; start < open.size(); ++start) {
+        if (!open[start]) continue;
+        open[start] = 0;
+        group.assign(1, start);
+        for (std::size_t next = 0; next < group.size(); ++next) {
+            const int x0 = static_cast<int>(group[next] % static_cast<std::size_t>(pile.width_px)),
+                      y0 = static_cast<int>(group[next] / static_cast<std::size_t>(pile.width_px));
+            for (int y = std::max(y0 - 1, 0); y <= std::min(y0 + 1, pile.height_px - 1); ++y) {
+                for (int x = std::max(x0 - 1, 0); x <= std::min(x0 + 1, pile.width_px - 1); ++x) {
+                    const std::size_t i = pile.index(x, y);
+                    if (!open[i]) continue;
+                    open[i] = 0;
+                    group.push_back(i);
+                }
+            }
+        }
+        if (static_cast<int>(group.size()) >= least) continue;
+        for (const std::size_t i : group) mask[i] = 0;
+    }
+}
+
 }  // namespace
 
 Result<std::vector<std::string>> list_frames(const std::vector<std::string>& inputs) {
@@ -118,6 +143,9 @@ std::vector<std::uint8_t> burnt_in(const FramePile& pile) {
         still[i] = pile.highest[i] - pile.lowest[i] <= kStill;
         stills += still[i];
     }
+    // In few frames some pixels of a speckle stay as they are by chance: dots, not strokes.
+    constexpr int kFewFrames = 8, kStroke = 6;
+    if (pile.frames < kFewFrames) drop_small_groups(pile, kStroke, still);
     // A clip whose picture does not move says nothing about what is burnt in.
     if (pile.frames >= 3 && stills * 2 < bright) {
         for (std::size_t i = 0; i < mask.size(); ++i) mask[i] |= still[i];

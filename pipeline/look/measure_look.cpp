@@ -3,6 +3,7 @@
 #include "pipeline/look/measure_look.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "formats/image_scores/smooth.h"
@@ -41,7 +42,41 @@ std::vector<double> median_profile(const std::vector<std::vector<float>>& profil
     return out;
 }
 
+// Grey that only a 500th of the samples lie below, away from the borders of the scan and its face.
+double darkest_grey(const BeamImage& image, const std::vector<std::uint8_t>& use) {
+    std::array<int, 256> count{};
+    int total = 0;
+    for (int k = static_cast<int>(kFirstShare * image.samples); k < image.samples - 4; ++k) {
+        for (int l = image.lines / 16; l < image.lines - image.lines / 16; ++l) {
+            if (!use[image.index(k, l)]) continue;
+            ++count[static_cast<std::size_t>(std::lround(image.at(k, l)))];
+            ++total;
+        }
+    }
+    int below = 0, grey = 0;
+    while (grey < 255 && below + count[static_cast<std::size_t>(grey)] < total / 500)
+        below += count[static_cast<std::size_t>(grey++)];
+    return grey;
+}
+
 }  // namespace
+
+std::vector<LookBand> look_bands(const std::vector<PatchScores>& patches, const BeamImage& grid) {
+    const double width = kStride * grid.sample_mm;
+    std::map<int, std::vector<PatchScores>> rows;
+    for (const PatchScores& patch : patches)
+        rows[static_cast<int>(patch.depth_mm / width)].push_back(patch);
+    std::vector<LookBand> bands;
+    for (const auto& [number, row] : rows) {
+        if (row.size() < 3) continue;
+        const PatchScores s = median_scores(row);
+        std::vector<double> means;
+        for (const PatchScores& p : row) means.push_back(p.mean);
+        bands.push_back({s.depth_mm, static_cast<int>(row.size()), s.mean, s.local_sd,
+                         quantile_of(means, 0.6), s.grain_along_mm, s.grain_across_mm});
+    }
+    return bands;
+}
 
 bool is_even(const PatchScores& p, double black) {
     const double level = p.mean - black;
@@ -55,9 +90,16 @@ LookGauge::LookGauge(BeamImage grid,
                      std::vector<std::uint8_t> parenchyma,
                      std::map<std::string, std::vector<std::uint8_t>> tissues)
     : grid_(std::move(grid)),
+      anywhere_(parenchyma.empty()),
       use_(std::move(use)),
-      parenchyma_(std::move(parenchyma)),
-      tissues_(std::move(tissues)) {}
+      parenchyma_(anywhere_ ? use_ : std::move(parenchyma)),
+      tissues_(std::move(tissues)) {
+    if (!anywhere_) return;
+    for (const auto& [tissue, mask] : tissues_) {
+        for (std::size_t i = 0; i < mask.size(); ++i)
+            if (mask[i]) parenchyma_[i] = 0;
+    }
+}
 
 LookGauge::Part LookGauge::measure(const BeamImage& image) const {
     Part part;
@@ -78,27 +120,33 @@ LookGauge::Part LookGauge::measure(const BeamImage& image) const {
             if (!used) continue;
             const Moments m = moments_of(square);
             means.push_back(m.mean);
-            if (m.sd < 1.6 && m.mean < 60) part.dark.push_back(m.mean);
+            if (m.sd >= 1.6 || m.mean >= 60) continue;
+            part.dark.push_back(m.mean);
+            part.dark_sd.push_back(m.sd);
         }
     }
     part.lowest = means.empty() ? 0 : quantile_of(means, 0.01);
+    part.darkest = darkest_grey(image, use_);
 
-    const std::vector<std::uint8_t>& where = parenchyma_.empty() ? use_ : parenchyma_;
-    const bool anywhere = parenchyma_.empty();
-    const int first = anywhere ? static_cast<int>(kFirstShare * image.samples) : 0,
-              end = anywhere ? static_cast<int>(kLastShare * image.samples) : image.samples,
-              margin = anywhere ? image.lines / 16 : 0;
-    for (const PatchPlace place : patch_places(image, first, std::max(end, first + kPatch), margin,
-                                               image.lines - margin, kStride, where)) {
+    const int first = anywhere_ ? static_cast<int>(kFirstShare * image.samples) : 0,
+              end = anywhere_ ? static_cast<int>(kLastShare * image.samples) : image.samples,
+              margin = anywhere_ ? image.lines / 16 : 0;
+    const double black = part.dark.empty() ? part.darkest : part.lowest;
+    for (const PatchPlace place : patch_places(image, first, image.samples, margin,
+                                               image.lines - margin, kStride, parenchyma_)) {
         double mean = 0;
         for (int k = 0; k < kPatch; k += 4) {
             for (int l = 0; l < kPatch; l += 4)
                 mean += static_cast<double>(image.at(place.sample + k, place.line + l)) / 144;
         }
-        if (mean < part.lowest + 5) continue;
+        if (mean < black + 5) continue;
         const PatchScores patch = score_patch(image, place);
+        if (place.sample + kPatch > std::max(end, first + kPatch)) {
+            part.deep.push_back(patch);
+            continue;
+        }
         part.patches.push_back(patch);
-        if (!is_even(patch, part.lowest)) continue;
+        if (!is_even(patch, black)) continue;
         const StreakScore streaks = score_streaks(image, place.sample, place.sample + kPatch,
                                                   place.line, place.line + kPatch);
         part.streaks.count += streaks.count;
@@ -142,23 +190,28 @@ void LookGauge::add(Part part) {
 }
 
 double LookGauge::black(bool& seen) const {
-    std::vector<double> dark, lowest;
+    std::vector<double> dark, lowest, darkest, sd;
     for (const Part& part : parts_) {
         dark.insert(dark.end(), part.dark.begin(), part.dark.end());
         lowest.push_back(part.lowest);
+        darkest.push_back(part.darkest);
     }
-    const double darkest = median_of(lowest);
     // The lowest quarter of the smooth squares, if they reach the bottom of the picture's greys.
+    // Parenchyma that fades with depth is nearly smooth at last, but never quite.
     const double black = quantile_of(dark, 0.25);
-    seen = dark.size() >= 8 && black < darkest + 4;
-    return seen ? black : darkest;
+    for (const Part& part : parts_) {
+        for (std::size_t i = 0; i < part.dark.size(); ++i)
+            if (part.dark[i] <= black) sd.push_back(part.dark_sd[i]);
+    }
+    seen = dark.size() >= 8 && black < median_of(lowest) + 4 && median_of(sd) < 1.2;
+    return seen ? black : median_of(darkest);
 }
 
 LookMeasures LookGauge::result() const {
     LookMeasures m;
     m.frames = static_cast<int>(parts_.size());
     m.black = black(m.black_seen);
-    std::vector<PatchScores> even;
+    std::vector<PatchScores> even, deep;
     StreakScore streaks;
     std::vector<double> first, layers, thickness, peak, across[5];
     std::vector<std::vector<float>> near, by_line;
@@ -169,6 +222,9 @@ LookMeasures LookGauge::result() const {
         const Part& part = parts_[i];
         for (const PatchScores& patch : part.patches) {
             if (is_even(patch, m.black)) even.push_back(patch);
+        }
+        for (const PatchScores& patch : part.deep) {
+            if (is_even(patch, m.black)) deep.push_back(patch);
         }
         streaks.count += part.streaks.count;
         streaks.area_cm2 += part.streaks.area_cm2;
@@ -208,17 +264,14 @@ LookMeasures LookGauge::result() const {
     }
     for (const auto& [tissue, grey] : tissues) m.tissue_grey[tissue] = median_of(grey);
 
-    const double width = grid_.fan ? 12 : 3;  // of a band, mm
-    std::map<int, std::vector<PatchScores>> bands;
-    for (const PatchScores& patch : even)
-        bands[static_cast<int>(patch.depth_mm / width)].push_back(patch);
-    for (const auto& [number, patches] : bands) {
-        if (patches.size() < 3) continue;
-        const PatchScores s = median_scores(patches);
-        std::vector<double> means;
-        for (const PatchScores& p : patches) means.push_back(p.mean);
-        m.bands.push_back({s.depth_mm, static_cast<int>(patches.size()), quantile_of(means, 0.6),
-                           s.grain_along_mm, s.grain_across_mm});
+    for (const auto& [tissue, mask] : tissues_) {
+        double depth = 0, n = 0;
+        for (std::size_t i = 0; i < mask.size(); ++i) {
+            if (!mask[i]) continue;
+            depth += grid_.depth_mm(static_cast<int>(i / static_cast<std::size_t>(grid_.lines)));
+            ++n;
+        }
+        if (n > 0) m.tissue_depth_mm[tissue] = depth / n;
     }
     if (!even.empty()) {
         const auto [low, high] = std::minmax_element(
@@ -227,6 +280,9 @@ LookMeasures LookGauge::result() const {
         m.lowest_mm = low->depth_mm;
         m.highest_mm = high->depth_mm;
     }
+    m.bands = look_bands(even, grid_);
+    even.insert(even.end(), deep.begin(), deep.end());
+    m.all_bands = look_bands(even, grid_);
     return m;
 }
 

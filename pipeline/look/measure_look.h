@@ -24,18 +24,28 @@ struct LookRectangle {
 struct LookBand {
     double depth_mm = 0;
     int patches = 0;
-    double mean = 0;  // grey
+    double mean = 0, local_sd = 0;  // grey
+    double upper_mean = 0;          // sixth tenth of the means: vessels pull the median down
     double grain_along_mm = 0, grain_across_mm = 0;
 };
+
+// Bands as wide as patches are apart, those of fewer than three patches left out.
+std::vector<LookBand> look_bands(const std::vector<PatchScores>& patches, const BeamImage& grid);
+// At depth what is left of a band says little if hardly any of it is even: an eighth of the `most`
+// patches of the bands above must be.
+inline bool counts_at_depth(const LookBand& band, int most) {
+    return band.patches * 8 >= most;
+}
 
 struct LookMeasures {
     int frames = 0;
     int patches = 0;          // even ones: without vessels, walls or shadows
     double black = 0;         // the machine's own black, grey
-    bool black_seen = false;  // false: nothing black was seen; the darkest hundredth stands in
-    PatchScores texture;      // medians over the even patches
+    bool black_seen = false;  // false: nothing black was seen, and `black` is the darkest grey
+    PatchScores texture;      // medians over the even patches of the middle depths
     double lowest_mm = 0, highest_mm = 0;  // depths that they span
-    std::vector<LookBand> bands;           // shallow to deep
+    std::vector<LookBand> bands;           // of these depths, shallow to deep
+    std::vector<LookBand> all_bands;       // and of those below, where other tissue may lie
     double streaks_per_cm2 = 0;
     WallScores wall;           // fans only
     double first_4_mm = 0;     // mean grey
@@ -44,7 +54,7 @@ struct LookMeasures {
     bool moves = false;        // frames differ enough for near_still to mean anything
     std::vector<double> by_line;  // grey per line in the middle depths, median of frames
     std::optional<DiaphragmScore> diaphragm;
-    std::map<std::string, double> tissue_grey;  // of named rectangles, mean
+    std::map<std::string, double> tissue_grey, tissue_depth_mm;  // of named rectangles, mean
     std::vector<std::string> warnings;
 };
 
@@ -60,9 +70,10 @@ class LookGauge {
 
     // What one frame gives; frames may be measured at the same time.
     struct Part {
-        std::vector<PatchScores> patches;  // of all patches that are not black
-        std::vector<double> dark;          // means of smooth squares, grey
-        double lowest = 255;               // hundredth of the grey
+        std::vector<PatchScores> patches, deep;  // of patches that are not black; deep: below them
+        std::vector<double> dark, dark_sd;       // means and sd of smooth squares, grey
+        double lowest = 255;                     // hundredth of the means of squares
+        double darkest = 255;                    // 500th of the grey of samples
         StreakScore streaks;
         WallScores wall;
         double first_4_mm = 0;
@@ -78,7 +89,8 @@ class LookGauge {
   private:
     double black(bool& seen) const;
     BeamImage grid_;
-    std::vector<std::uint8_t> use_, parenchyma_;
+    bool anywhere_;                               // even patches are looked for everywhere
+    std::vector<std::uint8_t> use_, parenchyma_;  // the latter: where they are looked for
     std::map<std::string, std::vector<std::uint8_t>> tissues_;
     std::vector<Part> parts_;
 };
