@@ -53,7 +53,15 @@ std::vector<std::size_t> LabelDistance::find_strays(const LabelSet& labels,
                     }
                     if (member[row[first]] ? high <= 0 : low >= 0) continue;
                 }
-                for (int i = first; i < std::min(first + SparseBox::kRun, box.size.x); ++i) {
+                // Most runs that hold both sides have no voxel on the wrong one.
+                const int end = std::min(first + SparseBox::kRun, box.size.x);
+                unsigned wrong = 0;
+                for (int i = first; i < end; ++i) {
+                    const float value = values[i - first];
+                    wrong |= member[row[i]] ? value > 0 : value < 0;
+                }
+                if (wrong == 0) continue;
+                for (int i = first; i < end; ++i) {
                     const float value = values[i - first];
                     const float across = member[row[i]] ? value : -value;
                     if (across > 0 && across > limit_of({start.x + i, start.y, start.z}))

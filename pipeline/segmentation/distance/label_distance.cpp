@@ -252,7 +252,7 @@ void LabelDistance::distance_on(const LabelSet& labels,
     };
     shrink(smoothed, &raw);
     smooth_sparse(raw, levels_[0].kernels, &smooth, &other);
-    const bool cut = widened.count() < smoothed.count();
+    const bool cut = needed == nullptr && widened.count() < smoothed.count();
     if (cut) crop(smooth, widened, phi);
     smooth_sparse(cut ? *phi : smooth, wide_.kernels, &wide, &other, needed, margin.blended);
     shrink(blended, &wide);

@@ -3,6 +3,7 @@
 // The part of label_field.h that finds, for given volume offsets, which labels can be near a point.
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "pipeline/base/parallel.h"
 #include "pipeline/segmentation/field/label_field.h"
@@ -56,7 +57,9 @@ LabelField::CandidateSet LabelField::candidate_set(const Block& block,
 
 // Value of the spline through a block's values at the corners of its cells: a weighted mean of
 // three values along each axis.
-void LabelField::read_corners(const float* values, float* out) const {
+template <class Number>
+void LabelField::read_corners(const Number* values, float* out) const {
+    const float unit = std::is_same_v<Number, float> ? 1 : step_mm_;
     const auto mean = [](float a, float b, float c) { return (a + 4 * b + c) * (1.0f / 6); };
     const std::size_t corners = (std::size_t{1} << shift_) + 1;
     constexpr std::size_t kLargest = 19 * 19;  // row_ * (block_edge() + 3) of a block of 16
@@ -64,7 +67,7 @@ void LabelField::read_corners(const float* values, float* out) const {
     std::array<float, kLargest> planes;
     for (std::size_t k = 0; k < corners + 2; ++k) {
         for (std::size_t v = 0; v < corners * row_; ++v) {
-            const float* p = values + k * plane_ + v;
+            const Number* p = values + k * plane_ + v;
             rows[k * plane_ + v] = mean(p[0], p[row_], p[2 * row_]);
         }
     }
@@ -76,7 +79,7 @@ void LabelField::read_corners(const float* values, float* out) const {
         for (std::size_t j = 0; j < corners; ++j) {
             for (std::size_t i = 0; i < corners; ++i) {
                 const float* p = planes.data() + j * row_ + i;
-                *out++ = mean(p[0], p[1], p[2]);
+                *out++ = unit * mean(p[0], p[1], p[2]);
             }
         }
     }
@@ -119,7 +122,12 @@ void LabelField::find_candidates(Block* block, float reach_mm, std::vector<float
     const std::vector<std::uint16_t>& phis = block->candidate_sets[0].phis;
     phi_at_corners->resize(phis.size() * corner_count);
     for (std::size_t e = 0; e < phis.size(); ++e) {
-        read_corners(block->values + phis[e] * phi_, phi_at_corners->data() + e * corner_count);
+        float* out = phi_at_corners->data() + e * corner_count;
+        if (block->values != nullptr) {
+            read_corners(block->values + phis[e] * phi_, out);
+        } else {
+            read_corners(block->steps + phis[e] * phi_, out);
+        }
     }
     // From any point of a cell to its nearest corner.
     const float reach = reach_mm + 0.5f * static_cast<float>(norm(nodes_.spacing_mm));

@@ -3,6 +3,7 @@
 // Evaluation of a label field at a point: the inner loop of resampling.
 #include <algorithm>
 #include <cassert>
+#include <type_traits>
 
 #include "pipeline/segmentation/field/label_field.h"
 
@@ -16,6 +17,16 @@ Four load(const float* p) {
     Four v;
     __builtin_memcpy(&v, p, sizeof v);
     return v;
+}
+
+Four load(const std::int16_t* p) {
+    typedef std::int16_t EightShort __attribute__((vector_size(16)));
+    typedef std::int32_t FourInt __attribute__((vector_size(16)));
+    EightShort v;  // four of which are asked for: kBehind numbers follow the last of a layer
+    __builtin_memcpy(&v, p, sizeof v);
+    // Each number twice in four bytes, of which the upper one is kept with its sign.
+    const auto twice = __builtin_shufflevector(v, v, 0, 0, 1, 1, 2, 2, 3, 3);
+    return __builtin_convertvector((FourInt)twice >> 16, Four);
 }
 
 void store(Four v, float* p) {
@@ -74,40 +85,59 @@ LabelField::Position LabelField::locate(float x, float y, float z) const {
 
 void LabelField::scores(const Position& position, float* out) const {
     assert(position.candidates != nullptr);
-    const CandidateSet& set = *position.candidates;
-    const auto& [wx, wy, wz] = position.weights;
-    const float* values = position.block->values + position.offset;
-    std::array<float, 512> phis;  // at most an edge and an own distance per label
-    for (std::size_t e = 0; e < set.phis.size(); ++e) {
-        const float* phi = values + set.phis[e] * phi_;
-        Four total{};
-        for (std::size_t k = 0; k < 4; ++k) {
-            const float* p = phi + k * plane_;
-            const Four plane = wy[0] * load(p) + wy[1] * load(p + row_) +
-                               wy[2] * load(p + 2 * row_) + wy[3] * load(p + 3 * row_);
-            total += wz[k] * plane;
-        }
-        phis[e] = sum(total * load(wx.data()));
+    if (step_mm_ > 0) {
+        sum_scores(position, position.block->steps + position.offset, out);
+    } else {
+        sum_scores(position, position.block->values + position.offset, out);
     }
-    sum_terms(set, phis.data(), out);
 }
 
 std::array<float, 4> LabelField::difference(const Position& position,
                                             std::size_t a,
                                             std::size_t b) const {
+    return step_mm_ > 0
+               ? weigh_difference(position, position.block->steps + position.offset, a, b)
+               : weigh_difference(position, position.block->values + position.offset, a, b);
+}
+
+template <class Number>
+void LabelField::sum_scores(const Position& position, const Number* values, float* out) const {
+    const float unit = std::is_same_v<Number, float> ? 1 : step_mm_;
+    const CandidateSet& set = *position.candidates;
+    const auto& [wx, wy, wz] = position.weights;
+    std::array<float, 512> phis;  // at most an edge and an own distance per label
+    for (std::size_t e = 0; e < set.phis.size(); ++e) {
+        const Number* phi = values + set.phis[e] * phi_;
+        Four total{};
+        for (std::size_t k = 0; k < 4; ++k) {
+            const Number* p = phi + k * plane_;
+            const Four plane = wy[0] * load(p) + wy[1] * load(p + row_) +
+                               wy[2] * load(p + 2 * row_) + wy[3] * load(p + 3 * row_);
+            total += wz[k] * plane;
+        }
+        phis[e] = unit * sum(total * load(wx.data()));
+    }
+    sum_terms(set, phis.data(), out);
+}
+
+template <class Number>
+std::array<float, 4> LabelField::weigh_difference(const Position& position,
+                                                  const Number* values,
+                                                  std::size_t a,
+                                                  std::size_t b) const {
+    const float unit = std::is_same_v<Number, float> ? 1 : step_mm_;
     const CandidateSet& set = *position.candidates;
     const auto& [wx, wy, wz] = position.weights;
     const Four sx = slopes(position.t[0]), sy = slopes(position.t[1]), sz = slopes(position.t[2]);
     const Four w = load(wx.data());
-    const float* values = position.block->values + position.offset;
     const Four per_mm{per_mm_[0], per_mm_[1], per_mm_[2], 0};
     Four mean{};
     float weights = 0, count = 0;
     const auto add = [&](std::size_t term, float sign) {
-        const float* phi = values + set.phis[term] * phi_;
+        const Number* phi = values + set.phis[term] * phi_;
         Four value{}, along_y{}, along_z{};
         for (std::size_t k = 0; k < 4; ++k) {
-            const float* p = phi + k * plane_;
+            const Number* p = phi + k * plane_;
             const Four q = load(p), r = load(p + row_), s = load(p + 2 * row_),
                        t = load(p + 3 * row_);
             const Four plane = wy[0] * q + wy[1] * r + wy[2] * s + wy[3] * t;
@@ -115,7 +145,7 @@ std::array<float, 4> LabelField::difference(const Position& position,
             along_y += wz[k] * (sy[0] * q + sy[1] * r + sy[2] * s + sy[3] * t);
             along_z += sz[k] * plane;
         }
-        const Four one = sums(value * sx, along_y * w, along_z * w, value * w);
+        const Four one = unit * sums(value * sx, along_y * w, along_z * w, value * w);
         const float square = sum((one * per_mm) * (one * per_mm)) + 1e-6f;  // never zero
         const float weight = square * square;
         mean += (sign * weight) * one;

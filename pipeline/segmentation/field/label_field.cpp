@@ -19,7 +19,10 @@ constexpr int kReach = 3;
 
 constexpr std::size_t kManyNodes = 30'000'000;  // from which memory decides the size of blocks
 
-constexpr int kTile = 128;  // nodes along an edge of the tiles that large distances are cut into
+constexpr int kLayer = 128;  // nodes of a layer along k
+// Nodes along an edge of the tiles that large distances are cut into. They are measured on some 35
+// nodes more on each side, which small tiles repeat more of and large ones need room for.
+constexpr int kTile = 128, kLargeTile = 256;
 
 // First and last of the voxels within reach of a block.
 std::pair<Int3, Int3> voxels_near(Int3 first, int block, Int3 size, int factor) {
@@ -42,7 +45,10 @@ LabelField::LabelField(const LabelVolume& labels,
     report_progress(progress, 0, "distances");
     tree_ = nest_labels(source());
     volume_offsets_mm_.assign(label_count(), 0.0f);
-    room_ = options.held_mb * 1'000'000 / sizeof(float);
+    const bool many = nodes_.voxel_count() > options.most_float_nodes;
+    // Smoothing carries distances a little beyond their limit.
+    if (many) step_mm_ = 1.25f * static_cast<float>(distance_.limit_mm()) / 32767;
+    room_ = options.held_mb * 1'000'000 / (many ? sizeof(std::int16_t) : sizeof(float));
     assert(options.block == 4 || options.block == 8 || options.block == 16);
     shift_ = options.block == 4 ? 2 : options.block == 8 ? 3 : 4;
     if (shift_ == 3 && nodes_.voxel_count() > kManyNodes) shift_ = 4;
@@ -145,7 +151,7 @@ void LabelField::list_phis(Block* block) const {
 // Which distances are measured where, and what each layer of blocks holds of them.
 void LabelField::list_pieces() {
     blocks_per_layer_ =
-        factor() > 1 ? block_count_.z : std::min(kTile / block_edge(), block_count_.z);
+        factor() > 1 ? block_count_.z : std::min(kLayer / block_edge(), block_count_.z);
     layers_.resize(
         static_cast<std::size_t>((block_count_.z + blocks_per_layer_ - 1) / blocks_per_layer_));
     // Blocks that need each distance: first those of the edges, then the labels' own.
@@ -180,7 +186,7 @@ void LabelField::cut_into_pieces(const std::vector<std::vector<std::uint32_t>>& 
             pieces.push_back({d, box, blocks_of[d]});
             continue;
         }
-        const int edge = factor() > 1 ? kColumn : kTile;
+        const int edge = factor() > 1 ? kColumn : step_mm_ > 0 ? kLargeTile : kTile;
         std::map<std::array<int, 3>, Piece> tiles;
         for (const std::uint32_t b : blocks_of[d]) {
             const Int3 first = blocks_[b].first;
@@ -231,11 +237,35 @@ void LabelField::copy_phi(const SparseBox& phi, float beyond, Int3 first, float*
             const bool in = z >= 0 && z < box.size.z && y >= 0 && y < box.size.y;
             float* row =
                 to + static_cast<std::size_t>(k) * plane_ + static_cast<std::size_t>(j) * row_;
+            if (!in) {
+                std::fill_n(row, field_nodes, beyond);
+                continue;
+            }
+            const int start = first.x - 1 - box.first.x;
+            if (start >= 0 && start + field_nodes <= box.size.x) {  // not beyond any border
+                for (int i = 0; i < field_nodes;) {
+                    const int at = (start + i) % SparseBox::kRun;
+                    const int count = std::min(SparseBox::kRun - at, field_nodes - i);
+                    const auto run = phi.run_index((start + i) / SparseBox::kRun, y, z);
+                    std::copy_n(phi.values(phi.states()[run]) + at, count, row + i);
+                    i += count;
+                }
+                continue;
+            }
             for (int i = 0; i < field_nodes; ++i) {
                 const int x = std::clamp(first.x - 1 + i, 0, nodes_.size.x - 1) - box.first.x;
-                row[i] = in && x >= 0 && x < box.size.x ? phi.value(x, y, z) : beyond;
+                row[i] = x >= 0 && x < box.size.x ? phi.value(x, y, z) : beyond;
             }
         }
+    }
+}
+
+// The values of one block as 16-bit numbers.
+void LabelField::round_phi(const float* phi, std::int16_t* to) const {
+    const float per_step = 1 / step_mm_;
+    for (std::size_t n = 0; n < phi_; ++n) {
+        const float steps = std::clamp(phi[n] * per_step, -32767.0f, 32767.0f);
+        to[n] = static_cast<std::int16_t>(steps + (steps < 0 ? -0.5f : 0.5f));
     }
 }
 

@@ -43,6 +43,9 @@ struct LabelFieldOptions {
     // takes less memory there. Small blocks repeat much of their rims; large blocks hold distances
     // to labels that are far from most of their nodes.
     int block = 8;
+    // Fields of more nodes hold distances as 16-bit numbers, a third of a thousandth of a voxel
+    // apart: half the memory, in which larger tiles of them are measured at once.
+    std::size_t most_float_nodes = 30'000'000;
     // Distances held at a time, MB; two layers are held whatever they take. Affects time and memory
     // alone.
     std::size_t held_mb = kAll;
@@ -80,7 +83,10 @@ class LabelField {
         std::vector<std::uint8_t> labels;  // candidates; if only one, no distances are stored
         std::vector<std::uint8_t> edges;   // tree edges that separate candidates, by lower label
         std::vector<std::uint8_t> own;     // labels that have a phi of their own
-        const float* values = nullptr;     // one phi after another: edges, then own; null: not held
+        // One phi after another: edges, then own. One of the two where they are held, by the
+        // field's kind of numbers.
+        const float* values = nullptr;
+        const std::int16_t* steps = nullptr;       // in step_mm_
         std::vector<CandidateSet> candidate_sets;  // the first holds all candidates
         std::vector<std::uint8_t> set_of_cell;     // block^3; empty: the first set everywhere
     };
@@ -93,9 +99,7 @@ class LabelField {
     // Layers of blocks along k. Stacks of thick slices have one, since they are measured whole.
     int layer_count() const { return static_cast<int>(layers_.size()); }
     int layer_nodes() const { return blocks_per_layer_ << shift_; }
-    bool holds(int layer) const {
-        return layers_[static_cast<std::size_t>(layer)].values != nullptr;
-    }
+    bool holds(int layer) const { return layers_[static_cast<std::size_t>(layer)].held(); }
     bool holds_all() const;
     // Blocks [first, second) of a layer.
     std::pair<std::size_t, std::size_t> blocks_of_layer(int layer) const;
@@ -160,10 +164,14 @@ class LabelField {
     void cut_into_pieces(const std::vector<std::vector<std::uint32_t>>& blocks_of);
     VoxelBox nodes_of(const std::vector<std::uint32_t>& blocks, const VoxelBox& box) const;
     void copy_phi(const SparseBox& phi, float beyond, Int3 first, float* to) const;
+    void round_phi(const float* phi, std::int16_t* to) const;
     // label_layers.cpp: layers of blocks, of which some are held.
+    static constexpr std::size_t kBehind = 4;  // numbers, since 16-bit ones are read by eight
     struct Layer {
-        std::size_t size = 0;  // floats
+        std::size_t size = 0;  // numbers
         std::unique_ptr<float[]> values;
+        std::unique_ptr<std::int16_t[]> steps;
+        bool held() const { return values != nullptr || steps != nullptr; }
         bool has_candidates = false;
     };
     int layer_of(std::size_t block) const { return static_cast<int>(block / blocks_in_layer()); }
@@ -171,13 +179,22 @@ class LabelField {
         return static_cast<std::size_t>(block_count_.x) * static_cast<std::size_t>(block_count_.y) *
                static_cast<std::size_t>(blocks_per_layer_);
     }
-    std::size_t held_floats() const;
+    std::size_t held_numbers() const;
     void give_up(int layer);
     void measure(const std::vector<int>& layers);
     // label_candidates.cpp
     void find_layer_candidates(int layer);
     CandidateSet candidate_set(const Block& block, const std::vector<std::uint8_t>& labels) const;
-    void read_corners(const float* values, float* out) const;
+    template <class Number>
+    void read_corners(const Number* values, float* out) const;
+    // label_evaluation.cpp
+    template <class Number>
+    void sum_scores(const Position& position, const Number* values, float* out) const;
+    template <class Number>
+    std::array<float, 4> weigh_difference(const Position& position,
+                                          const Number* values,
+                                          std::size_t a,
+                                          std::size_t b) const;
     void rank_corners(const Block& block,
                       float reach,
                       const std::vector<float>& phi_at_corners,
@@ -207,7 +224,8 @@ class LabelField {
     std::vector<Piece> pieces_;
     int blocks_per_layer_ = 1;
     std::vector<Layer> layers_;
-    std::size_t room_ = 0;  // floats
+    std::size_t room_ = 0;  // numbers
+    float step_mm_ = 0;     // of 16-bit numbers; 0: the field holds floats
     float reach_mm_ = 0;    // of the candidates
     std::vector<float> volume_offsets_mm_;
     std::vector<std::uint8_t> node_label_, node_margin_;

@@ -16,22 +16,24 @@ std::pair<std::size_t, std::size_t> LabelField::blocks_of_layer(int layer) const
 
 bool LabelField::holds_all() const {
     return std::all_of(layers_.begin(), layers_.end(),
-                       [](const Layer& layer) { return layer.values != nullptr; });
+                       [](const Layer& layer) { return layer.held(); });
 }
 
-std::size_t LabelField::held_floats() const {
+std::size_t LabelField::held_numbers() const {
     std::size_t sum = 0;
-    for (const Layer& layer : layers_) sum += layer.values != nullptr ? layer.size : 0;
+    for (const Layer& layer : layers_) sum += layer.held() ? layer.size : 0;
     return sum;
 }
 
 void LabelField::give_up(int layer) {
     Layer& left = layers_[static_cast<std::size_t>(layer)];
     left.values.reset();
+    left.steps.reset();
     left.has_candidates = false;
     const auto [first, last] = blocks_of_layer(layer);
     for (std::size_t b = first; b < last; ++b) {
         blocks_[b].values = nullptr;
+        blocks_[b].steps = nullptr;
         blocks_[b].candidate_sets = {};
         blocks_[b].set_of_cell = {};
     }
@@ -39,7 +41,7 @@ void LabelField::give_up(int layer) {
 
 void LabelField::hold(int first, int last) {
     std::vector<int> wanted;
-    std::size_t held = held_floats();
+    std::size_t held = held_numbers();
     for (int l = first; l <= last; ++l) {
         if (holds(l)) continue;
         wanted.push_back(l);
@@ -87,15 +89,21 @@ void LabelField::measure(const std::vector<int>& layers) {
         Layer& layer = layers_[static_cast<std::size_t>(l)];
         wanted[static_cast<std::size_t>(l)] = 1;
         // Not cleared: every value is written below.
-        layer.values =
-            std::make_unique_for_overwrite<float[]>(std::max<std::size_t>(1, layer.size));
-        const float* values = layer.values.get();
+        const std::size_t room = std::max<std::size_t>(1, layer.size);
+        if (step_mm_ > 0) {
+            layer.steps = std::make_unique_for_overwrite<std::int16_t[]>(room + kBehind);
+            std::fill_n(layer.steps.get() + room, kBehind, std::int16_t{0});
+        } else {
+            layer.values = std::make_unique_for_overwrite<float[]>(room);
+        }
+        std::size_t at = 0;
         const auto [first, last] = blocks_of_layer(l);
         for (std::size_t b = first; b < last; ++b) {
             Block& block = blocks_[b];
             if (block.labels.size() < 2) continue;
-            block.values = values;
-            values += (block.edges.size() + block.own.size()) * phi_;
+            block.values = step_mm_ > 0 ? nullptr : layer.values.get() + at;
+            block.steps = step_mm_ > 0 ? layer.steps.get() + at : nullptr;
+            at += (block.edges.size() + block.own.size()) * phi_;
         }
     }
     const auto in_layers = [&](std::uint32_t b) {
@@ -113,6 +121,7 @@ void LabelField::measure(const std::vector<int>& layers) {
     parallel_for(pieces.size(), 1, [&](std::size_t, std::size_t) {
         SparseBox phi;
         LabelDistance::Scratch scratch;
+        std::vector<float> copied(step_mm_ > 0 ? phi_ : 0);
         NodeBlocks needed;
         needed.edge = block_edge();
         for (std::size_t p = next++; p < pieces.size(); p = next++) {
@@ -136,8 +145,14 @@ void LabelField::measure(const std::vector<int>& layers) {
                                            std::find(held.begin(), held.end(), l) - held.begin()) +
                                        (own ? block.edges.size() : 0);
                 Layer& layer = layers_[static_cast<std::size_t>(layer_of(b))];
-                copy_phi(phi, beyond, block.first,
-                         layer.values.get() + (block.values - layer.values.get()) + at * phi_);
+                if (step_mm_ > 0) {
+                    copy_phi(phi, beyond, block.first, copied.data());
+                    round_phi(copied.data(),
+                              layer.steps.get() + (block.steps - layer.steps.get()) + at * phi_);
+                } else {
+                    copy_phi(phi, beyond, block.first,
+                             layer.values.get() + (block.values - layer.values.get()) + at * phi_);
+                }
             }
         }
     });

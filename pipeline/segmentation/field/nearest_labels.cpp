@@ -2,6 +2,7 @@
 
 #include "pipeline/segmentation/field/nearest_labels.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/base/parallel.h"
@@ -68,34 +69,50 @@ LabelVolume nearest_labels(const LabelVolume& ct_labels,
 }
 
 std::vector<double> mapped_volumes_ml(const LabelVolume& ct_labels,
-                                      const Registration& registration) {
+                                      const Registration& registration,
+                                      std::size_t many) {
     const Grid& g = ct_labels.grid;
     const std::size_t labels = ct_labels.labels.size();
-    std::vector<std::vector<double>> slices(static_cast<std::size_t>(g.size.z));
-    parallel_for(slices.size(), 1, [&](std::size_t begin, std::size_t end) {
-        constexpr int kRun = 4;  // det J is smooth: one value serves a run of voxels
-        for (std::size_t k = begin; k < end; ++k) {
-            std::vector<double>& sum = slices[k];
-            sum.assign(labels, 0.0);
-            for (int j = 0; j < g.size.y; ++j) {
-                const std::uint8_t* row =
-                    ct_labels.voxels.data() + g.index(0, j, static_cast<int>(k));
-                for (int i = 0; i < g.size.x; i += kRun) {
-                    const int stop = std::min(g.size.x, i + kRun);
-                    bool body = false;
-                    for (int r = i; r < stop; ++r) body = body || row[r] != 0;
-                    if (!body) continue;
-                    const Point3 at = g.point_from_voxel(
-                        {0.5 * (i + stop - 1), static_cast<double>(j), static_cast<double>(k)});
-                    const double det = determinant(jacobian(registration, at));
-                    for (int r = i; r < stop; ++r) sum[row[r]] += det;
-                }
+    Int3 box{4, 1, 1};
+    if (g.voxel_count() > many) {
+        const double wanted_mm[3] = {12, 3, 3};
+        for (int a = 0; a < 3; ++a)
+            box[a] = std::max(box[a], static_cast<int>(wanted_mm[a] / g.spacing_mm[a]));
+    }
+    std::vector<std::vector<double>> slabs(static_cast<std::size_t>((g.size.z - 1) / box.z + 1));
+    const auto add_box = [&](Int3 first, std::vector<double>* sum) {
+        Int3 stop;
+        for (int a = 0; a < 3; ++a) stop[a] = std::min(g.size[a], first[a] + box[a]);
+        const auto for_rows = [&](const auto& visit) {
+            for (int k = first.z; k < stop.z; ++k) {
+                for (int j = first.y; j < stop.y; ++j)
+                    visit(ct_labels.voxels.data() + g.index(0, j, k));
+            }
+        };
+        bool body = false;
+        for_rows([&](const std::uint8_t* row) {
+            for (int i = first.x; i < stop.x; ++i) body = body || row[i] != 0;
+        });
+        if (!body) return;
+        const Point3 middle{0.5 * (first.x + stop.x - 1), 0.5 * (first.y + stop.y - 1),
+                            0.5 * (first.z + stop.z - 1)};
+        const double det = determinant(jacobian(registration, g.point_from_voxel(middle)));
+        for_rows([&](const std::uint8_t* row) {
+            for (int i = first.x; i < stop.x; ++i) (*sum)[row[i]] += det;
+        });
+    };
+    parallel_for(slabs.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t s = begin; s < end; ++s) {
+            slabs[s].assign(labels, 0.0);
+            for (int j = 0; j < g.size.y; j += box.y) {
+                for (int i = 0; i < g.size.x; i += box.x)
+                    add_box({i, j, static_cast<int>(s) * box.z}, &slabs[s]);
             }
         }
     });
     std::vector<double> out(labels, 0.0);
-    for (const auto& slice : slices) {
-        for (std::size_t l = 0; l < labels; ++l) out[l] += slice[l] * g.voxel_volume_mm3() / 1000;
+    for (const auto& slab : slabs) {
+        for (std::size_t l = 0; l < labels; ++l) out[l] += slab[l] * g.voxel_volume_mm3() / 1000;
     }
     return out;
 }

@@ -34,16 +34,19 @@ struct SurfaceCell {
 // The cells of a block of the field.
 struct BlockCells {
     double weight_mm3 = 0;                                  // volume of one cell
+    double each = 1;                                        // cells that each one read stands for
     std::vector<SurfaceCell> near_surface;                  // cells that offsets can reassign
     std::vector<std::pair<std::uint8_t, double>> interior;  // label, mm^3 of its other cells
 };
 
 // # field.blocks(). limit_mm: largest offset that will be tried. The field's offsets are zero and
 // its candidates found for surface_reach_mm(). Same result for any number of threads.
-// Holds the field's layers one after another.
+// Holds the field's layers one after another. some: reads one node in four, which counts for four,
+// in blocks that are not near a label of fewer than 50,000 voxels.
 std::vector<BlockCells> cut_into_cells(LabelField* field,
                                        const CellLayout& layout,
                                        float limit_mm,
+                                       bool some,
                                        const std::function<double(Point3)>& weight);
 
 // Offsets separate two labels by up to twice the limit, and a cell is shared along a surface that

@@ -114,7 +114,7 @@ Volumes integrate(const LabelField& field,
             const std::size_t last = cells.size() * (piece + 1) / kPieces;
             for (std::size_t b = first; b < last; ++b) {
                 for (const SurfaceCell& cell : cells[b].near_surface)
-                    add_cell(field, cell, cells[b].weight_mm3, cell_mm, &sum);
+                    add_cell(field, cell, cells[b].each * cells[b].weight_mm3, cell_mm, &sum);
             }
         }
     });
@@ -181,7 +181,8 @@ VolumeCorrectionReport correct_up_to(double limit_vx,
     std::vector<float>& offset = field->volume_offsets_mm();
     std::fill(offset.begin(), offset.end(), 0.0f);
     field->find_candidates(surface_reach_mm(layout, limit));
-    const std::vector<BlockCells> cells = cut_into_cells(field, layout, limit, weight);
+    const std::vector<BlockCells> cells = cut_into_cells(
+        field, layout, limit, field->nodes().voxel_count() > options.most_read_nodes, weight);
 
     VolumeCorrectionReport report;
     report.target_mm3 = target_volumes(*field, cells, layout.volume_mm3);

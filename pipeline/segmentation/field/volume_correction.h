@@ -21,6 +21,9 @@ struct VolumeCorrectionOptions {
     int iterations = 8;          // Newton steps; 0: all offsets stay 0
     double cell_mm = 1.5;        // size of the integration cells, at most a voxel of the map
     double max_offset_vx = 1.5;  // limit of an offset, in-plane voxels of the map
+    // In fields of more nodes one node in four is read, and counts for four, in blocks that are not
+    // near a label of fewer than 50,000 voxels.
+    std::size_t most_read_nodes = 30'000'000;
 };
 
 struct VolumeCorrectionReport {

@@ -47,9 +47,13 @@ struct Sampled {
 };
 
 // Into a grid turned by `turn_rad` about x, such that its rows of bricks cross the layers.
-Sampled sample(const LabelVolume& ct, std::size_t held_mb, double turn_rad) {
+Sampled sample(const LabelVolume& ct,
+               std::size_t held_mb,
+               double turn_rad,
+               std::size_t most_float_nodes = LabelFieldOptions{}.most_float_nodes) {
     LabelFieldOptions options;
     options.held_mb = held_mb;
+    options.most_float_nodes = most_float_nodes;
     LabelField field(ct, options);
     EXPECT_EQ(field.layer_count(), 3);
     EXPECT_EQ(field.holds_all(), held_mb > 0);
@@ -97,6 +101,25 @@ TEST(LabelLayers, GiveTheSameBytesAsAllDistancesAtOnce) {
         EXPECT_EQ(streamed.field.lost, whole.field.lost);
         EXPECT_GT(whole.field.boundary.pool.size(), 10000u);
     }
+}
+
+// 16-bit numbers: whatever the layers, and next to what floats give.
+TEST(LabelLayers, HalvedNumbersGiveTheSameSurfaces) {
+    const LabelVolume ct = long_body();
+    const Sampled floats = sample(ct, LabelFieldOptions::kAll, 0.3);
+    const Sampled whole = sample(ct, LabelFieldOptions::kAll, 0.3, 0);
+    const Sampled streamed = sample(ct, 0, 0.3, 0);
+    EXPECT_EQ(streamed.offsets, whole.offsets);
+    EXPECT_EQ(streamed.field.volume.voxels, whole.field.volume.voxels);
+    EXPECT_EQ(streamed.field.boundary.pool, whole.field.boundary.pool);
+    for (std::size_t l = 0; l < floats.offsets.size(); ++l)
+        EXPECT_NEAR(whole.offsets[l], floats.offsets[l], 1e-3) << l;
+    std::size_t voxels = 0;
+    for (std::size_t v = 0; v < floats.field.volume.voxels.size(); ++v)
+        voxels += floats.field.volume.voxels[v] != whole.field.volume.voxels[v];
+    EXPECT_LE(voxels, 5u);  // of 192,000
+    EXPECT_EQ(whole.field.boundary.table, floats.field.boundary.table);
+    EXPECT_EQ(whole.field.rescued, floats.field.rescued);
 }
 
 TEST(LabelLayers, GoWhereThereIsNoRoomAndComeBackTheSame) {

@@ -33,5 +33,27 @@ TEST(VolumeCorrection, KeepVolumesWhereTheWeightVaries) {
     }
 }
 
+// One node in four gives the offsets that all of them give, flat faces across the axes included,
+// and small labels keep all of theirs.
+TEST(VolumeCorrection, OneNodeInFourGivesTheSameOffsets) {
+    const LabelVolume ct = sample_labels(cubic_grid(96), 5, [](Point3 p) {
+        if (norm(p - Point3{-9, 4, 0}) < 25) return 2;
+        if (norm(p - Point3{35, 0, -6}) < 2) return 3;
+        if (p.z < -20) return 4;
+        return norm_of(p) < 45 ? 1 : 0;
+    });
+    LabelField all(ct, {}), some(ct, {});
+    VolumeCorrectionOptions options;
+    const auto weight = [](Point3 p) { return 1 + 0.2 * std::cos(0.05 * p.x); };
+    const VolumeCorrectionReport expected = correct_volumes(&all, weight, options);
+    options.most_read_nodes = 0;
+    const VolumeCorrectionReport report = correct_volumes(&some, weight, options);
+    for (std::size_t l = 0; l < 5; ++l) {
+        EXPECT_DOUBLE_EQ(report.target_mm3[l], expected.target_mm3[l]) << l;
+        EXPECT_NEAR(report.reached_mm3[l] / expected.reached_mm3[l], 1, 0.002) << l;
+        EXPECT_NEAR(some.volume_offsets_mm()[l], all.volume_offsets_mm()[l], 0.02) << l;
+    }
+}
+
 }  // namespace
 }  // namespace sonocase::pipeline
