@@ -18,7 +18,7 @@ namespace {
 // machine that others used as well; the term in the label map is that of the 88 million voxels of
 // docs/farm.md.
 constexpr double kFixed_s = 5.53, kTexture_s = 1.25, kVolume_s = 0.1003, kSurface_s = 0.5727,
-                 kLabels_s = 0.52, kLabelsWithin = 3;
+                 kLabels_s = 0.43, kLabelsWithin = 3;
 // What one thread does alone: the start, the import, textures, the fit's last steps, packing.
 constexpr double kSerial_s = 3.0, kSerialVolume_s = 0.012;
 // Of machine_speed() when those builds were measured.

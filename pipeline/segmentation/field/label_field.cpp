@@ -177,6 +177,10 @@ void LabelField::cut_into_pieces(const std::vector<std::vector<std::uint32_t>>& 
     constexpr int kColumn = 64;                 // nodes; columns are as long as the stack
     const std::size_t label_count = this->label_count();
     std::vector<Piece>& pieces = pieces_;
+    // Layers that come and go are no thicker than a tile.
+    std::size_t all = 0;
+    for (const Layer& layer : layers_) all += layer.size;
+    const bool large = step_mm_ > 0 && all <= room_;
     for (std::size_t d = 0; d < blocks_of.size(); ++d) {
         if (blocks_of[d].empty()) continue;
         const bool own = d >= label_count;
@@ -186,7 +190,7 @@ void LabelField::cut_into_pieces(const std::vector<std::vector<std::uint32_t>>& 
             pieces.push_back({d, box, blocks_of[d]});
             continue;
         }
-        const int edge = factor() > 1 ? kColumn : step_mm_ > 0 ? kLargeTile : kTile;
+        const int edge = factor() > 1 ? kColumn : large ? kLargeTile : kTile;
         std::map<std::array<int, 3>, Piece> tiles;
         for (const std::uint32_t b : blocks_of[d]) {
             const Int3 first = blocks_[b].first;
