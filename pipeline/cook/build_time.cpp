@@ -15,8 +15,8 @@ namespace sonocase::pipeline {
 namespace {
 
 // Relative least squares over demo-torso and real-torso at six voxel sizes, two threads, on a
-// machine that others used as well; the term in the label map is that of the 88 million voxels of
-// docs/farm.md.
+// machine that others used as well; the term in the label map is that of 88 and 210 million voxels
+// (docs/farm.md).
 constexpr double kFixed_s = 5.53, kTexture_s = 1.25, kVolume_s = 0.1003, kSurface_s = 0.5727,
                  kLabels_s = 0.43, kLabelsWithin = 3;
 // What one thread does alone: the start, the import, textures, the fit's last steps, packing.

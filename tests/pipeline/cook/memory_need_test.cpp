@@ -74,8 +74,6 @@ TEST(MemoryNeed, GrowsWithTheCookedVoxels) {
     EXPECT_GT(fine.mb, coarse.mb);
 }
 
-// Resampling of a large map measures distances again rather than hold them all; what it then needs
-// is what it is given, down to two layers of distances.
 // Round a label: the box that the analytic liver has in the map, and twice the margin. The cooked
 // region, turned and warped, is another tenth larger or smaller.
 TEST(MemoryNeed, CountsARegionRoundALabel) {
@@ -102,6 +100,8 @@ TEST(MemoryNeed, CountsARegionRoundALabel) {
     EXPECT_EQ(need_of(head + region + "\"no such\"").size.region_voxels, 0);
 }
 
+// Resampling of a large map measures distances again rather than hold them all; what it then needs
+// is what it is given, down to two layers of distances.
 TEST(MemoryNeed, OfALargeMapFollowsTheLimitDownToItsLeast) {
     const std::string map = "name = \"a\"\n[analytic]\nvoxel_mm = 0.7\nslice_mm = 0.7\n";
     const double all = need_of(map, 1e9).mb, least = need_of(map, 1).mb;
