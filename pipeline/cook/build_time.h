@@ -18,8 +18,8 @@ struct BuildTime {
 // table):
 //     processor_s = speed * (a + t (edge / 64)^3 + b (C + R) + c C^(2/3) + d (V - 3))
 // C, R, V millions of voxels, cooked, of the region and of the label map (V counts where it exceeds
-// 3); edge of the textures. A fit that needs the elastic warp takes some 3 s more, which is not
-// known beforehand.
+// 3, and less beyond 30); edge of the textures. A fit that needs the elastic warp takes some 3 s
+// more, which is not known beforehand.
 //
 // speed: machine_speed(); threads: 0 for all cores.
 BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int threads);

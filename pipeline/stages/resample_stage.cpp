@@ -192,7 +192,7 @@ StageDescriptor resample_stage() {
     stage.codec = label_codec();
     stage.reports = label_reports;
     stage.share = 0.4;
-    stage.cost = {2, 250, 0, 85, 3, 420, 12, 8, 86};
+    stage.cost = {2, 250, 0, 65, 3, 420, 12, 8, 86};
     stage.cost.per_region_voxel = 1.5;
     stage.verb = verb();
     return stage;
