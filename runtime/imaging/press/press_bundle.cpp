@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 #include "formats/volume/tissue_mechanics.h"
+#include "runtime/imaging/press/skin_plane.h"
 
 namespace sonocase::runtime::press {
 
@@ -15,8 +17,9 @@ constexpr double kTableVenousPressure_mmhg = 8;
 
 }  // namespace
 
-PressBundle::PressBundle(const CaseBundle& bundle, const PressBundleOptions& options)
-    : bundle_(&bundle), simd_(options.simd) {
+PressBundle::PressBundle(const CaseView& view, const PressBundleOptions& options)
+    : bundle_(view), simd_(options.simd) {
+    const CaseBundle& bundle = *view;
     assert(options.venous_pressure_mmhg > 0 && bundle.labels.size() <= kMaxPressTissues);
     const std::vector<int> tissue_of = tissue_of_label(bundle);
     for (std::size_t n = 0; n < bundle.labels.size(); ++n) {
@@ -73,9 +76,26 @@ void PressBundle::along(const void* context,
     look_along(self.simd_, self.bricks_, voxels, depth_mm, tissue);
 }
 
+void PressBundle::settle_skin(const void* context,
+                              std::span<const PressLine> lines,
+                              std::span<double> depth_mm) {
+    const PressBundle& self = *static_cast<const PressBundle*>(context);
+    constexpr double kWithinMm = 0.01;  // in the voxel that was found
+    constexpr double kStepMm = 0.5;
+    const double per_mm = 1 / self.bundle_->grid.spacing_mm.x;
+    for (std::size_t n = 0; n < lines.size(); ++n) {
+        if (std::isnan(depth_mm[n])) continue;
+        const Point3 in = lines[n].from + (depth_mm[n] + kWithinMm) * lines[n].direction;
+        const Point3 p = self.bundle_->grid.voxel_from_point(self.mannequin_from_probe_ * in);
+        const Vector3 step = (kStepMm * per_mm) * (self.mannequin_from_probe_ * lines[n].direction);
+        const double steps = steps_to_skin(self.bundle_, p, step);
+        if (steps != 0) depth_mm[n] += kWithinMm + steps * kStepMm;
+    }
+}
+
 PressScene PressBundle::scene(const Rigid& mannequin_from_probe) {
     mannequin_from_probe_ = mannequin_from_probe;
-    return {tissues_, {this, along}};
+    return {tissues_, {this, along, settle_skin}};
 }
 
 }  // namespace sonocase::runtime::press

@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/streamed_bundle.h"
 #include "runtime/imaging/press/brick_lines.h"
 #include "runtime/imaging/press/press_scene.h"
 
@@ -21,7 +21,7 @@ struct PressBundleOptions {
 class PressBundle {
   public:
     // The bundle must outlive this object. Allocates; done when a scene is opened.
-    explicit PressBundle(const CaseBundle& bundle, const PressBundleOptions& options = {});
+    explicit PressBundle(const CaseView& bundle, const PressBundleOptions& options = {});
 
     // The body under a probe at this pose; a finite rigid motion. The scene refers to this object
     // and is good until the next call. Beyond the volume its border goes on.
@@ -37,7 +37,11 @@ class PressBundle {
                       std::span<const float> depth_mm,
                       std::uint8_t* tissue);
 
-    const CaseBundle* bundle_;
+    static void settle_skin(const void* context,
+                            std::span<const PressLine> lines,
+                            std::span<double> depth_mm);
+
+    CaseView bundle_;
     std::vector<PressTissue> tissues_;
     SimdTarget simd_;
     std::vector<std::int32_t> uniform_;  // labels of uniform bricks, as words

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "press_samples.cpp"
@@ -134,6 +135,7 @@ void set_figures(std::span<const PressTissue> tissues, float scale, FigureTable&
 }
 
 using Lines = std::array<PressLine, kColumns>;
+using SkinDepths = std::array<double, kColumns>;
 
 struct Looker {
     const PressScene& scene;
@@ -143,6 +145,10 @@ struct Looker {
         for (PressLine& line : lines) line.from = line.from + shift;
         scene.lookup.along(scene.lookup.context, lines, depth, out);
     }
+    void settle_skin(Lines lines, SkinDepths& skin) const {
+        for (PressLine& line : lines) line.from = line.from + shift;
+        scene.lookup.settle_skin(scene.lookup.context, lines, skin);
+    }
     bool outside(std::uint8_t tissue) const { return scene.tissues[tissue].outside; }
 };
 
@@ -151,8 +157,6 @@ Lines lines_of(const ColumnBeams& beams) {
     for (std::size_t i = 0; i < kColumns; ++i) lines[i] = {beams[i].origin, beams[i].direction};
     return lines;
 }
-
-using SkinDepths = std::array<double, kColumns>;
 
 // Depth of the skin from the face, negative behind it: the first step that lies in the body, then
 // the first of its parts. kSearch_mm where there is none.
@@ -201,6 +205,13 @@ void find_skin(const Looker& look, const Lines& lines, SkinDepths& skin, bool& o
         }
         step = finer;
     }
+    if (look.scene.lookup.settle_skin == nullptr) return;
+    SkinDepths found = skin;
+    for (std::size_t i = 0; i < kColumns; ++i)
+        if (settled[i]) found[i] = std::numeric_limits<double>::quiet_NaN();
+    look.settle_skin(lines, found);
+    for (std::size_t i = 0; i < kColumns; ++i)
+        if (!settled[i]) skin[i] = found[i];
 }
 
 // Whether the body lies at the face anywhere: all that a frame costs while nothing is pressed.

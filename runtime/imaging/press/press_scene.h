@@ -37,6 +37,11 @@ struct TissueLookup {
                   std::span<const PressLine> lines,
                   std::span<const float> depth_mm,
                   std::uint8_t* tissue) = nullptr;
+    // Null: the skin is where the tissue changes. Otherwise moves depths at which it does to where
+    // the skin runs there, by two voxels at most; NaN: a line that has none.
+    void (*settle_skin)(const void* context,
+                        std::span<const PressLine> lines,
+                        std::span<double> depth_mm) = nullptr;
 };
 
 struct PressScene {

@@ -7,7 +7,7 @@
 
 namespace sonocase::runtime::press {
 
-ProbePress::ProbePress(const CaseBundle& bundle, const Exercise& exercise, SimdTarget simd)
+ProbePress::ProbePress(const CaseView& bundle, const Exercise& exercise, SimdTarget simd)
     : body_(bundle, {exercise.deformation.venous_pressure_mmhg, simd}),
       field_(press_face(exercise.probe)),
       simd_(simd) {

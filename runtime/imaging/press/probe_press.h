@@ -20,7 +20,7 @@ inline constexpr double kMostPress_mm = 40;  // by which a probe is pressed beyo
 class ProbePress {
   public:
     // The bundle must outlive this object. Allocates; the rest of the class does not.
-    ProbePress(const CaseBundle& bundle, const Exercise& exercise, SimdTarget simd);
+    ProbePress(const CaseView& bundle, const Exercise& exercise, SimdTarget simd);
 
     // Presses a face at the pose, press_mm deeper; a pose that stays is solved once. Returns the
     // pose at which bone holds it: that of the picture.

@@ -55,7 +55,7 @@ TruthRenderer::Impl::Impl(CaseView view,
     if (!(needle.slab_mm > 0)) needle.slab_mm = info.needle_slab_mm(exercise);
     truth.targets.resize(exercise.targets.size());
     if (!moves.deformation) return;
-    probe = std::make_unique<press::ProbePress>(*view, exercise, simd);
+    probe = std::make_unique<press::ProbePress>(bundle, exercise, simd);
     press_view = std::make_unique<press::PressView>(geometry, press::press_face(e.probe));
     closed_label = press::closed_labels(*view);
 }
@@ -72,6 +72,7 @@ void TruthRenderer::Impl::press(FrameInput& input, bool wants_entry) {
         pressed = probe->moving();
         if (pressed != nullptr) press_view->show(simd, *pressed);
     }
+    ensure_loaded(input.mannequin_from_probe);  // gaps and skin are read on the beams
     look_up.begin(input.mannequin_from_probe, input.time_s, wants_entry, pressed);
 }
 

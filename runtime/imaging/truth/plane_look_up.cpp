@@ -9,6 +9,7 @@
 #include "formats/volume/brick_volume.h"
 #include "runtime/imaging/physical/model/physical_frame.h"
 #include "runtime/imaging/physical/model/physical_model.h"
+#include "runtime/imaging/press/skin_plane.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -120,8 +121,9 @@ bool PlaneLookUp::body_at(Point3 p) const {
               j = static_cast<int>(std::floor(v.y + 0.5)),
               k = static_cast<int>(std::floor(v.z + 0.5));
     if (!bundle_->grid.contains(i, j, k)) return false;
-    // The skin as the probe meets it: whole voxels, like the gaps.
-    return bundle_->label_bricks.at(i, j, k) != 0;
+    // The skin as the probe meets it, like the gaps.
+    const std::optional<press::SkinPlane> skin = press::skin_plane_of(bundle_, {i, j, k});
+    return skin ? skin->inside(v) >= 0 : bundle_->label_bricks.at(i, j, k) != 0;
 }
 
 double PlaneLookUp::entry_along(PlanePoint origin, PlanePoint direction) const {

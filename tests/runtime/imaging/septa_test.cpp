@@ -316,6 +316,43 @@ TEST(Septa, AFlatFaceClosesASlopedGapEvenlyAndBridgesNoWideOne) {
     EXPECT_LT(touching, b.geometry.scanlines);
 }
 
+// Where boundary records say where the skin runs within a voxel, the gap ends there: at a slant its
+// steps would be waves of all layers below, longer than the mean over neighbouring beams.
+TEST(Septa, AGapEndsWhereTheRecordsOfTheSkinSay) {
+    constexpr double kSlope = 0.2, kVoxelMm = 1;
+    CaseBundle sloped = block_of(kVoxelMm, [](Point3 p) {
+        return p.z < kSlope * p.x ? Phantom::outside : Phantom::fat;
+    });
+    const Vector3 into = normalized(Vector3{-kSlope, 0, 1});  // the body
+    std::vector<std::uint32_t> records;
+    for (int k = 0; k < sloped.grid.size.z; ++k) {
+        for (int j = 0; j < sloped.grid.size.y; ++j) {
+            for (int i = 0; i < sloped.grid.size.x; ++i) {
+                const Point3 p = sloped.grid.point_from_voxel({1.0 * i, 1.0 * j, 1.0 * k});
+                const double inside = dot(into, p - Point3{}) / kVoxelMm;
+                const bool body = p.z >= kSlope * p.x;
+                records.push_back(
+                    std::abs(inside) > 1.5
+                        ? kNoBoundary
+                        : pack_boundary({body ? Phantom::outside : Phantom::fat, std::abs(inside),
+                                         body ? into : -into}));
+            }
+        }
+    }
+    sloped.boundary = bricks_from_dense<std::uint32_t>(records, sloped.grid.size);
+    BlockBench b(sloped, fine_exercise());
+    constexpr double kAwayMm = 5;
+    b.frame.volume_from_probe.translation = {0, 0, -kAwayMm};
+    const auto lines = static_cast<std::size_t>(b.geometry.scanlines);
+    std::vector<float> raw(lines);
+    find_gaps(b.scene, b.geometry, b.frame, 0, b.geometry.scanlines, raw);
+    for (std::size_t l = 0; l < lines; ++l) {
+        const double skin_mm = kAwayMm + kSlope * b.geometry.beams[l].origin.x;
+        // Records are rounded by up to 0.01 voxel and 1 degree over at most 1.5 voxels.
+        EXPECT_NEAR(raw[l], skin_mm, 0.05) << l;
+    }
+}
+
 // Held still, nothing moves: the machine rejects its receiver's noise.
 TEST(Septa, AProbeHeldStillShowsTheSamePicture) {
     RenderOptions options;

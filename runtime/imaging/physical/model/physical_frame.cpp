@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/imaging/press/skin_plane.h"
+
 namespace sonocase::runtime {
 namespace {
 
@@ -119,7 +121,8 @@ void find_gaps(const PhysicalScene& scene,
             const Point3 q = p + static_cast<double>(step) * v;
             const int label = label_at(scene, nearest(q.x), nearest(q.y), nearest(q.z));
             if (label == 0) continue;
-            gap = static_cast<float>(step * physical::kGapStepMm);
+            const double steps = std::max(step + press::steps_to_skin(*scene.bundle, q, v), 0.0);
+            gap = static_cast<float>(std::min(steps * physical::kGapStepMm, most_mm));
             break;
         }
     }
