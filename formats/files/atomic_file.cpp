@@ -179,7 +179,13 @@ Status write_file(const std::string& path, std::span<const std::uint8_t> bytes) 
     }
     OutputFile output(path);
     if (!open_locked(output.temporary(), &file)) {
-        return Error{std::string("cannot write: ") + std::strerror(errno), path,
+        int fault = errno;
+        if (fault == ENOENT) {  // the folder could not be made, for a reason of its own
+            std::error_code code;
+            fs::create_directories(fs::path(path).parent_path(), code);
+            if (code) fault = code.value();
+        }
+        return Error{std::string("cannot write: ") + std::strerror(fault), path,
                      "check that the folder may be written"};
     }
     const bool written = write_all(file.get(), bytes) &&
@@ -212,6 +218,7 @@ OutputFile::~OutputFile() {
 
 Status OutputFile::commit() {
     if (::rename(temporary_.c_str(), path_.c_str()) != 0) {
+        if (errno == EISDIR) return Error{"is a folder", path_, "expected the name of a file"};
         return Error{std::string("cannot write: ") + std::strerror(errno), path_,
                      "check that the folder may be written"};
     }

@@ -60,12 +60,27 @@ std::string plain_text_of(const toml::node& node) {
 
 }  // namespace
 
+Error toml_fault(std::string_view description, const std::string& where) {
+    // "Error while parsing key-value pair: cannot redefine existing string 'name'"
+    std::string what(description), in;
+    const std::string start = "Error while parsing ";
+    if (const auto at = what.find(": "); what.starts_with(start) && at != std::string::npos) {
+        in = " in a " + what.substr(start.size(), at - start.size());
+        what = what.substr(at + 2);
+    }
+    if (const std::string cut = "encountered end-of-file"; what.starts_with(cut))
+        what = "the file ends too early" + what.substr(cut.size());
+    if (const std::string twice = "cannot redefine existing "; what.starts_with(twice))
+        return {"the " + what.substr(twice.size()) + " is given twice", where,
+                "remove one of the two"};
+    return {"not valid TOML (" + what + in + ")", where, "correct this line"};
+}
+
 Result<TomlTable> TomlTable::parse(std::string_view text, const std::string& where) {
     toml::parse_result parsed = toml::parse(text, std::string_view(where));
     if (!parsed) {
         const toml::parse_error& error = parsed.error();
-        return Error{std::string(error.description()), line_of(where, error.source()),
-                     "expected TOML"};
+        return toml_fault(error.description(), line_of(where, error.source()));
     }
     auto document = std::make_shared<Document>();
     document->where = where;

@@ -92,4 +92,7 @@ class TomlTable {
     std::shared_ptr<Part> part_;
 };
 
+// What a fault of toml++ (error.description()) says, as an Error of ours.
+Error toml_fault(std::string_view description, const std::string& where);
+
 }  // namespace sonocase

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "formats/text/nearest_name.h"
+#include "formats/text/toml_reader.h"
 
 // toml++ 3.3 asserts of input what hostile input ("[[[") does not hold; without the assertion it
 // reports the error.
@@ -20,8 +21,8 @@ namespace sonocase::pipeline {
 namespace {
 
 Error not_toml(const toml::parse_error& error, const std::string& where) {
-    return {std::string(error.description()),
-            where + ":" + std::to_string(error.source().begin.line), "expected TOML"};
+    return toml_fault(error.description(),
+                      where + ":" + std::to_string(error.source().begin.line));
 }
 
 std::optional<Vector3> triple_in(const toml::table& table, std::string_view key) {

@@ -30,6 +30,7 @@
 #include <filesystem>
 
 #include "formats/files/atomic_file.h"
+#include "pipeline/base/quiet_library.h"
 #include "pipeline/pictures/offscreen_display.h"
 #include "pipeline/registration/fit_measure.h"
 
@@ -106,9 +107,13 @@ Status write_png(vtkRenderWindow* window, const std::string& path) {
     vtkNew<vtkPNGWriter> writer;
     writer->SetFileName(out.temporary().c_str());
     writer->SetInputConnection(grab->GetOutputPort());
-    writer->Write();
+    {
+        const QuietLibrary quiet;  // a full disk is reported below
+        writer->Write();
+    }
     if (writer->GetErrorCode() != 0)
-        return Error{"picture cannot be written", path, "check the folder"};
+        return Error{"cannot write the picture", path,
+                     "check that the folder is writable and has room"};
     return out.commit();
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <utility>
 
 #include "formats/base/digest.h"
 #include "pipeline/base/stopwatch.h"
@@ -122,8 +123,10 @@ Status StageRunner::make(std::size_t i, bool damaged, const Progress& progress) 
     if (cache_.enabled() && stage.codec) {
         CacheEntry entry{stage.codec.encode(slot.value), "", seconds};
         slot.digest = entry.digest = digest_of(entry.bytes);
-        if (auto status = cache_.store(stage.name, slot.key, entry); !status)
-            notes.push_back("the cache could not be written (" + status.error().message() + ")");
+        if (auto status = cache_.store(stage.name, slot.key, entry);
+            !status && !std::exchange(cache_fault_told_, true))
+            notes.push_back("the cache could not be written (" + status.error().message() +
+                            "): the case is cooked all the same, and will be anew next time");
     }
     if (stage.digest) slot.digest = stage.digest(slot.value);
     keep_reports(i, seconds, false, std::move(notes));

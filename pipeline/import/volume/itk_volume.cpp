@@ -39,6 +39,13 @@ std::string sizes_text(const itk::ImageIOBase& io) {
     return text;
 }
 
+// ITK's NIfTI reader calls axes in metres so as well: their matrix is nearly 0.
+Error not_orthogonal(const std::string& path) {
+    return {"voxel axes are not at right angles, or are not in millimetres", path,
+            "write the geometry in millimetres, or resample the volume to an orthogonal grid "
+            "(Slicer: Resample Image)"};
+}
+
 Result<Grid> grid_of(const itk::ImageIOBase& io, const std::string& path) {
     Grid grid;
     Matrix3 direction;
@@ -68,8 +75,7 @@ Result<Grid> grid_of(const itk::ImageIOBase& io, const std::string& path) {
         for (int b = a; b < 3; ++b) {
             const double expected = a == b ? 1 : 0;
             if (!(std::abs(dot(direction.column(a), direction.column(b)) - expected) < 1e-3))
-                return Error{"voxel axes are not at right angles", path,
-                             "resample the volume to an orthogonal grid (Slicer: Resample Image)"};
+                return not_orthogonal(path);
         }
     }
     grid.direction = direction;
@@ -171,10 +177,13 @@ Result<NativeVolume> read_itk_volume(const std::string& path) {
             std::string value;
             if (itk::ExposeMetaData(dictionary, key, value)) volume.fields[key] = value;
         }
+        if (auto warning = nifti_orientation_warning(path); !warning.empty())
+            volume.warnings.push_back(std::move(warning));
         return volume;
     } catch (const itk::ExceptionObject& exception) {
         std::string what = exception.GetDescription();
         if (const auto at = what.find("): "); at != std::string::npos) what = what.substr(at + 3);
+        if (what.find("orthonormal") != std::string::npos) return not_orthogonal(path);
         return Error{"cannot be read as a volume (" + what + ")", path, todo};
     } catch (const std::exception& exception) {
         return Error{std::string("cannot be read as a volume (") + exception.what() + ")", path,

@@ -32,6 +32,7 @@ struct NiftiHeader {
     std::int64_t size = 0;  // 0: not a NIfTI file
     bool swapped = false;
     bool has_extensions = false;
+    bool has_orientation = false;  // qform_code or sform_code is not 0
     std::int64_t voxels_at = 0;
 };
 
@@ -53,6 +54,9 @@ NiftiHeader read_header(gzFile_s* file) {
     if (!read_bytes(file, bytes.data() + 4, bytes.size() - 4)) return header;
     header.size = size;
     header.has_extensions = bytes[static_cast<std::size_t>(size)] != 0;
+    const auto first_code = bytes.begin() + (size == 348 ? 252 : 344);  // two codes side by side
+    header.has_orientation = std::any_of(first_code, first_code + (size == 348 ? 4 : 8),
+                                         [](std::uint8_t byte) { return byte != 0; });
     if (size == 348) {
         const std::int32_t bits = int_at(bytes.data() + 108, header.swapped);
         float offset = 0;
@@ -88,6 +92,17 @@ Result<LabelTable> load_nifti_label_table(const std::string& path) {
         if (!table->empty()) return table;
     }
     return LabelTable{};
+}
+
+std::string nifti_orientation_warning(const std::string& path) {
+    if (!path.ends_with(".nii") && !path.ends_with(".nii.gz")) return "";
+    const std::unique_ptr<gzFile_s, CloseGz> file(gzopen(path.c_str(), "rb"));
+    if (!file) return "";
+    const NiftiHeader header = read_header(file.get());
+    if (header.size == 0 || header.has_orientation) return "";
+    return "the file does not say how its axes lie in the patient (qform_code and sform_code are "
+           "0), so right and left may be exchanged: check on which side the liver is, or export "
+           "the file again with its orientation";
 }
 
 Status check_nifti_length(const std::string& path, std::uint64_t voxel_bytes) {

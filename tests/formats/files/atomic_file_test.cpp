@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <thread>
 
@@ -58,6 +60,21 @@ TEST(AtomicFile, ErrorsNameThePath) {
     const Status below = write_file(folder / "file/below", std::string_view("x"));
     ASSERT_FALSE(below);
     EXPECT_NE(below.error().message().find("file/below"), std::string::npos);
+    std::filesystem::create_directory(folder / "sub");
+    const Status onto = write_file(folder / "sub", std::string_view("x"));
+    ASSERT_FALSE(onto);
+    EXPECT_EQ(onto.error().what, "is a folder");
+    EXPECT_EQ(folder.names().size(), 2u);
+}
+
+TEST(AtomicFile, AFolderThatCannotBeMadeIsToldWithTheReason) {
+    if (::geteuid() == 0) GTEST_SKIP() << "root may write anywhere";
+    const TemporaryFolder folder;
+    std::filesystem::create_directory(folder / "locked");
+    ASSERT_EQ(::chmod((folder / "locked").c_str(), 0500), 0);
+    const Status status = write_file(folder / "locked/new/a", std::string_view("x"));
+    ASSERT_FALSE(status);
+    EXPECT_NE(status.error().what.find("Permission denied"), std::string::npos);
 }
 
 TEST(AtomicFile, MakesMissingFoldersAndAppendsToPipes) {

@@ -128,6 +128,23 @@ TEST(TomlReader, FaultsNameFileLineKeyFoundAndExpected) {
     EXPECT_EQ(point, (Point3{}));
 }
 
+TEST(TomlReader, BrokenTomlIsToldInWordsThatNameTheLineAndTheRemedy) {
+    const std::pair<const char*, const char*> cases[] = {
+        {"a = 1\nname = \"x\"\nname = \"y\"\n", "f.toml:3: the string 'name' is given twice; remove one of the two"},
+        {"a = 1\nb = \"open\n", "f.toml:2: not valid TOML ("},
+        {"d = \"\"\"open", "f.toml:1: not valid TOML (the file ends too early"},
+        {"a = \xff\xfe", "f.toml:1: not valid TOML ("},
+    };
+    for (const auto& [text, message] : cases) {
+        const auto parsed = TomlTable::parse(text, "f.toml");
+        ASSERT_FALSE(parsed.has_value()) << text;
+        const std::string told = parsed.error().message();
+        EXPECT_EQ(told.find(message), 0u) << told;
+        EXPECT_EQ(told.find("Error while"), std::string::npos) << told;
+        EXPECT_EQ(told.find('\n'), std::string::npos) << told;
+    }
+}
+
 TEST(TomlReader, TheFirstFaultIsKept) {
     const TomlTable root = parsed("a = 1\nb = 2\n");
     std::string text;

@@ -145,6 +145,23 @@ TEST(ImportLabelMapRefuses, MoreLabelsThanFit) {
     expect_refused(import_label_map(path), path, "255 labels");
 }
 
+// ITK refuses both before anything else is known, in words that name neither.
+TEST(ImportLabelMapRefuses, NiftiInMetresOrWithSlantedAxesAndSaysWhatToDo) {
+    const TemporaryFolder folder;
+    TinyVolume metres = ras_volume(), slanted = ras_volume();
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) metres.columns(row, column) *= 0.001;
+        metres.origin[row] *= 0.001;
+    }
+    slanted.columns(1, 2) = 0.3 * slanted.columns(2, 2);  // the tilt of a gantry
+    for (const TinyVolume& volume : {metres, slanted}) {
+        const std::string path = folder.write("a.nii", testing::nifti_bytes(volume));
+        const auto imported = import_label_map(path);
+        expect_refused(imported, path, "not at right angles, or are not in millimetres");
+        EXPECT_NE(imported.error().expected.find("resample"), std::string::npos);
+    }
+}
+
 TEST(ImportLabelMapRefuses, TorsoInMetresOrMicrometresAndNamesTheFactor) {
     const TemporaryFolder folder;
     for (const auto& [unit, factor] : {std::pair{0.001, "1000"}, {1000.0, "0.001"}}) {

@@ -157,6 +157,27 @@ TEST(ImportLabelMap, UnnamedValuesAreKeptAndToldOf) {
     EXPECT_NE(imported->report.warnings[0].find("222"), std::string::npos);
 }
 
+// Left and right are then whatever the reader takes for granted.
+TEST(ImportLabelMap, NiftiWithoutOrientationIsReadWithAWarning) {
+    const TemporaryFolder folder;
+    std::string bytes = testing::nifti_bytes(ras_volume());
+    const auto oriented = import_label_map(folder.write("a.nii", bytes));
+    ASSERT_TRUE(oriented.has_value());
+    bytes[252] = bytes[253] = bytes[254] = bytes[255] = 0;  // qform_code, sform_code
+    for (const char* name : {"b.nii", "b.nii.gz"}) {
+        const bool packed = std::string(name).ends_with(".gz");
+        const auto imported =
+            import_label_map(folder.write(name, packed ? testing::gzip_bytes(bytes) : bytes));
+        ASSERT_TRUE(imported.has_value()) << imported.error().message();
+        const auto& warnings = imported->report.warnings;
+        ASSERT_EQ(warnings.size(), oriented->report.warnings.size() + 1);
+        const auto told = std::find_if(warnings.begin(), warnings.end(), [](const auto& w) {
+            return w.find("right and left may be exchanged") != std::string::npos;
+        });
+        EXPECT_NE(told, warnings.end());
+    }
+}
+
 TEST(ImportLabelMap, SegmentsOfSlicerKeepNamesColoursAndLayers) {
     const TemporaryFolder folder;
     // Two layers: the liver in the first, a vessel inside it and a cyst in the second.
