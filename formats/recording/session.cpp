@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "formats/text/number_text.h"
 
@@ -267,6 +269,37 @@ std::uint64_t attempt_seed(const SessionHeader& header) {
     std::uint64_t seed = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
     return error == std::errc{} && end == text.data() + text.size() ? seed : 0;
+}
+
+Status check_session(const Session& session, const std::string& where) {
+    constexpr double kMetres = 2;  // no torso is that small in mm, nor that large in m
+    if (session.samples.empty()) return Done{};
+    long poses = 0;
+    double farthest = 0;
+    double before = -std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < session.samples.size(); ++i) {
+        const SessionSample& s = session.samples[i];
+        if (!std::isfinite(s.time_s) || s.time_s < before)
+            return Error{"time stamps do not rise at frame " + std::to_string(i + 1), where,
+                         "expected frames in the order of their time stamps, in seconds"};
+        before = s.time_s;
+        for (const auto& [ok, pose] : {std::pair{s.probe_ok, &s.mannequin_from_probe},
+                                       {s.needle_ok, &s.mannequin_from_needle}}) {
+            if (!ok) continue;
+            ++poses;
+            farthest = std::max(farthest, norm(pose->translation));
+        }
+    }
+    if (poses == 0)
+        return Error{"none of " + std::to_string(session.samples.size()) +
+                         " frames has a pose of probe or needle that counts",
+                     where,
+                     "expected rotations without scale or mirror, places in mm, and status OK"};
+    if (poses > 10 && farthest < kMetres)
+        return Error{
+            "no pose lies farther than " + number_text(farthest, 3) + " mm from the origin", where,
+            "expected millimetres; these look like metres: multiply them by 1000"};
+    return Done{};
 }
 
 Sequence sequence_from_session(const Session& session) {

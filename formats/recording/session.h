@@ -106,6 +106,9 @@ SessionNames guess_names(const Sequence& sequence);
 Result<Session> session_from_sequence(const Sequence& sequence,
                                       const SessionNames& names,
                                       const std::string& where);
+// An Error for a session that nothing can be told of: no pose that counts, times that fall, or
+// places in metres. Where the scores would be zeros that look like a trainee's.
+Status check_session(const Session& session, const std::string& where);
 Sequence sequence_from_session(const Session& session);
 
 // One frame and the fields of its events, as the recorder writes it.

@@ -213,6 +213,9 @@ Result<FoundScan> find_scan(const FramePile& pile, const std::vector<std::uint8_
         echoes += mask[i];
     }
     if (echoes * 100 < mask.size()) {
+        if (background > 40)
+            return Error{"the pictures are one even grey of " + std::to_string(background), "",
+                         "expected frames that show a scan on black"};
         return Error{"the pictures are black", "", "expected frames that show a scan"};
     }
     keep_large_places(mask, pile);

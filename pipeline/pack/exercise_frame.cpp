@@ -21,8 +21,7 @@ namespace sonocase::pipeline {
 namespace {
 
 Error not_toml(const toml::parse_error& error, const std::string& where) {
-    return toml_fault(error.description(),
-                      where + ":" + std::to_string(error.source().begin.line));
+    return toml_fault(error.description(), where + ":" + std::to_string(error.source().begin.line));
 }
 
 std::optional<Vector3> triple_in(const toml::table& table, std::string_view key) {

@@ -67,6 +67,8 @@ Result<ReviewInput> load_review(const std::string& session_path,
         return session_from_sequence(*sequence, guess_names(*sequence), session_path);
     }();
     if (!session) return session.error();
+    if (const auto status = check_session(*session, session_path); !status)
+        input.warnings.push_back("The session cannot be judged: " + status.error().message() + ".");
     input.session = std::move(*session);
     if (input.session.samples.empty()) {
         return Error{"holds no reading", session_path, "record a session with sonoplay --record"};

@@ -75,7 +75,7 @@ class StageRunner {
     std::vector<Slot> slots_;  // # plan
     std::size_t goal_ = 0;
     bool cache_fault_told_ = false;  // once: what ails one entry ails them all
-    std::vector<bool> needed_;  // # plan: what the goal takes, directly or through others
+    std::vector<bool> needed_;       // # plan: what the goal takes, directly or through others
     std::vector<std::string> step_warnings_;  // for the next stage's report
 };
 

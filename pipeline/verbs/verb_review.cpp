@@ -114,6 +114,8 @@ int verb_score(int argc, char** argv) {
         return session_from_sequence(*sequence, names, a.session);
     }();
     if (!session) return fail("score", session.error());
+    if (const auto status = check_session(*session, a.session); !status)
+        return fail("score", status.error());
     CaseBundle bundle;
     std::vector<std::string> warnings;
     if (!a.bundle.empty()) {

@@ -33,8 +33,8 @@ Result<NativeVolume> read_dicom_series(const std::string& folder);  // the folde
 // An Error if a NIfTI file holds fewer than `voxel_bytes` after its header, or is damaged gzip: the
 // library below ITK silently fills with zeros what is missing. Done for any other file.
 Status check_nifti_length(const std::string& path, std::uint64_t voxel_bytes);
-// A warning where a NIfTI file says nothing about its orientation (qform_code and sform_code are 0),
-// so that right and left are a guess; empty for any other file.
+// A warning where a NIfTI file says nothing about its orientation (qform_code and sform_code are
+// 0), so that right and left are a guess; empty for any other file.
 std::string nifti_orientation_warning(const std::string& path);
 // The same as check_nifti_length for MetaImage.
 Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "formats/recording/session.h"
 #include "formats/recording/transform_log.h"
 #include "support/random.h"
@@ -31,6 +33,31 @@ Session example() {
                 {0.52, 30, "target_hit", "target=0 name=lesion"},
                 {1.95, 117, "session_end", ""}};
     return s;
+}
+
+// Each would be scored as zeros, or as somebody else's session, without a word.
+TEST(SessionFile, SessionsThatNothingCanBeToldOfAreRefused) {
+    EXPECT_TRUE(check_session(example(), "s"));
+    Session twice = example(), back = example(), lost = example(), metres = example();
+    twice.samples[4].time_s = twice.samples[3].time_s;
+    EXPECT_TRUE(check_session(twice, "s"));
+    for (const double time : {0.01, std::nan("")}) {
+        back.samples[7].time_s = time;
+        const Status status = check_session(back, "s");
+        ASSERT_FALSE(status);
+        EXPECT_NE(status.error().what.find("do not rise at frame 8"), std::string::npos);
+    }
+    for (SessionSample& sample : lost.samples) sample.probe_ok = sample.needle_ok = false;
+    const Status none = check_session(lost, "s");
+    ASSERT_FALSE(none);
+    EXPECT_NE(none.error().what.find("none of 40 frames"), std::string::npos);
+    for (SessionSample& sample : metres.samples)
+        for (Rigid* pose : {&sample.mannequin_from_probe, &sample.mannequin_from_needle})
+            pose->translation = 0.001 * pose->translation;
+    const Status small = check_session(metres, "s");
+    ASSERT_FALSE(small);
+    EXPECT_NE(small.error().expected.find("metres"), std::string::npos);
+    EXPECT_TRUE(check_session({}, "s"));  // an empty one has an error of its own
 }
 
 TEST(SessionFile, ComesBackAsItWas) {

@@ -130,7 +130,8 @@ TEST(TomlReader, FaultsNameFileLineKeyFoundAndExpected) {
 
 TEST(TomlReader, BrokenTomlIsToldInWordsThatNameTheLineAndTheRemedy) {
     const std::pair<const char*, const char*> cases[] = {
-        {"a = 1\nname = \"x\"\nname = \"y\"\n", "f.toml:3: the string 'name' is given twice; remove one of the two"},
+        {"a = 1\nname = \"x\"\nname = \"y\"\n",
+         "f.toml:3: the string 'name' is given twice; remove one of the two"},
         {"a = 1\nb = \"open\n", "f.toml:2: not valid TOML ("},
         {"d = \"\"\"open", "f.toml:1: not valid TOML (the file ends too early"},
         {"a = \xff\xfe", "f.toml:1: not valid TOML ("},

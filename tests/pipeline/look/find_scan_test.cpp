@@ -127,6 +127,11 @@ TEST(FindScan, BlackPicturesAndPicturesWithoutSidesAreRefusedInOneLine) {
     const auto none = find_scan(black, burnt_in(black));
     ASSERT_FALSE(none);
     EXPECT_NE(none.error().message().find("black"), std::string::npos);
+    const FramePile white =
+        pile_of({frame_of(std::vector<std::uint8_t>(100 * 100, 255), 100, 100)});
+    const auto bright = find_scan(white, burnt_in(white));
+    ASSERT_FALSE(bright);
+    EXPECT_EQ(bright.error().what, "the pictures are one even grey of 255");
     std::vector<std::uint8_t> disc(200 * 200, 0);
     for (int y = 0; y < 200; ++y) {
         for (int x = 0; x < 200; ++x)

@@ -95,7 +95,8 @@ TEST(RegisterVerb, ASpoiltSweepFarAwayIsFittedAndWhatWasWrongIsSaid) {
     EXPECT_EQ(report["readings_repeated"].get<double>(), 30);
     EXPECT_GT(report["readings_lifted_off"].get<double>(), 40);  // of 108, in any direction
     EXPECT_NE(r.error.find("30 readings without position"), std::string::npos) << r.error;
-    EXPECT_NE(r.error.find("lie off the surface of their neighbours"), std::string::npos) << r.error;
+    EXPECT_NE(r.error.find("lie off the surface of their neighbours"), std::string::npos)
+        << r.error;
 }
 
 TEST(RegisterVerb, FiftyReadingsOfTheFrontGiveAnAnswerAndTheHintsToAdd) {

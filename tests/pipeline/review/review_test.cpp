@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <filesystem>
 
 #include "formats/exercise/metric_table.h"
@@ -181,6 +183,9 @@ TEST(Review, OddSessionsStillGiveAPage) {
     const auto input = load_review(files.session, files.bundle, {});
     ASSERT_TRUE(input) << input.error().message();
     EXPECT_NE(review_page(*input, {}).find("</html>"), std::string::npos);
+    EXPECT_TRUE(std::any_of(input->warnings.begin(), input->warnings.end(), [](const auto& w) {
+        return w.find("cannot be judged") != std::string::npos;
+    }));
 }
 
 TEST(Review, AnotherCaseAndAMissingExerciseAreSaid) {
