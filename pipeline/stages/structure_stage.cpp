@@ -17,7 +17,7 @@
 namespace sonocase::pipeline {
 namespace {
 
-constexpr int kStructureVersion = 2;
+constexpr int kStructureVersion = 3;
 constexpr std::string_view kEchoKind = "ECHO";
 constexpr std::array<std::string_view, 5> kEchoChunks{"size", "table", "uniform", "pool", "report"};
 

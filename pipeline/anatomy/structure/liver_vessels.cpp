@@ -16,7 +16,9 @@ namespace {
 constexpr double kLumenDb = -26;  // blood re liver, less what the beam's thickness adds to it
 constexpr double kWallDb = 7;
 constexpr double kWallMm = 1.1;
-constexpr double kLeastWalledRadiusMm = 1.5;
+// Thinner ones are chains of single dark voxels, which no living liver shows: a tube needs four
+// voxels of 1 mm, the size at which offsets are kept, to have edges.
+constexpr double kLeastRadiusMm = 2.2;
 
 bool has_word(const LabelVolume& labels, const std::vector<LabelFacts>& facts, const char* word) {
     for (std::size_t l = 1; l < labels.labels.size(); ++l) {
@@ -262,7 +264,7 @@ void draw_vessels(const LabelVolume& labels,
         for (const VesselTree& tree : trees) {
             if (walls && !tree.bright_wall) continue;
             for (const VesselNode& node : tree.nodes) {
-                if (node.parent < 0 || (walls && node.radius_mm < kLeastWalledRadiusMm)) continue;
+                if (node.parent < 0 || node.radius_mm < kLeastRadiusMm) continue;
                 const Piece piece(labels.grid, tree.nodes[static_cast<std::size_t>(node.parent)],
                                   node);
                 piece.each_voxel(
