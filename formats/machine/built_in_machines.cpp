@@ -22,6 +22,7 @@ Machine classic() {
     m.near_field = {1.6, 2.2, 0.3, 9, 0, 0.5, 1.9, 0, 0, 0.8, 1, 3};
     m.haze = {0, 4.5, 2, -24};
     m.contact = {0, 0};
+    m.equalisation.amount = 0;
     m.structures = {false, false, false, false, false};
     m.post_filter = true;
     return m;
@@ -50,6 +51,7 @@ Machine modern_linear() {
     m.near_field = {1, 0.9, 0, 9, 3, 0.3, 0.8, 4, 2.2, 0.35, 0.5, 1.5};
     m.haze = {0.2, 1.6, 0.8, -120};
     m.contact = {6, 0.05};
+    m.equalisation.amount = 0;
     return m;
 }
 

@@ -112,6 +112,14 @@ struct MachineContact {
     bool operator==(const MachineContact&) const = default;
 };
 
+// Gain evened out across the beams: where a beam differs from those beside it over some
+// millimetres, it goes half the way to them (physical/model/equaliser.h).
+struct MachineEqualisation {
+    double amount = 1;    // of it, [0, 1]; 0: none
+    double from_mm = 35;  // deeper than this, [0, 500]
+    bool operator==(const MachineEqualisation&) const = default;
+};
+
 // Structures that a case does not hold and the renderer adds to its tissue, each an effect
 // (docs/effects.md); linings are the walls of vessels and the double line of capsules. A machine of
 // the nineties shows none of them, and its frames do not pay for them.
@@ -131,6 +139,7 @@ struct Machine {
     MachineNearField near_field;
     MachineHaze haze;
     MachineContact contact;
+    MachineEqualisation equalisation;
     MachineStructures structures;
     // Weights of the frames that persistence blends, newest first; scaled to sum to 1. One: none.
     std::vector<double> persistence{0.4, 0.3, 0.2, 0.1};  // 1 to 8 weights, [0, 1], the first > 0

@@ -72,6 +72,9 @@ void visit_machine(M& m, V& v) {
     v.table("contact");
     v.number("edge_db", m.contact.edge_db, 0, 120);
     v.number("edge_fraction", m.contact.edge_fraction, 0, 0.5);
+    v.table("equalisation");
+    v.number("amount", m.equalisation.amount, 0, 1);
+    v.number("from_mm", m.equalisation.from_mm, 0, 500);
     v.table("structures");
     v.flag("parenchyma", m.structures.parenchyma);
     v.flag("streaks", m.structures.streaks);

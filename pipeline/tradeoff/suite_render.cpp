@@ -81,13 +81,15 @@ Result<std::vector<ExampleImage>> play(const Player& player,
             if (s.value == "on") command += " --truth " + quoted(player.folder.path() + "/truth");
             continue;
         }
-        if (name == "aperture_mm" || name == "grain_db") {
+        const bool grain = name == "grain_db", even = name == "equalisation";
+        if (name == "aperture_mm" || grain || even) {
             const std::string machine = player.folder.path() + "/machine.toml";
-            const std::string text = name == "grain_db"
+            const std::string text = grain
                                          ? "[machine]\nbase = \"modern-linear\"\nname = \"grain\"\n"
                                            "[machine.noise]\ngrain_db = " +
                                                s.value + "\n"
-                                         : "[machine.beam]\naperture_mm = " + s.value + "\n";
+                                     : even ? "[machine.equalisation]\namount = " + s.value + "\n"
+                                            : "[machine.beam]\naperture_mm = " + s.value + "\n";
             if (const Status w = write_file(machine, text); !w) return w.error();
             command += " --machine " + quoted(machine);
             continue;
@@ -244,6 +246,13 @@ Suite render_suite() {
          "width of the face that listens",
          "the penumbra of shadows",
          "costs one pass over the light of all samples, as much at every width but 0"},
+        {"render.equalisation",
+         {"0", "0.25", "0.5", "1"},
+         "1",
+         "",
+         "how far a beam's gain goes to its neighbours'",
+         "upright columns in the liver: of shadows, and of bright and dark places",
+         "costs the sum of cells and a product of all samples, as much at every amount but 0"},
         {"render.effects",
          {"auto", "-deformation", "-wall", "-streaks", "-parenchyma,-fine_structure", "-structure",
           "-clutter", "-boundaries"},

@@ -27,13 +27,13 @@ using sonocase::testing::run_command;
 
 // Bundles: since the portal vein's flow is weighed against its velocity. Physical frames: since
 // light spreads on the way down and the wall has its ground. Paper: commit aa0be5b.
-constexpr const char* kDraft = "a1eb85faaffc7edfbd90f76d4bbfc9b2";
-constexpr const char* kBalanced = "9fd29c25ec54009bf120ae1a0b30a7e2";
-constexpr const char* kSlender = "8204b8b89df6614c73ec63d12e6efd92";
-constexpr const char* kReal = "9028ba28372bd45a21f6605310e88da0";
-constexpr const char* kDraftPhysical = "101dea1f9f593f9fe7308651f17a0505";
+constexpr const char* kDraft = "47a2cc200ffc65019b0ec6ec85817d0a";
+constexpr const char* kBalanced = "ffec51169de01d5d24af99210de08b6e";
+constexpr const char* kSlender = "c03741afe932752ca4085732c8e39249";
+constexpr const char* kReal = "eb2cc85e4123410b29937521d52d27ef";
+constexpr const char* kDraftPhysical = "03637098278ffb448f85c6663d2e3b8b";
 constexpr const char* kDraftPaper = "2f241268411ba418106fde0ced219bbb";
-constexpr const char* kRealPhysical = "4c135be2edcdc6678bda7e8dfafcf8fb";
+constexpr const char* kRealPhysical = "0a6a983abfbf3bdaf4d9022b33c07c9c";
 constexpr const char* kRealPaper = "ab88db573d849d9ea988c882a10a9d13";
 
 class SameBytes : public ::testing::Test {

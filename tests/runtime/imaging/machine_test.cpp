@@ -56,6 +56,10 @@ TEST(MachineInTheRenderer, BothRenderersAgreeAtTheLimits) {
         const char* what;
         std::function<void(Machine&)> change;
     } cases[] = {
+        {"gain evened out from the face on",
+         [](Machine& m) {
+             m.equalisation = {1, 0};
+         }},
         {"16 looks",
          [](Machine& m) {
              m.looks = {16, 16, 30};

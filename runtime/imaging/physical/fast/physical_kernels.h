@@ -242,6 +242,8 @@ struct PhysicalGreyTask {
     const std::int8_t* haze_re[2] = {nullptr, nullptr};  // rows to blend
     const std::int8_t* haze_im[2] = {nullptr, nullptr};
     float haze_first = 1, haze_second = 0;
+    const float *even_above = nullptr, *even_below = nullptr;  // gain of power; null: none
+    float even_mix = 0;
     const std::int8_t* grain = nullptr;  // null: none
     float grain_log2 = 0;                // of power, per step of the draw
     // Logarithm: grey = offset + per_log2 log2(power). Otherwise floor plus 2 to that power, and

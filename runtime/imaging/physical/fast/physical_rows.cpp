@@ -120,6 +120,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
     const int ring_rows = std::max(2 * tables_.axial_reach + 1, 3);
     static constexpr std::array<float, 1> kOneTap{1.0f};
     const bool haze = f.effects.haze && has_side_lobes(tables_);
+    const bool even = f.effects.equalisation && has_equalisation(tables_);
     const auto haze_level =
         static_cast<float>(std::pow(10.0, tables_.machine.haze.side_lobe_db / 20));
     start_rows();
@@ -167,7 +168,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
         t.axial =
             f.effects.point_spread ? tables_.axial.data() + kMaxAxial - reach : kOneTap.data();
         t.axial_count = 2 * reach + 1;
-        t.envelope_sum = haze ? envelope : nullptr;
+        t.envelope_sum = haze || even ? envelope : nullptr;
         for (int k = begin; k < end; ++k) {
             if (k % kHazeCell == 0) std::fill_n(envelope, lines_, 0.0f);
             if (k + reach < g.samples) fill(k + reach);
@@ -187,11 +188,18 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             t.clutter_steady = static_cast<float>(1 - row.drawn);
             t.power = power_ + at;
             make_power_row(context_.simd, t);
-            if (haze && (k % kHazeCell == kHazeCell - 1 || k == g.samples - 1))
+            const bool last = k % kHazeCell == kHazeCell - 1 || k == g.samples - 1;
+            if (even && last) {
+                std::copy_n(envelope, lines_,
+                            equaliser_.envelope.data() +
+                                static_cast<std::ptrdiff_t>(k / kHazeCell) * stride_);
+            }
+            if (haze && last)
                 spread_haze(k / kHazeCell, haze_level / static_cast<float>(k % kHazeCell + 1),
                             envelope);
         }
     });
+    if (even) equaliser_.make_gain(g, tables_);
 }
 
 // One row of the haze: the mean envelope over cells (`level` times the sum over a cell's samples),
@@ -239,10 +247,16 @@ void PhysicalFast::fill_grey_task(const PhysicalFrame& f, int k, PhysicalGreyTas
         grain > 0 ? noise_.white.data() + noise_start(f.seed, NoiseUse::grain, 0, k) : nullptr;
     t.grain_log2 = static_cast<float>(grain / 32);
     t.haze_above = nullptr;
+    // Between the middles of the cells.
+    const double at = std::clamp((k + 0.5) / kHazeCell - 0.5, 0.0, cells_k_ - 1.0);
+    const int k0 = std::min(static_cast<int>(at), std::max(cells_k_ - 2, 0)),
+              k1 = std::min(k0 + 1, cells_k_ - 1);
+    if (f.effects.equalisation && has_equalisation(tables_)) {
+        t.even_above = equaliser_.envelope.data() + static_cast<std::ptrdiff_t>(k0) * stride_;
+        t.even_below = equaliser_.envelope.data() + static_cast<std::ptrdiff_t>(k1) * stride_;
+        t.even_mix = static_cast<float>(at - k0);
+    }
     if (f.effects.haze && has_side_lobes(tables_)) {
-        const double at = std::clamp((k + 0.5) / kHazeCell - 0.5, 0.0, cells_k_ - 1.0);
-        const int k0 = std::min(static_cast<int>(at), std::max(cells_k_ - 2, 0)),
-                  k1 = std::min(k0 + 1, cells_k_ - 1);
         t.haze_above = haze_.data() + static_cast<std::ptrdiff_t>(k0) * stride_;
         t.haze_below = haze_.data() + static_cast<std::ptrdiff_t>(k1) * stride_;
         t.haze_mix = static_cast<float>(at - k0);

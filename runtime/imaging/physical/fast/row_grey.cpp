@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effects haze, compression, post_filter and grey_map: from power to grey.
+// Effects haze, equalisation, compression, post_filter and grey_map: from power to grey.
 #include "runtime/imaging/physical/fast/row_grey.h"
 
 #include <algorithm>
@@ -37,6 +37,12 @@ void make_grey_row(const PhysicalGreyTask& t) {
             const auto draw =
                 hn::Mul(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), hn::Set(d, 0.5f / 1024));
             power = hn::Add(power, hn::Mul(hn::Mul(haze, haze), draw));
+        }
+        if (t.even_above != nullptr) {
+            const auto above = hn::LoadU(d, t.even_above + i);
+            power = hn::Mul(power,
+                            hn::Add(above, hn::Mul(hn::Sub(hn::LoadU(d, t.even_below + i), above),
+                                                   hn::Set(d, t.even_mix))));
         }
         auto level = log2_of(d, hn::Add(power, hn::Set(d, 1e-12f)));
         if (t.grain != nullptr)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "runtime/imaging/physical/reference/physical_reference.h"
+#include "runtime/imaging/physical/model/equaliser.h"
 
 #include <algorithm>
 #include <array>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "runtime/imaging/physical/reference/reference_beams.h"
+#include "runtime/imaging/physical/reference/reference_equaliser.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -332,7 +334,9 @@ void render_physical_reference(const PhysicalScene& scene,
         add_look(in, look, envelope_power(in, echoes), power);
     }
     add_steady(in, clutter, power);
+    const Plane before_haze = power;
     if (frame.effects.haze && has_side_lobes(tables)) add_haze(in, power);
+    even_out(in, before_haze, power);
     convert(in, grey_of(in, power), pixels);
 }
 
