@@ -16,54 +16,139 @@ constexpr double kLeastMm = 1;
 constexpr double kShiftMm =
     2;  // by which walls are off the middle of their seeds, at most; few are further
 
-constexpr std::size_t kOwn = 13, kSeeds = 27;
+// The other cells: those that share a face, an edge, a corner with it; the first hold the walls
+// that most often end a line. Padded.
+constexpr std::size_t kOthers = 26, kLanes = 4, kPlanes = 28;
+constexpr std::array<std::uint8_t, kOthers> kPlace{4,  10, 12, 14, 16, 22, 1, 3, 5, 7,  9,  11, 15,
+                                                   17, 19, 21, 23, 25, 0,  2, 6, 8, 18, 20, 24, 26};
+// Which of them is at a place, 9 z + 3 y + x.
+constexpr std::array<std::uint8_t, 27> kOther = [] {
+    std::array<std::uint8_t, 27> out{};
+    for (std::size_t m = 0; m < kOthers; ++m) out[kPlace[m]] = static_cast<std::uint8_t>(m);
+    return out;
+}();
+constexpr int kOwn = 13;  // place of the cell itself
 constexpr double kUp = kLobuleFlat * kLobuleFlat - 1;
 
-// Seeds of a cell and its neighbours, and how far they are apart.
+struct Seed {
+    Point3 at;
+    std::uint32_t draw;
+};
+
+// Seeds around a cell: what their cells' hashes begin with, by the step along each axis.
 struct Seeds {
-    std::array<Point3, kSeeds> at;
-    std::array<std::uint32_t, kSeeds> draw{};
-    Vector3 skin;
+    Int3 cell;
+    double cell_mm;
+    Point3 corner;
+    std::array<std::uint32_t, 3> x, y, z;
 
-    Vector3 stretched(Vector3 v) const { return v + kUp * dot(v, skin) * skin; }
-
-    // Where the line from `from` along `to` (unit) lies nearer to the own seed than to any third
-    // one, within kMostMm. False: nowhere.
-    bool clip(std::size_t other, Point3 from, Vector3 to, double& begin, double& end) const {
-        begin = -kMostMm;
-        end = kMostMm;
-        for (std::size_t m = 0; m < kSeeds; ++m) {
-            if (m == kOwn || m == other) continue;
-            // Nearer to the own seed: (from + t to - middle) . normal < 0.
-            const Vector3 apart = at[m] - at[kOwn], normal = stretched(apart);
-            const double past = dot(from - (at[kOwn] + 0.5 * apart), normal),
-                         slope = dot(to, normal);
-            if (slope > 1e-9) {
-                end = std::min(end, -past / slope);
-            } else if (slope < -1e-9) {
-                begin = std::max(begin, -past / slope);
-            } else if (past > 0) {
-                return false;
-            }
-            if (!(begin < end)) return false;
+    Seeds(Int3 own, double edge_mm, Point3 corner_mm)
+        : cell(own), cell_mm(edge_mm), corner(corner_mm) {
+        for (std::size_t n = 0; n < 3; ++n) {
+            const auto step = static_cast<std::uint32_t>(n) - 1;
+            x[n] = (static_cast<std::uint32_t>(cell.x) + step) * kHashX;
+            y[n] = (static_cast<std::uint32_t>(cell.y) + step) * kHashY;
+            z[n] = (static_cast<std::uint32_t>(cell.z) + step) * kHashZ;
         }
-        return true;
+    }
+    Seed at(int place) const {
+        const int i = place % 3, j = place / 3 % 3, k = place / 9;
+        const std::uint32_t of_cell =
+            hash32(x[static_cast<std::size_t>(i)] ^ y[static_cast<std::size_t>(j)] ^
+                   z[static_cast<std::size_t>(k)]);
+        const std::uint32_t h = hash32(of_cell + 977);
+        const auto part = [&](int shift) { return (h >> shift & 0x3FF) / 1024.0; };
+        return {corner + cell_mm * Vector3{cell.x + i - 1 + part(0), cell.y + j - 1 + part(10),
+                                           cell.z + k - 1 + part(20)},
+                h};
     }
 };
 
-Seeds seeds_around(Int3 cell, double cell_mm, Point3 corner, Vector3 skin) {
-    Seeds seeds{{}, {}, skin};
-    for (std::size_t n = 0; n < kSeeds; ++n) {
-        const int i = cell.x + static_cast<int>(n % 3) - 1,
-                  j = cell.y + static_cast<int>(n / 3 % 3) - 1,
-                  k = cell.z + static_cast<int>(n / 9) - 1;
-        const std::uint32_t h = hash32(hash_of_cell(i, j, k) + 977);
-        const auto part = [&](int shift) { return (h >> shift & 0x3FF) / 1024.0; };
-        seeds.draw[n] = h;
-        seeds.at[n] = corner + cell_mm * Vector3{i + part(0), j + part(10), k + part(20)};
+// The planes halfway between a cell's own seed and the others, in the order of kPlace. A normal of
+// zero bounds nothing.
+struct Planes {
+    std::array<double, kPlanes> x, y, z;     // a place on it
+    std::array<double, kPlanes> nx, ny, nz;  // normal
+    std::array<std::uint32_t, kOthers> draw;
+    std::array<std::uint8_t, kPlanes> meets;  // what is looked for may be there
+
+    Planes(const Seeds& seeds,
+           const Seed& own,
+           const LobuleView& view,
+           Point3 centre,
+           double reach_mm) {
+        for (std::size_t m = 0; m < kOthers; ++m) {
+            const Seed other = seeds.at(kPlace[m]);
+            draw[m] = other.draw;
+            x[m] = other.at.x;
+            y[m] = other.at.y;
+            z[m] = other.at.z;
+        }
+        for (std::size_t m = kOthers; m < kPlanes; ++m) {
+            x[m] = own.at.x;
+            y[m] = own.at.y;
+            z[m] = own.at.z;
+        }
+        const double least = 1 - view.most_sin * view.most_sin;
+        for (std::size_t m = 0; m < kPlanes; ++m) {
+            const double ax = x[m] - own.at.x, ay = y[m] - own.at.y, az = z[m] - own.at.z;
+            const double up = kUp * (ax * view.skin.x + ay * view.skin.y + az * view.skin.z);
+            nx[m] = ax + up * view.skin.x;
+            ny[m] = ay + up * view.skin.y;
+            nz[m] = az + up * view.skin.z;
+            x[m] = own.at.x + 0.5 * ax;
+            y[m] = own.at.y + 0.5 * ay;
+            z[m] = own.at.z + 0.5 * az;
+            const double facing = nx[m] * view.beam.x + ny[m] * view.beam.y + nz[m] * view.beam.z,
+                         size = nx[m] * nx[m] + ny[m] * ny[m] + nz[m] * nz[m];
+            const double off = view.off_mm + ((x[m] - centre.x) * view.across.x +
+                                              (y[m] - centre.y) * view.across.y +
+                                              (z[m] - centre.z) * view.across.z);
+            meets[m] = static_cast<std::uint8_t>((facing * facing > least * size) &
+                                                 (std::abs(off) <= reach_mm));
+        }
     }
-    return seeds;
-}
+    void set_normal(std::size_t m, Vector3 normal) {
+        nx[m] = normal.x;
+        ny[m] = normal.y;
+        nz[m] = normal.z;
+    }
+
+    // Where the line from `from` along `to` (unit) lies on the own seed's side of all planes,
+    // within kMostMm. False: nowhere; most often, the nearest planes tell. Few branches, since
+    // nobody could foretell them.
+    bool clip(Point3 from, Vector3 to, double& begin, double& end) const {
+        std::array<double, kLanes> least, most;
+        least.fill(-kMostMm);
+        most.fill(kMostMm);
+        for (std::size_t first = 0; first < kPlanes; first += kLanes) {
+            for (std::size_t lane = 0; lane < kLanes; ++lane) {
+                // (from + t to - place) . normal < 0
+                const std::size_t m = first + lane;
+                const double past =
+                    (from.x - x[m]) * nx[m] + (from.y - y[m]) * ny[m] + (from.z - z[m]) * nz[m];
+                const double slope = to.x * nx[m] + to.y * ny[m] + to.z * nz[m];
+                const bool rises = slope > 1e-9, falls = slope < -1e-9;
+                const double across = -past / (rises || falls ? slope : 1);
+                // Along a plane, on its other side: nowhere.
+                const double nowhere = past > 0 ? -kMostMm : kMostMm;
+                const double above = rises   ? across
+                                     : falls ? kMostMm
+                                             : nowhere,
+                             below = falls ? across : -kMostMm;
+                most[lane] = above < most[lane] ? above : most[lane];
+                least[lane] = below > least[lane] ? below : least[lane];
+            }
+            if (first % (2 * kLanes) != kLanes) continue;
+            begin = std::max(std::max(least[0], least[1]), std::max(least[2], least[3]));
+            end = std::min(std::min(most[0], most[1]), std::min(most[2], most[3]));
+            if (!(begin < end)) return false;
+        }
+        begin = std::max(std::max(least[0], least[1]), std::max(least[2], least[3]));
+        end = std::min(std::min(most[0], most[1]), std::min(most[2], most[3]));
+        return begin < end;
+    }
+};
 
 }  // namespace
 
@@ -76,33 +161,38 @@ int find_lobule_walls(Int3 cell,
     const double reach_mm = view.reach_mm + kShiftMm;
     if (std::abs(view.off_mm) > reach_mm + 1.5 * cell_mm) return 0;
     const Vector3 skin = view.skin;
-    const Seeds seeds = seeds_around(cell, cell_mm, corner, skin);
+    const Seeds seeds(cell, cell_mm, corner);
+    const Seed own = seeds.at(kOwn);
     const Point3 centre = corner + cell_mm * Vector3{cell.x + 0.5, cell.y + 0.5, cell.z + 0.5};
-    const double least = 1 - view.most_sin * view.most_sin;
+    Planes planes(seeds, own, view, centre, reach_mm);
     int found = 0;
-    for (std::size_t n = kOwn + 1; n < kSeeds; ++n) {
-        const Vector3 apart = seeds.at[n] - seeds.at[kOwn], normal = seeds.stretched(apart);
-        const double facing = dot(normal, view.beam), size = dot(normal, normal);
-        if (!(facing * facing > least * size)) continue;
-        Point3 middle = seeds.at[kOwn] + 0.5 * apart;
-        if (std::abs(view.off_mm + dot(middle - centre, view.across)) > reach_mm) continue;
+    for (std::size_t place = kOwn + 1; place < kOther.size(); ++place) {
+        const std::size_t m = kOther[place];
+        if (!planes.meets[m]) continue;  // most are turned away, or off the picture's plane
+        const Vector3 normal{planes.nx[m], planes.ny[m], planes.nz[m]};
+        Point3 middle{planes.x[m], planes.y[m], planes.z[m]};
         // The wall's middle, first along the skin, then at right angles to that.
         Vector3 along = cross(normal, skin);
-        if (dot(along, along) < 1e-6 * size)
+        if (dot(along, along) < 1e-6 * dot(normal, normal))
             along = cross(normal, std::abs(normal.x) < std::abs(normal.y) ? Vector3{1, 0, 0}
                                                                           : Vector3{0, 1, 0});
         along = normalized(along);
         const Vector3 across = normalized(cross(normal, along));
+        planes.set_normal(m, {});  // which holds the line
         double begin = 0, end = 0, length = 0;
-        if (!seeds.clip(n, middle, along, begin, end)) continue;
-        middle = middle + 0.5 * (begin + end) * along;
-        length = end - begin;
-        if (!seeds.clip(n, middle, across, begin, end)) continue;
+        bool shows = planes.clip(middle, along, begin, end);
+        if (shows) {
+            middle = middle + 0.5 * (begin + end) * along;
+            length = end - begin;
+            shows = planes.clip(middle, across, begin, end);
+        }
+        planes.set_normal(m, normal);
+        if (!shows) continue;
         middle = middle + 0.5 * (begin + end) * across;
         length = std::sqrt(length * (end - begin));
         if (length < kLeastMm) continue;
         out[static_cast<std::size_t>(found++)] = {middle, normal, length,
-                                                  hash32(seeds.draw[kOwn] ^ seeds.draw[n])};
+                                                  hash32(own.draw ^ planes.draw[m])};
     }
     return found;
 }

@@ -23,7 +23,7 @@ Vector3 layer_normal(const PhysicalScene& scene, Point3 x) {
     constexpr double kReachMm = 4;
     if (scene.layers.empty()) return {};
     const auto depth = [&](double i, double j, double k) {
-        return scene.layers.at(scene.grid.voxel_from_point(x + kReachMm * Vector3{i, j, k})).depth;
+        return scene.layers.depth_at(scene.grid.voxel_from_point(x + kReachMm * Vector3{i, j, k}));
     };
     // Corners of a tetrahedron.
     const double a = depth(1, 1, 1), b = depth(1, -1, -1), c = depth(-1, 1, -1),
@@ -49,9 +49,6 @@ void StreakSearch::add_cell(int i, int j, int k) {
     const Point3 corner =
         scene.grid.origin_mm + kind.cell_mm * Vector3{double(i), double(j), double(k)};
     const Point3 middle = corner + 0.5 * kind.cell_mm * Vector3{1, 1, 1};
-    const PlateCells& cells = scene.plate_cells;
-    if (!septa && !cells.holds[static_cast<std::size_t>((k * cells.size.y + j) * cells.size.x + i)])
-        return;
     const Point3 p = seen_at_rest(middle);
     double r = 0;
     const PlanePoint beam = beam_at({p.x, p.z}, r);
@@ -67,7 +64,8 @@ void StreakSearch::add_cell(int i, int j, int k) {
     const bool fibres = septa && is_muscle_cube(fine.cube);
     // Within a cell beams turn by as much as its size over their distance from the fan's centre.
     const double turn = kind.cell_mm / (g.fan ? std::max(g.radius_mm + r, kind.cell_mm) : 1e9);
-    const double widest = std::min(widest_sin(fibres) + turn, 1.0);
+    // Breathing moves neighbours by almost as much: half as far again.
+    const double widest = std::min({widest_sin(fibres) + turn, faint_sin(fibres, 1.5 * turn), 1.0});
     const auto least = static_cast<float>(1 - widest * widest);
     Vector3 guide;
     if (fibres) {
@@ -81,7 +79,10 @@ void StreakSearch::add_cell(int i, int j, int k) {
     if (lobules) {
         // Beyond two deviations of the slab a plate is too faint.
         const Vector3 across = frame.volume_from_probe.rotation * Vector3{0, 1, 0};
-        add_lobule({i, j, k}, {guide, along, widest, across, p.y, 2.5 * thickest_mm + 0.5});
+        // Its walls lie up to four cells away.
+        const double facing = std::min(widest_sin(false) + turn, faint_sin(false, 4 * turn));
+        add_lobule({i, j, k},
+                   {guide, along, std::min(facing, 1.0), across, p.y, 2.5 * thickest_mm + 0.5});
     }
     const std::uint32_t cell = hash_of_cell(i, j, k);
     if (kind.tract_share > 0) {
@@ -128,18 +129,18 @@ void StreakSearch::add_plate(const Plate& plate) {
     const bool fibrous = dot(fibres, fibres) > 0;
     const double own = 0.25 * longest_mm;
     Point3 p = seen_at_rest(centre);
+    const double off_plane = p.y / (2.9 * std::sqrt(thickest_mm * thickest_mm + own * own));
+    const double in_slab = bump(off_plane * off_plane);
+    if (in_slab < kFaintest) return;
     if (frame.press != nullptr) {
         // Pressing moves nothing across the plane, and costs most for plates that are too far.
-        const double off = p.y / (2.9 * std::sqrt(thickest_mm * thickest_mm + own * own));
-        const double in_slab = bump(off * off);
-        if (in_slab < 0.1) return;
         double r_at_rest = 0;
         const PlanePoint at_rest = beam_at({p.x, p.z}, r_at_rest);
         const Vector3 n = probe_from_volume.rotation * normal;
         const double along = n.x * at_rest.x + n.z * at_rest.z;
         const double away =
             std::max(std::sqrt(std::max(1 - along * along / dot(n, n), 0.0)) - turned, 0.0);
-        if (in_slab * facing(away * away, fibrous) < 0.1) return;
+        if (in_slab * facing(away * away, fibrous) < kFaintest) return;
         p = pressed(p);
     }
     double r = 0;
@@ -153,11 +154,11 @@ void StreakSearch::add_plate(const Plate& plate) {
         const double off = p.y / (2.9 * std::sqrt(slab * slab + own * own));
         return bump(off * off) * facing_beam;
     };
-    if (level_in(thickest_mm) < 0.1) return;
+    if (in_slab * facing_beam < kFaintest) return;
     Shown shown;
     if (!show({p.x, p.z}, shown)) return;
     const double level = level_in(row_at(shown.depth).elevation_mm);
-    if (level < 0.1 || found >= static_cast<int>(out.size()) || plates_at(centre) < 0) return;
+    if (level < kFaintest || found >= static_cast<int>(out.size()) || plates_at(centre) < 0) return;
     const double length =
         longest_mm * (fibrous ? length_in_plane(n, probe_from_volume.rotation * fibres) : 1.0);
     Streak& s = out[static_cast<std::size_t>(found)];
@@ -284,13 +285,19 @@ int find_streaks(const PhysicalScene& scene,
     const double thick =
         std::max(4.0, beyond) + shift_mm +
         0.5 * kind.cell_mm * (std::abs(normal[u]) + std::abs(normal[v])) / std::abs(normal[a]);
-    for (int j = cell(lower[v], v); j <= cell(upper[v], v); ++j) {
-        for (int i = cell(lower[u], u); i <= cell(upper[u], u); ++i) {
+    const PlateCells& cells = scene.plate_cells;
+    const int strides[3] = {1, cells.size.x, cells.size.x * cells.size.y};
+    const int last_v = cell(upper[v], v), first_u = cell(lower[u], u), last_u = cell(upper[u], u);
+    for (int j = cell(lower[v], v); j <= last_v; ++j) {
+        for (int i = first_u; i <= last_u; ++i) {
             const double mu = (i + 0.5) * kind.cell_mm - origin[u],
                          mv = (j + 0.5) * kind.cell_mm - origin[v];
             const double plane = origin[a] - (normal[u] * mu + normal[v] * mv) / normal[a];
             if (plane < -thick || plane > box[a] + thick) continue;
-            for (int k = cell(plane - thick, a); k <= cell(plane + thick, a); ++k) {
+            const int end = cell(plane + thick, a), column = i * strides[u] + j * strides[v];
+            for (int k = cell(plane - thick, a); k <= end; ++k) {
+                if (!septa && !cells.holds[static_cast<std::size_t>(column + k * strides[a])])
+                    continue;
                 int at[3];
                 at[u] = i;
                 at[v] = j;

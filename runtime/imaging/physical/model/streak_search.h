@@ -23,6 +23,9 @@ inline double bump(double x) {
     return y * y * y * y;
 }
 
+// Share of its echo below which a plate is left out, and a little more than the x of bump() there.
+inline constexpr double kFaintest = 0.1, kFaintSquare = 0.438;
+
 // A plate in the tissue, frame of the volume.
 struct Plate {
     Point3 centre;
@@ -96,6 +99,17 @@ struct StreakSearch {
         if (!fibrous) return mirror;
         const double all_ways = 1 - sine2 / (kind.diffuse_sin * kind.diffuse_sin);
         return mirror + kind.diffuse * (1 - mirror) * std::max(all_ways, 0.0);
+    }
+
+    // Sine at which a plate is too faint to show, a little more; a plate at a distance of
+    // `away` in radians from where the beam is known may have turned by so much.
+    double faint_sin(bool fibrous, double away) const {
+        double sine = std::sqrt(kFaintSquare) * kind.face_sin;
+        if (fibrous && kind.diffuse > 0)
+            sine = std::max(
+                kind.face_sin,
+                kind.diffuse_sin * std::sqrt(std::max(1 - 0.99 * kFaintest / kind.diffuse, 0.0)));
+        return sine + away + turned;
     }
 
     // The row of a depth, the nearest one beyond them.

@@ -162,7 +162,7 @@ std::int16_t packed(float value, double unit) {
 
 }  // namespace
 
-LayerPoint TissueLayers::at(Point3 voxel) const noexcept {
+TissueLayers::Around TissueLayers::around(Point3 voxel) const noexcept {
     const auto place = [&](double v, int size, int& first) {
         const double cell = std::clamp((v + 0.5) * cells_per_voxel_ - 0.5, 0.0, size - 1.0);
         first = std::min(static_cast<int>(cell), std::max(size - 2, 0));
@@ -171,25 +171,39 @@ LayerPoint TissueLayers::at(Point3 voxel) const noexcept {
     int i = 0, j = 0, k = 0;
     const float x = place(voxel.x, size_.x, i), y = place(voxel.y, size_.y, j),
                 z = place(voxel.z, size_.z, k);
-    const std::ptrdiff_t sx = size_.x > 1 ? 1 : 0, sy = size_.y > 1 ? size_.x : 0,
-                         sz = size_.z > 1 ? static_cast<std::ptrdiff_t>(size_.x) * size_.y : 0;
-    const auto* p = cells_.data() + (static_cast<std::ptrdiff_t>(k) * size_.y + j) * size_.x + i;
+    return {cells_.data() + (static_cast<std::ptrdiff_t>(k) * size_.y + j) * size_.x + i,
+            size_.x > 1 ? 1 : 0,
+            size_.y > 1 ? size_.x : 0,
+            size_.z > 1 ? static_cast<std::ptrdiff_t>(size_.x) * size_.y : 0,
+            x,
+            y,
+            z};
+}
+
+LayerPoint TissueLayers::at(Point3 voxel) const noexcept {
+    const Around a = around(voxel);
     // Distances are linear between cells; noises have no kinks there.
     const auto even = [](float t) { return t * t * (3 - 2 * t); };
-    const float u = even(x), v = even(y), w = even(z);
+    const float u = even(a.x), v = even(a.y), w = even(a.z);
     std::array<float, 4> sum{};
     for (int corner = 0; corner < 8; ++corner) {
-        const float linear =
-            (corner & 1 ? x : 1 - x) * (corner & 2 ? y : 1 - y) * (corner & 4 ? z : 1 - z);
-        const float smooth =
-            (corner & 1 ? u : 1 - u) * (corner & 2 ? v : 1 - v) * (corner & 4 ? w : 1 - w);
-        const auto& cell = p[(corner & 1 ? sx : 0) + (corner & 2 ? sy : 0) + (corner & 4 ? sz : 0)];
+        const float linear = Around::share(corner, a.x, a.y, a.z),
+                    smooth = Around::share(corner, u, v, w);
+        const auto& cell = a.corner(corner);
         for (std::size_t n = 0; n < 2; ++n) sum[n] += linear * static_cast<float>(cell[n]);
         for (std::size_t n = 2; n < 4; ++n) sum[n] += smooth * static_cast<float>(cell[n]);
     }
     return {static_cast<double>(sum[0]) / kDistanceUnit,
             static_cast<double>(sum[1]) / kDistanceUnit, static_cast<double>(sum[2]) / kNoiseUnit,
             static_cast<double>(sum[3]) / kNoiseUnit};
+}
+
+double TissueLayers::depth_at(Point3 voxel) const noexcept {
+    const Around a = around(voxel);
+    float sum = 0;
+    for (int corner = 0; corner < 8; ++corner)
+        sum += Around::share(corner, a.x, a.y, a.z) * static_cast<float>(a.corner(corner)[0]);
+    return static_cast<double>(sum) / kDistanceUnit;
 }
 
 TissueLayers make_tissue_layers(const CaseBundle& bundle, JobRunner& jobs) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -30,6 +31,7 @@ class TissueLayers {
     // Between the centres of cells of about 6 mm, linear; the nearest cell beyond the volume.
     // Neither allocates nor throws. Cost: 15 ns.
     LayerPoint at(Point3 voxel) const noexcept;
+    double depth_at(Point3 voxel) const noexcept;  // at().depth alone, for half the cost
 
     // What at() reads, for vectorised look-ups: per cell depth and above_organs in 1 /
     // kDistanceUnit mm, wave and strength in 1 / kNoiseUnit, side by side; x fastest.
@@ -40,6 +42,21 @@ class TissueLayers {
 
   private:
     friend TissueLayers make_tissue_layers(const CaseBundle& bundle, JobRunner& jobs);
+
+    // The lowest of the eight cells around a place, steps to the others, shares of the higher ones.
+    struct Around {
+        const std::array<std::int16_t, 4>* lowest;
+        std::ptrdiff_t sx, sy, sz;
+        float x, y, z;
+
+        const std::array<std::int16_t, 4>& corner(int number) const {
+            return lowest[(number & 1 ? sx : 0) + (number & 2 ? sy : 0) + (number & 4 ? sz : 0)];
+        }
+        static float share(int number, float x, float y, float z) {
+            return (number & 1 ? x : 1 - x) * (number & 2 ? y : 1 - y) * (number & 4 ? z : 1 - z);
+        }
+    };
+    Around around(Point3 voxel) const noexcept;
 
     Int3 size_{0, 0, 0};
     double cells_per_voxel_ = 1;
