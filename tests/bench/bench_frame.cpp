@@ -3,6 +3,7 @@
 // Frames a second and what each effect costs. Ratios inside one run are what to read:
 //   Frame/paper     <= 0.5 x Peer/vtkImageReslice, and Reference/paper >= 50 x Frame/paper
 //   Frame/physical  <= 1.0 x Peer/vtkImageReslice (aim 0.6), drawn as the machine `modern` does
+//   Frame/linear: a linear probe of 60 mm on `modern-linear`, without pressing; and without plates
 // Counters: ns_per_sample; p50_ms and p99_ms over the run of a jumping probe; quiet_ms, the mean
 // over the poses of each pose's fastest frame: what a machine that does nothing else would show.
 #include <benchmark/benchmark.h>
@@ -60,8 +61,23 @@ void timed_loop(benchmark::State& state, F&& work) {
     laps.report(state);
 }
 
-void frame(benchmark::State& state, const RenderOptions& options, bool needle) {
-    auto renderer = runtime::Renderer::create(bench_bundle(), bench_exercise(), options);
+// A vascular probe: septa of fat and perimysium show.
+Exercise linear_exercise() {
+    Exercise e = bench_exercise();
+    e.probe.shape = ProbeShape::linear;
+    e.probe.width_mm = 45;
+    e.probe.depth_mm = 60;
+    e.probe.frequency_mhz = 7.5;
+    e.probe.focus_mm = 35;
+    e.probe.elevation_mm = 2.5;
+    return e;
+}
+
+void frame(benchmark::State& state,
+           const Exercise& exercise,
+           const RenderOptions& options,
+           bool needle) {
+    auto renderer = runtime::Renderer::create(bench_bundle(), exercise, options);
     if (!renderer) {
         state.SkipWithError(renderer.error().message().c_str());
         return;
@@ -100,7 +116,7 @@ void first_frame(benchmark::State& state, ImageModel model) {
 [[maybe_unused]] const bool kRegistered = [] {
     const auto add = [](const std::string& name, const RenderOptions& options, bool needle) {
         benchmark::RegisterBenchmark(name.c_str(), [options, needle](benchmark::State& s) {
-            frame(s, options, needle);
+            frame(s, bench_exercise(), options, needle);
         })->Unit(benchmark::kMillisecond);
     };
     const auto paper = ImageModel::paper, physical = ImageModel::physical;
@@ -116,6 +132,15 @@ void first_frame(benchmark::State& state, ImageModel model) {
         RenderOptions with = options_of(physical, {"-deformation"});
         with.machine = *built_in_machine(name);
         add("Frame/physical/" + name, with, true);
+    }
+    for (const bool plates : {true, false}) {
+        RenderOptions with = options_of(physical, {"-deformation"});
+        if (!plates) with.effects.push_back("-streaks");
+        with.machine = *built_in_machine("modern-linear");
+        benchmark::RegisterBenchmark(
+            plates ? "Frame/linear" : "Frame/linear/plain",
+            [with](benchmark::State& s) { frame(s, linear_exercise(), with, false); })
+            ->Unit(benchmark::kMillisecond);
     }
     add("Frame/physical/2threads", options_of(physical, {"auto"}, 2), true);
     add("Frame/physical/1024", options_of(physical, {"auto"}, 1, 1024), true);

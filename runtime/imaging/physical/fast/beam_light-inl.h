@@ -31,12 +31,19 @@ struct BeamLight {
     int tail_from = 0;
 };
 
+// A tail that nobody sees ends before it and its square are denormal numbers.
+template <class D, class V>
+HWY_INLINE V faded(D d, V tail, float keep) {
+    const auto left = hn::Mul(tail, hn::Set(d, keep));
+    return hn::IfThenElseZero(hn::Ge(left, hn::Set(d, 1e-12f)), left);
+}
+
 template <class D>
 HWY_INLINE void fade_tails(D d, const PhysicalBlock& b, BeamLight<D>& t) {
-    t.bone = hn::Mul(t.bone, hn::Set(d, b.decay.bone));
-    t.bone_slow = hn::Mul(t.bone_slow, hn::Set(d, b.decay.bone_slow));
-    t.bone_floor = hn::Mul(t.bone_floor, hn::Set(d, b.decay.bone_floor));
-    t.gas = hn::Mul(t.gas, hn::Set(d, b.decay.gas));
+    t.bone = faded(d, t.bone, b.decay.bone);
+    t.bone_slow = faded(d, t.bone_slow, b.decay.bone_slow);
+    t.bone_floor = faded(d, t.bone_floor, b.decay.bone_floor);
+    t.gas = faded(d, t.gas, b.decay.gas);
 }
 
 // Lines of reverberation between the probe's face and a face of gas.
@@ -161,7 +168,8 @@ HWY_INLINE void add_clutter(
 
 // kTails: the stretch holds bone or gas, or follows some.
 template <bool kTails, class D>
-HWY_INLINE void light_rows(D d, const PhysicalBlock& b, const BeamChunk& c, BeamLight<D>& t) {
+HWY_INLINE void light_rows(D d, const PhysicalBlock& block, const BeamChunk& c, BeamLight<D>& t) {
+    const PhysicalBlock b = block;
     const hn::RebindToSigned<D> di;
     const auto zero = hn::Zero(d);
     const auto least = hn::Set(d, b.dead_light);

@@ -25,7 +25,8 @@ HWY_INLINE void fetch_lanes(const T* pool, const std::int32_t* at, int lanes) {
 }
 
 template <class D>
-HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
+HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& block, BeamChunk& c) {
+    const PhysicalBlock b = block;
     const hn::RebindToSigned<D> di;
     const int v = c.beam;
     const auto beam = [&](int number)
@@ -70,7 +71,8 @@ HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
 
 // The words of each sample's brick, and the index of its voxel in the pools.
 template <class D>
-HWY_NOINLINE void entry_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
+HWY_NOINLINE void entry_chunk(D d, const PhysicalBlock& block, BeamChunk& c) {
+    const PhysicalBlock b = block;
     const hn::RebindToSigned<D> di;
     const int lanes = static_cast<int>(hn::Lanes(d));
     const auto zero = hn::Zero(di);

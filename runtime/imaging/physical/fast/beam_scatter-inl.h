@@ -41,7 +41,8 @@ HWY_NOINLINE void look_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
 
 // Baked echo offsets.
 template <class D>
-HWY_NOINLINE void structure_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
+HWY_NOINLINE void structure_chunk(D, const PhysicalBlock& block, BeamChunk& c) {
+    const PhysicalBlock b = block;
     const hn::RebindToSigned<D> di;
     for (int row = 0; row < c.rows; ++row) {
         const auto word = hn::Load(di, c.echo_word.row(row));

@@ -28,32 +28,39 @@ HWY_INLINE V streak_ripple(D d, const PhysicalStreak& s, V along) {
                    hn::Sub(hn::Add(wave(turns), wave(second)), hn::Set(d, 0.5f)));
 }
 
+// Rows begin to end of the stretch. What does not depend on the row is read once.
 template <class D>
-HWY_INLINE void streak_row(
-    D d, const PhysicalBlock& b, const PhysicalStreak& s, BeamChunk& c, int row) {
+HWY_INLINE void streak_rows(
+    D d, const PhysicalBlock& b, const PhysicalStreak& plate, BeamChunk& c, int begin, int end) {
     const hn::RebindToSigned<D> di;
-    const int k = c.first + row;
+    const PhysicalStreak s = plate;
     const auto beam = [&](int number)
                           HWY_ATTR { return hn::LoadU(d, b.plane + number * b.lines + c.beam); };
-    const auto r = hn::Set(d, b.r[k]);
-    const auto x = hn::Sub(hn::Add(beam(0), hn::Mul(r, beam(2))), hn::Set(d, s.x)),
-               z = hn::Sub(hn::Add(beam(1), hn::Mul(r, beam(3))), hn::Set(d, s.z));
+    const auto from_x = beam(0), from_z = beam(1), to_x = beam(2), to_z = beam(3);
     const auto nx = hn::Set(d, s.normal_x), nz = hn::Set(d, s.normal_z);
-    const auto along = hn::Mul(hn::Sub(hn::Mul(x, nz), hn::Mul(z, nx)), hn::Set(d, s.per_length));
-    const auto square = hn::Mul(along, along);
-    const auto off =
-        hn::Sub(hn::Mul(hn::Add(hn::Mul(x, nx), hn::Mul(z, nz)), hn::Set(d, s.per_width)),
-                hn::Mul(square, hn::Set(d, s.bend)));
-    auto exponent =
-        hn::Mul(hn::Add(hn::Mul(off, off), hn::Mul(square, square)), hn::Set(d, -0.72134752f));
-    if (s.ripple > 0) exponent = hn::Add(exponent, streak_ripple(d, s, along));
-    const auto soft =
-        hn::RebindMask(d, hn::Eq(hn::And(hn::Load(di, c.look.row(row)), hn::Set(di, 7 << 16)),
-                                 hn::Set(di, static_cast<std::int32_t>(kPackedSoft) << 16)));
-    const auto echo = hn::IfThenElseZero(
-        soft, hn::Mul(exp2_fading(d, exponent), hn::Set(d, s.amplitude * b.interface_scale[k])));
-    float* re = c.echo_re.row(row);
-    hn::Store(hn::Add(hn::Load(d, re), echo), d, re);
+    const auto kind_bits = hn::Set(di, 7 << 16),
+               soft_bits = hn::Set(di, static_cast<std::int32_t>(kPackedSoft) << 16);
+    const float *r = b.r + c.first, *scale = b.interface_scale + c.first;
+    for (int row = begin; row < end; ++row) {
+        const auto depth = hn::Set(d, r[row]);
+        const auto x = hn::Sub(hn::Add(from_x, hn::Mul(depth, to_x)), hn::Set(d, s.x)),
+                   z = hn::Sub(hn::Add(from_z, hn::Mul(depth, to_z)), hn::Set(d, s.z));
+        const auto along =
+            hn::Mul(hn::Sub(hn::Mul(x, nz), hn::Mul(z, nx)), hn::Set(d, s.per_length));
+        const auto square = hn::Mul(along, along);
+        const auto off =
+            hn::Sub(hn::Mul(hn::Add(hn::Mul(x, nx), hn::Mul(z, nz)), hn::Set(d, s.per_width)),
+                    hn::Mul(square, hn::Set(d, s.bend)));
+        auto exponent =
+            hn::Mul(hn::Add(hn::Mul(off, off), hn::Mul(square, square)), hn::Set(d, -0.72134752f));
+        if (s.ripple > 0) exponent = hn::Add(exponent, streak_ripple(d, s, along));
+        const auto soft =
+            hn::RebindMask(d, hn::Eq(hn::And(hn::Load(di, c.look.row(row)), kind_bits), soft_bits));
+        const auto echo = hn::IfThenElseZero(
+            soft, hn::Mul(exp2_fading(d, exponent), hn::Set(d, s.amplitude * scale[row])));
+        float* re = c.echo_re.row(row);
+        hn::Store(hn::Add(hn::Load(d, re), echo), d, re);
+    }
 }
 
 // Plates of the block, by their first sample.
@@ -67,7 +74,7 @@ HWY_NOINLINE void streak_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
             c.surfaces = true;
             for (int r = 0; r < c.rows; ++r) clear_surface_row(d, c, r);
         }
-        for (int row = begin; row < end; ++row) streak_row(d, b, s, c, row);
+        streak_rows(d, b, s, c, begin, end);
     }
 }
 

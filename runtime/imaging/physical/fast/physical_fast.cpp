@@ -198,7 +198,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     tail_from_.assign(lines / kBeamBlock, 0);
     own_tail_from_ = tail_from_;
     const auto threads = static_cast<std::size_t>(context.workers.threads());
-    work_.assign(threads * 3 * static_cast<std::size_t>(stride_), 0.0f);
+    work_.assign(threads * kWorkRows * static_cast<std::size_t>(stride_), 0.0f);
     const auto ring_rows = static_cast<std::size_t>(std::max(2 * tables.axial_reach + 1, 3));
     ring_.assign(threads * 2 * ring_rows * static_cast<std::size_t>(tables.looks) *
                      static_cast<std::size_t>(stride_),

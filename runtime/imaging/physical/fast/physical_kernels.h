@@ -48,6 +48,8 @@ enum BeamNumber {
 inline constexpr int kRowSlack = 64;   // behind rows and buffers: lanes of the widest vector
 inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 6
 
+inline constexpr int kWorkRows = 4;  // of a thread, for the passes over rows
+
 inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
 
 // Effect wall: distances at nodes, `lines` of the block apart, and the tables of sheets.
@@ -186,8 +188,9 @@ struct PhysicalRowTask {
     const float* lateral = nullptr;  // centre tap
     int reach = 0;
     bool point_spread = true;
-    float *work_re = nullptr, *work_im = nullptr, *work_light = nullptr;  // with margins
-    float *out_re = nullptr, *out_im = nullptr;                           // of the first look
+    // With margins.
+    float *work_re = nullptr, *work_im = nullptr, *work_light = nullptr, *work_clutter = nullptr;
+    float *out_re = nullptr, *out_im = nullptr;  // of the first look
     int looks = 1;
     std::ptrdiff_t look_stride = 0, out_stride = 0;  // of echoes and of `out`
 
@@ -218,7 +221,7 @@ struct PhysicalSpreadTask {
 // A row's filter along the beams; the envelope's power.
 struct PhysicalPowerTask {
     int lines = 0;
-    const float* const* re = nullptr;  // rows of the filter, first look; null rows count as zero
+    const float* const* re = nullptr;  // rows of the filter, first look
     const float* const* im = nullptr;
     int looks = 1;
     std::ptrdiff_t look_stride = 0;
@@ -228,7 +231,8 @@ struct PhysicalPowerTask {
     float steady = 0;                // power that the looks leave of the near field's ringing
     const float* clutter = nullptr;  // null: none
     int clutter_reach = 0;
-    float clutter_steady = 0;       // its share
+    float clutter_steady = 0;  // its share
+    float* work_clutter = nullptr;
     float* envelope_sum = nullptr;  // the envelope is added to it; null: not needed
     float* power = nullptr;
 };

@@ -18,6 +18,7 @@ namespace {
 // What a thread takes at a time: rows of cells of the haze, and rows of samples.
 constexpr int kCellsAtOnce = 2;
 constexpr int kGreyRows = 16;
+constexpr double kFaintestRinging = 1e-12;  // of which the square is still a normal number
 }  // namespace
 
 // Beyond the outermost beams a row is mirrored, `reach` beams far.
@@ -91,7 +92,8 @@ void PhysicalFast::fill_row_task(const PhysicalFrame& f, int k, PhysicalRowTask&
     t.looks = row.looks_drawn;
     const double all = std::sqrt(static_cast<double>(row.looks)) / row.gain;
     t.inverse_gain = static_cast<float>(all);
-    t.near_field = static_cast<float>(face_clutter(row, f.effects) * std::sqrt(row.drawn));
+    const double ringing = face_clutter(row, f.effects) * std::sqrt(row.drawn);
+    t.near_field = ringing > kFaintestRinging ? static_cast<float>(ringing) : 0;
     t.clutter = f.effects.clutter && clutter_ != nullptr ? clutter_ + at : nullptr;
     t.clutter_reach = row.haze_reach;
     t.clutter_drawn = static_cast<float>(row.drawn);
@@ -128,12 +130,12 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
                                                                                 int item) {
         const int begin = item * kCellsAtOnce * kHazeCell;
         const int end = std::min(begin + kCellsAtOnce * kHazeCell, g.samples);
-        float* work = work_.data() + static_cast<std::ptrdiff_t>(part) * 3 * stride_;
+        float* work = work_.data() + static_cast<std::ptrdiff_t>(part) * kWorkRows * stride_;
         const std::ptrdiff_t ring_size = static_cast<std::ptrdiff_t>(2) * ring_rows * stride_;
         float* ring = ring_.data() + part * tables_.looks * ring_size;
         float* envelope = envelope_.data() + static_cast<std::ptrdiff_t>(part) * stride_;
         const auto ring_re = [&](int k) {
-            return ring + static_cast<std::ptrdiff_t>(2 * (k % ring_rows)) * stride_;
+            return ring + static_cast<std::ptrdiff_t>(2 * ((k + ring_rows) % ring_rows)) * stride_;
         };
         const auto ring_im = [&](int k) { return ring_re(k) + stride_; };
         PhysicalRowTask row_task;
@@ -144,9 +146,15 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
         row_task.work_re = work + kRowMargin;
         row_task.work_im = work + stride_ + kRowMargin;
         row_task.work_light = work + 2 * static_cast<std::ptrdiff_t>(stride_) + kRowMargin;
+        row_task.work_clutter = work + 3 * static_cast<std::ptrdiff_t>(stride_) + kRowMargin;
         row_task.look_stride = look_stride_;
         row_task.out_stride = ring_size;
         const auto fill = [&](int k) {
+            if (k < 0 || k >= g.samples) {  // beyond the picture there is nothing
+                for (int look = 0; look < tables_.looks; ++look)
+                    std::fill_n(ring_re(k) + look * ring_size, 2 * stride_, 0.0f);
+                return;
+            }
             fill_row_task(f, k, row_task);
             row_task.out_re = ring_re(k);
             row_task.out_im = ring_im(k);
@@ -154,8 +162,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
         };
         int& next = next_row_[static_cast<std::size_t>(part)];
         if (next != begin) {
-            for (int k = std::max(begin - reach, 0); k < std::min(begin + reach, g.samples); ++k)
-                fill(k);
+            for (int k = begin - reach; k < begin + reach; ++k) fill(k);
         }
         next = end;
         PhysicalPowerTask t;
@@ -169,20 +176,21 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             f.effects.point_spread ? tables_.axial.data() + kMaxAxial - reach : kOneTap.data();
         t.axial_count = 2 * reach + 1;
         t.envelope_sum = haze || even ? envelope : nullptr;
+        t.work_clutter = row_task.work_clutter;
         for (int k = begin; k < end; ++k) {
             if (k % kHazeCell == 0) std::fill_n(envelope, lines_, 0.0f);
-            if (k + reach < g.samples) fill(k + reach);
+            fill(k + reach);
             for (int j = -reach; j <= reach; ++j) {
-                const bool exists = k + j >= 0 && k + j < g.samples;
-                rows_re[j + reach] = exists ? ring_re(k + j) : nullptr;
-                rows_im[j + reach] = exists ? ring_im(k + j) : nullptr;
+                rows_re[j + reach] = ring_re(k + j);
+                rows_im[j + reach] = ring_im(k + j);
             }
             const Row& row = tables_.rows[static_cast<std::size_t>(k)];
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * stride_ + kRowMargin;
             t.gain = static_cast<float>(row.gain);
             t.looks = row.looks;
             const double face = face_clutter(row, f.effects);
-            t.steady = static_cast<float>(face * face * (1 - row.drawn));
+            t.steady =
+                face > kFaintestRinging ? static_cast<float>(face * face * (1 - row.drawn)) : 0;
             t.clutter = f.effects.clutter && clutter_ != nullptr ? clutter_ + at : nullptr;
             t.clutter_reach = row.haze_reach;
             t.clutter_steady = static_cast<float>(1 - row.drawn);
@@ -304,7 +312,8 @@ void PhysicalFast::make_grey(const PhysicalFrame& f) {
         const auto weight = static_cast<float>(filter_weight(tables_, f.effects));
         const bool filtered = weight != 0, plain = filtered && weight != 1;
         t.filtered = filtered;
-        t.work = work_.data() + static_cast<std::ptrdiff_t>(part) * 3 * stride_ + kRowMargin;
+        t.work =
+            work_.data() + static_cast<std::ptrdiff_t>(part) * kWorkRows * stride_ + kRowMargin;
         const auto fill = [&](int k) {
             fill_grey_task(f, k, t);
             t.out = ring_at(k);

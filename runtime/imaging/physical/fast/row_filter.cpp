@@ -4,7 +4,9 @@
 #include "runtime/imaging/physical/fast/row_filter.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <type_traits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "row_filter.cpp"
@@ -26,13 +28,31 @@ HWY_INLINE hn::Vec<D> smooth_light(D d, const float* light) {
     return hn::Add(sum, hn::Mul(hn::Add(hn::Add(at(-2), at(2)), at(0)), hn::Set(d, 3 / 15.0f)));
 }
 
+// Loops over a reach are unrolled: with one that is not known, the end of each is guessed wrongly.
+template <int kMost, int kReach = 0, class Call>
+HWY_INLINE void with_reach(int reach, const Call& call) {
+    if constexpr (kReach < kMost) {
+        if (reach != kReach) return with_reach<kMost, kReach + 1>(reach, call);
+    }
+    call(std::integral_constant<int, kReach>());
+}
+
 // Mean of the clutter over neighbouring beams.
-template <class D>
-HWY_INLINE hn::Vec<D> mean_clutter(D d, const float* row, int reach) {
-    auto sum = hn::LoadU(d, row);
-    for (int j = 1; j <= reach; ++j)
-        sum = hn::Add(sum, hn::Add(hn::LoadU(d, row - j), hn::LoadU(d, row + j)));
-    return hn::Mul(sum, hn::Set(d, 1 / (2 * static_cast<float>(reach) + 1)));
+template <int kReach>
+HWY_NOINLINE void mean_clutter(const float* row, int lines, float* out) {
+    const hn::CappedTag<float, kBeamBlock> d;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const auto share = hn::Set(d, 1 / (2 * static_cast<float>(kReach) + 1));
+    for (int i = 0; i < lines; i += lanes) {
+        auto sum = hn::LoadU(d, row + i);
+        for (int j = 1; j <= kReach; ++j)
+            sum = hn::Add(sum, hn::Add(hn::LoadU(d, row + i - j), hn::LoadU(d, row + i + j)));
+        hn::StoreU(hn::Mul(sum, share), d, out + i);
+    }
+}
+HWY_INLINE void mean_clutter(const float* row, int lines, int reach, float* out) {
+    with_reach<kMaxHazeReach>(
+        reach, [&](auto n) HWY_ATTR { mean_clutter<decltype(n)::value>(row, lines, out); });
 }
 
 // Adds tails, ringing and reverberation: echoes of their own, which pass through the point spread.
@@ -44,8 +64,8 @@ HWY_INLINE void add_clutter_noise(D d, const PhysicalRowTask& t, int i, V& re, V
     if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock])
         power = hn::Add(power, smooth_light(d, t.tail + i));
     if (t.clutter != nullptr) {
-        power = hn::Add(power, hn::Mul(mean_clutter(d, t.clutter + i, t.clutter_reach),
-                                       hn::Set(d, t.clutter_drawn)));
+        power =
+            hn::Add(power, hn::Mul(hn::LoadU(d, t.work_clutter + i), hn::Set(d, t.clutter_drawn)));
     }
     const auto level = hn::Mul(hn::Sqrt(hn::Mul(half, power)), unit);
     re = hn::Add(re, hn::Mul(level, noise_of(d, t.clutter_re + i)));
@@ -67,18 +87,13 @@ HWY_INLINE void add_electronic_noise(D d, const PhysicalRowTask& t, int i, V& re
     im = hn::Add(im, hn::Mul(noise_level, n_im));
 }
 
-// Light of the aperture times echoes, then the point spread across beams. kFirst: of the looks; it
-// leaves the light to the others, and carries the noise.
+// Light of the aperture times echoes. kFirst: of the looks; it leaves the light to the others.
 template <bool kFirst>
-HWY_INLINE void filter_look(const PhysicalRowTask& t, int look) {
+HWY_INLINE void light_look(const PhysicalRowTask& task, const std::int32_t* echoes) {
+    const PhysicalRowTask t = task;  // a copy, which no store into a row can change
     const hn::CappedTag<float, kBeamBlock> d;
     const hn::RebindToSigned<decltype(d)> di;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    const std::int32_t* echoes = t.echoes + look * t.look_stride;
-    float* out_re = t.out_re + look * t.out_stride;
-    float* out_im = t.out_im + look * t.out_stride;
-    float* mre = t.work_re;
-    float* mim = t.work_im;
     for (int i = 0; i < t.lines; i += lanes) {
         auto light = hn::Zero(d);
         if constexpr (kFirst) {
@@ -90,23 +105,26 @@ HWY_INLINE void filter_look(const PhysicalRowTask& t, int look) {
         const auto echo = hn::LoadU(di, echoes + i);
         auto re = hn::Mul(echo_real(d, echo), light), im = hn::Mul(echo_imaginary(d, echo), light);
         if constexpr (kFirst) add_clutter_noise(d, t, i, re, im);
-        hn::StoreU(re, d, mre + i);
-        hn::StoreU(im, d, mim + i);
+        hn::StoreU(re, d, t.work_re + i);
+        hn::StoreU(im, d, t.work_im + i);
     }
-    const int reach = t.point_spread ? t.reach : 0;
-    for (int j = 0; j < reach; ++j) {  // mirrored at the sector's edges
-        const int left = std::min(j, t.scanlines - 1), right = std::max(t.scanlines - 1 - j, 0);
-        mre[-1 - j] = mre[left];
-        mim[-1 - j] = mim[left];
-        mre[t.scanlines + j] = mre[right];
-        mim[t.scanlines + j] = mim[right];
-    }
-    const auto centre = hn::Set(d, t.point_spread ? t.lateral[0] : 1.0f);
+}
+
+// The point spread across beams. kFirst: it carries the noise.
+template <bool kFirst, int kReach>
+HWY_NOINLINE void spread_look(const PhysicalRowTask& task, float* out_re, float* out_im) {
+    const PhysicalRowTask t = task;
+    const hn::CappedTag<float, kBeamBlock> d;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const float *mre = t.work_re, *mim = t.work_im;
+    std::array<float, kReach + 1> taps;
+    for (std::size_t j = 0; j <= kReach; ++j) taps[j] = t.lateral[j];
+    const auto centre = hn::Set(d, t.point_spread ? taps[0] : 1.0f);
     for (int i = 0; i < t.lines; i += lanes) {
         auto re = hn::Mul(hn::LoadU(d, mre + i), centre),
              im = hn::Mul(hn::LoadU(d, mim + i), centre);
-        for (int j = 1; j <= reach; ++j) {
-            const auto tap = hn::Set(d, t.lateral[j]);
+        for (int j = 1; j <= kReach; ++j) {
+            const auto tap = hn::Set(d, taps[static_cast<std::size_t>(j)]);
             re = hn::Add(
                 re, hn::Mul(hn::Add(hn::LoadU(d, mre + i - j), hn::LoadU(d, mre + i + j)), tap));
             im = hn::Add(
@@ -118,7 +136,26 @@ HWY_INLINE void filter_look(const PhysicalRowTask& t, int look) {
     }
 }
 
+template <bool kFirst>
+HWY_INLINE void filter_look(const PhysicalRowTask& t, int look) {
+    light_look<kFirst>(t, t.echoes + look * t.look_stride);
+    const int reach = t.point_spread ? t.reach : 0;
+    float *mre = t.work_re, *mim = t.work_im;
+    for (int j = 0; j < reach; ++j) {  // mirrored at the sector's edges
+        const int left = std::min(j, t.scanlines - 1), right = std::max(t.scanlines - 1 - j, 0);
+        mre[-1 - j] = mre[left];
+        mim[-1 - j] = mim[left];
+        mre[t.scanlines + j] = mre[right];
+        mim[t.scanlines + j] = mim[right];
+    }
+    with_reach<kMaxLateral>(reach, [&](auto n) HWY_ATTR {
+        spread_look<kFirst, decltype(n)::value>(t, t.out_re + look * t.out_stride,
+                                                t.out_im + look * t.out_stride);
+    });
+}
+
 void filter_across(const PhysicalRowTask& t) {
+    if (t.clutter != nullptr) mean_clutter(t.clutter, t.lines, t.clutter_reach, t.work_clutter);
     filter_look<true>(t, 0);
     for (int look = 1; look < t.looks; ++look) filter_look<false>(t, look);
 }
@@ -141,39 +178,38 @@ void spread_light(const PhysicalSpreadTask& t) {
 }
 
 // Point spread along the beam and gain; the envelope's power, the mean of all looks.
-void make_power(const PhysicalPowerTask& t) {
+template <int kReach>
+HWY_NOINLINE void power_of_row(const PhysicalPowerTask& task) {
+    const PhysicalPowerTask t = task;
     const hn::CappedTag<float, kBeamBlock> d;
     const int lanes = static_cast<int>(hn::Lanes(d));
     const auto gain = hn::Set(d, t.gain * t.gain / static_cast<float>(t.looks));
+    std::array<const float*, 2 * kReach + 1> row_re, row_im;
+    std::array<float, kReach + 1> taps;
+    for (std::size_t j = 0; j < row_re.size(); ++j) {
+        row_re[j] = t.re[j];
+        row_im[j] = t.im[j];
+    }
+    for (std::size_t j = 0; j <= kReach; ++j) taps[j] = t.axial[kReach + j];
     for (int i = 0; i < t.lines; i += lanes) {
         auto power = hn::Zero(d);
         for (int look = 0; look < t.looks; ++look) {
             const std::ptrdiff_t from = look * t.look_stride + i;
-            const int centre = t.axial_count / 2;
-            auto tap = hn::Set(d, t.axial[centre]);
-            auto re = hn::Mul(hn::LoadU(d, t.re[centre] + from), tap),
-                 im = hn::Mul(hn::LoadU(d, t.im[centre] + from), tap);
-            for (int j = 1; j <= centre; ++j) {
-                const int above = centre - j, below = centre + j;
-                tap = hn::Set(d, t.axial[below]);
-                auto sum_re = hn::Zero(d), sum_im = hn::Zero(d);
-                if (t.re[above] != nullptr) {
-                    sum_re = hn::LoadU(d, t.re[above] + from);
-                    sum_im = hn::LoadU(d, t.im[above] + from);
-                }
-                if (t.re[below] != nullptr) {
-                    sum_re = hn::Add(sum_re, hn::LoadU(d, t.re[below] + from));
-                    sum_im = hn::Add(sum_im, hn::LoadU(d, t.im[below] + from));
-                }
-                re = hn::Add(re, hn::Mul(sum_re, tap));
-                im = hn::Add(im, hn::Mul(sum_im, tap));
+            const auto at = [&](const float* row) HWY_ATTR { return hn::LoadU(d, row + from); };
+            auto tap = hn::Set(d, taps[0]);
+            auto re = hn::Mul(at(row_re[kReach]), tap), im = hn::Mul(at(row_im[kReach]), tap);
+            for (std::size_t j = 1; j <= kReach; ++j) {
+                const std::size_t above = kReach - j, below = kReach + j;
+                tap = hn::Set(d, taps[j]);
+                re = hn::Add(re, hn::Mul(hn::Add(at(row_re[above]), at(row_re[below])), tap));
+                im = hn::Add(im, hn::Mul(hn::Add(at(row_im[above]), at(row_im[below])), tap));
             }
             power = hn::Add(power, hn::Add(hn::Mul(re, re), hn::Mul(im, im)));
         }
         power = hn::Add(hn::Mul(power, gain), hn::Set(d, t.steady));
         if (t.clutter != nullptr) {
-            power = hn::Add(power, hn::Mul(mean_clutter(d, t.clutter + i, t.clutter_reach),
-                                           hn::Set(d, t.clutter_steady)));
+            power = hn::Add(
+                power, hn::Mul(hn::LoadU(d, t.work_clutter + i), hn::Set(d, t.clutter_steady)));
         }
         if (t.envelope_sum != nullptr) {
             hn::StoreU(hn::Add(hn::LoadU(d, t.envelope_sum + i), hn::Sqrt(power)), d,
@@ -181,6 +217,12 @@ void make_power(const PhysicalPowerTask& t) {
         }
         hn::StoreU(power, d, t.power + i);
     }
+}
+
+void make_power(const PhysicalPowerTask& t) {
+    if (t.clutter != nullptr) mean_clutter(t.clutter, t.lines, t.clutter_reach, t.work_clutter);
+    with_reach<kMaxAxial>(t.axial_count / 2,
+                          [&](auto n) HWY_ATTR { power_of_row<decltype(n)::value>(t); });
 }
 
 }  // namespace sonocase::runtime::HWY_NAMESPACE
