@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Gain that a machine evens out across its beams.
-#include "runtime/imaging/physical/model/equaliser.h"
+#include "runtime/imaging/physical/fast/equaliser_rows.h"
 
 #include <gtest/gtest.h>
 
@@ -20,19 +20,18 @@ struct Bench {
     Exercise exercise = phantom_exercise();
     ScanGeometry geometry;
     Tables tables;
-    Equaliser even;
+    EqualiserRows even;
 
     Bench() {
         exercise.probe.depth_mm = 150;
         geometry = make_scan_geometry(exercise.probe, 192, 512, 128, 128);
         tables = make_tables(exercise.probe, Machine{}, geometry);
-        even.resize(64, 224);
+        even.resize(64, 192 + 2 * kRowMargin + kRowSlack);
     }
-    float& at(int row, int line) {
-        return even.envelope[static_cast<std::size_t>(row * even.stride + line)];
-    }
+    float& envelope(int row, int line) { return even.envelope_row(row)[line]; }
+    float gain(int row, int line) const { return even.gain_row(row)[line]; }
     void fill(float value) { std::fill(even.envelope.begin(), even.envelope.end(), value); }
-    void run() { even.make_gain(geometry, tables); }
+    void run() { even.make_gain(available_simd_targets().front(), geometry, tables); }
 };
 
 TEST(Equaliser, LeavesEvenGroundShadingAlongTheBeamAndNothingAlone) {
@@ -41,14 +40,14 @@ TEST(Equaliser, LeavesEvenGroundShadingAlongTheBeamAndNothingAlone) {
         b.fill(value);
         b.run();
         for (int row = 0; row < 64; ++row) {
-            for (int l = 0; l < 192; ++l) ASSERT_NEAR(b.at(row, l), 1, 1e-5) << value;
+            for (int l = 0; l < 192; ++l) ASSERT_NEAR(b.gain(row, l), 1, 1e-5) << value;
         }
     }
     for (int row = 0; row < 64; ++row) {
-        for (int l = 0; l < 192; ++l) b.at(row, l) = static_cast<float>(std::exp(-0.1 * row));
+        for (int l = 0; l < 192; ++l) b.envelope(row, l) = static_cast<float>(std::exp(-0.1 * row));
     }
     b.run();
-    for (int row = 0; row < 64; ++row) EXPECT_NEAR(b.at(row, 100), 1, 1e-4) << row;
+    for (int row = 0; row < 64; ++row) EXPECT_NEAR(b.gain(row, 100), 1, 1e-4) << row;
 }
 
 TEST(Equaliser, RaisesAColumnHalfTheWayAndHardlyASpot) {
@@ -56,32 +55,32 @@ TEST(Equaliser, RaisesAColumnHalfTheWayAndHardlyASpot) {
     const auto shade = [&](int from, int to) {
         b.fill(8);
         for (int row = from; row < to; ++row) {
-            for (int l = 99; l < 103; ++l) b.at(row, l) = 4;
+            for (int l = 99; l < 103; ++l) b.envelope(row, l) = 4;
         }
         b.run();
     };
     shade(0, 64);
     const int deep = 40, shallow = 10;
-    EXPECT_EQ(b.at(shallow, 100), 1);  // 24 mm: above where it begins
-    const double column = 0.5 * std::sqrt(static_cast<double>(b.at(deep, 100)));
+    EXPECT_EQ(b.gain(shallow, 100), 1);  // 24 mm: above where it begins
+    const double column = 0.5 * std::sqrt(static_cast<double>(b.gain(deep, 100)));
     EXPECT_GT(column, 0.62);  // half the way to 1: 0.71
     EXPECT_LT(column, 0.72);
-    EXPECT_NEAR(b.at(deep, 20), 1, 1e-4);
+    EXPECT_NEAR(b.gain(deep, 20), 1, 1e-4);
     shade(deep, deep + 1);
-    EXPECT_LT(std::sqrt(static_cast<double>(b.at(deep, 100))), 1.12);
+    EXPECT_LT(std::sqrt(static_cast<double>(b.gain(deep, 100))), 1.12);
 }
 
 TEST(Equaliser, NeverMovesPowerByMoreThanThreeDecibels) {
     Bench b;
     b.fill(0);
     for (int row = 0; row < 64; ++row) {
-        for (int l = 0; l < 192; l += 7) b.at(row, l) = row % 5 == 0 ? 1e4f : 3;
+        for (int l = 0; l < 192; l += 7) b.envelope(row, l) = row % 5 == 0 ? 1e4f : 3;
     }
     b.run();
     for (int row = 0; row < 64; ++row) {
         for (int l = 0; l < 192; ++l) {
-            EXPECT_GE(b.at(row, l), 0.5f);
-            EXPECT_LE(b.at(row, l), 2.0f);
+            EXPECT_GE(b.gain(row, l), 0.5f);
+            EXPECT_LE(b.gain(row, l), 2.0f);
         }
     }
 }

@@ -320,9 +320,8 @@ TEST(Septa, AFlatFaceClosesASlopedGapEvenlyAndBridgesNoWideOne) {
 // steps would be waves of all layers below, longer than the mean over neighbouring beams.
 TEST(Septa, AGapEndsWhereTheRecordsOfTheSkinSay) {
     constexpr double kSlope = 0.2, kVoxelMm = 1;
-    CaseBundle sloped = block_of(kVoxelMm, [](Point3 p) {
-        return p.z < kSlope * p.x ? Phantom::outside : Phantom::fat;
-    });
+    CaseBundle sloped = block_of(
+        kVoxelMm, [](Point3 p) { return p.z < kSlope * p.x ? Phantom::outside : Phantom::fat; });
     const Vector3 into = normalized(Vector3{-kSlope, 0, 1});  // the body
     std::vector<std::uint32_t> records;
     for (int k = 0; k < sloped.grid.size.z; ++k) {
@@ -331,11 +330,10 @@ TEST(Septa, AGapEndsWhereTheRecordsOfTheSkinSay) {
                 const Point3 p = sloped.grid.point_from_voxel({1.0 * i, 1.0 * j, 1.0 * k});
                 const double inside = dot(into, p - Point3{}) / kVoxelMm;
                 const bool body = p.z >= kSlope * p.x;
-                records.push_back(
-                    std::abs(inside) > 1.5
-                        ? kNoBoundary
-                        : pack_boundary({body ? Phantom::outside : Phantom::fat, std::abs(inside),
-                                         body ? into : -into}));
+                records.push_back(std::abs(inside) > 1.5
+                                      ? kNoBoundary
+                                      : pack_boundary({body ? Phantom::outside : Phantom::fat,
+                                                       std::abs(inside), body ? into : -into}));
             }
         }
     }

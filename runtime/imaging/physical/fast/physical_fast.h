@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "runtime/imaging/formation/render_context.h"
+#include "runtime/imaging/physical/fast/equaliser_rows.h"
 #include "runtime/imaging/physical/fast/node_lattice.h"
 #include "runtime/imaging/physical/fast/physical_kernels.h"
-#include "runtime/imaging/physical/model/equaliser.h"
 #include "runtime/imaging/physical/model/gas_faces.h"
 #include "runtime/imaging/physical/model/physical_frame.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
@@ -129,7 +129,7 @@ class PhysicalFast {
     std::vector<std::int32_t> tail_from_, own_tail_from_;  // per block; before join_tails()
     std::vector<float> work_, ring_;                       // per thread
     std::vector<int> next_row_;  // per thread: the row that its ring is ready for
-    physical::Equaliser equaliser_;
+    EqualiserRows equaliser_;
     std::vector<float> envelope_, haze_;  // per thread: sum of a row of cells; # cells x stride
     std::vector<std::uint8_t> shade_;     // per thread: two rows
     std::vector<std::uint16_t> pairs_;

@@ -197,17 +197,13 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             t.power = power_ + at;
             make_power_row(context_.simd, t);
             const bool last = k % kHazeCell == kHazeCell - 1 || k == g.samples - 1;
-            if (even && last) {
-                std::copy_n(envelope, lines_,
-                            equaliser_.envelope.data() +
-                                static_cast<std::ptrdiff_t>(k / kHazeCell) * stride_);
-            }
+            if (even && last) std::copy_n(envelope, lines_, equaliser_.envelope_row(k / kHazeCell));
             if (haze && last)
                 spread_haze(k / kHazeCell, haze_level / static_cast<float>(k % kHazeCell + 1),
                             envelope);
         }
     });
-    if (even) equaliser_.make_gain(g, tables_);
+    if (even) equaliser_.make_gain(context_.simd, g, tables_);
 }
 
 // One row of the haze: the mean envelope over cells (`level` times the sum over a cell's samples),
@@ -260,8 +256,8 @@ void PhysicalFast::fill_grey_task(const PhysicalFrame& f, int k, PhysicalGreyTas
     const int k0 = std::min(static_cast<int>(at), std::max(cells_k_ - 2, 0)),
               k1 = std::min(k0 + 1, cells_k_ - 1);
     if (f.effects.equalisation && has_equalisation(tables_)) {
-        t.even_above = equaliser_.envelope.data() + static_cast<std::ptrdiff_t>(k0) * stride_;
-        t.even_below = equaliser_.envelope.data() + static_cast<std::ptrdiff_t>(k1) * stride_;
+        t.even_above = equaliser_.gain_row(k0);
+        t.even_below = equaliser_.gain_row(k1);
         t.even_mix = static_cast<float>(at - k0);
     }
     if (f.effects.haze && has_side_lobes(tables_)) {

@@ -8,13 +8,13 @@
 // In cells of kHazeCell samples of one beam, e: mean envelope,
 //     N = e under a triangle of deviation kEvenAlongMm along the beam, then 1 2 1 across
 //     W = N over cells of kHazeCell beams, then a triangle of deviation about kEvenAcross of all
-//     power gain = 1 + amount ramp(r) (clamp(W / N, 1/2, 2) - 1)
+//     d = W / N - 1, by kEvenSpeckle nearer to 0, since speckle alone makes it differ by so much
+//     power gain = 1 + amount ramp(r) (clamp(1 + d, 1/2, 2) - 1)
 // between the middles of the cells along the beam; ramp: 0 up to from_mm, 1 from kEvenRampMm
 // further on. Half the way in amplitude is W / N in power. A cell without echo stays as it is.
 #pragma once
 
-#include <span>
-#include <vector>
+#include <algorithm>
 
 #include "runtime/imaging/physical/model/physical_tables.h"
 
@@ -22,7 +22,17 @@ namespace sonocase::runtime::physical {
 
 inline constexpr double kEvenAlongMm = 4.9, kEvenAcross = 0.047, kEvenRampMm = 10;
 inline constexpr double kMostEven = 2;        // of power, and one over it
+inline constexpr double kEvenSpeckle = 0.08;  // of W / N
 inline constexpr float kEvenNothing = 1e-4f;  // mean envelope that counts as no echo
+
+// The gain of power where W / N is `ratio`, before amount and ramp.
+template <class Number>
+Number even_gain(Number ratio) {
+    const Number differs = ratio - 1, speckle = static_cast<Number>(kEvenSpeckle);
+    const Number left = differs - std::clamp(differs, -speckle, speckle);
+    return 1 + std::clamp(left, static_cast<Number>(1 / kMostEven - 1),
+                          static_cast<Number>(kMostEven - 1));
+}
 
 inline bool has_equalisation(const Tables& t) {
     return t.machine.equalisation.amount > 0;
@@ -33,16 +43,5 @@ int even_reach_along(const ScanGeometry& geometry);
 int even_reach_across(const ScanGeometry& geometry);
 // What of the gain counts at a row of cells: amount times ramp.
 double even_share(const ScanGeometry& geometry, const Tables& tables, int cell_row);
-
-// Buffers of one renderer.
-struct Equaliser {
-    int rows = 0, stride = 0;
-    std::vector<float> envelope;  // rows x stride: sums of each cell's samples; then power gain
-    std::vector<float> sums, smooth, wide, wider;
-
-    void resize(int cell_rows, int row_stride);
-    // Neither allocates nor throws. Cost: 25 us for 64 x 192 cells.
-    void make_gain(const ScanGeometry& geometry, const Tables& tables);
-};
 
 }  // namespace sonocase::runtime::physical

@@ -61,9 +61,9 @@ inline std::uint32_t noise_start(std::uint32_t seed, NoiseUse use, std::uint32_t
 }
 
 // Gap between the probe's face and the skin on the beams [first, last), mm; negative: no skin
-// within kMaxGapMm, so that the beam sees air. Where boundary records say how the skin runs within a
-// voxel the gap ends there, otherwise in steps of kGapStepMm at the first voxel of the body. Reads
-// voxels on the beams, whose blocks must be loaded. raw: # scanlines.
+// within kMaxGapMm, so that the beam sees air. Where boundary records say how the skin runs within
+// a voxel the gap ends there, otherwise in steps of kGapStepMm at the first voxel of the body.
+// Reads voxels on the beams, whose blocks must be loaded. raw: # scanlines.
 void find_gaps(const PhysicalScene& scene,
                const ScanGeometry& geometry,
                const PhysicalFrame& frame,

@@ -24,48 +24,7 @@ class Evening {
             for (int l = 0; l < lines_; ++l)
                 sum[at(k / kHazeCell, l)] += std::sqrt(power[in.at(k, l)]);
         }
-        const int along = even_reach_along(in.geometry), across = even_reach_across(in.geometry);
-        const int cells = (lines_ + kHazeCell - 1) / kHazeCell;
-        for (int row = 0; row < rows_; ++row) {
-            const auto triangle = [&](int l) {
-                double s = 0, n = 0;
-                for (int j = -along; j <= along; ++j) {
-                    if (row + j < 0 || row + j >= rows_) continue;
-                    s += (along + 1 - std::abs(j)) * sum[at(row + j, l)];
-                    n += along + 1 - std::abs(j);
-                }
-                return s / n;
-            };
-            const auto narrow = [&](int l) {
-                return 0.25 * triangle(std::max(l - 1, 0)) + 0.5 * triangle(l) +
-                       0.25 * triangle(std::min(l + 1, lines_ - 1));
-            };
-            std::vector<double> wide(static_cast<std::size_t>(cells), 0.0), wider = wide;
-            for (int c = 0; c < cells; ++c) {
-                const int end = std::min((c + 1) * kHazeCell, lines_);
-                for (int l = c * kHazeCell; l < end; ++l)
-                    wide[static_cast<std::size_t>(c)] += narrow(l) / (end - c * kHazeCell);
-            }
-            for (int c = 0; c < cells; ++c) {
-                double s = 0, n = 0;
-                for (int j = std::max(c - across, 0); j <= std::min(c + across, cells - 1); ++j) {
-                    s += (across + 1 - std::abs(j - c)) * wide[static_cast<std::size_t>(j)];
-                    n += across + 1 - std::abs(j - c);
-                }
-                wider[static_cast<std::size_t>(c)] = s / n;
-            }
-            for (int l = 0; l < lines_; ++l) {
-                const double c = std::clamp((l + 0.5) / kHazeCell - 0.5, 0.0, cells - 1.0);
-                const auto c0 = static_cast<std::size_t>(c),
-                           c1 = std::min(c0 + 1, static_cast<std::size_t>(cells - 1));
-                const double nothing = static_cast<double>(kEvenNothing) * kHazeCell,
-                             mix = c - static_cast<double>(c0);
-                const double ratio =
-                    ((1 - mix) * wider[c0] + mix * wider[c1] + nothing) / (narrow(l) + nothing);
-                gain_[at(row, l)] = 1 + even_share(in.geometry, in.tables, row) *
-                                            (std::clamp(ratio, 1 / kMostEven, kMostEven) - 1);
-            }
-        }
+        for (int row = 0; row < rows_; ++row) even_out_row(in, sum, row);
     }
 
     double gain(int k, int l) const {
@@ -76,6 +35,61 @@ class Evening {
     }
 
   private:
+    // N of a row's beams.
+    std::vector<double> narrow_of(const ReferenceInput& in,
+                                  const std::vector<double>& sum,
+                                  int row) const {
+        const int along = even_reach_along(in.geometry);
+        std::vector<double> mean(static_cast<std::size_t>(lines_), 0.0), narrow = mean;
+        const auto of = [&](int l) -> double& { return mean[static_cast<std::size_t>(l)]; };
+        for (int l = 0; l < lines_; ++l) {
+            double s = 0, n = 0;
+            for (int j = -along; j <= along; ++j) {
+                if (row + j < 0 || row + j >= rows_) continue;
+                s += (along + 1 - std::abs(j)) * sum[at(row + j, l)];
+                n += along + 1 - std::abs(j);
+            }
+            of(l) = s / n;
+        }
+        for (int l = 0; l < lines_; ++l)
+            narrow[static_cast<std::size_t>(l)] = 0.25 * of(std::max(l - 1, 0)) + 0.5 * of(l) +
+                                                  0.25 * of(std::min(l + 1, lines_ - 1));
+        return narrow;
+    }
+    // W at the middles of cells of beams.
+    std::vector<double> wide_of(const ReferenceInput& in, const std::vector<double>& narrow) const {
+        const int across = even_reach_across(in.geometry);
+        const int cells = (lines_ + kHazeCell - 1) / kHazeCell;
+        std::vector<double> mean(static_cast<std::size_t>(cells), 0.0), wide = mean;
+        for (int l = 0; l < lines_; ++l) {
+            const int c = l / kHazeCell, count = std::min(lines_ - c * kHazeCell, kHazeCell);
+            mean[static_cast<std::size_t>(c)] += narrow[static_cast<std::size_t>(l)] / count;
+        }
+        for (int c = 0; c < cells; ++c) {
+            double s = 0, n = 0;
+            for (int j = std::max(c - across, 0); j <= std::min(c + across, cells - 1); ++j) {
+                s += (across + 1 - std::abs(j - c)) * mean[static_cast<std::size_t>(j)];
+                n += across + 1 - std::abs(j - c);
+            }
+            wide[static_cast<std::size_t>(c)] = s / n;
+        }
+        return wide;
+    }
+    void even_out_row(const ReferenceInput& in, const std::vector<double>& sum, int row) {
+        const std::vector<double> narrow = narrow_of(in, sum, row), wide = wide_of(in, narrow);
+        const double last = static_cast<double>(wide.size()) - 1,
+                     nothing = static_cast<double>(kEvenNothing) * kHazeCell;
+        for (int l = 0; l < lines_; ++l) {
+            const double c = std::clamp((l + 0.5) / kHazeCell - 0.5, 0.0, last);
+            const auto c0 = static_cast<std::size_t>(c), c1 = std::min(c0 + 1, wide.size() - 1);
+            const double mix = c - static_cast<double>(c0);
+            const double ratio = ((1 - mix) * wide[c0] + mix * wide[c1] + nothing) /
+                                 (narrow[static_cast<std::size_t>(l)] + nothing);
+            gain_[at(row, l)] =
+                1 + even_share(in.geometry, in.tables, row) * (even_gain(ratio) - 1);
+        }
+    }
+
     std::size_t at(int row, int l) const { return static_cast<std::size_t>(row * lines_ + l); }
 
     int rows_, lines_;
