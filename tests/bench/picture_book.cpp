@@ -186,6 +186,7 @@ Shot shot_of(const std::string& effect) {
                                                    {"noise", {"bladder"}},
                                                    {"persistence", {"bladder"}},
                                                    {"haze", {"bladder"}},
+                                                   {"equalisation", {"kidney"}},
                                                    {"shadow", {"kidney"}},
                                                    {"texture", {"kidney"}}};
     const auto found = shots.find(effect);
