@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import sonocase
 from test_dataset import recipe  # noqa: F401  (a fixture)
@@ -46,10 +47,6 @@ def test_replay_and_score(small):
 
 def test_tiny_segmenter(small, case, pose, tmp_path):
     """On frames of its own kind: what it learns from it must find again."""
-    for module in ("sklearn", "scipy", "PIL"):
-        pytest.importorskip(module)
-    from PIL import Image
-
     empty = run("tiny_segmenter.py", small[0], "scan", tmp_path, check=False)
     assert empty.returncode == 1 and "no images" in empty.stderr
     renderer = sonocase.Renderer(case, "scan", size=(384, 384))
