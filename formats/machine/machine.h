@@ -50,7 +50,7 @@ enum class GreyMap { power, log };
 struct MachineGrey {
     GreyMap map = GreyMap::power;
     double floor = 9;              // the machine's own black, [0, 255]
-    double level = 44;             // of e = 1; power: above the floor; [1, 255]
+    double level = 56;             // of e = 1; power: above the floor; [1, 255]
     double exponent = 0.75;        // power only, [0.05, 4]
     double knee = 160;             // power only; 255: none; [1, 255]
     double knee_slope = 0.5;       // [0, 1]
@@ -70,7 +70,7 @@ struct MachineNoise {
 struct MachineGain {
     double tgc_db_per_cm_mhz = 0;  // one way; 0: by the probe's shape; [0, 3]
     double far_from_mm = 100;      // beyond it the gain falls again, [0, 500]
-    double far_db_per_cm = 1.6;    // by so much, [0, 30]
+    double far_db_per_cm = 0.8;    // by so much, [0, 30]
     double far_limit_db = 11;      // and no further, [0, 120]
     bool operator==(const MachineGain&) const = default;
 };
@@ -79,7 +79,7 @@ struct MachineGain {
 // decay, and lines fixed to the probe at first_mm + k spacing_mm, line_db - k line_step_db over it.
 // Everything else is multiplied by min(1, start + r / start_mm) below the face.
 struct MachineNearField {
-    double ring_level = 1.5;     // [0, 100]
+    double ring_level = 1.1;     // [0, 100]
     double ring_decay_mm = 2.5;  // [0.1, 100]
     double tail_level = 0;       // [0, 100]
     double tail_decay_mm = 9;    // [0.1, 100]
@@ -97,7 +97,7 @@ struct MachineNearField {
 // Haze under bright lines: along each beam, power fraction (1 - q) sum q^k s^2 with
 // q = exp(-dr / decay_mm), smoothed over across_mm along the face.
 struct MachineHaze {
-    double fraction = 0.3;  // 0: none; [0, 10]
+    double fraction = 0.2;  // 0: none; [0, 10]
     double decay_mm = 4.5;  // [0.1, 100]
     double across_mm = 2;   // full width of the mean, [0, 50]
     // Side lobes: a part of the mean envelope of the neighbourhood, dB; -120: none; [-120, 0]

@@ -6,8 +6,9 @@
 //   Effect/MODEL/NAME   time: the whole frame; cost_ns: of the effect, a beam sample; share: of the
 //                       frame; gathers, bytes: what it must fetch, a sample where it shows;
 //                       floor_ns: how long that takes if nothing waits
-//   Off/MODEL/NAME      a scene that calls for no effect that could be left out; percent: what the
-//                       effect costs there all the same, of the frame; the bar is 1
+//   Off/MODEL/NAME      a scene and a machine that call for no effect that could be left out;
+//                       percent: what the effect costs there all the same, of the frame; the bar
+//                       is 1
 //   Off/physical/compiled_in
 //                       the same, bone and gas compiled in against a version without them; the bar
 //                       is 2
@@ -104,10 +105,28 @@ runtime::RenderContext context_of(runtime::Workers& workers) {
     return {workers, serial_jobs(), runtime::available_simd_targets().front()};
 }
 
+// A machine that adds nothing which could be left out.
+Machine plain_machine() {
+    Machine m;
+    m.haze.fraction = 0;
+    m.equalisation.amount = 0;
+    m.structures = {false, false, false, false, false};
+    return m;
+}
+
+runtime::PhysicalSceneOptions scene_options_of(const Machine& machine) {
+    runtime::PhysicalSceneOptions options;
+    options.structures = machine.structures;
+    return options;
+}
+
 // Both models' renderers, with the switches at hand.
 struct PhysicalRig {
-    explicit PhysicalRig(const CaseBundle& bundle, const std::vector<Target>& targets = {})
-        : scene(*runtime::make_physical_scene(bundle, targets)),
+    explicit PhysicalRig(const CaseBundle& bundle,
+                         const std::vector<Target>& targets = {},
+                         const Machine& machine = {})
+        : tables(runtime::physical::make_tables(exercise.probe, machine, geometry)),
+          scene(*runtime::make_physical_scene(bundle, targets, scene_options_of(machine))),
           breathing(bundle),
           fast(scene,
                geometry,
@@ -133,8 +152,7 @@ struct PhysicalRig {
     const Exercise exercise = bench_exercise();
     const runtime::ScanGeometry geometry =
         runtime::make_scan_geometry(exercise.probe, kPhysicalLines, kSamples, kPixels, kPixels);
-    const runtime::physical::Tables tables =
-        runtime::physical::make_tables(exercise.probe, {}, geometry);
+    const runtime::physical::Tables tables;
     const runtime::PhysicalNoise noise = runtime::make_physical_noise(
         runtime::physical_textures().normal_levels, 1, kPhysicalLines + 128);
     const runtime::NeedleShape shaft = needle_of(exercise);
@@ -239,15 +257,15 @@ const CaseBundle& soft_bundle() {
     return soft;
 }
 
-// The case as one lump of liver: no surface, no fluid, no fibre, nothing baked.
+// The case as one block of a phantom: no surface, no fluid, no fibre, no organ, nothing baked.
 const CaseBundle& plain_bundle() {
     static const CaseBundle plain = [] {
         CaseBundle b = soft_bundle();
-        Tissue liver;
-        liver.name = "liver";
-        liver.texture = b.tissues.back().texture;
-        b.tissues = {liver};
-        for (std::size_t l = 1; l < b.labels.size(); ++l) b.labels[l].tissue = "liver";
+        Tissue phantom;
+        phantom.name = "phantom";
+        phantom.texture = b.tissues.back().texture;
+        b.tissues = {phantom};
+        for (std::size_t l = 1; l < b.labels.size(); ++l) b.labels[l].tissue = "phantom";
         b.boundary = {};
         b.echo_offset = {};
         return b;
@@ -279,7 +297,7 @@ void off(benchmark::State& state, const PaperEntry& entry) {
 }
 
 void off_physical(benchmark::State& state, const PhysicalEffects& without) {
-    static PhysicalRig rig(plain_bundle());
+    static PhysicalRig rig(plain_bundle(), {}, plain_machine());
     report_off(state, take_turns(state, [&](std::size_t pose, bool on) {
                    rig.render(pose, on ? PhysicalEffects{} : without, false);
                }));

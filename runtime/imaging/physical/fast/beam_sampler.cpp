@@ -80,10 +80,10 @@ void sample_beams_as(PhysicalBlock& b) {
             look_chunk(d, b, c);
             c.offsets = b.structure;
             if (b.structure) structure_chunk(d, b, c);
+            if (b.fine != nullptr && c.fine) fine_chunk(d, b, c);
             if (b.wall != nullptr && k < b.wall->rows) wall_chunk(d, b, c);
             if (b.streak_count > 0) streak_chunk(d, b, c);
             if (b.dome_mm != nullptr) dome_chunk(d, b, c);
-            if (b.fine != nullptr && c.fine) fine_chunk(d, b, c);
             scatter_chunk(d, b, c);
             light_chunk<kHard>(d, b, c, light);
         }

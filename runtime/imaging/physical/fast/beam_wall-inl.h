@@ -29,7 +29,7 @@ HWY_INLINE V sheet_echo(D d, const float* table, int size, V distance, V slope) 
     const auto echo = hn::GatherIndex(d, table, hn::ConvertTo(hn::RebindToSigned<D>(), within));
     const auto c2 = hn::Min(hn::Mul(slope, slope), hn::Set(d, 1.0f));
     const auto c4 = hn::Mul(c2, c2);
-    return hn::Mul(echo, hn::Mul(c4, c4));
+    return hn::Mul(echo, c4);
 }
 
 template <class D>

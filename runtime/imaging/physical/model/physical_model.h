@@ -39,6 +39,8 @@ inline constexpr double kMaxReflection = 0.115;
 
 // Walls of portal veins and arteries, and half the distance between the two lines of a capsule.
 inline constexpr double kVesselWall = 5, kVesselWallMm = 0.45, kCapsuleMm = 0.55;
+// A capsule is a mirror that the step in impedance does not tell of (a).
+inline constexpr double kCapsuleGain = 5, kCapsuleMost = 12, kCapsuleOnMuscle = 6;
 
 // Refraction at fluid: a beam that grazes the wall, its cosine to the normal below kEdgeCos, loses
 // energy along it.

@@ -86,7 +86,12 @@ void add_lining(const Label& la, const Tissue& a, const Label& lb, const Tissue&
     if (is_parenchyma(a) && b.name == "blood") line_vessel(lb.name, e);
     if (is_parenchyma(b) && a.name == "blood") line_vessel(la.name, e);
     // An organ's capsule, and the peritoneum on it.
-    if (is_parenchyma(a) != is_parenchyma(b) && !e.hard && !fluid) e.split_mm = kCapsuleMm;
+    if (is_parenchyma(a) != is_parenchyma(b) && !e.hard && !fluid) {
+        e.split_mm = kCapsuleMm;
+        e.amplitude = std::min(kCapsuleGain * e.amplitude, kCapsuleMost);
+        // What moves an organ against the wall: the diaphragm, or a fascia.
+        if (is_muscle(a) || is_muscle(b)) e.amplitude = std::max(e.amplitude, kCapsuleOnMuscle);
+    }
 }
 
 // A fine pulse shows the dermis as sheets of its own (wall_sheets.h); the lower face of a label of

@@ -210,8 +210,10 @@ Machine default_machine(const Probe& probe) {
 
 int samples_along(const Probe& probe, const Machine& machine) {
     constexpr int kLeast = 384, kMost = 512, kStretch = 32;
+    // Fewer than two: what a picture loses of its detail, .12 of a grey level, cannot be seen.
+    constexpr double kSamplesPerWidth = 1.85;
     const double width_mm = axial_width(machine.beam, frequency_of(machine.beam, probe));
-    const double needed = 2 * probe.depth_mm / width_mm;
+    const double needed = kSamplesPerWidth * probe.depth_mm / width_mm;
     const long stretches = std::lround(std::clamp(needed, 1.0, double{kMost}) / kStretch);
     return std::max(static_cast<int>(stretches) * kStretch, kLeast);
 }

@@ -124,7 +124,7 @@ Machine default_machine(const Probe& probe);
 // the pulse of a fan.
 bool shows_fine(const Machine& machine, const Probe& probe);
 
-// Samples along a beam that the machine's point spread needs: two to its width along the beam, in
+// Samples along a beam that the machine's point spread needs: 1.85 to its width along the beam, in
 // steps of a stretch; at least three for four pixels of a picture 512 high, at most one each.
 int samples_along(const Probe& probe, const Machine& machine);
 

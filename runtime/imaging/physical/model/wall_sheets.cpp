@@ -18,19 +18,20 @@ struct Sheet {
 
 constexpr double kDoubleDb = -4;
 
-// Below the skin: its two faces, then sheets of the fat.
+// Below the skin: its faces, the superficial fascia, then sheets of the fat.
 constexpr Sheet kOuter[] = {
-    {0.8, 8, 1.1},        {2.8, 8, 1.0}, {7.4, 16, 1.2, 1.4}, {13.2, 10, 1.1},
-    {16.6, 15, 1.4, 1.7}, {25, 12, 1.3}, {33, 12, 1.4},
+    {0.5, 7, 1.1},     {6.2, 17.5, 1.1}, {16.5, 12.5, 0.95},
+    {18.4, 9.5, 0.95}, {27.5, 10.5, 1},  {35, 10, 1},
 };
 // Above the organs: the peritoneum, then the sheets of three muscles.
 constexpr Sheet kInner[] = {
-    {1.4, 21, 1.5}, {4.1, 12, 1.2}, {7.6, 18, 1.3, 1.3}, {13.4, 14, 1.3, 1.7}, {16.9, 11, 1.2},
+    {1.4, 17, 1.2},   {2.7, 10.5, 0.85},  {6.2, 15.5, 1},    {7, 7, 0.95},
+    {8.3, 7.5, 0.95}, {12.6, 11.5, 0.95}, {18.5, 13.5, 1.1}, {22, 10, 1.1},
 };
-// Lamellae of fat and muscle between them: faint, at random distances.
-constexpr double kLamellaDb = -1, kLamellaSpreadDb = 8;
+// Lamellae of fat and muscle between them, at random distances.
+constexpr double kLamellaDb = 4.5, kLamellaSpreadDb = 10;
 constexpr double kLamellaApartMm = 0.7, kLamellaApartSpreadMm = 1.2;
-constexpr double kLamellaMm = 0.9, kLamellaSpreadMm = 0.5;
+constexpr double kLamellaMm = 0.75, kLamellaSpreadMm = 0.4;
 
 // What a pulse of a third of the length shows: septa of fat and fasciae, thin and many.
 constexpr Sheet kOuterFine[] = {
@@ -45,6 +46,7 @@ constexpr Sheet kInnerFine[] = {
     {12.6, 14, 1, 1.2},
 };
 constexpr double kFineMhz = 6;
+constexpr int kNoLimitDb = 100;
 
 // Faint sheets from the first to beyond the last of `sheets`.
 void add_lamellae(std::span<const Sheet> sheets, std::vector<Sheet>& out) {
@@ -106,14 +108,17 @@ WallTables make_wall_tables(double frequency_mhz,
         t.outer = table(kOuterFine);
         t.inner = table(kInnerFine);
         t.wave_mm = 0.15;
+        t.structure_db = kNoLimitDb;
         t.strength_db = 12;
         t.node_mm = 1.25;
     } else {
         t.outer = table(with_lamellae(kOuter));
         t.inner = table(with_lamellae(kInner));
+        t.wave_mm = 0.25;
         t.own_wave_mm = 0.4;
-        t.ground_db = 10;
-        t.structure_db = 0;
+        t.ground_db = 13;
+        t.structure_db = -7;
+        t.strength_db = 4;
     }
     return t;
 }

@@ -7,7 +7,7 @@
 //     (outer(depth) w + inner(above) (1 - w)) 10^(strength / 20) interface_scale
 // Scatterers of the ground between sheets are ground(above) dB brighter than the tissue's.
 // outer, inner: tables of sheets by depth below the skin and by height above the organs, each times
-// |cosine|^8 of the beam to the sheet; w = 1/2 + (above - depth) / 3, within 0 to 1.
+// |cosine|^4 of the beam to the sheet; w = 1/2 + (above - depth) / kWallBlendMm, within 0 to 1.
 // Depths include the wave; sheets above the organs have one of their own besides, so that the two
 // kinds do not run side by side. Source: recipe 5 of the living sweep, and the level of its ground;
 // places (a).
@@ -21,9 +21,8 @@
 
 namespace sonocase::runtime::physical {
 
-inline constexpr double kWallWaveMm = 0.4;  // deviation of a sheet from its even course
 inline constexpr double kWallMostDb = 4;    // its echo along it varies up to so much more
-inline constexpr double kWallBlendMm = 3;   // between sheets of the skin and of the organs
+inline constexpr double kWallBlendMm = 8;   // both kinds of sheet cross over so far
 inline constexpr double kWallDepthMm = 60;  // nothing is drawn deeper along a beam
 inline constexpr double kWallSkinMm = 2;    // below it begins the ground between sheets
 inline constexpr double kWallGroundMm = 2;  // and has its level so far below, and above the organs
@@ -36,10 +35,10 @@ inline constexpr double kWallBeforeMm = 4;
 
 struct WallTables {
     std::vector<float> outer, inner;
-    double wave_mm = kWallWaveMm;
+    double wave_mm = 0.25;     // deviation of a sheet from its even course
     double own_wave_mm = 0;    // of the sheets above the organs
     double ground_db = 0;      // of the ground over its tissue
-    int structure_db = 4;      // coarse structure of the wall is no brighter
+    int structure_db = 0;      // coarse and fine structure of the wall are no brighter
     double strength_db = 3.5;  // deviation of a sheet's echo along it
     double node_mm = 2.5;      // between nodes along a beam, at most
 };

@@ -300,6 +300,9 @@ class Beams {
         const PhysicalEffects& on = in_.frame.effects;
         double echo_db = look.echo_db + (on.wall ? look.wall_db : 0);
         if (p.look_index == p.place.label) {
+            double structure = fine_offset_db(
+                in_.scene, on, p.place.label,
+                in_.scene.grid.voxel_from_point(in_.scene.grid.origin_mm + p.from_origin));
             if (on.structure) {
                 double baked = echo_offset_db(in_.scene, p.looked_up);
                 const std::vector<double>& most = in_.scene.structure_most_db;
@@ -310,14 +313,11 @@ class Beams {
                     const double own = dead[static_cast<std::size_t>(p.place.label)];
                     baked -= std::clamp(baked, -own, own);
                 }
-                echo_db += wall.in_wall
-                               ? std::min(baked, static_cast<double>(in_.tables.wall.structure_db))
-                               : baked;
+                structure += baked;
             }
-            echo_db += wall.ground_db;
-            echo_db += fine_offset_db(
-                in_.scene, on, p.place.label,
-                in_.scene.grid.voxel_from_point(in_.scene.grid.origin_mm + p.from_origin));
+            if (wall.in_wall)
+                structure = std::min(structure, static_cast<double>(in_.tables.wall.structure_db));
+            echo_db += structure + wall.ground_db;
         }
         if (dome > 0)
             echo_db +=

@@ -17,7 +17,7 @@ WallEcho wall_echo(
                            double after_mm) {
         const double cosine = std::min(std::abs(after_mm - before_mm) / node_mm, 1.0);
         return static_cast<double>(table[static_cast<std::size_t>(wall_step(mm, table.size()))]) *
-               std::pow(cosine, 8);
+               std::pow(cosine, 4);
     };
     const double outer = sheet(sheets.outer, here.depth, before.depth, after.depth),
                  inner = sheet(sheets.inner, here.above, before.above, after.above);
