@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -26,31 +27,38 @@ const CaseBundle& liver() {
 
 using Plane = std::vector<double>;
 
-// Rows and columns less their Gaussian mean of 12 pixels.
-Plane detail_of(const std::vector<std::uint8_t>& pixels) {
-    constexpr double kSigma = 12;
+// The Gaussian mean of 12 pixels of a picture of `width` columns along its rows, turned over: rows
+// of the picture become columns.
+Plane row_means_turned(const Plane& in, std::size_t width, std::size_t height) {
     constexpr int kReach = 36;
-    std::vector<double> taps;
+    constexpr double kSigma = 12;
     double sum = 0;
-    for (int i = -kReach; i <= kReach; ++i)
-        sum += taps.emplace_back(std::exp(-0.5 * i * i / (kSigma * kSigma)));
-    const auto blur = [&](const Plane& in, int step, int length, int other, int other_step) {
-        Plane out(in.size());
-        for (int o = 0; o < other; ++o) {
-            for (int i = 0; i < length; ++i) {
-                double v = 0;
-                for (int j = -kReach; j <= kReach; ++j) {
-                    const int at = std::clamp(i + j, 0, length - 1);
-                    v += taps[static_cast<std::size_t>(j + kReach)] *
-                         in[static_cast<std::size_t>(at * step + o * other_step)];
-                }
-                out[static_cast<std::size_t>(i * step + o * other_step)] = v / sum;
-            }
+    std::array<double, 2 * kReach + 1> taps;
+    for (int j = -kReach; j <= kReach; ++j)
+        sum += taps[static_cast<std::size_t>(j + kReach)] =
+            std::exp(-0.5 * j * j / kSigma / kSigma);
+    for (double& tap : taps) tap /= sum;
+    Plane out(in.size()), mean(width), row(width + 2 * kReach);
+    for (std::size_t y = 0; y < height; ++y) {
+        const double* from = in.data() + y * width;
+        std::fill_n(row.begin(), kReach, from[0]);
+        std::copy_n(from, width, row.begin() + kReach);
+        std::fill_n(row.end() - kReach, kReach, from[width - 1]);
+        std::fill(mean.begin(), mean.end(), 0.0);
+        for (std::size_t j = 0; j < taps.size(); ++j) {
+            const double *shifted = row.data() + j, tap = taps[j];
+            double* to = mean.data();
+            for (std::size_t x = 0; x < width; ++x) to[x] += tap * shifted[x];
         }
-        return out;
-    };
+        for (std::size_t x = 0; x < width; ++x) out[x * height + y] = mean[x];
+    }
+    return out;
+}
+
+// A picture less its Gaussian mean.
+Plane detail_of(const std::vector<std::uint8_t>& pixels) {
     Plane grey(pixels.begin(), pixels.end());
-    const Plane mean = blur(blur(grey, 1, kWidth, kHeight, kWidth), kWidth, kHeight, kWidth, 1);
+    const Plane mean = row_means_turned(row_means_turned(grey, kWidth, kHeight), kHeight, kWidth);
     for (std::size_t i = 0; i < grey.size(); ++i) grey[i] -= mean[i];
     return grey;
 }
@@ -93,25 +101,33 @@ class Sweep {
 
   private:
     static double best_of(const Plane& a, const Plane& b, int x, int y) {
+        constexpr double n = kPatch * kPatch;
+        const auto at = [](const Plane& of, int column, int row) {
+            return of.data() + row * kWidth + column;
+        };
+        const auto sum_of = [](const double* p) {
+            double sum = 0;
+            for (int j = 0; j < kPatch; ++j, p += kWidth) {
+                for (int i = 0; i < kPatch; ++i) sum += p[i];
+            }
+            return sum;
+        };
+        const auto product_of = [](const double* p, const double* q) {
+            double sum = 0;
+            for (int j = 0; j < kPatch; ++j, p += kWidth, q += kWidth) {
+                for (int i = 0; i < kPatch; ++i) sum += p[i] * q[i];
+            }
+            return sum;
+        };
+        const double* first = at(a, x, y);
+        const double sa = sum_of(first), aa = product_of(first, first);
         double best = -1;
         for (int dy = -4; dy <= 4; ++dy) {
             for (int dx = -4; dx <= 4; ++dx) {
-                double sa = 0, sb = 0, aa = 0, bb = 0, ab = 0;
-                for (int j = 0; j < kPatch; ++j) {
-                    for (int i = 0; i < kPatch; ++i) {
-                        const double
-                            p = a[static_cast<std::size_t>((y + j) * kWidth + x + i)],
-                            q = b[static_cast<std::size_t>((y + dy + j) * kWidth + x + dx + i)];
-                        sa += p;
-                        sb += q;
-                        aa += p * p;
-                        bb += q * q;
-                        ab += p * q;
-                    }
-                }
-                constexpr double n = kPatch * kPatch;
-                best = std::max(
-                    best, (ab - sa * sb / n) / std::sqrt((aa - sa * sa / n) * (bb - sb * sb / n)));
+                const double* second = at(b, x + dx, y + dy);
+                const double sb = sum_of(second), bb = product_of(second, second);
+                best = std::max(best, (product_of(first, second) - sa * sb / n) /
+                                          std::sqrt((aa - sa * sa / n) * (bb - sb * sb / n)));
             }
         }
         return best;
