@@ -15,6 +15,7 @@ Machine classic() {
     m.beam.lateral_focus_mm = 0;
     m.beam.skirt = 0;
     m.beam.aperture_mm = 0;
+    m.beam.lines = 192;
     m.looks = {1, 1, 0};
     m.grey = {GreyMap::log, 0, 131.5, 1, 255, 1, 60};
     m.noise = {-70, false};
@@ -23,6 +24,7 @@ Machine classic() {
     m.haze = {0, 4.5, 2, -24};
     m.contact = {0, 0};
     m.equalisation.amount = 0;
+    m.speckle_reduction.variation = 0;
     m.structures = {false, false, false, false, false};
     m.post_filter = true;
     return m;
@@ -42,6 +44,7 @@ Machine modern_linear() {
     m.beam.skirt = 1;
     m.beam.skirt_width = 5.2;
     m.beam.aperture_mm = 0;
+    m.beam.lines = 192;
     m.looks = {4, 5, 8};
     m.grey.floor = 3;
     m.grey.level = 76;
@@ -52,6 +55,7 @@ Machine modern_linear() {
     m.haze = {0.2, 1.6, 0.8, -120};
     m.contact = {6, 0.05};
     m.equalisation.amount = 0;
+    m.speckle_reduction.variation = 0;
     return m;
 }
 

@@ -19,7 +19,7 @@ namespace sonocase {
 struct MachineBeam {
     double frequency_mhz = 0;    // 0: the exercise's; else [0.5, 50]
     double reference_mhz = 3.5;  // [0.5, 50]
-    double axial_mm = 0.72;      // along the beam; 0: from the frequency alone; [0, 10]
+    double axial_mm = 0.75;      // along the beam; 0: from the frequency alone; [0, 10]
     // Along the face: width = lateral_mm sqrt(1 + ((r - focus) / range)^2). A dynamic receive focus
     // keeps it narrow near the face, where its focus therefore lies.
     double lateral_mm = 0.85;      // at the focus; 0: from the frequency; [0, 20]
@@ -33,6 +33,7 @@ struct MachineBeam {
     // Width of the face that listens: what blocks a part of it casts a shadow whose edges soften on
     // the way down. 0: they stay as they are; [0, 100].
     double aperture_mm = 17;
+    int lines = 176;  // beams of a frame, [16, 1024]
     bool operator==(const MachineBeam&) const = default;
 };
 
@@ -120,6 +121,15 @@ struct MachineEqualisation {
     bool operator==(const MachineEqualisation&) const = default;
 };
 
+// Detail that adaptive speckle reduction leaves: little in even ground, much where it takes it for
+// structure. Contrast about the local mean varies so much between places of the tissue, some
+// millimetres large (physical/model/speckle_reduction.h).
+struct MachineSpeckleReduction {
+    double variation = 0.3;  // deviation of the contrast, of which the mean is 1; 0: none; [0, 1]
+    double from_mm = 20;     // deeper than this, [0, 500]
+    bool operator==(const MachineSpeckleReduction&) const = default;
+};
+
 // Structures that a case does not hold and the renderer adds to its tissue, each an effect
 // (docs/effects.md); linings are the walls of vessels and the double line of capsules. A machine of
 // the nineties shows none of them, and its frames do not pay for them.
@@ -140,6 +150,7 @@ struct Machine {
     MachineHaze haze;
     MachineContact contact;
     MachineEqualisation equalisation;
+    MachineSpeckleReduction speckle_reduction;
     MachineStructures structures;
     // Weights of the frames that persistence blends, newest first; scaled to sum to 1. One: none.
     std::vector<double> persistence{0.4, 0.3, 0.2, 0.1};  // 1 to 8 weights, [0, 1], the first > 0

@@ -30,6 +30,7 @@ void visit_machine(M& m, V& v) {
     v.number("skirt_width", m.beam.skirt_width, 1, 10);
     v.number("elevation_mm", m.beam.elevation_mm, 0.01, 50, true);
     v.number("aperture_mm", m.beam.aperture_mm, 0, 100);
+    v.whole("lines", m.beam.lines, 16, 1024);
     v.table("looks");
     v.whole("count", m.looks.count, 1, 16);
     v.whole("near_count", m.looks.near_count, 1, 16);
@@ -75,6 +76,9 @@ void visit_machine(M& m, V& v) {
     v.table("equalisation");
     v.number("amount", m.equalisation.amount, 0, 1);
     v.number("from_mm", m.equalisation.from_mm, 0, 500);
+    v.table("speckle_reduction");
+    v.number("variation", m.speckle_reduction.variation, 0, 1);
+    v.number("from_mm", m.speckle_reduction.from_mm, 0, 500);
     v.table("structures");
     v.flag("parenchyma", m.structures.parenchyma);
     v.flag("streaks", m.structures.streaks);

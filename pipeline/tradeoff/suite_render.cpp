@@ -81,15 +81,17 @@ Result<std::vector<ExampleImage>> play(const Player& player,
             if (s.value == "on") command += " --truth " + quoted(player.folder.path() + "/truth");
             continue;
         }
-        const bool grain = name == "grain_db", even = name == "equalisation";
-        if (name == "aperture_mm" || grain || even) {
+        const bool grain = name == "grain_db", even = name == "equalisation",
+                   reduction = name == "speckle_reduction";
+        if (name == "aperture_mm" || grain || even || reduction) {
             const std::string machine = player.folder.path() + "/machine.toml";
-            const std::string text = grain
-                                         ? "[machine]\nbase = \"modern-linear\"\nname = \"grain\"\n"
-                                           "[machine.noise]\ngrain_db = " +
-                                               s.value + "\n"
-                                     : even ? "[machine.equalisation]\namount = " + s.value + "\n"
-                                            : "[machine.beam]\naperture_mm = " + s.value + "\n";
+            const std::string text =
+                grain ? "[machine]\nbase = \"modern-linear\"\nname = \"grain\"\n"
+                        "[machine.noise]\ngrain_db = " +
+                            s.value + "\n"
+                : even      ? "[machine.equalisation]\namount = " + s.value + "\n"
+                : reduction ? "[machine.speckle_reduction]\nvariation = " + s.value + "\n"
+                            : "[machine.beam]\naperture_mm = " + s.value + "\n";
             if (const Status w = write_file(machine, text); !w) return w.error();
             command += " --machine " + quoted(machine);
             continue;
@@ -219,8 +221,8 @@ Suite render_suite() {
         "samples; seconds are the median of a frame on one thread.";
     suite.knobs = {
         {"render.scanlines",
-         {"64", "96", "128", "192", "256", "384"},
-         "192",
+         {"64", "96", "128", "176", "256", "384"},
+         "176",
          "",
          "beams of the sector",
          "detail across the beams",
@@ -253,6 +255,13 @@ Suite render_suite() {
          "how far a beam's gain goes to its neighbours'",
          "upright columns in the liver: of shadows, and of bright and dark places",
          "costs the sum of cells and a product of all samples, as much at every amount but 0"},
+        {"render.speckle_reduction",
+         {"0", "0.15", "0.3", "0.6"},
+         "0.3",
+         "",
+         "how much the contrast of detail differs between places of the tissue",
+         "smooth regions beside busy ones",
+         "costs the sum of cells and a blend of all samples, as much at every value but 0"},
         {"render.effects",
          {"auto", "-deformation", "-wall", "-streaks", "-parenchyma,-fine_structure", "-structure",
           "-clutter", "-boundaries"},

@@ -184,7 +184,7 @@ Result<Renderer> Renderer::create(CaseView bundle,
     m.deformation = row_of_effect(info, "deformation");
     if (m.deformation >= 0 && m.effects.on[static_cast<std::size_t>(m.deformation)])
         m.probe = std::make_unique<press::ProbePress>(bundle, exercise, *simd);
-    const int lines = options.scanlines > 0 ? options.scanlines : info.scanlines;
+    const int lines = options.scanlines > 0 ? options.scanlines : info.scanlines(exercise, options);
     const int samples = options.samples > 0 ? options.samples : info.samples(exercise, options);
     Result<std::unique_ptr<ImageFormation>> formation =
         info.create({bundle,

@@ -110,6 +110,7 @@ Machine plain_machine() {
     Machine m;
     m.haze.fraction = 0;
     m.equalisation.amount = 0;
+    m.speckle_reduction.variation = 0;
     m.structures = {false, false, false, false, false};
     return m;
 }
@@ -117,6 +118,7 @@ Machine plain_machine() {
 runtime::PhysicalSceneOptions scene_options_of(const Machine& machine) {
     runtime::PhysicalSceneOptions options;
     options.structures = machine.structures;
+    options.speckle_reduction = machine.speckle_reduction.variation > 0;
     return options;
 }
 

@@ -69,7 +69,7 @@ class ImageFormation {
 // A model before it is created.
 struct ImageModelInfo {
     // Full accuracy, unless the options say otherwise.
-    int scanlines;
+    int (*scanlines)(const Exercise& exercise, const RenderOptions& options);
     int (*samples)(const Exercise& exercise, const RenderOptions& options);
     std::span<const char* const> effects;  // names, in order of execution
     // Thickness of the slab in which the needle shows, mm; 0: the needle's own.

@@ -31,7 +31,7 @@ struct RenderOptions {
     std::vector<std::string> effects{"auto"};  // "auto", "all", "none", NAME or -NAME
     std::uint32_t seed = 1;
     // Beams [0, 4096] and samples per beam [0, 8192]; 0 takes the model's own number (paper
-    // 512 x 512; physical 192 x 384 to 512, 1.85 samples to the point spread's width).
+    // 512 x 512; physical the machine's beams x 384 to 512, 1.85 samples to the point spread's width).
     int scanlines = 0;
     int samples = 0;
     // Time that a frame shall take; 0: no limit, full accuracy (recordings). Needs host.clock. See

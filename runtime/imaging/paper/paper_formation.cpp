@@ -98,11 +98,15 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
         std::make_unique<PaperFormation>(std::move(*scene), input));
 }
 
+int beams_and_samples(const Exercise&, const RenderOptions&) {
+    return 512;
+}
+
 constexpr auto kEffectNames = effect_names_of(kPaperEffects);
 
 }  // namespace
 
-const ImageModelInfo kPaperModel{512, [](const Exercise&, const RenderOptions&) { return 512; },
-                                 kEffectNames, [](const Exercise&) { return 0.0; }, create};
+const ImageModelInfo kPaperModel{beams_and_samples, beams_and_samples, kEffectNames,
+                                 [](const Exercise&) { return 0.0; }, create};
 
 }  // namespace sonocase::runtime

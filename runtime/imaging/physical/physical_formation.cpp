@@ -158,7 +158,8 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
             const Machine machine = machine_of(input);
             scene = make_physical_scene(input.bundle, shown_lesions(input.exercise),
                                         {&jobs, textures, machine.tissue_db, machine.structures,
-                                         physical::shows_fine(machine, input.exercise.probe)});
+                                         physical::shows_fine(machine, input.exercise.probe),
+                                         machine.speckle_reduction.variation > 0});
         } else {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,
                                         input.scanlines + kNoiseSlack);
@@ -174,6 +175,10 @@ double needle_slab_mm(const Exercise& exercise) {
     return exercise.probe.elevation_mm;
 }
 
+int scanlines(const Exercise& exercise, const RenderOptions& options) {
+    return chosen_machine(exercise, options).beam.lines;
+}
+
 int samples(const Exercise& exercise, const RenderOptions& options) {
     return physical::samples_along(exercise.probe, chosen_machine(exercise, options));
 }
@@ -186,6 +191,6 @@ std::shared_ptr<const PhysicalTextures> shared_physical_textures() {
     return std::make_shared<const PhysicalTextures>(physical_textures());
 }
 
-const ImageModelInfo kPhysicalModel{192, samples, kEffectNames, needle_slab_mm, create};
+const ImageModelInfo kPhysicalModel{scanlines, samples, kEffectNames, needle_slab_mm, create};
 
 }  // namespace sonocase::runtime

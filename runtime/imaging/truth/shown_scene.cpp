@@ -31,9 +31,9 @@ Result<MovingEffects> moving_effects(const RenderOptions& options) {
 
 ScanGeometry shown_geometry(const Exercise& exercise, const RenderOptions& o) {
     const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
-    return make_scan_geometry(exercise.probe, o.scanlines > 0 ? o.scanlines : info.scanlines,
-                              o.samples > 0 ? o.samples : info.samples(exercise, o), o.width_px,
-                              o.height_px);
+    return make_scan_geometry(
+        exercise.probe, o.scanlines > 0 ? o.scanlines : info.scanlines(exercise, o),
+        o.samples > 0 ? o.samples : info.samples(exercise, o), o.width_px, o.height_px);
 }
 
 }  // namespace sonocase::runtime

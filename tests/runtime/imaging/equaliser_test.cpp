@@ -20,18 +20,20 @@ struct Bench {
     Exercise exercise = phantom_exercise();
     ScanGeometry geometry;
     Tables tables;
+    CellRows cells;
     EqualiserRows even;
 
     Bench() {
         exercise.probe.depth_mm = 150;
         geometry = make_scan_geometry(exercise.probe, 192, 512, 128, 128);
         tables = make_tables(exercise.probe, Machine{}, geometry);
-        even.resize(64, 192 + 2 * kRowMargin + kRowSlack);
+        cells.resize(64, 192 + 2 * kRowMargin + kRowSlack);
+        even.resize(64, cells.stride);
     }
-    float& envelope(int row, int line) { return even.envelope_row(row)[line]; }
+    float& envelope(int row, int line) { return cells.row(row)[line]; }
     float gain(int row, int line) const { return even.gain_row(row)[line]; }
-    void fill(float value) { std::fill(even.envelope.begin(), even.envelope.end(), value); }
-    void run() { even.make_gain(available_simd_targets().front(), geometry, tables); }
+    void fill(float value) { std::fill(cells.envelope.begin(), cells.envelope.end(), value); }
+    void run() { even.make_gain(available_simd_targets().front(), cells, geometry, tables); }
 };
 
 TEST(Equaliser, LeavesEvenGroundShadingAlongTheBeamAndNothingAlone) {

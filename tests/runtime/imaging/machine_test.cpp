@@ -60,6 +60,11 @@ TEST(MachineInTheRenderer, BothRenderersAgreeAtTheLimits) {
          [](Machine& m) {
              m.equalisation = {1, 0};
          }},
+        {"contrast that varies strongly from the face on",
+         [](Machine& m) {
+             m.speckle_reduction = {1, 0};
+         }},
+        {"16 beams", [](Machine& m) { m.beam.lines = 16; }},
         {"16 looks",
          [](Machine& m) {
              m.looks = {16, 16, 30};

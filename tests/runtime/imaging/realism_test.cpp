@@ -83,7 +83,7 @@ void expect_inside(const char* name, double value) {
 TEST(Realism, ModernLiverHasTheTextureOfALivingOne) {
     View view(liver(), sweep_exercise(), "modern");
     // No wall weakens this liver: an operator turns the gain down to where a living one lies.
-    const PatchScores t = liver_scores(view.at({}, -3));
+    const PatchScores t = liver_scores(view.at({}, -5));
     const double black = built_in_machine("modern")->grey.floor;
     expect_inside("liver_mean", t.mean);
     expect_inside("local_sd", t.local_sd);

@@ -4,36 +4,18 @@
 #include "runtime/imaging/physical/fast/equaliser_rows.h"
 
 #include <algorithm>
-#include <cstdlib>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "equaliser_rows.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 //
+#include "runtime/imaging/physical/fast/cell_rows-inl.h"
 #include "runtime/imaging/simd/simd_math-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 using namespace physical;
-
-// The mean of a row's cells and those above and below it, under a triangle.
-void mean_along(const EqualiserRows& e, int row, int along, int lines, float* out) {
-    const hn::ScalableTag<float> d;
-    const int first = std::max(row - along, 0), last = std::min(row + along, e.rows - 1);
-    float all = 0;
-    for (int r = first; r <= last; ++r) all += static_cast<float>(along + 1 - std::abs(r - row));
-    const auto share = hn::Set(d, 1 / all);
-    for (int l = 0; l < lines; l += static_cast<int>(hn::Lanes(d))) {
-        auto sum = hn::Zero(d);
-        const float* from = e.envelope.data() + static_cast<std::ptrdiff_t>(first) * e.stride + l;
-        for (int r = first; r <= last; ++r, from += e.stride) {
-            const auto weight = hn::Set(d, static_cast<float>(along + 1 - std::abs(r - row)));
-            sum = hn::Add(sum, hn::Mul(hn::LoadU(d, from), weight));
-        }
-        hn::StoreU(hn::Mul(sum, share), d, out + l);
-    }
-}
 
 // 1 2 1 across the beams; `row` has a place before and behind them.
 void mean_of_three(float* row, int lines, float* out) {
@@ -89,7 +71,10 @@ HWY_INLINE void gain_between(
     }
 }
 
-void even_rows(EqualiserRows& e, const ScanGeometry& g, const Tables& tables) {
+void even_rows(EqualiserRows& e,
+               const CellRows& envelope,
+               const ScanGeometry& g,
+               const Tables& tables) {
     constexpr int kHalf = kHazeCell / 2;
     const hn::CappedTag<float, kHazeCell> d;
     const int lines = g.scanlines, cells = (lines + kHazeCell - 1) / kHazeCell;
@@ -103,7 +88,7 @@ void even_rows(EqualiserRows& e, const ScanGeometry& g, const Tables& tables) {
             continue;
         }
         float* plain = narrow + e.stride;
-        mean_along(e, row, along, lines, plain);
+        mean_along(envelope, row, along, lines, plain);
         mean_of_three(plain, lines, narrow);
         mean_across(narrow, lines, cells, across, e.wide.data(), e.wider.data());
         for (int c = -1; c < cells; ++c) {  // from the middle of one cell to the next one's
@@ -127,17 +112,17 @@ void EqualiserRows::resize(int cell_rows, int row_stride) {
     rows = cell_rows;
     stride = row_stride;
     const auto width = static_cast<std::size_t>(stride);
-    envelope.assign(static_cast<std::size_t>(rows) * width, 0.0f);
-    gain.assign(envelope.size(), 1.0f);
+    gain.assign(static_cast<std::size_t>(rows) * width, 1.0f);
     column.assign(2 * width, 0.0f);
     wide.assign(width, 0.0f);
     wider.assign(width, 0.0f);
 }
 
 void EqualiserRows::make_gain(SimdTarget simd,
+                              const CellRows& envelope,
                               const ScanGeometry& geometry,
                               const physical::Tables& tables) {
-    HWY_DISPATCH_TABLE(even_rows)[simd.index](*this, geometry, tables);
+    HWY_DISPATCH_TABLE(even_rows)[simd.index](*this, envelope, geometry, tables);
 }
 
 }  // namespace sonocase::runtime

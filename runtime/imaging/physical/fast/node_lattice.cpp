@@ -149,6 +149,28 @@ void layers_of_block(const LayerSearch& s) {
     }
 }
 
+void noise_of_block(const NoiseSearch& s) {
+    const NodeLattice& n = *s.nodes;
+    constexpr auto kNoise = static_cast<float>(TissueLayers::kNoiseUnit);
+    const int end = std::min(s.first + kBeamBlock, n.nodes);
+    for (int row = 0; row < s.rows; ++row) {
+        // Nodes lie at the middles of their samples.
+        const float at_row =
+            (static_cast<float>(row * s.samples) + 0.5f * static_cast<float>(s.samples - 1)) /
+            static_cast<float>(n.spacing.samples);
+        const int above = std::min(static_cast<int>(at_row), n.rows - 2);
+        const float part = at_row - static_cast<float>(above);
+        for (int node = s.first; node < end; ++node) {
+            const std::size_t at = n.at(above, node), below = n.at(above + 1, node);
+            const auto between = [&](const std::vector<float>& of) {
+                return of[at] + (of[below] - of[at]) * part;
+            };
+            const auto [p] = layers_at(*s.layers, between(n.x), between(n.y), between(n.z));
+            s.noise[n.at(row, node)] = p[3] * (1 / kNoise);
+        }
+    }
+}
+
 }  // namespace sonocase::runtime::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -157,12 +179,16 @@ namespace sonocase::runtime {
 
 HWY_EXPORT(find_block);
 HWY_EXPORT(layers_of_block);
+HWY_EXPORT(noise_of_block);
 
 void search_faces(SimdTarget simd, FaceSearch& search) {
     HWY_DISPATCH_TABLE(find_block)[simd.index](search);
 }
 void search_layers(SimdTarget simd, const LayerSearch& search) {
     HWY_DISPATCH_TABLE(layers_of_block)[simd.index](search);
+}
+void search_noise(SimdTarget simd, const NoiseSearch& search) {
+    HWY_DISPATCH_TABLE(noise_of_block)[simd.index](search);
 }
 
 void NodeLattice::create(const ScanGeometry& g, const physical::Tables& tables) {

@@ -58,4 +58,14 @@ struct LayerSearch {
 };
 void search_layers(SimdTarget simd, const LayerSearch& search);
 
+// LayerPoint::strength at the beams of a block of nodes, halfway down each of `rows` cells of
+// `samples` samples, between nodes on straight lines. Out: rows of nodes.stride.
+struct NoiseSearch {
+    const NodeLattice* nodes = nullptr;
+    int first = 0, rows = 0, samples = 0;
+    const TissueLayers* layers = nullptr;
+    float* noise = nullptr;
+};
+void search_noise(SimdTarget simd, const NoiseSearch& search);
+
 }  // namespace sonocase::runtime

@@ -288,6 +288,7 @@ void PhysicalFast::meet_machine(const PhysicalFrame& f) {
     met_.reverberation = has_clutter(tables_);
     met_.side_lobes = has_side_lobes(tables_);
     met_.equalisation = has_equalisation(tables_);
+    met_.speckle_reduction = has_speckle_reduction(tables_);
     met_.binomial = m.post_filter;
     met_.sharpening = m.edge_enhancement > 0;
     met_.logarithm = has_logarithm(tables_);

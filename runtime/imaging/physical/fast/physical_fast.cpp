@@ -206,7 +206,9 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     next_row_.assign(threads, -1);
     envelope_.assign(threads * static_cast<std::size_t>(stride_), 0.0f);
     haze_.assign(static_cast<std::size_t>(cells_k_) * static_cast<std::size_t>(stride_), 0.0f);
+    if (has_equalisation(tables) || has_speckle_reduction(tables)) cells_.resize(cells_k_, stride_);
     if (has_equalisation(tables)) equaliser_.resize(cells_k_, stride_);
+    if (has_speckle_reduction(tables)) contrast_.resize(cells_k_, stride_, nodes_);
     shade_.assign(threads * 2 * static_cast<std::size_t>(lines_ + kSlack), 0);
     pairs_.assign(samples * static_cast<std::size_t>(pair_stride_) + kSlack, 0);
 }

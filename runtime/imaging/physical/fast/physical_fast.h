@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "runtime/imaging/formation/render_context.h"
+#include "runtime/imaging/physical/fast/contrast_rows.h"
 #include "runtime/imaging/physical/fast/equaliser_rows.h"
 #include "runtime/imaging/physical/fast/node_lattice.h"
 #include "runtime/imaging/physical/fast/physical_kernels.h"
@@ -79,6 +80,10 @@ class PhysicalFast {
     void filter_rows(const PhysicalFrame& frame);
     void fill_row_task(const PhysicalFrame& frame, int sample, PhysicalRowTask& task) const;
     void spread_haze(int cell_row, float level, const float* envelope);
+    bool reduces_speckle(const PhysicalFrame& frame) const {
+        return frame.effects.speckle_reduction && has_speckle_reduction(tables_) &&
+               !scene_.layers.empty();
+    }
     void make_grey(const PhysicalFrame& frame);
     void fill_grey_task(const PhysicalFrame& frame, int sample, PhysicalGreyTask& task) const;
     void start_rows() { std::fill(next_row_.begin(), next_row_.end(), -1); }
@@ -129,7 +134,9 @@ class PhysicalFast {
     std::vector<std::int32_t> tail_from_, own_tail_from_;  // per block; before join_tails()
     std::vector<float> work_, ring_;                       // per thread
     std::vector<int> next_row_;  // per thread: the row that its ring is ready for
+    CellRows cells_;
     EqualiserRows equaliser_;
+    ContrastRows contrast_;
     std::vector<float> envelope_, haze_;  // per thread: sum of a row of cells; # cells x stride
     std::vector<std::uint8_t> shade_;     // per thread: two rows
     std::vector<std::uint16_t> pairs_;

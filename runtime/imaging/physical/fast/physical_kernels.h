@@ -247,7 +247,10 @@ struct PhysicalGreyTask {
     const std::int8_t* haze_im[2] = {nullptr, nullptr};
     float haze_first = 1, haze_second = 0;
     const float *even_above = nullptr, *even_below = nullptr;  // gain of power; null: none
-    float even_mix = 0;
+    // Effect speckle_reduction: log2 of power about which detail changes, contrast - 1; null: none.
+    const float *middle_above = nullptr, *middle_below = nullptr;
+    const float *change_above = nullptr, *change_below = nullptr;
+    float even_mix = 0;                  // the lower row's part, of these and of the gain
     const std::int8_t* grain = nullptr;  // null: none
     float grain_log2 = 0;                // of power, per step of the draw
     // Logarithm: grey = offset + per_log2 log2(power). Otherwise floor plus 2 to that power, and

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effects diaphragm, gas_ring_down and wall: where a frame's beams meet gas, and how far their
-// nodes lie from skin and organs.
+// Effects diaphragm, gas_ring_down, wall and speckle_reduction: where a frame's beams meet gas, and how far their
+// nodes lie from skin and organs, and the noise of their tissue.
 #include <algorithm>
 #include <cmath>
 
@@ -129,11 +129,16 @@ void PhysicalFast::search_nodes(const PhysicalFrame& f, const PhysicalBlock& bas
     faces_.any_dome = false;
     faces_found_ = scene_.has_gas && (f.effects.diaphragm || f.effects.gas_ring_down);
     wall_shows_ = f.effects.wall && !scene_.layers.empty();
-    if (!faces_found_ && !wall_shows_) return;
+    const bool reduced = reduces_speckle(f);
+    if (!faces_found_ && !wall_shows_ && !reduced) return;
     context_.workers.for_each(nodes_.stride / kBeamBlock, [&](int, int block) {
         const int first = block * kBeamBlock;
         place_nodes(f, breathes, first);
         if (faces_found_) find_faces(f, base, first);
+        if (reduced) {
+            search_noise(context_.simd, {&nodes_, first, contrast_.rows, kHazeCell, &scene_.layers,
+                                         contrast_.noise.data()});
+        }
         if (!wall_shows_) return;
         float* out = layer_nodes_.data();
         const std::size_t plane = nodes_.at(nodes_.rows, 0);

@@ -123,6 +123,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
     static constexpr std::array<float, 1> kOneTap{1.0f};
     const bool haze = f.effects.haze && has_side_lobes(tables_);
     const bool even = f.effects.equalisation && has_equalisation(tables_);
+    const bool reduced = reduces_speckle(f), cells = even || reduced;
     const auto haze_level =
         static_cast<float>(std::pow(10.0, tables_.machine.haze.side_lobe_db / 20));
     start_rows();
@@ -175,7 +176,7 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
         t.axial =
             f.effects.point_spread ? tables_.axial.data() + kMaxAxial - reach : kOneTap.data();
         t.axial_count = 2 * reach + 1;
-        t.envelope_sum = haze || even ? envelope : nullptr;
+        t.envelope_sum = haze || cells ? envelope : nullptr;
         t.work_clutter = row_task.work_clutter;
         for (int k = begin; k < end; ++k) {
             if (k % kHazeCell == 0) std::fill_n(envelope, lines_, 0.0f);
@@ -197,13 +198,17 @@ void PhysicalFast::filter_rows(const PhysicalFrame& f) {
             t.power = power_ + at;
             make_power_row(context_.simd, t);
             const bool last = k % kHazeCell == kHazeCell - 1 || k == g.samples - 1;
-            if (even && last) std::copy_n(envelope, lines_, equaliser_.envelope_row(k / kHazeCell));
+            if (cells && last) std::copy_n(envelope, lines_, cells_.row(k / kHazeCell));
             if (haze && last)
                 spread_haze(k / kHazeCell, haze_level / static_cast<float>(k % kHazeCell + 1),
                             envelope);
         }
     });
-    if (even) equaliser_.make_gain(context_.simd, g, tables_);
+    if (even) equaliser_.make_gain(context_.simd, cells_, g, tables_);
+    if (reduced) {
+        contrast_.make(context_.simd, {&cells_, even ? &equaliser_ : nullptr, &g, &tables_, &nodes_,
+                                       node_of_.data(), node_part_.data()});
+    }
 }
 
 // One row of the haze: the mean envelope over cells (`level` times the sum over a cell's samples),
@@ -258,7 +263,13 @@ void PhysicalFast::fill_grey_task(const PhysicalFrame& f, int k, PhysicalGreyTas
     if (f.effects.equalisation && has_equalisation(tables_)) {
         t.even_above = equaliser_.gain_row(k0);
         t.even_below = equaliser_.gain_row(k1);
-        t.even_mix = static_cast<float>(at - k0);
+    }
+    t.even_mix = static_cast<float>(at - k0);
+    if (reduces_speckle(f)) {
+        t.middle_above = contrast_.middle_row(k0);
+        t.middle_below = contrast_.middle_row(k1);
+        t.change_above = contrast_.change_row(k0);
+        t.change_below = contrast_.change_row(k1);
     }
     if (f.effects.haze && has_side_lobes(tables_)) {
         t.haze_above = haze_.data() + static_cast<std::ptrdiff_t>(k0) * stride_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effects haze, equalisation, compression, post_filter and grey_map: from power to grey.
+// Effects haze, equalisation, speckle_reduction, compression, post_filter and grey_map: from power to grey.
 #include "runtime/imaging/physical/fast/row_grey.h"
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 //
+#include "runtime/imaging/physical/model/speckle_reduction.h"
 #include "runtime/imaging/simd/simd_math-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -45,6 +46,17 @@ void make_grey_row(const PhysicalGreyTask& t) {
                                                    hn::Set(d, t.even_mix))));
         }
         auto level = log2_of(d, hn::Add(power, hn::Set(d, 1e-12f)));
+        if (t.change_above != nullptr) {
+            const auto between = [&](const float* above_row, const float* below_row) HWY_ATTR {
+                const auto above = hn::LoadU(d, above_row + i);
+                return hn::Add(above, hn::Mul(hn::Sub(hn::LoadU(d, below_row + i), above),
+                                              hn::Set(d, t.even_mix)));
+            };
+            const auto most = hn::Set(d, static_cast<float>(kMostDetail));
+            const auto detail = hn::Sub(level, between(t.middle_above, t.middle_below));
+            level = hn::Add(level, hn::Mul(between(t.change_above, t.change_below),
+                                           hn::Min(hn::Max(detail, hn::Neg(most)), most)));
+        }
         if (t.grain != nullptr)
             level = hn::Add(level, hn::Mul(noise_of(d, t.grain + i), hn::Set(d, t.grain_log2)));
         auto g = hn::Add(hn::Set(d, t.offset), hn::Mul(level, hn::Set(d, t.per_log2)));

@@ -3,30 +3,20 @@
 #include "runtime/imaging/physical/model/equaliser.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "runtime/imaging/physical/model/cell_reach.h"
 
 namespace sonocase::runtime::physical {
-namespace {
-
-constexpr int kMostReach = 8;
-
-// Half width of a triangle of this variance, whose own is n (n + 2) / 6.
-int reach_of(double variance) {
-    return std::clamp(static_cast<int>(std::lround(std::sqrt(1 + 6 * std::max(variance, 0.0)) - 1)),
-                      1, kMostReach);
-}
-
-}  // namespace
 
 int even_reach_along(const ScanGeometry& g) {
     const double cells = kEvenAlongMm / (g.step_mm * kHazeCell);
-    return reach_of(cells * cells);
+    return cell_reach(cells * cells, 1);
 }
 
 int even_reach_across(const ScanGeometry& g) {
     // Means over cells, and straight lines between them, have a variance of their own.
     const double beams = kEvenAcross * g.scanlines;
-    return reach_of(beams * beams / (kHazeCell * kHazeCell) - 0.25);
+    return cell_reach(beams * beams / (kHazeCell * kHazeCell) - 0.25, 1);
 }
 
 double even_share(const ScanGeometry& g, const Tables& tables, int cell_row) {

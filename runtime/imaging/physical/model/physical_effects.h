@@ -33,9 +33,10 @@ struct PhysicalEffects {
     bool near_field = true;
     bool noise = true;
     bool persistence = true;
-    bool clutter = true;       // reverberation below what is bright
-    bool haze = true;          // side lobes
-    bool equalisation = true;  // gain evened out across the beams
+    bool clutter = true;            // reverberation below what is bright
+    bool haze = true;               // side lobes
+    bool equalisation = true;       // gain evened out across the beams
+    bool speckle_reduction = true;  // smooth regions beside busy ones
     bool post_filter = true;
     bool edge_enhancement = true;
     bool grey_map = true;
@@ -62,8 +63,8 @@ struct PhysicalMet {
     int beams_in_contact = 0;
     // What the machine has.
     bool edge_contact = false, compounding = false, receiver_noise = false, blending = false,
-         reverberation = false, side_lobes = false, equalisation = false, binomial = false,
-         sharpening = false, logarithm = false;
+         reverberation = false, side_lobes = false, equalisation = false, speckle_reduction = false,
+         binomial = false, sharpening = false, logarithm = false;
     // Structures that it shows.
     bool shows_parenchyma = false, shows_streaks = false, shows_diaphragm = false,
          shows_wall = false;
@@ -88,7 +89,7 @@ inline const char* structure_if(bool machine_shows_it, bool met, const char* non
 
 }  // namespace physical
 
-inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 34> kPhysicalEffects{{
+inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 35> kPhysicalEffects{{
     {"contact", Pass::contact, 1, 0, 0, &PhysicalEffects::contact,
      [](const PhysicalMet& m) {
          return m.gap || m.edge_contact ? "" : "the probe touches everywhere";
@@ -152,6 +153,8 @@ inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 34> kPhys
      [](const PhysicalMet& m) { return physical::only_if(m.side_lobes); }},
     {"equalisation", Pass::grey, 0.3, 0, 8, &PhysicalEffects::equalisation,
      [](const PhysicalMet& m) { return physical::only_if(m.equalisation); }},
+    {"speckle_reduction", Pass::grey, 0.5, 0, 16, &PhysicalEffects::speckle_reduction,
+     [](const PhysicalMet& m) { return physical::only_if(m.speckle_reduction); }},
     {"compression", Pass::grey, 2, 0, 8},
     {"post_filter", Pass::grey, 1, 0, 0, &PhysicalEffects::post_filter,
      [](const PhysicalMet& m) { return physical::only_if(m.binomial); }},

@@ -263,7 +263,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
     s.has_septa = std::any_of(s.fine.frames.begin(), s.fine.frames.end(), [](const FineFrame& f) {
         return is_muscle_cube(f.cube) || is_fat_cube(f.cube);
     });
-    if (options.structures.wall || options.structures.diaphragm ||
+    if (options.structures.wall || options.structures.diaphragm || options.speckle_reduction ||
         (options.structures.streaks && s.has_septa))
         s.layers = make_tissue_layers(bundle, jobs);
     s.closed_label = press::closed_labels(bundle);

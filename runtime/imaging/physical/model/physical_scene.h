@@ -102,6 +102,7 @@ struct PhysicalSceneOptions {
     std::map<std::string, double> tissue_db;           // of labels, instead of the bundle's own
     MachineStructures structures;                      // that the machine shows
     bool fine = false;                                 // physical::shows_fine()
+    bool speckle_reduction = true;                     // whether the machine has it
 };
 
 // targets: of the exercise, with its findings; those that only mark a place do not show in the

@@ -20,13 +20,13 @@ constexpr double kDoubleDb = -4;
 
 // Below the skin: its faces, the superficial fascia, then sheets of the fat.
 constexpr Sheet kOuter[] = {
-    {0.5, 7, 1.1},     {6.2, 17.5, 1.1}, {16.5, 12.5, 0.95},
-    {18.4, 9.5, 0.95}, {27.5, 10.5, 1},  {35, 10, 1},
+    {0.5, 4, 1.1},     {6.2, 14.5, 1.1}, {16.5, 9.5, 0.95},
+    {18.4, 6.5, 0.95}, {27.5, 7.5, 1},   {35, 7, 1},
 };
 // Above the organs: the peritoneum, then the sheets of three muscles.
 constexpr Sheet kInner[] = {
-    {1.4, 17, 1.2},   {2.7, 10.5, 0.85},  {6.2, 15.5, 1},    {7, 7, 0.95},
-    {8.3, 7.5, 0.95}, {12.6, 11.5, 0.95}, {18.5, 13.5, 1.1}, {22, 10, 1.1},
+    {1.4, 14, 1.2},   {2.7, 7.5, 0.85},  {6.2, 12.5, 1},    {7, 4, 0.95},
+    {8.3, 4.5, 0.95}, {12.6, 8.5, 0.95}, {18.5, 10.5, 1.1}, {22, 7, 1.1},
 };
 // Lamellae of fat and muscle between them, at random distances.
 constexpr double kLamellaDb = 4.5, kLamellaSpreadDb = 10;
@@ -116,7 +116,7 @@ WallTables make_wall_tables(double frequency_mhz,
         t.inner = table(with_lamellae(kInner));
         t.wave_mm = 0.25;
         t.own_wave_mm = 0.4;
-        t.ground_db = 13;
+        t.ground_db = 15;
         t.structure_db = -7;
         t.strength_db = 4;
     }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runtime/imaging/physical/reference/reference_beams.h"
+#include "runtime/imaging/physical/reference/reference_contrast.h"
 #include "runtime/imaging/physical/reference/reference_equaliser.h"
 
 namespace sonocase::runtime {
@@ -334,9 +335,10 @@ void render_physical_reference(const PhysicalScene& scene,
         add_look(in, look, envelope_power(in, echoes), power);
     }
     add_steady(in, clutter, power);
-    const Plane before_haze = power;
+    const CellPlane sums = envelope_sums(in, power), even = even_gains(in, sums);
     if (frame.effects.haze && has_side_lobes(tables)) add_haze(in, power);
-    even_out(in, before_haze, power);
+    for_samples(in, [&](int k, int l) { power[in.at(k, l)] *= even.between(k, l); });
+    reduce_speckle(in, beams.noise, sums, even, power);
     convert(in, grey_of(in, power), pixels);
 }
 

@@ -160,6 +160,16 @@ class Beams {
                              breathing_.empty() ? nullptr : &breathing_, gaps_, streaks_);
     }
 
+    // LayerPoint::strength of the tissue at the middles of a beam's cells.
+    void find_noise(int l, CellPlane& noise) const {
+        if (in_.scene.layers.empty()) return;
+        for (int row = 0; row < noise.rows; ++row) {
+            const double r = (row + 0.5) * kHazeCell * in_.geometry.step_mm;
+            noise.at(row, l) =
+                in_.scene.layers.at(in_.scene.grid.voxel_from_point(point_at(l, r))).strength;
+        }
+    }
+
     void trace(int l, BeamSamples& out) const {
         const ScanGeometry& g = in_.geometry;
         const PlanePoint o = g.beam_origin(l), d = g.beam_direction(l);
@@ -356,9 +366,12 @@ BeamSamples reference_beams(const ReferenceInput& input) {
     const std::vector<double> dark(count, 0.0);
     BeamSamples out{
         std::vector<ComplexPlane>(static_cast<std::size_t>(input.tables.looks), {dark, dark}),
-        std::vector<double>(count, 1.0), dark, dark};
+        std::vector<double>(count, 1.0), dark, dark, CellPlane(input)};
     const Beams beams(input);
-    for (int l = 0; l < input.geometry.scanlines; ++l) beams.trace(l, out);
+    for (int l = 0; l < input.geometry.scanlines; ++l) {
+        beams.trace(l, out);
+        beams.find_noise(l, out.noise);
+    }
     return out;
 }
 

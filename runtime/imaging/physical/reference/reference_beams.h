@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "runtime/imaging/physical/reference/reference_input.h"
+#include "runtime/imaging/physical/reference/reference_cells.h"
 
 namespace sonocase::runtime {
 
@@ -21,6 +21,7 @@ struct BeamSamples {
     std::vector<double> light;        // amplitude that is left, there and back
     std::vector<double> tail;         // power behind bone, gas and needle
     std::vector<double> clutter;      // power of the reverberation
+    CellPlane noise;                  // of the tissue, for speckle_reduction
 };
 
 BeamSamples reference_beams(const ReferenceInput& input);

@@ -3,15 +3,12 @@
 // Effect equalisation, sample by sample (model/equaliser.h).
 #pragma once
 
-#include <vector>
-
-#include "runtime/imaging/physical/reference/reference_input.h"
+#include "runtime/imaging/physical/reference/reference_cells.h"
 
 namespace sonocase::runtime {
 
-// before: power of the envelope, before the haze of side lobes; power: after it.
-void even_out(const ReferenceInput& in,
-              const std::vector<double>& before,
-              std::vector<double>& power);
+// Gain of power; 1 where it is not evened out. sums: of the envelope, before the haze of side
+// lobes.
+CellPlane even_gains(const ReferenceInput& in, const CellPlane& sums);
 
 }  // namespace sonocase::runtime
