@@ -25,15 +25,15 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Bundles: since the liver's thin vessels are no longer baked. Physical frames: since sheets of the
-// wall cross over and capsules show. Paper: commit aa0be5b.
+// Bundles: since the liver's thin vessels are no longer baked. Physical frames: since contrast of
+// detail varies with the tissue. Paper: commit aa0be5b.
 constexpr const char* kDraft = "47a2cc200ffc65019b0ec6ec85817d0a";
 constexpr const char* kBalanced = "ffec51169de01d5d24af99210de08b6e";
 constexpr const char* kSlender = "c03741afe932752ca4085732c8e39249";
 constexpr const char* kReal = "eb2cc85e4123410b29937521d52d27ef";
-constexpr const char* kDraftPhysical = "a0ff8e5e513b668ba1a2e049c9ceb814";
+constexpr const char* kDraftPhysical = "ceeb313ed8e4865513daeed10c7ce4d9";
 constexpr const char* kDraftPaper = "2f241268411ba418106fde0ced219bbb";
-constexpr const char* kRealPhysical = "47d9161c27067371eb00a9ad17c28ecc";
+constexpr const char* kRealPhysical = "ad7980ccb2ed0dd6c9994b75ef60a922";
 constexpr const char* kRealPaper = "ab88db573d849d9ea988c882a10a9d13";
 
 class SameBytes : public ::testing::Test {

@@ -80,7 +80,8 @@ TEST(SpeckleReduction, ContrastFollowsTheNoiseFromItsDepthOnAndWithinLimits) {
 
 constexpr int kSide = 384, kPatch = 24;
 
-// A linear scan of liver alone, 100 mm wide and deep; speckle alone, below the knee of the grey map.
+// A linear scan of liver alone, 100 mm wide and deep: speckle alone, below the knee of the grey
+// map.
 class Scan {
   public:
     explicit Scan(double variation) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effects diaphragm, gas_ring_down, wall and speckle_reduction: where a frame's beams meet gas, and how far their
-// nodes lie from skin and organs, and the noise of their tissue.
+// Effects diaphragm, gas_ring_down, wall and speckle_reduction: where a frame's beams meet gas, how
+// far their nodes lie from skin and organs, and the noise of the tissue there.
 #include <algorithm>
 #include <cmath>
 

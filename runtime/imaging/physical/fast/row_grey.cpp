@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effects haze, equalisation, speckle_reduction, compression, post_filter and grey_map: from power to grey.
+// Effects haze, equalisation, speckle_reduction, compression, post_filter and grey_map: from power
+// to grey.
 #include "runtime/imaging/physical/fast/row_grey.h"
 
 #include <algorithm>
