@@ -7,8 +7,8 @@
 
 #include <cmath>
 
+#include "cell_bench.h"
 #include "formats/machine/machine_toml.h"
-#include "imaging_support.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -16,23 +16,11 @@ namespace {
 using namespace physical;
 using namespace sonocase::testing;
 
-struct Bench {
-    Exercise exercise = phantom_exercise();
-    ScanGeometry geometry;
-    Tables tables;
-    CellRows cells;
+struct Bench : CellBench {
     EqualiserRows even;
 
-    Bench() {
-        exercise.probe.depth_mm = 150;
-        geometry = make_scan_geometry(exercise.probe, 192, 512, 128, 128);
-        tables = make_tables(exercise.probe, Machine{}, geometry);
-        cells.resize(64, 192 + 2 * kRowMargin + kRowSlack);
-        even.resize(64, cells.stride);
-    }
-    float& envelope(int row, int line) { return cells.row(row)[line]; }
+    Bench() { even.resize(kRows, cells.stride); }
     float gain(int row, int line) const { return even.gain_row(row)[line]; }
-    void fill(float value) { std::fill(cells.envelope.begin(), cells.envelope.end(), value); }
     void run() { even.make_gain(available_simd_targets().front(), cells, geometry, tables); }
 };
 

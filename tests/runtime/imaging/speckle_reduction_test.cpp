@@ -8,8 +8,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "cell_bench.h"
 #include "formats/machine/machine_toml.h"
-#include "imaging_support.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -17,30 +17,22 @@ namespace {
 using namespace physical;
 using namespace sonocase::testing;
 
-struct Bench {
-    Exercise exercise = phantom_exercise();
-    ScanGeometry geometry;
-    Tables tables;
+struct Bench : CellBench {
     NodeLattice nodes;
     std::vector<int> node_of;
     std::vector<float> node_part;
-    CellRows cells;
     ContrastRows contrast;
 
     Bench() {
-        exercise.probe.depth_mm = 150;
-        geometry = make_scan_geometry(exercise.probe, 192, 512, 128, 128);
-        tables = make_tables(exercise.probe, Machine{}, geometry);
         nodes.create(geometry, tables);
-        for (int l = 0; l < 192; ++l) {
+        for (int l = 0; l < kLines; ++l) {
             node_of.push_back(nodes.spacing.node_of(l));
             node_part.push_back(nodes.spacing.part(l));
         }
-        cells.resize(64, 192 + 2 * kRowMargin + kRowSlack);
-        contrast.resize(64, cells.stride, nodes);
+        contrast.resize(kRows, cells.stride, nodes);
     }
     void run(float envelope, float noise) {
-        std::fill(cells.envelope.begin(), cells.envelope.end(), kHazeCell * envelope);
+        fill(kHazeCell * envelope);
         std::fill(contrast.noise.begin(), contrast.noise.end(), noise);
         contrast.make(available_simd_targets().front(), {&cells, nullptr, &geometry, &tables,
                                                          &nodes, node_of.data(), node_part.data()});

@@ -16,7 +16,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 
-// A sheet's echo by its distance, times the eighth power of the cosine: the slope of the distance
+// A sheet's echo by its distance, times the fourth power of the cosine: the slope of the distance
 // along the beam.
 template <class D, class V>
 HWY_INLINE V sheet_echo(D d, const float* table, int size, V distance, V slope) {

@@ -33,7 +33,7 @@ struct NodeSpacing {
 
 // Few beams are far apart: then each is a node.
 inline NodeSpacing node_spacing(const ScanGeometry& g, const Tables& t) {
-    return {g.scanlines < 96 ? 1 : 4,
+    return {g.scanlines < 88 ? 1 : 4,
             std::clamp(static_cast<int>(t.wall.node_mm / g.step_mm), 1, kNodeMostSamples),
             g.scanlines, g.step_mm};
 }

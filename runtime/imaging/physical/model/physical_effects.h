@@ -153,7 +153,7 @@ inline constexpr std::array<EffectEntry<PhysicalEffects, PhysicalMet>, 35> kPhys
      [](const PhysicalMet& m) { return physical::only_if(m.side_lobes); }},
     {"equalisation", Pass::grey, 0.3, 0, 8, &PhysicalEffects::equalisation,
      [](const PhysicalMet& m) { return physical::only_if(m.equalisation); }},
-    {"speckle_reduction", Pass::grey, 0.5, 0, 16, &PhysicalEffects::speckle_reduction,
+    {"speckle_reduction", Pass::grey, 1, 0, 16, &PhysicalEffects::speckle_reduction,
      [](const PhysicalMet& m) { return physical::only_if(m.speckle_reduction); }},
     {"compression", Pass::grey, 2, 0, 8},
     {"post_filter", Pass::grey, 1, 0, 0, &PhysicalEffects::post_filter,
