@@ -240,7 +240,7 @@ Suite render_suite() {
          "",
          "speckle fields that are averaged",
          "grain of the speckle",
-         "a look costs as much as a sixth of a frame; fewer make the speckle more contrasty"},
+         "a look costs some 5 % of a frame; fewer make the speckle more contrasty"},
         {"render.aperture_mm",
          {"0", "8", "17", "30"},
          "17",
@@ -276,7 +276,7 @@ Suite render_suite() {
          "",
          "truth of every pixel beside the picture",
          "nothing: the picture is the same",
-         "labels, needle, shadow and depth cost about a quarter of a frame, and nothing when off"},
+         "labels, needle, shadow and depth cost about as much as a frame, and nothing when off"},
     };
     suite.pairs = {{"render.scanlines", "render.samples"}};
     suite.named = {{TrialRole::paper, "model paper", {{"render.model", "paper"}}},
