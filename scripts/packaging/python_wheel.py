@@ -29,7 +29,8 @@ def _built(prefix, build):
         build = ROOT / "build" / f"wheel-{_tag()}"
         off = [f"-DSONOCASE_{part}=OFF" for part in ("PIPELINE", "TESTS", "BENCH")]
         subprocess.run(["cmake", "-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
-                        f"-DPython_EXECUTABLE={sys.executable}", "-DSONOCASE_PYTHON_FOLDER=.", *off],
+                        f"-DPython_EXECUTABLE={sys.executable}", "-DSONOCASE_PYTHON_FOLDER=.",
+                        "-DSONOCASE_PYTHON=ON", *off],
                        check=True)
     elif not pathlib.Path(build, "CMakeCache.txt").is_file():
         raise SystemExit(f"{build}: no CMakeCache.txt; give the folder of a configured build")
