@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "sonocase/version.h"
 
 using namespace sonocase;

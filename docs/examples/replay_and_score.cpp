@@ -6,8 +6,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "formats/files/bundle_file.h"
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "formats/recording/session.h"
 #include "formats/scoring/session_score.h"
 #include "runtime/imaging/renderer.h"

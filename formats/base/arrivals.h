@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Which bytes of a file are there while it arrives in segments, as over a network.
+// Which bytes of a file have arrived while it comes in segments, as over a network.
 #pragma once
 
 #include <algorithm>
@@ -25,35 +25,35 @@ class Arrivals {
         : bytes_(bytes),
           segment_bytes_(segment_bytes),
           left_((bytes + segment_bytes - 1) / segment_bytes),
-          here_(left_, 0) {}
+          arrived_(left_, 0) {}
 
-    std::size_t segments() const { return here_.size(); }
+    std::size_t segments() const { return arrived_.size(); }
     std::size_t segment_bytes() const { return segment_bytes_; }
     ByteRange range(std::size_t segment) const {
         const std::size_t at = segment * segment_bytes_;
         return {at, std::min(segment_bytes_, bytes_ - at)};
     }
-    bool has_segment(std::size_t segment) const { return here_[segment] != 0; }
-    std::size_t left() const { return left_; }  // segments
+    bool has_segment(std::size_t segment) const { return arrived_[segment] != 0; }
+    std::size_t left() const { return left_; }  // segments that have not arrived
     bool whole() const { return left_ == 0; }
-    // range: inside the file. An empty range is there.
+    // range: inside the file. An empty range has always arrived.
     bool has(ByteRange range) const noexcept {
         if (range.count == 0 || whole()) return true;
         const std::size_t last = (range.end() - 1) / segment_bytes_;
         for (std::size_t n = range.at / segment_bytes_; n <= last; ++n) {
-            if (!here_[n]) return false;
+            if (!arrived_[n]) return false;
         }
         return true;
     }
     void add(std::size_t segment) {
-        assert(segment < here_.size());
-        left_ -= here_[segment] == 0;
-        here_[segment] = 1;
+        assert(segment < arrived_.size());
+        left_ -= arrived_[segment] == 0;
+        arrived_[segment] = 1;
     }
 
   private:
     std::size_t bytes_, segment_bytes_, left_;
-    std::vector<std::uint8_t> here_;
+    std::vector<std::uint8_t> arrived_;
 };
 
 }  // namespace sonocase

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Content hash for cache keys and for the inputs that a manifest names: XXH3, 128 bits, as 32 hex
-// digits. Finds changes and accidents; it is no protection against deliberate forgery.
+// digits. Finds changes and accidents, and does not protect against deliberate forgery.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace sonocase {
 
 std::string digest_of(std::span<const std::uint8_t> bytes);
 std::string digest_of(std::string_view text);
-// XXH3, 64 bits, for lists of many: whether parts of a file have come as they were sent.
+// XXH3, 64 bits, for long lists of hashes, such as one per segment of a file.
 std::uint64_t hash_of(std::span<const std::uint8_t> bytes);
 
 // Several parts under one hash. Every part is hashed with its length, so that ("ab", "c") and

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "formats/base/arc_tangent.h"
+#include "formats/base/portable_math.h"
 
 namespace sonocase {
 

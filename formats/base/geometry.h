@@ -83,12 +83,8 @@ Vector3 any_perpendicular(Vector3 a);
 // 3 x 3 matrix, row by row. Columns of a rotation are the source axes seen in the destination.
 struct Matrix3 {
     std::array<double, 9> m{1, 0, 0, 0, 1, 0, 0, 0, 1};
-    double operator()(int row, int column) const {
-        return m[static_cast<std::size_t>(3 * row + column)];
-    }
-    double& operator()(int row, int column) {
-        return m[static_cast<std::size_t>(3 * row + column)];
-    }
+    double operator()(int row, int column) const { return m[3 * row + column]; }
+    double& operator()(int row, int column) { return m[3 * row + column]; }
     Vector3 column(int c) const { return {(*this)(0, c), (*this)(1, c), (*this)(2, c)}; }
     static Matrix3 from_columns(Vector3 a, Vector3 b, Vector3 c);
     static Matrix3 diagonal(Vector3 d);

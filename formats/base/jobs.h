@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Independent jobs, run by what the caller passes in: the caller's own thread (serial_jobs()),
-// threads of the standard library (formats/threads/thread_jobs.h) or a host's pool. Functions that
+// Independent jobs on whatever the caller passes in: the caller's own thread (serial_jobs()),
+// threads of the standard library (formats/files/thread_jobs.h) or a host's pool. Functions that
 // take a JobRunner start no thread themselves, and their results do not depend on the runner.
 #pragma once
 

@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The latest value from one writer thread to one reader thread. Neither ever waits: three slots and
-// one atomic exchange per side. Values in between are overwritten: a display wants the newest pose
-// or frame, never a queue.
+// How two threads talk to each other: the latest value from one to the other, and a signal.
 #pragma once
 
 #include <array>
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <cstdint>
+#include <mutex>
 
-namespace sonocase::runtime {
+namespace sonocase {
 
+// The latest value from one writer thread to one reader thread. Neither ever waits: three slots and
+// one atomic exchange per side. Values in between are overwritten: a display wants the newest pose
+// or frame, never a queue.
 template <class T>
 class Mailbox {
   public:
@@ -41,4 +45,29 @@ class Mailbox {
     std::uint8_t reader_ = 2;  // owned by the reader
 };
 
-}  // namespace sonocase::runtime
+// Wakes a thread that waits for something to happen. Any thread may notify(); one thread waits.
+class Event {
+  public:
+    void notify() {
+        {
+            const std::lock_guard lock(mutex_);
+            notified_ = true;
+        }
+        condition_.notify_one();
+    }
+    // Returns after the next notify(), at once if one came since the last wait, and after max_s
+    // seconds at the latest.
+    void wait(double max_s) {
+        std::unique_lock lock(mutex_);
+        condition_.wait_for(lock, std::chrono::duration<double>(max_s),
+                            [this] { return notified_; });
+        notified_ = false;
+    }
+
+  private:
+    std::mutex mutex_;
+    std::condition_variable condition_;
+    bool notified_ = false;
+};
+
+}  // namespace sonocase

@@ -12,22 +12,22 @@
 #include <utility>
 #include <variant>
 
+#include "formats/base/message.h"
+
 namespace sonocase {
 
 struct Error {
-    std::string what;      // what was found: "label map holds no body voxel"
-    std::string where;     // file, offset, line or key; may be empty
-    std::string expected;  // what was expected and what to do; may be empty
+    Message what;       // what was found: "label map holds no body voxel"
+    std::string where;  // file, offset, line or key; may be empty
+    Message expected;   // what was expected and what to do; may be empty
 
     // One line for people: "where: what; expected". What is quoted of a file may hold line breaks
     // and escape sequences: blanks stand for them.
-    std::string message() const {
-        std::string line = where.empty() ? what : where + ": " + what;
-        if (!expected.empty()) line += "; " + expected;
-        for (char& c : line) {
-            if (static_cast<unsigned char>(c) < 32 || c == 127) c = ' ';
-        }
-        return line;
+    Message message() const {
+        if (where.empty() && expected.empty()) return what.on_one_line();
+        if (expected.empty()) return Message("{}: {}", {where, what}).on_one_line();
+        if (where.empty()) return Message("{}; {}", {what, expected}).on_one_line();
+        return Message("{}: {}; {}", {where, what, expected}).on_one_line();
     }
 };
 
@@ -68,3 +68,22 @@ struct Done {};
 using Status = Result<Done>;
 
 }  // namespace sonocase
+
+#define SONOCASE_JOIN_NAMES_(a, b) a##b
+#define SONOCASE_JOIN_NAMES(a, b) SONOCASE_JOIN_NAMES_(a, b)
+#define SONOCASE_TRY_IN_(result, declaration, ...) \
+    auto result = (__VA_ARGS__);                   \
+    if (!result) return result.error();            \
+    declaration = *std::move(result)
+
+// SONOCASE_TRY returns the error to the caller, or declares the value and goes on;
+// SONOCASE_TRY_DONE does the same for a Status:
+//     SONOCASE_TRY(const std::string text, read_text_file(path));
+//     SONOCASE_TRY_DONE(write_file(path, text));
+// SONOCASE_TRY is several statements: never the body of an `if` without braces.
+#define SONOCASE_TRY(declaration, ...) \
+    SONOCASE_TRY_IN_(SONOCASE_JOIN_NAMES(try_result_, __LINE__), declaration, __VA_ARGS__)
+#define SONOCASE_TRY_DONE(...)                                                       \
+    do {                                                                             \
+        if (auto try_status = (__VA_ARGS__); !try_status) return try_status.error(); \
+    } while (false)

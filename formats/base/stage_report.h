@@ -27,8 +27,23 @@ struct MeasureGroup {
     friend bool operator==(const MeasureGroup&, const MeasureGroup&) = default;
 };
 
+// Names of the stages that make the reports of a case.
+namespace stage_names {
+inline constexpr const char* kImport = "import";
+inline constexpr const char* kSurface = "surface";
+inline constexpr const char* kAlign = "align";  // the first of two reports of the stage "warp"
+inline constexpr const char* kWarp = "warp";
+inline constexpr const char* kResample = "resample";
+inline constexpr const char* kSmooth = "smooth";
+inline constexpr const char* kPathology = "pathology";
+inline constexpr const char* kTexture = "texture";
+inline constexpr const char* kStructure = "structure";
+inline constexpr const char* kFlow = "flow";
+inline constexpr const char* kPack = "pack";
+}  // namespace stage_names
+
 struct StageReport {
-    std::string stage;  // "warp"
+    std::string stage;  // one of stage_names, or the verb that reports: "map"
     int version = 1;    // of the stage's algorithm; part of the cache key
     double seconds = 0;
     std::vector<Measure> measures;  // errors and figures, in a fixed order

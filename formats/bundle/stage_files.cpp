@@ -5,7 +5,6 @@
 #include "formats/bundle/codec/bundle_parts.h"
 #include "formats/bundle/codec/packed_volumes.h"
 #include "formats/bundle/codec/region_codec.h"
-#include "formats/bundle/codec/volume_json.h"
 #include "formats/bundle/voxel_blocks.h"
 #include "formats/text/stage_report_json.h"
 
@@ -28,14 +27,12 @@ Result<File> read_container(std::span<const std::uint8_t> bytes,
                             std::span<const std::string_view> known,
                             const std::string& where,
                             Fill fill) {
-    const auto reader = ChunkReader::open(bytes, kind, known, where);
-    if (!reader) return reader.error();
-    const auto json = detail::read_manifest(*reader);
-    if (!json) return json.error();
+    SONOCASE_TRY(const auto reader, ChunkReader::open(bytes, kind, known, where));
+    SONOCASE_TRY(const auto json, detail::read_manifest(reader));
     JsonFault fault{where + ": manifest", {}};
-    JsonObject manifest(*json, "", fault);
+    JsonObject manifest(json, "", fault);
     File file;
-    const Status filled = fill(file, *reader, manifest);
+    const Status filled = fill(file, reader, manifest);
     if (fault.error) return *fault.error;
     if (!filled) return filled.error();
     return file;
@@ -51,44 +48,40 @@ Status fill_labels(LabelFile& file,
     file.reports = detail::reports_from(manifest, "stages");
     if (!manifest.ok()) return Done{};
     const Int3 size = file.volume.grid.size;
-    auto volumes = detail::read_volumes(reader, manifest, size, file.volume.labels.size(), jobs);
-    if (!volumes) return volumes.error();
-    if (volumes->packed) {
-        VoxelBlocks blocks(std::move(volumes->packed));
+    SONOCASE_TRY(auto volumes,
+                 detail::read_volumes(reader, manifest, size, file.volume.labels.size(), jobs));
+    if (volumes.packed) {
+        VoxelBlocks blocks(std::move(volumes.packed));
         blocks.load_all(jobs);
-        if (Status whole = blocks.status(); !whole) return whole;
+        SONOCASE_TRY_DONE(blocks.status());
     }
-    file.volume.voxels = dense_from_bricks(volumes->labels);
-    file.boundary = std::move(volumes->boundary);
-    file.echo_offset = std::move(volumes->echo_offset);
+    file.volume.voxels = dense_from_bricks(volumes.labels);
+    file.boundary = std::move(volumes.boundary);
+    file.echo_offset = std::move(volumes.echo_offset);
     if (!reader.has("region")) return Done{};
-    const auto bytes = reader.read("region", detail::kMaxRegionBytes, jobs);
-    if (!bytes) return bytes.error();
-    auto region = detail::region_from_bytes(*bytes, file.volume.labels.size(),
-                                            file.volume.grid.spacing_mm.x, reader.where(), jobs);
-    if (!region) return region.error();
-    file.region = std::move(*region);
+    SONOCASE_TRY(const auto bytes, reader.read("region", detail::kMaxRegionBytes, jobs));
+    SONOCASE_TRY(auto region,
+                 detail::region_from_bytes(bytes, file.volume.labels.size(),
+                                           file.volume.grid.spacing_mm.x, reader.where(), jobs));
+    file.region = std::move(region);
     return Done{};
 }
 
 Status fill_textures(TextureFile& file, const ChunkReader& reader, JsonObject& manifest) {
     file.reports = detail::reports_from(manifest, "stages");
     file.tissues = detail::tissues_from(manifest, "tissues");
-    auto textures = detail::read_textures(reader, manifest);
-    if (!textures) return textures.error();
-    file.textures = std::move(*textures);
-    auto speckle = detail::read_speckle(reader, manifest);
-    if (!speckle) return speckle.error();
-    file.speckle = std::move(*speckle);
+    SONOCASE_TRY(auto textures, detail::read_textures(reader, manifest));
+    file.textures = std::move(textures);
+    SONOCASE_TRY(auto speckle, detail::read_speckle(reader, manifest));
+    file.speckle = std::move(speckle);
     return Done{};
 }
 
 Status fill_surface(SurfaceFile& file, const ChunkReader& reader, JsonObject& manifest) {
     file.frame = manifest.text_or("frame", "");
     file.reports = detail::reports_from(manifest, "stages");
-    auto surface = detail::read_surface(reader, "surface");
-    if (!surface) return surface.error();
-    file.surface = std::move(*surface);
+    SONOCASE_TRY(auto surface, detail::read_surface(reader, "surface"));
+    file.surface = std::move(surface);
     return Done{};
 }
 

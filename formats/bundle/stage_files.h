@@ -28,7 +28,7 @@ struct LabelFile {
     BoundaryBricks boundary;               // formats/volume/boundary_record.h; may be empty
     BrickVolume<std::int8_t> echo_offset;  // quarter dB; may be empty
     std::vector<StageReport> reports;
-    std::optional<FineRegion> region = {};  // of the frame `mannequin`; most have none
+    std::optional<FineRegion> region = {};  // frame `mannequin`; most files have none
 };
 std::vector<std::uint8_t> write_label_file(const LabelFile& file, JobRunner& jobs = serial_jobs());
 Result<LabelFile> read_label_file(std::span<const std::uint8_t> bytes,
@@ -58,7 +58,8 @@ std::vector<std::uint8_t> write_surface_file(const SurfaceFile& file,
 Result<SurfaceFile> read_surface_file(std::span<const std::uint8_t> bytes,
                                       const std::string& where);
 
-// What the bytes are, by their first 16: "CASE", "LABL", "TXTR", "SURF", or "" for anything else.
+// The kind of file, from its first 16 bytes: "CASE", "LABL", "TXTR", "SURF", or "" for anything
+// else.
 std::string container_kind(std::span<const std::uint8_t> bytes);
 
 }  // namespace sonocase

@@ -9,7 +9,7 @@
 #include <sys/mman.h>
 #endif
 
-#include "formats/bundle/codec/block_parts.h"
+#include "formats/bundle/codec/packed_blocks.h"
 
 namespace sonocase {
 namespace {
@@ -77,10 +77,10 @@ void VoxelBlocks::forget_awaited() noexcept {
     awaited_ = 0;
 }
 
-void VoxelBlocks::look_again() noexcept {
+void VoxelBlocks::read_arrived() noexcept {
     for (std::size_t block = 0; block < count_; ++block) {
         State filled_in = kFilledIn;
-        if (parts_->is_here(block)) state_[block].compare_exchange_strong(filled_in, kPacked);
+        if (parts_->is_loaded(block)) state_[block].compare_exchange_strong(filled_in, kPacked);
     }
 }
 
@@ -102,7 +102,7 @@ void VoxelBlocks::unpack(std::size_t block) noexcept {
         } else if (!lock.try_lock()) {
             continue;
         }
-        if (parts_->is_here(block)) {
+        if (parts_->is_loaded(block)) {
             finish(block, workers_[n].unpacker->unpack(*parts_, block));
             return;
         }
@@ -115,16 +115,16 @@ void VoxelBlocks::unpack(std::size_t block) noexcept {
 }
 
 void VoxelBlocks::load_all(JobRunner& jobs) {
-    // A row of blocks per job, so that few jobs allocate an unpacker.
+    // One job per row of blocks, so that few unpackers are allocated.
     const auto row = static_cast<std::size_t>(std::max(blocks_.x, 1));
     jobs.run((count_ + row - 1) / row, [&](std::size_t job) {
         detail::BlockUnpacker unpacker(*parts_);
         for (std::size_t block = job * row; block < std::min((job + 1) * row, count_); ++block) {
-            if (parts_->is_here(block) && take(block))
+            if (parts_->is_loaded(block) && take(block))
                 finish(block, unpacker.unpack(*parts_, block));
         }
     });
-    for (std::size_t block = 0; block < count_; ++block)  // that other threads have begun
+    for (std::size_t block = 0; block < count_; ++block)  // those that other threads have begun
         state_[block].wait(kBeingUnpacked, std::memory_order_acquire);
 }
 

@@ -4,12 +4,14 @@
 // blocks of bricks. Labels and all tables are loaded from the start; the pools of the other two are
 // valid in a block only once the block has been asked for.
 //
-// Asking neither allocates nor throws, so that a frame may do it; any thread may. A block costs
-// about 0.1 ms the first time. A block whose contents are invalid although their checksum is right
-// is found when it is asked for: it then holds no surfaces and offsets of 0, and status() says so.
+// Asking neither allocates nor throws, so that the frame loop may do it, on any thread. A block
+// costs about 0.1 ms the first time. A block whose contents are invalid although their checksum is
+// right is found when it is asked for: it then holds no surfaces and offsets of 0, and status()
+// says so.
 //
-// Of a bundle that arrives in segments (streamed_bundle.h) a block that is asked for before its
-// bytes are there holds surfaces without corrections and offsets of 0, and is awaited.
+// If the bundle arrives in segments (stream_bundle_in_parts()), a block that is asked for before
+// its bytes have arrived holds surfaces without corrections and offsets of 0, and counts as
+// awaited.
 #pragma once
 
 #include <array>
@@ -34,8 +36,8 @@ class VoxelBlocks {
     explicit VoxelBlocks(std::unique_ptr<detail::BlockParts> parts);
     ~VoxelBlocks();
 
-    // Unpacks every block for which wanted(lower) is true; lower: the block's first voxel. Of two
-    // threads that want the same blocks, one should begin at the end.
+    // Unpacks every block for which wanted(lower) is true; lower: the block's first voxel. If two
+    // threads want the same blocks, one should go backwards.
     template <class Wanted>
     void ensure_loaded(const Wanted& wanted, bool backwards = false) noexcept {
         if (whole()) return;
@@ -59,16 +61,17 @@ class VoxelBlocks {
     bool is_awaited(std::size_t block) const noexcept {
         return asked_[block].load(std::memory_order_relaxed) != 0;
     }
-    void forget_awaited() noexcept;  // counts again from here
-    // Segments have come: blocks whose bytes are now there are unpacked when next asked for.
-    void look_again() noexcept;
+    void forget_awaited() noexcept;  // awaited() counts from 0 again
+    // Call it when segments have arrived: blocks whose bytes are now there are unpacked when they
+    // are asked for again.
+    void read_arrived() noexcept;
     std::size_t count() const noexcept { return count_; }
     Int3 lower(std::size_t block) const noexcept { return lower_[block]; }  // first voxel
     // Where the block's bytes lie in the file: records, echo offsets.
     std::array<ByteRange, 2> places(std::size_t block) const noexcept;
 
-    // Keeps the system from providing a page of 2 MB for a block of a tenth of that, where the
-    // pools are large enough for such pages. To be called before any block is asked for.
+    // Keeps the system from providing a page of 2 MB for a block of a tenth of that size. Call it
+    // before any block is asked for.
     void use_small_pages() noexcept;
 
   private:
@@ -78,7 +81,7 @@ class VoxelBlocks {
     bool is_loaded(std::size_t block) const noexcept {
         return state_[block].load(std::memory_order_acquire) == kLoaded;
     }
-    bool take(std::size_t block) noexcept;  // claims it; false: another thread has
+    bool take(std::size_t block) noexcept;  // claims it; false if another thread has done so
     void finish(std::size_t block, bool valid) noexcept;
     void unpack(std::size_t block) noexcept;
     void await(std::size_t block) noexcept;
@@ -91,7 +94,7 @@ class VoxelBlocks {
     std::vector<Int3> lower_;  // first voxel of each block
     std::unique_ptr<std::atomic<State>[]> state_;
     std::atomic<std::size_t> left_{0};
-    std::unique_ptr<std::atomic<std::uint8_t>[]> asked_;  // though not there
+    std::unique_ptr<std::atomic<std::uint8_t>[]> asked_;  // before its bytes arrived
     std::atomic<std::size_t> awaited_{0};
     std::atomic<bool> damaged_{false};
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A saved calibration (JSON): which sensor, what was found, how good it is.
+// A saved calibration (JSON): which sensor, what was found, how good it is, and what to tell the
+// user before relying on it.
 #pragma once
 
 #include <optional>
@@ -37,5 +38,24 @@ std::string format_calibration(const Calibration& calibration);
 // Reads what `sonocase calibrate lag` saves: the second recording shows a motion lag_s later than
 // the first. Empty if the text is not such a file; an Error if it is one without a finite lag.
 Result<std::optional<double>> parse_lag_s(std::string_view json, const std::string& where);
+
+// Limits beyond which calibration_concerns() reports a calibration.
+struct CalibrationLimits {
+    double max_rms_mm = 2;
+    double max_sigma_mm = 1;
+    double max_condition = 100;
+    double max_age_days = 30;
+    int min_poses = 20;  // probe and needle
+};
+
+// Whole sentences, each with what to do; empty if there is nothing to report. `now` and the
+// calibration's date are ISO 8601 in UTC ("2026-11-21T02:00:00Z"); an unreadable date is a concern
+// of its own.
+std::vector<Message> calibration_concerns(const Calibration& calibration,
+                                          std::string_view now,
+                                          const CalibrationLimits& limits = {});
+
+// Days since 1970-01-01, with a fraction; false if the text is not an ISO 8601 date.
+bool days_from_iso_date(std::string_view text, double* days);
 
 }  // namespace sonocase

@@ -6,11 +6,13 @@
 #include <cassert>
 #include <cmath>
 
+#include "formats/base/constants.h"
+#include "formats/base/random.h"
+#include "formats/calibration/least_squares.h"
+#include "formats/calibration/pivot.h"
 #include "formats/calibration/pose_screen.h"
 #include "formats/calibration/report_text.h"
-#include "formats/calibration/solve/least_squares.h"
-#include "formats/calibration/solve/pivot_search.h"
-#include "formats/calibration/solve/statistics.h"
+#include "formats/calibration/statistics.h"
 
 namespace sonocase {
 namespace {
@@ -21,7 +23,7 @@ struct Line {
     Point3 point;
     Vector3 direction;
     double along = 0;   // standard deviation along the line
-    double across = 0;  // and across it, per component
+    double across = 0;  // standard deviation across it, per component
 };
 
 Line fit_line(const std::vector<Point3>& points, const std::vector<std::size_t>& chosen) {
@@ -63,7 +65,7 @@ std::vector<std::size_t> straight_part(const std::vector<Point3>& points,
     // plain fit.
     Line best = fit_line(points, all);
     double best_middle = 0.7 * median(residuals(best));
-    IndexStream random(options.seed);
+    RandomStream random(options.seed);
     for (int trial = 0; trial < options.trials; ++trial) {
         const std::size_t a = random.below(points.size()), b = random.below(points.size());
         const Vector3 v = points[b] - points[a];
@@ -90,8 +92,8 @@ std::vector<std::size_t> straight_part(const std::vector<Point3>& points,
     return kept.size() >= 4 ? kept : all;
 }
 
-// Points the line the way the sweep first went: that of its first stroke of a quarter of the whole
-// length. Sets the length and whether later strokes went back.
+// Points the line the way the sweep first went, which is that of its first stroke of a quarter of
+// the whole length. Sets the length and whether later strokes went back.
 void orient_line(const std::vector<Point3>& points,
                  const std::vector<std::size_t>& kept,
                  Line& line,
@@ -104,26 +106,26 @@ void orient_line(const std::vector<Point3>& points,
         high = std::max(high, along.back());
     }
     out.length_mm = high - low;
-    double least = along[0], most = along[0];
+    double lowest = along[0], highest = along[0];
     int first = 0, turns = 0, way = 0;
     for (double s : along) {
-        least = std::min(least, s);
-        most = std::max(most, s);
-        const int now = s - least > 0.25 * out.length_mm  ? 1
-                        : most - s > 0.25 * out.length_mm ? -1
-                                                          : 0;
+        lowest = std::min(lowest, s);
+        highest = std::max(highest, s);
+        const int now = s - lowest > 0.25 * out.length_mm    ? 1
+                        : highest - s > 0.25 * out.length_mm ? -1
+                                                             : 0;
         if (now == 0) continue;
         if (first == 0) first = now;
         turns += way != 0 && now != way;
         way = now;
-        least = most = s;
+        lowest = highest = s;
     }
     if (first < 0) line.direction = -line.direction;
     out.back_and_forth = turns > 0;
 }
 
-// The line's direction in the sensor's frame, averaged over the poses, and how far the tool turned
-// about its mean orientation.
+// Sets the line's direction in the sensor's frame, averaged over the poses, and how far the tool
+// turned about its mean orientation.
 void project_into_sensor(const std::vector<Pose>& poses,
                          const std::vector<std::size_t>& kept,
                          const Line& line,
@@ -145,12 +147,13 @@ void project_into_sensor(const std::vector<Pose>& poses,
         }
         out.turn_rad = std::sqrt(turn / static_cast<double>(kept.size()));
     } else {
-        out.turn_rad = 3.14159265358979323846;
+        out.turn_rad = kPi;
     }
     out.direction = normalized(k);
 }
 
-// Distances from the line, their rms, and the correlation of successive ones (0 if within chance).
+// Sets the distances from the line and their rms. Returns the correlation of successive distances,
+// 0 if it could be chance.
 double fill_residuals(const std::vector<Pose>& poses,
                       const std::vector<Point3>& points,
                       const std::vector<std::size_t>& kept,
@@ -158,7 +161,8 @@ double fill_residuals(const std::vector<Pose>& poses,
                       DirectionFit& out) {
     double square = 0, product = 0;
     Vector3 before;
-    for (const Pose& p : poses) out.residuals.push_back({p.frame, p.timestamp_s, 0, false, -1});
+    for (const Pose& p : poses)
+        out.residuals.push_back({.frame = p.frame, .timestamp_s = p.timestamp_s});
     for (std::size_t i = 0; i < poses.size(); ++i)
         out.residuals[i].residual_mm = off_line(line, points[i]);
     for (std::size_t i : kept) {
@@ -177,7 +181,7 @@ double fill_residuals(const std::vector<Pose>& poses,
     return rho;
 }
 
-// Whether the path determines a direction, and what is doubtful about it.
+// Sets whether the path determines a direction, and warns of what is doubtful about it.
 void judge_path(const Line& line, double rho, DirectionFit& out) {
     const auto n = static_cast<double>(out.inliers);
     if (out.length_mm < 1 || out.condition < 3) {
@@ -187,8 +191,7 @@ void judge_path(const Line& line, double rho, DirectionFit& out) {
                        out.length_mm)
                 : text(
                       "the path is not a straight line (%.1f mm along, %.1f mm rms across); move "
-                      "the tool "
-                      "along a straight edge",
+                      "the tool along a straight edge",
                       out.length_mm, out.rms_mm);
         return;
     }
@@ -199,11 +202,11 @@ void judge_path(const Line& line, double rho, DirectionFit& out) {
             text("The path is only %.0f mm long; 50 mm or more give a steadier direction.",
                  out.length_mm));
     }
-    if (out.turn_rad > 5 * kDegree) {
+    if (out.turn_rad > 5 * kRadPerDeg) {
         out.warnings.push_back(
             text("The tool turned by %.1f degrees rms while it moved; hold its orientation, "
                  "or slide it along an edge.",
-                 out.turn_rad / kDegree));
+                 out.turn_rad / kRadPerDeg));
     }
     if (out.rms_mm > 0.05 * out.length_mm) {
         out.warnings.push_back(
@@ -276,12 +279,12 @@ ProbeFrame make_probe_frame(const DirectionFit& depth, const DirectionFit& later
         out.sigma_rad = INFINITY;
         return out;
     }
-    const double error = out.raw_angle_rad - 90 * kDegree;  // > 0: the two lie too far apart
-    if (std::abs(error) > 60 * kDegree) {
+    const double error = out.raw_angle_rad - 90 * kRadPerDeg;  // > 0: the two lie too far apart
+    if (std::abs(error) > 60 * kRadPerDeg) {
         out.problem = text(
             "the two sweeps are only %.0f degrees apart; one goes into the body, the other "
             "along the probe's face",
-            std::min(out.raw_angle_rad, 180 * kDegree - out.raw_angle_rad) / kDegree);
+            std::min(out.raw_angle_rad, 180 * kRadPerDeg - out.raw_angle_rad) / kRadPerDeg);
         out.sigma_rad = INFINITY;
         return out;
     }
@@ -295,11 +298,11 @@ ProbeFrame make_probe_frame(const DirectionFit& depth, const DirectionFit& later
     // The common error leaves each axis with the variance of the better-known combination.
     out.sigma_rad = std::sqrt(std::max(vz, vx));
     out.determined = true;
-    if (std::abs(error) > 5 * kDegree) {
+    if (std::abs(error) > 5 * kRadPerDeg) {
         out.warnings.push_back(
             text("The two sweeps make an angle of %.1f degrees instead of 90; hold the "
                  "probe straight and sweep along an edge.",
-                 out.raw_angle_rad / kDegree));
+                 out.raw_angle_rad / kRadPerDeg));
     }
     return out;
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Directions of a tool in the frame of the sensor on it, from one sweep along each: the tool is
-// moved along the direction while its orientation is held. Two sweeps give the probe's frame.
+// Directions of a tool in the frame of its sensor, from one sweep along each: the user moves the
+// tool along the direction and holds its orientation. Two sweeps give the probe's frame.
 //
 // [Magee] eq. (14) takes successive pairs of readings, each a unit vector V_n, and projects them
 // into (S_dir, S_ori, S_3). Pairs that lie close together are mostly noise, and a hand moves back
 // and forth. Here a straight line is fitted robustly to the path in the tracker's frame and
-// projected into the sensor's frame at every reading; the paper's form is kept as the oracle.
+// projected into the sensor's frame at every reading; the paper's form is kept for comparison.
 #pragma once
 
 #include <span>
@@ -32,7 +32,7 @@ struct DirectionFit {
     double rms_mm = 0;     // distance from the line
     double length_mm = 0;  // of the path along the line
     double turn_rad = 0;   // rms change of orientation about its mean
-    double condition = 0;  // spread along the line over spread across it
+    double condition = 0;  // ratio of the spread along the line to the spread across it
     bool back_and_forth = false;  // the sweep reversed
     int poses = 0, inliers = 0;
     bool determined = false;

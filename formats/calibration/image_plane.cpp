@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "formats/calibration/report_text.h"
 
 namespace sonocase {
@@ -12,7 +13,8 @@ namespace {
 
 using namespace calibrate;
 
-// Mean of the finite points in another frame, false if there are none; adds their squared scatter.
+// Computes the mean of the finite points in the probe's frame and adds their squared scatter and
+// their number. False if there are none.
 bool mean_in(const Rigid& probe_from_sensor,
              std::span<const Point3> points,
              Point3* mean,
@@ -72,7 +74,7 @@ ImagePlane fit_image_plane(const ImagePlaneInput& input) {
         out.problem = text(
             "the touched face lies at %.0f degrees to the lateral direction; sweep the probe along "
             "its face again, or touch the two ends of the long side",
-            std::acos(std::abs(cosine)) / kDegree);
+            std::acos(std::abs(cosine)) / kRadPerDeg);
         return out;
     }
     out.mirrored = face.x < 0;
@@ -96,19 +98,18 @@ ImagePlane fit_image_plane(const ImagePlaneInput& input) {
         out.warnings.push_back(
             "The marked end is on the opposite side to the one that the lateral sweep went to: the "
             "image would be mirrored. The probe's frame was turned round; check the picture, and "
-            "sweep "
-            "towards the mark next time.");
+            "sweep towards the mark next time.");
     }
     if (out.upside_down) {
         out.warnings.push_back(
             "The touches in front of the face have negative depth: the image would be upside down. "
             "The probe's frame was turned over; make the depth sweep into the body next time.");
     }
-    if (out.face_angle_rad > 5 * kDegree) {
+    if (out.face_angle_rad > 5 * kRadPerDeg) {
         out.warnings.push_back(
             text("The face lies at %.1f degrees to the lateral direction; sweep along the face "
                  "again.",
-                 out.face_angle_rad / kDegree));
+                 out.face_angle_rad / kRadPerDeg));
     }
     if (input.footprint_mm > 0 && std::abs(width - input.footprint_mm) > 0.1 * input.footprint_mm) {
         out.warnings.push_back(

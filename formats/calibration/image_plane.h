@@ -8,9 +8,10 @@
 //
 //     x = lateral_sign (u - u0) mm_per_px,   z = (v - v0) mm_per_px
 //
-// The mark is drawn on the left of the image unless said otherwise, so that lateral_sign is -1. Two
-// touches of a calibrated pointer, on the marked end of the face and on the other, determine the
-// rest: a mirrored image is the commonest fault of such a set-up and the hardest to notice.
+// The mark is drawn on the left of the image unless mark_on_left is false, so that lateral_sign is
+// -1. Two touches of a calibrated pointer, on the marked end of the face and on the other,
+// determine the rest. They also show whether the image is mirrored, the commonest fault of such a
+// set-up and the hardest to notice.
 #pragma once
 
 #include <span>
@@ -24,7 +25,7 @@ namespace sonocase {
 struct ImagePlaneInput {
     Rigid sensor_from_probe;        // from the point and direction calibrations
     std::vector<Point3> mark_end;   // touches of the marked end of the face, sensor frame
-    std::vector<Point3> other_end;  // and of the other end
+    std::vector<Point3> other_end;  // touches of the other end
     // Touches of anything in front of the face, sensor frame; may be empty.
     std::vector<Point3> in_front;
     double depth_mm = 150;    // of the image, top to bottom, > 0

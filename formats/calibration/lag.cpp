@@ -5,17 +5,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/calibration/least_squares.h"
 #include "formats/calibration/pose_screen.h"
 #include "formats/calibration/report_text.h"
-#include "formats/calibration/solve/least_squares.h"
-#include "formats/calibration/solve/statistics.h"
+#include "formats/calibration/statistics.h"
 
 namespace sonocase {
 namespace {
 
 using namespace calibrate;
 
-Signal tidy(const Signal& raw) {
+// Finite readings in order of time, each time once.
+Signal cleaned(const Signal& raw) {
     std::vector<std::size_t> order;
     for (std::size_t i = 0; i < raw.time_s.size(); ++i) {
         if (std::isfinite(raw.time_s[i]) && std::isfinite(raw.value[i])) order.push_back(i);
@@ -38,7 +39,7 @@ double typical_step(const Signal& s) {
     return median(steps);
 }
 
-// Straight lines between readings, at start + k * step.
+// Values at start + k * step, linear between readings.
 std::vector<double> resampled(const Signal& s, double start, double step, std::size_t count) {
     std::vector<double> out(count);
     std::size_t at = 1;
@@ -68,8 +69,8 @@ double correlation(const double* a, const double* b, std::size_t n) {
     return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0;
 }
 
-// Whether a signal moves: its spread exceeds that of its second differences, which is noise.
-bool moves(const std::vector<double>& y) {
+// Whether a signal shows motion: its spread exceeds that of its second differences, which is noise.
+bool shows_motion(const std::vector<double>& y) {
     double mean = 0, spread = 0, noise = 0;
     for (double v : y) mean += v / static_cast<double>(y.size());
     for (std::size_t i = 2; i < y.size(); ++i) {
@@ -79,8 +80,8 @@ bool moves(const std::vector<double>& y) {
     return spread > 1e-18 && spread > noise;
 }
 
-// Standard deviation of the lag: what the fit of the first signal to the second leaves over,
-// widened by its correlation, against the steepness of the signal.
+// Standard deviation of the lag: the residual of fitting the first signal to the second, widened
+// for the correlation of successive residuals, over the steepness of the signal.
 double lag_sigma_s(const double* middle, const double* matched, std::size_t n, double step) {
     double aa = 0, ab = 0, ma = 0, mb = 0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -92,17 +93,17 @@ double lag_sigma_s(const double* middle, const double* matched, std::size_t n, d
         ab += (middle[i] - ma) * (matched[i] - mb);
     }
     const double gain = ab / aa;
-    double left_over = 0, steep = 0, product = 0, before = 0;
+    double residual = 0, steep = 0, product = 0, before = 0;
     for (std::size_t i = 1; i < n; ++i) {
         const double r = matched[i] - mb - gain * (middle[i] - ma);
         const double slope = gain * (middle[i] - middle[i - 1]) / step;
-        left_over += r * r;
+        residual += r * r;
         steep += slope * slope;
         product += r * before;
         before = r;
     }
-    const double rho = left_over > 0 ? std::clamp(product / left_over, 0.0, 0.99) : 0;
-    const double variance = left_over / static_cast<double>(n);
+    const double rho = residual > 0 ? std::clamp(product / residual, 0.0, 0.99) : 0;
+    const double variance = residual / static_cast<double>(n);
     return std::sqrt(variance / steep * (1 + rho) / (1 - rho));
 }
 
@@ -174,7 +175,7 @@ Signal speed_signal(std::span<const Pose> readings) {
 LagFit fit_lag(const Signal& first, const Signal& second, const LagOptions& options) {
     LagFit out;
     out.sigma_s = INFINITY;
-    const Signal a = tidy(first), b = tidy(second);
+    const Signal a = cleaned(first), b = cleaned(second);
     if (a.time_s.size() < 20 || b.time_s.size() < 20) {
         out.problem = text("%zu and %zu readings; at least 20 each are needed and 10 s are better",
                            a.time_s.size(), b.time_s.size());
@@ -196,18 +197,18 @@ LagFit fit_lag(const Signal& first, const Signal& second, const LagOptions& opti
     const auto count = static_cast<std::size_t>(out.overlap_s / step) + 1;
     const std::vector<double> ya = resampled(a, start, step, count);
     const std::vector<double> yb = resampled(b, start, step, count);
-    const auto most = static_cast<std::ptrdiff_t>(max_lag / step);
-    const std::size_t n = count - static_cast<std::size_t>(2 * most);
-    if (!moves(ya) || !moves(yb)) {
+    const auto max_shift = static_cast<std::ptrdiff_t>(max_lag / step);
+    const std::size_t n = count - static_cast<std::size_t>(2 * max_shift);
+    if (!shows_motion(ya) || !shows_motion(yb)) {
         out.problem =
             "one of the recordings shows no motion; move the tool up and down briskly, unevenly, "
             "for 10 s";
         return out;
     }
-    const double* middle = ya.data() + most;
-    for (std::ptrdiff_t k = -most; k <= most; ++k) {
+    const double* middle = ya.data() + max_shift;
+    for (std::ptrdiff_t k = -max_shift; k <= max_shift; ++k) {
         out.curve_lag_s.push_back(static_cast<double>(k) * step);
-        out.curve.push_back(correlation(middle, yb.data() + most + k, n));
+        out.curve.push_back(correlation(middle, yb.data() + max_shift + k, n));
     }
     std::size_t best = 0;
     for (std::size_t k = 1; k < out.curve.size(); ++k) {

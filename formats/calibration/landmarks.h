@@ -27,7 +27,7 @@ struct RigidFit {
     double rms_mm = 0;      // of the used points
     double condition = 0;   // of the scaled Jacobian; infinite if a motion is undetermined
     Vector3 sigma_mm;       // one standard deviation of the translation at the points' centroid
-    Vector3 sigma_rad;      // and of the rotation
+    Vector3 sigma_rad;      // one standard deviation of the rotation
     double sigma_scale = 0;
     int points = 0, inliers = 0;
     bool determined = false;
@@ -46,8 +46,7 @@ struct RigidFit {
 };
 
 // Points in pairs; `names` may be empty. Never fails. Quaternion fit [Horn 1987], refined by
-// Gauss-Newton steps with QR. Looks for wrong pairs, exchanged pairs and a mirror image, and warns
-// of them.
+// Gauss-Newton steps with QR. Warns of wrong pairs, exchanged pairs and a mirror image.
 RigidFit fit_rigid(std::span<const Point3> from,
                    std::span<const Point3> to,
                    std::span<const std::string> names = {},

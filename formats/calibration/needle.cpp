@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/base/constants.h"
+#include "formats/calibration/pivot.h"
 #include "formats/calibration/pose_screen.h"
 #include "formats/calibration/report_text.h"
-#include "formats/calibration/resting_poses.h"
-#include "formats/calibration/solve/pivot_system.h"
 
 namespace sonocase {
 namespace {
@@ -46,7 +46,8 @@ double quadratic(Vector3 a, const Matrix3& w, Vector3 b) {
     return dot(a, w * b);
 }
 
-// The paper: principal component, then the mean of the points minus their projections on it.
+// The paper's axis: the principal component of the points, then the mean of the points minus their
+// projections on it.
 void paper_axis(const std::vector<AxisPoint>& points, NeedleFit& out) {
     const auto n = static_cast<double>(points.size());
     Vector3 mean;
@@ -67,17 +68,17 @@ void paper_axis(const std::vector<AxisPoint>& points, NeedleFit& out) {
     out.condition = fit.singular[1] > 0 ? fit.singular[0] / fit.singular[1] : INFINITY;
 }
 
-// Line through points of known covariance: Gauss-Newton over two offsets and two tilts; the
-// position of each point along the line is eliminated. Gives the direction, a point on the line and
-// their standard deviations.
+// A line, with the standard deviations of its direction and offset.
 struct WeightedLine {
     Vector3 direction, at;
     double direction_sigma = 0;
     double offset_sigma = 0;  // across, at the centroid
     double chi_square = 0;
-    std::vector<double> along;
+    std::vector<double> along;  // position of each point along the line
 };
 
+// Fits a line through points of known covariance: Gauss-Newton over two offsets and two tilts; the
+// position of each point along the line is eliminated.
 WeightedLine weighted_line(const std::vector<AxisPoint>& points, Vector3 direction) {
     WeightedLine line;
     line.direction = direction;
@@ -117,6 +118,8 @@ WeightedLine weighted_line(const std::vector<AxisPoint>& points, Vector3 directi
     return line;
 }
 
+// Orients the line and sets the tip on it: by the measured depths, or else at the point farthest
+// from the sensor.
 void place_tip(const std::vector<AxisPoint>& points,
                const NeedleOptions& options,
                WeightedLine& line,
@@ -233,7 +236,7 @@ NeedleFit fit_needle(std::span<const std::vector<Pose>> recordings, const Needle
         return out;
     }
     WeightedLine line = weighted_line(points, out.paper_direction);
-    // Points farther from the line than their own sigmas allow: the needle bent or slipped.
+    // If points lie farther from the line than their own sigmas allow, the needle bent or slipped.
     const double freedom = 2.0 * static_cast<double>(points.size()) - 4;
     const double excess = freedom > 0 ? line.chi_square / freedom : 0;
     double square = 0;
@@ -259,11 +262,11 @@ NeedleFit fit_needle(std::span<const std::vector<Pose>> recordings, const Needle
         out.warnings.push_back(
             text("Only %zu depths; 5 over 50 mm or more are better.", points.size()));
     }
-    if (line.direction_sigma > 0.5 * kDegree) {
+    if (line.direction_sigma > 0.5 * kRadPerDeg) {
         out.warnings.push_back(
             text("The direction is known to %.1f degrees only; spread the depths further "
                  "(now %.0f mm) and tilt more at each.",
-                 line.direction_sigma / kDegree, far));
+                 line.direction_sigma / kRadPerDeg, far));
     }
     return out;
 }
@@ -288,19 +291,18 @@ NeedleFit fit_needle_spin(std::span<const Pose> readings) {
     const PivotSolution free = solve_pivots(poses, std::span(&all, 1));
     const double s0 = free.fit.singular[0] / root_n, s1 = free.fit.singular[1] / root_n,
                  s2 = free.fit.singular[2] / root_n;
-    if (s1 < 5 * kDegree) {
+    if (s1 < 5 * kRadPerDeg) {
         out.problem = text("the needle spun by %.1f degrees rms only; spin it half a turn or more",
-                           s0 / kDegree);
+                           s0 / kRadPerDeg);
         return out;
     }
     if (s2 > 0.3 * s1) {
         out.problem =
             "the needle was tilted while it spun, so that no axis stays fixed; spin it in a "
-            "groove, "
-            "or use the recording as a pinhole depth";
+            "groove, or use the recording as a pinhole depth";
         return out;
     }
-    // Without the axis itself: the position along it is undetermined.
+    // Solves without the axis itself, because the position along it is undetermined.
     const PivotSolution across = solve_pivots(poses, std::span(&all, 1), 0.999 * s1 / s0);
     out.direction = as_vector(free.fit.direction[2]);
     out.axis_point_mm = across.tip - dot(across.tip, out.direction) * out.direction;
@@ -320,7 +322,7 @@ NeedleFit fit_needle_spin(std::span<const Pose> readings) {
         out.warnings.push_back(
             text("The axis tilted by %.1f degrees rms while the needle spun; hold it in a "
                  "groove.",
-                 s2 / kDegree));
+                 s2 / kRadPerDeg));
     }
     out.warnings.push_back(
         "A spin gives the axis but neither the tip nor which way it points; add a recording "
@@ -343,13 +345,13 @@ NeedleAgreement compare(const NeedleFit& pinholes, const NeedleFit& spin) {
     const double reach = norm(pinholes.tip_mm - spin.axis_point_mm);
     const double across = std::hypot(std::hypot(pinholes.tip_sigma_mm.x, pinholes.tip_sigma_mm.y),
                                      reach * spin.direction_sigma_rad);
-    out.agree = out.angle_rad <= std::max(1 * kDegree, 3 * sigma) &&
+    out.agree = out.angle_rad <= std::max(1 * kRadPerDeg, 3 * sigma) &&
                 out.distance_mm <= std::max(1.0, 3 * across);
     out.sentence =
         text(out.agree ? "Pinholes and spin agree: %.2f degrees, %.2f mm at the tip."
                        : "Pinholes and spin disagree by %.2f degrees and %.2f mm at the tip; the "
                          "needle bent or the sensor slipped between them: record both again.",
-             out.angle_rad / kDegree, out.distance_mm);
+             out.angle_rad / kRadPerDeg, out.distance_mm);
     return out;
 }
 

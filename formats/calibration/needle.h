@@ -4,9 +4,9 @@
 //
 // Pinholes   The needle is pushed through a fixed hole to several depths and tilted at each: one
 //            pivot calibration per depth gives one point of the axis. The paper takes the points'
-//            principal direction and the mean of their rests after projection; both are reported.
-//            The answer weights each point by its own covariance, which equals the joint fit of
-//            all readings.
+//            principal direction and the mean of what is left of them after projection; both are
+//            reported. The answer weights each point by its own covariance, which equals the joint
+//            fit of all readings.
 // Spin       The needle is spun in a groove: the axis is the direction that does not turn.
 #pragma once
 
@@ -32,7 +32,7 @@ struct NeedleFit {
     bool tip_measured = false;   // false: only the axis is known, tip_mm is the farthest point
     double direction_sigma_rad = 0;
     Vector3 tip_sigma_mm;
-    double rms_mm = 0;  // distance of the points from the axis; spin: of the readings
+    double rms_mm = 0;  // distance of the points (spin: of the readings) from the axis
     double condition = 0;
     int poses = 0, inliers = 0;
 
@@ -51,7 +51,7 @@ struct NeedleFit {
 NeedleFit fit_needle(std::span<const std::vector<Pose>> recordings,
                      const NeedleOptions& options = {});
 
-// From a spin, which determines the axis but neither the tip (tip_mm is axis_point_mm) nor the sign
+// Fits a spin, which determines the axis but neither the tip (tip_mm is axis_point_mm) nor the sign
 // of the direction. Never fails.
 NeedleFit fit_needle_spin(std::span<const Pose> poses);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Pivot calibration: where the tip of a tool is in the frame of the sensor on it, from a recording
-// in which the tip rests on a fixed point while the tool is tilted every way. The paper's probe
-// point is the same problem and is solved here too.
+// Pivot calibration: where the tip of a tool is in the frame of its sensor, from a recording in
+// which the tip rests on a fixed point while the tool is tilted every way. The paper's probe point
+// is the same problem and is solved here too.
 //
 //     R_i t + p_i = c        unknown t (tip, sensor frame) and c (pivot, tracker frame)
 //
@@ -58,7 +58,7 @@ struct RestPoint {
 
 struct PointFit {
     Vector3 tip_mm;   // sensor frame; the undetermined part, if any, is zero
-    Point3 pivot_mm;  // tracker frame; of the resting point with most poses
+    Point3 pivot_mm;  // tracker frame; of the resting point with the most poses
     // The paper's unknowns: d2 >= 0, theta in (-pi, pi].
     double d1_mm = 0, d2_mm = 0, theta_rad = 0;
 
@@ -79,7 +79,7 @@ struct PointFit {
     bool determined = false;  // false: `problem` says why not and what to do
     std::string problem;
     Vector3 swing;             // in decreasing order; see above
-    Vector3 weak_axis;         // sensor frame, unit: the least well determined direction
+    Vector3 weak_axis;         // sensor frame, unit: the direction that is determined worst
     double weak_sigma_mm = 0;  // one standard deviation along it
 
     std::vector<RestPoint> rests;         // at least one if determined
@@ -89,12 +89,12 @@ struct PointFit {
 
 // Screens the readings (pose_screen.h), fits, and reports how good the answer is. Never fails: poor
 // data give determined == false or warnings. The sigmas assume equal, independent position noise
-// and are widened by the correlation of successive residuals. Same readings and options, same
-// bytes. Cost: 10 ms for 1,000 poses.
+// and are widened by the correlation of successive residuals. The same readings and options give
+// the same bytes. Cost: 10 ms for 1,000 poses.
 PointFit fit_point(std::span<const Pose> poses, const PointOptions& options = {});
 
 // The paper's own system, eqs. (11)-(12) in matrix form: six unknowns, every pose used. Slow and
-// obvious; kept as the oracle for fit_point. Takes screened poses; returns
+// simple; kept for comparison with fit_point. Takes screened poses; returns
 // {d1, d2 cos theta, d2 sin theta}.
 Vector3 fit_point_paper(std::span<const Pose> poses, Point3* pivot_mm = nullptr);
 

@@ -7,7 +7,7 @@
 
 #include "formats/base/digest.h"
 #include "formats/calibration/report_text.h"
-#include "formats/calibration/solve/statistics.h"
+#include "formats/calibration/statistics.h"
 
 namespace sonocase {
 namespace {
@@ -16,8 +16,8 @@ Matrix3 relative(const Matrix3& a, const Matrix3& b) {
     return transpose(a) * b;
 }
 
-// Marks rows whose position is in another unit than that of the others: scaled by the ratio of two
-// units they fall among the others; as they are, they lie far away.
+// Marks rows whose position is in another unit than that of the others: they lie far away, but
+// among the others once scaled by the ratio of two units.
 std::vector<bool> rows_in_other_units(const std::vector<Pose>& poses, double* factor_seen) {
     std::vector<bool> marked(poses.size(), false);
     if (poses.size() < 4) return marked;
@@ -52,8 +52,8 @@ std::vector<bool> rows_in_other_units(const std::vector<Pose>& poses, double* fa
     return marked;
 }
 
-// Marks rows whose orientation is the inverse of their neighbours': the sign of the vector part of
-// a quaternion was lost. Of the two kinds of rows, the rarer is marked.
+// Marks rows whose orientation is the inverse of their neighbours', because the sign of the vector
+// part of a quaternion was lost. The rarer of the two kinds of rows is marked.
 std::vector<bool> rows_with_inverse_orientation(const std::vector<Pose>& poses) {
     std::vector<bool> marked(poses.size(), false);
     // Only in a continuous recording: between poses taken one by one every jump occurs.
@@ -130,8 +130,7 @@ void describe(double worst, double factor, PoseScreen& screen) {
     if (screen.flipped > 0) {
         say(rows_of(screen.flipped, screen.rows) +
             " have the inverse of their neighbours' orientation and are left out; a quaternion "
-            "sign flips "
-            "in the export: flip all four numbers or none.");
+            "sign flips in the export: flip all four numbers or none.");
     }
     if (screen.rows > 4 && 5 * screen.repeated > screen.rows) {
         say(rows_of(screen.repeated, screen.rows) +

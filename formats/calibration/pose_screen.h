@@ -21,9 +21,9 @@ struct PoseScreen {
     int not_rotation = 0;               // columns not orthonormal to 0.05: left out
     int mirrored = 0;                   // determinant -1: left out
     int straightened = 0;               // orthonormal to 0.001..0.05: used, made orthonormal
-    int other_units =
-        0;            // positions 10, 25.4, 100 or 1000 times the others', or the inverse: left out
-    int flipped = 0;  // orientation is the inverse of its neighbours': left out
+    // Positions 10, 25.4, 100 or 1000 times the others', or the inverse: left out.
+    int other_units = 0;
+    int flipped = 0;   // orientation is the inverse of its neighbours': left out
     int repeated = 0;  // identical to the row before: used
 };
 

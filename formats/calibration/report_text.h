@@ -11,9 +11,7 @@
 
 namespace sonocase::calibrate {
 
-inline constexpr double kDegree = 3.14159265358979323846 / 180;
-
-// As printf; longer than 511 characters is cut.
+// Formats as printf does; text beyond 511 characters is cut off.
 template <class... Args>
 std::string text(const char* format, Args... args) {
     std::array<char, 512> line{};

@@ -12,9 +12,9 @@
 namespace sonocase {
 
 struct CaseExercises {
-    std::vector<Exercise> exercises;    // at least one: without any, a free scan
-    std::vector<std::string> digests;   // of each exercise's text; a free scan has none
-    std::vector<std::string> warnings;  // one per exercise that does not parse and is left out
+    std::vector<Exercise> exercises;   // at least one: without any, a free scan
+    std::vector<std::string> digests;  // of each exercise's text; a free scan has none
+    std::vector<Message> warnings;     // one per exercise that does not parse and is left out
 };
 
 // where: names the bundle in warnings.

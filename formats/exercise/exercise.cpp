@@ -7,6 +7,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "formats/base/constants.h"
 #include "formats/exercise/metric_table.h"
 #include "formats/pathology/pathology_kinds.h"
 #include "formats/text/nearest_name.h"
@@ -15,22 +16,20 @@
 namespace sonocase {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
-// In the order of the enumerations.
+// The names in the order of the enumerations.
 const std::vector<std::string>& shape_names() {
     static const std::vector<std::string> names{"linear", "curvilinear", "phased"};
     return names;
 }
 
-const std::vector<std::string>& look_names() {
+const std::vector<std::string>& appearance_names() {
     static const std::vector<std::string> names{"none", "marker",  "lesion",
                                                 "cyst", "abscess", "calyx"};
     return names;
 }
 
-std::vector<std::string> look_and_kind_names() {
-    std::vector<std::string> names = look_names();
+std::vector<std::string> appearance_and_kind_names() {
+    std::vector<std::string> names = appearance_names();
     const std::vector<std::string> kinds = kinds_drawn_per_attempt();
     names.insert(names.end(), kinds.begin(), kinds.end());
     return names;
@@ -49,8 +48,8 @@ void read_probe(const TomlTable& table, Probe& probe) {
     if (table.number("field_of_view_deg", degrees, 1, 179))
         probe.field_of_view_rad = degrees * kPi / 180;
     if (table.number("field_of_view_rad", probe.field_of_view_rad, 0.01, 3.13) && degrees != 0) {
-        table.complain("field_of_view_rad", "is given twice, in degrees and in radians",
-                       "keep one");
+        table.add_fault("field_of_view_rad", "is given twice, in degrees and in radians",
+                        "keep one");
     }
     table.number("width_mm", probe.width_mm, 1, 300);
     table.number("depth_mm", probe.depth_mm, 1, 500);
@@ -74,18 +73,18 @@ void read_needle(const TomlTable& table, NeedleModel& needle) {
 }
 
 // What targets and findings share.
-Target read_place_and_look(const TomlTable& table, const std::string& name) {
+Target read_place_and_appearance(const TomlTable& table, const std::string& name) {
     Target target;
     target.name = name;
     table.text("name", target.name);
     if (!table.point("centre", target.centre) && !table.has("centre")) {
-        table.complain("centre", "is missing",
-                       "expected the centre of the target in mm, as in [10, 20, 30]");
+        table.add_fault("centre", "is missing",
+                        "expected the centre of the target in mm, as in [10, 20, 30]");
     }
     table.number("radius_mm", target.radius_mm, 0.1, 200);
-    static const std::vector<std::string> looks = look_and_kind_names();
+    static const std::vector<std::string> looks = appearance_and_kind_names();
     if (const auto look = table.choice("look", looks)) {
-        const bool kind = *look >= look_names().size();
+        const bool kind = *look >= appearance_names().size();
         target.look = kind ? TargetLook::lesion : static_cast<TargetLook>(*look);
         if (kind) target.kind = looks[*look];
     }
@@ -96,7 +95,8 @@ Target read_place_and_look(const TomlTable& table, const std::string& name) {
 }
 
 void read_target(const TomlTable& table, std::vector<Target>& targets) {
-    Target target = read_place_and_look(table, "target " + std::to_string(targets.size() + 1));
+    Target target =
+        read_place_and_appearance(table, "target " + std::to_string(targets.size() + 1));
     if (!table.number("hit_radius_mm", target.hit_radius_mm, 0.1, 200) && table.has("radius_mm"))
         target.hit_radius_mm = target.radius_mm;
     table.finish();
@@ -105,10 +105,11 @@ void read_target(const TomlTable& table, std::vector<Target>& targets) {
 
 void read_finding(const TomlTable& table, std::vector<Finding>& findings) {
     Finding finding;
-    finding.lesion = read_place_and_look(table, "finding " + std::to_string(findings.size() + 1));
+    finding.lesion =
+        read_place_and_appearance(table, "finding " + std::to_string(findings.size() + 1));
     if (finding.lesion.look == TargetLook::none || finding.lesion.look == TargetLook::marker)
-        table.complain("look", "is missing, or shows nothing",
-                       "expected what the finding is, as in \"simple_cyst\"");
+        table.add_fault("look", "is missing, or shows nothing",
+                        "expected what the finding is, as in \"simple_cyst\"");
     table.number("radius_spread", finding.radius_spread, 0, 0.8);
     table.number("chance", finding.chance, 0, 1, true);
     table.finish();
@@ -119,13 +120,13 @@ void read_sweep(const TomlTable& table, std::vector<Sweep>& sweeps) {
     Sweep sweep;
     table.text("name", sweep.name);
     if (sweep.name.empty())
-        table.complain("name", "is missing or empty", "the player starts it as sweep:NAME");
+        table.add_fault("name", "is missing or empty", "the player starts it as sweep:NAME");
     table.flag("snap_to_skin", sweep.snap_to_skin);
     for (const TomlTable& item : table.tables("keys")) {
         SweepKey key;
-        if (!item.has("time_s")) item.complain("time_s", "is missing", "");
+        if (!item.has("time_s")) item.add_fault("time_s", "is missing", "");
         if (!item.has("probe"))
-            item.complain("probe", "is missing", "expected the middle of the probe face in mm");
+            item.add_fault("probe", "is missing", "expected the middle of the probe face in mm");
         item.number("time_s", key.time_s, 0, 1e6);
         item.point("probe", key.probe);
         item.direction("beam", key.beam);
@@ -134,23 +135,23 @@ void read_sweep(const TomlTable& table, std::vector<Sweep>& sweeps) {
         const bool direction = item.direction("needle_direction", key.needle_direction);
         key.has_needle = tip;
         if (direction && !tip)
-            item.complain("needle_tip", "is missing beside needle_direction",
-                          "expected both or neither");
+            item.add_fault("needle_tip", "is missing beside needle_direction",
+                           "expected both or neither");
         if (norm(cross(key.beam, key.lateral)) < 1e-6) {
-            item.complain("lateral", "is parallel to the beam", "expected a direction across it");
+            item.add_fault("lateral", "is parallel to the beam", "expected a direction across it");
         }
         if (!sweep.keys.empty() && !(key.time_s > sweep.keys.back().time_s)) {
-            item.complain("time_s", "does not increase", "expected key poses in order of time");
+            item.add_fault("time_s", "does not increase", "expected key poses in order of time");
         }
         item.finish();
         sweep.keys.push_back(key);
     }
     if (sweep.keys.empty())
-        table.complain("keys", "is empty", "expected at least one [[sweeps.keys]]");
+        table.add_fault("keys", "is empty", "expected at least one [[sweeps.keys]]");
     table.finish();
     for (const Sweep& other : sweeps) {
         if (other.name == sweep.name)
-            table.complain("name", "'" + sweep.name + "' is given twice", "");
+            table.add_fault("name", "'" + sweep.name + "' is given twice", "");
     }
     sweeps.push_back(std::move(sweep));
 }
@@ -159,25 +160,25 @@ void read_pass_mark(const TomlTable& table, std::vector<Exercise::PassMark>& mar
     Exercise::PassMark mark;
     table.text("metric", mark.metric);
     if (mark.metric.empty())
-        table.complain("metric", "is missing or empty", "expected a name from docs/metrics.md");
+        table.add_fault("metric", "is missing or empty", "expected a name from docs/metrics.md");
     if (!mark.metric.empty() && !find_metric(mark.metric)) {
-        // All fifty names would bury the fault.
+        // Listing all names would hide the fault.
         const std::string nearest = nearest_name(mark.metric, metric_names());
-        table.complain(
+        table.add_fault(
             "metric", "'" + mark.metric + "' is not a score",
             nearest.empty() ? "docs/metrics.md lists them" : "did you mean '" + nearest + "'?");
     }
-    const bool most = table.number("at_most", mark.at_most, -1e12, 1e12);
-    const bool least = table.number("at_least", mark.at_least, -1e12, 1e12);
-    if (!most && !least && !table.has("at_most") && !table.has("at_least")) {
-        table.complain("metric", "has no limit", "expected at_most or at_least beside it");
+    const bool has_max = table.number("at_most", mark.at_most, -1e12, 1e12);
+    const bool has_min = table.number("at_least", mark.at_least, -1e12, 1e12);
+    if (!has_max && !has_min && !table.has("at_most") && !table.has("at_least")) {
+        table.add_fault("metric", "has no limit", "expected at_most or at_least beside it");
     }
     table.finish();
     marks.push_back(std::move(mark));
 }
 
-// Line breaks in the file are where its author's screen ended: a single one becomes a space, an
-// empty line separates paragraphs.
+// The text without the line breaks within its paragraphs, which an empty line separates: the window
+// breaks lines by itself.
 std::string flowed(const std::string& lines) {
     std::string text;
     std::istringstream in(lines);
@@ -199,8 +200,8 @@ Exercise read_exercise(const TomlTable& root) {
     Exercise e;
     root.text("name", e.name);
     if (e.name.empty())
-        root.complain("name", "is missing or empty",
-                      "expected a short name, as in \"liver-biopsy\"");
+        root.add_fault("name", "is missing or empty",
+                       "expected a short name, as in \"liver-biopsy\"");
     e.title = e.name;
     root.text("title", e.title);
     root.text("description", e.description);
@@ -249,10 +250,9 @@ Exercise read_exercise(const TomlTable& root) {
 }  // namespace
 
 Result<Exercise> parse_exercise(std::string_view text, const std::string& where) {
-    const auto root = TomlTable::parse(text, where);
-    if (!root) return root.error();
-    Exercise exercise = read_exercise(*root);
-    if (root->fault()) return *root->fault();
+    SONOCASE_TRY(const auto root, TomlTable::parse(text, where));
+    Exercise exercise = read_exercise(root);
+    if (root.fault()) return *root.fault();
     return exercise;
 }
 

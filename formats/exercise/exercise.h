@@ -36,7 +36,7 @@ struct NeedleModel {
     double length_mm = 150;
     double slab_mm = 0;           // thickness t of the scan plane for the needle; 0: its diameter
     double tip_visibility = 1;    // model paper: opacity at the tip, [0, 1]
-    double shaft_visibility = 1;  // and far from it, [0, 1]
+    double shaft_visibility = 1;  // model paper: opacity far from the tip, [0, 1]
     // Bend constraint, eqs. (16)-(17).
     double bend_max_weight = 1;
     double bend_alpha_per_m = 60;
@@ -57,20 +57,21 @@ struct Target {
     double radius_mm = 5;      // of the target itself
     double hit_radius_mm = 5;  // a tip this near the centre is a hit
     TargetLook look = TargetLook::marker;
-    // look lesion: a kind of formats/pathology, by whose figures it shows; empty: a plain lesion.
+    // For a lesion: the kind of formats/pathology that says how it shows; empty: a plain lesion.
     std::string kind;
-    LesionAxes axes;     // of a kind, drawn for each attempt; a ball as written
+    LesionAxes axes;     // drawn for each attempt by its kind; a ball in the exercise as written
     std::string inside;  // label that it must lie in; empty: anywhere
-    // Where an attempt may draw it (formats/attempt): anywhere in this ball about `centre`, with
-    // nothing but `inside` within clearance_mm. 0: the target stays at its centre.
+    // An attempt may draw the target anywhere in this ball about `centre`, with nothing but
+    // `inside` within clearance_mm (formats/scoring/draw_attempt.h). 0: the target stays at its
+    // centre.
     double spread_mm = 0;
     double clearance_mm = -1;  // negative: the target's radius
 };
 
-// A finding that is no target: it is there to be told from one.
+// A finding that is not a target: the trainee has to tell it from one.
 struct Finding {
-    Target lesion;             // hit_radius_mm means nothing
-    double radius_spread = 0;  // an attempt draws the radius from (1 -+ this) of what is written
+    Target lesion;             // hit_radius_mm is not used
+    double radius_spread = 0;  // an attempt draws the radius from (1 -+ this) times radius_mm
     double chance = 1;         // that an attempt has it, (0, 1]
 };
 
@@ -111,7 +112,7 @@ enum class ExerciseMode { practice, exam };
 struct Deformation {
     double venous_pressure_mmhg = 8;  // veins are as stiff as this pressure makes them
     double stiffness_scale = 1;       // of every tissue
-    double press_offset_mm = 0;       // by which the probe begins pressed in; the player changes it
+    double press_offset_mm = 0;       // how far the probe is pressed in at the start
     double force_limit_n = 15;        // for the score of the time above it
 };
 
@@ -150,12 +151,12 @@ struct Exercise {
 // `where` names the file in errors.
 Result<Exercise> parse_exercise(std::string_view toml, const std::string& where);
 
-// What shows in the tissue: findings, then targets.
+// The lesions that show in the tissue: findings, then targets.
 std::vector<Target> shown_lesions(const Exercise& exercise);
 
-// To where a lesion reaches from its centre, with the shells of its kind.
+// How far a lesion reaches from its centre, with the shells of its kind.
 double outer_radius_mm(const Target& lesion);
 
-double needle_diameter_mm(const NeedleModel& needle);  // from the gauge table where not given
+double needle_diameter_mm(const NeedleModel& needle);  // as given, or by the gauge
 
 }  // namespace sonocase

@@ -23,91 +23,160 @@ constexpr const char* kMansfield = "Mansfield 1994";
 constexpr const char* kLui = "Lui 2005";
 constexpr const char* kOutcome = "outcome";
 
+// What a trainee who missed the pass mark of a measure may do about it.
+constexpr const char* kPlanPath =
+    "Plan the path before the needle enters, then advance without pauses.";
+constexpr const char* kMiddleOfTarget =
+    "Go on until the tip lies in the middle of the target, and check it by rocking the probe.";
+constexpr const char* kWholeOrgan =
+    "Slide the probe over the whole organ before you choose an entry.";
+constexpr const char* kStopInMiddle =
+    "Stop in the middle of the target: rock the probe over the tip before you finish.";
+constexpr const char* kAim = "Aim at the target before the needle enters the skin.";
+constexpr const char* kAimAndKeep =
+    "Aim at the target before the needle enters the skin, and keep the line.";
+constexpr const char* kAimOutside =
+    "Aim outside the skin first; correct the angle before the needle enters.";
+constexpr const char* kGoStraight =
+    "Go straight to the target; pull back to the skin before you change direction.";
+constexpr const char* kReadDepth =
+    "Read the depth of the target from the scale before you advance.";
+constexpr const char* kPressGently =
+    "Press gently before you puncture: a vein closes, an artery keeps its shape.";
+constexpr const char* kStopInVessel =
+    "Stop as soon as the tip shows inside the vessel, and flatten the needle before you go on.";
+constexpr const char* kLookFirst =
+    "Before you advance, look for vessels and bowel on the way, and choose another entry if they "
+    "lie on it.";
+constexpr const char* kHoldStill =
+    "Hold the probe still while the needle moves, and the needle still while you look.";
+constexpr const char* kWholeShaft =
+    "Turn the probe until the whole shaft lies in the picture, then advance.";
+constexpr const char* kTipBright =
+    "Stop pushing as soon as the tip fades; fan the probe until it is bright, then go on.";
+constexpr const char* kTiltAlong =
+    "Tilt the probe along the vessel or steer the box until beam and flow are off a right angle.";
+constexpr const char* kEachVessel =
+    "Lay the gate into each vessel and hold still for two heartbeats.";
+constexpr const char* kTellVessels =
+    "Tell artery from vein by colour and pulse before you lay the gate.";
+constexpr const char* kGateInMiddle =
+    "Lay the gate into the middle of the vessel, no longer than its lumen.";
+constexpr const char* kBelow60 =
+    "Tilt the probe or steer until beam and flow are less than 60 degrees apart.";
+constexpr const char* kCursorAlong = "Turn the angle cursor until it lies along the vessel.";
+constexpr const char* kLessPressure =
+    "Hold the probe with less pressure: tissue and veins keep their shape.";
+
+// name, group, title, sense, evidence, advice
 constexpr MetricInfo kTable[] = {
-    {"elapsed_time_s", "session", "Total time", kLess, kChin},
+    {"elapsed_time_s", "session", "Total time", kLess, kChin, kPlanPath},
     {"tracking_gap_s", "session", "Longest time without the needle's pose", kLess},
 
-    {"targets_hit", "targets", "Targets reached", kMore, kOutcome},
-    {"targets_hit_fraction", "targets", "Share of the targets reached", kMore, kOutcome},
-    {"targets_scanned_percent", "targets", "Targets whose centre was in the image", kMore},
-    {"structures_scanned_percent", "targets", "Targets of which any part was in the image", kMore},
-    {"final_tip_to_target_mm", "targets", "Tip to target centre at the end", kLess, kOutcome},
-    {"final_angle_deg", "targets", "Angle between needle and the line from entry to target", kLess},
-    {"targeting_error_mm", "targets", "Tip to nearest target, mean over insertions", kLess},
-    {"trajectory_deviation_mm", "targets", "Maximum deviation from straight path", kLess},
-    {"trajectory_deviation_mean_mm", "targets", "Mean deviation from straight path", kLess},
+    {"targets_hit", "targets", "Targets reached", kMore, kOutcome, kMiddleOfTarget},
+    {"targets_hit_fraction", "targets", "Share of the targets reached", kMore, kOutcome,
+     kMiddleOfTarget},
+    {"targets_scanned_percent", "targets", "Targets whose centre was in the image", kMore, "",
+     kWholeOrgan},
+    {"structures_scanned_percent", "targets", "Targets of which any part was in the image", kMore,
+     "", kWholeOrgan},
+    {"final_tip_to_target_mm", "targets", "Tip to target centre at the end", kLess, kOutcome,
+     kStopInMiddle},
+    {"final_angle_deg", "targets", "Angle between needle and the line from entry to target", kLess,
+     "", kAim},
+    {"targeting_error_mm", "targets", "Tip to nearest target, mean over insertions", kLess, "",
+     kStopInMiddle},
+    {"trajectory_deviation_mm", "targets", "Maximum deviation from straight path", kLess, "",
+     kAimAndKeep},
+    {"trajectory_deviation_mean_mm", "targets", "Mean deviation from straight path", kLess, "",
+     kAimAndKeep},
 
-    {"insertions", "needle", "Skin punctures", kLess, kMansfield},
-    {"skin_contacts", "needle", "Separate touches of the skin by the tip", kLess},
-    {"tissue_punctures", "needle", "Entries of the tip into the body", kLess},
+    {"insertions", "needle", "Skin punctures", kLess, kMansfield, kAimOutside},
+    {"skin_contacts", "needle", "Separate touches of the skin by the tip", kLess, "", kAimOutside},
+    {"tissue_punctures", "needle", "Entries of the tip into the body", kLess, "", kAimOutside},
     {"deepest_mm", "needle", "Greatest inserted length", kNeutral},
-    {"path_in_tissue_mm", "needle", "Tip path length in tissue", kLess, kYeo},
-    {"time_in_tissue_s", "needle", "Time with the tip in tissue", kLess},
-    {"tissue_damage_mm2", "needle", "Area swept by the inserted shaft", kLess, kYeo},
-    {"depth_perception_mm", "needle", "Tip motion along the needle, both directions", kLess},
+    {"path_in_tissue_mm", "needle", "Tip path length in tissue", kLess, kYeo, kGoStraight},
+    {"time_in_tissue_s", "needle", "Time with the tip in tissue", kLess, "", kPlanPath},
+    {"tissue_damage_mm2", "needle", "Area swept by the inserted shaft", kLess, kYeo, kGoStraight},
+    {"depth_perception_mm", "needle", "Tip motion along the needle, both directions", kLess, "",
+     kReadDepth},
     {"correct_vessel_punctured", "needle", "First vessel punctured was the target's", kMore,
-     kOutcome},
+     kOutcome, kPressGently},
     {"vein_collapse_at_puncture_percent", "needle", "Loss of the vein's area at its puncture",
      kLess},
-    {"posterior_wall_punctures", "needle", "Punctures of a vessel's far wall", kLess, kOutcome},
-    {"no_go_contacts", "needle", "Critical structures touched", kLess, kOutcome},
-    {"no_go_time_s", "needle", "Time in critical structures", kLess, kOutcome},
-    {"needle_elapsed_time_s", "needle", "Time from its first reading to its last", kLess},
-    {"needle_path_length_mm", "needle", "Tip path length", kLess, kChin},
-    {"needle_filtered_path_length_mm", "needle", "Path length of the tip, jitter removed", kLess},
-    {"needle_average_velocity_mm_s", "needle", "Mean speed of the tip", kNeutral},
+    {"posterior_wall_punctures", "needle", "Punctures of a vessel's far wall", kLess, kOutcome,
+     kStopInVessel},
+    {"no_go_contacts", "needle", "Critical structures touched", kLess, kOutcome, kLookFirst},
+    {"no_go_time_s", "needle", "Time in critical structures", kLess, kOutcome, kLookFirst},
+    {"needle_elapsed_time_s", "needle", "Time from its first reading to its last", kLess, "",
+     kHoldStill},
+    {"needle_path_length_mm", "needle", "Tip path length", kLess, kChin, kHoldStill},
+    {"needle_filtered_path_length_mm", "needle", "Path length of the tip, jitter removed", kLess,
+     "", kHoldStill},
+    {"needle_average_velocity_mm_s", "needle", "Mean speed of the tip", kNeutral, "", kHoldStill},
     {"needle_motion_smoothness_mm_s3", "needle", "Jerkiness of the needle (lower is smoother)",
-     kLess},
+     kLess, "", kHoldStill},
     {"needle_path_inefficiency_percent", "needle", "Path length in excess of the straight line",
-     kLess},
-    {"needle_translational_actions", "needle", "Movements of the needle", kLess, kChin},
-    {"needle_rotational_actions", "needle", "Rotations of the needle", kLess},
-    {"needle_rotation_total_deg", "needle", "Total rotation", kLess},
-    {"needle_bounding_box_mm3", "needle", "Bounding box of the path of the tip", kLess},
+     kLess, "", kHoldStill},
+    {"needle_translational_actions", "needle", "Movements of the needle", kLess, kChin, kHoldStill},
+    {"needle_rotational_actions", "needle", "Rotations of the needle", kLess, "", kHoldStill},
+    {"needle_rotation_total_deg", "needle", "Total rotation", kLess, "", kHoldStill},
+    {"needle_bounding_box_mm3", "needle", "Bounding box of the path of the tip", kLess, "",
+     kHoldStill},
 
     {"needle_in_beam_fraction", "guidance", "Share of the inserted needle that is visible", kMore,
-     kSites},
-    {"needle_in_beam_mm", "guidance", "Visible inserted length, mean", kMore},
+     kSites, kWholeShaft},
+    {"needle_in_beam_mm", "guidance", "Visible inserted length, mean", kMore, "", kWholeShaft},
     {"tip_in_view_fraction", "guidance", "Share of the time in tissue with the tip visible", kMore,
-     kSites},
+     kSites, kTipBright},
     {"tip_in_view_at_advance_fraction", "guidance", "Share of the advance with the tip visible",
-     kMore, kSites},
-    {"needle_plane_distance_mean_mm", "guidance", "Tip to scan plane, mean in tissue", kLess},
-    {"needle_plane_distance_max_mm", "guidance", "Tip to scan plane, greatest in tissue", kLess},
+     kMore, kSites, kTipBright},
+    {"needle_plane_distance_mean_mm", "guidance", "Tip to scan plane, mean in tissue", kLess, "",
+     kWholeShaft},
+    {"needle_plane_distance_max_mm", "guidance", "Tip to scan plane, greatest in tissue", kLess, "",
+     kWholeShaft},
     {"needle_plane_angle_mean_deg", "guidance",
-     "Angle between needle and scan plane, mean in tissue", kNeutral},
+     "Angle between needle and scan plane, mean in tissue", kNeutral, "", kWholeShaft},
 
     {"vessels_shown_in_colour", "doppler", "Vessels of the targets shown in colour", kMore,
-     kOutcome},
+     kOutcome, kTiltAlong},
     {"vessels_measured", "doppler", "Vessels of the targets whose velocity was measured", kMore,
-     kOutcome},
+     kOutcome, kEachVessel},
     {"correct_vessel_measured", "doppler", "Velocities were measured in the targets' vessels alone",
-     kMore, kOutcome},
+     kMore, kOutcome, kTellVessels},
     {"gate_in_vessel_fraction", "doppler", "Share of the gate in the blood of a target's vessel",
-     kMore, kLui},
+     kMore, kLui, kGateInMiddle},
     {"doppler_angle_max_deg", "doppler", "Angle between beam and flow where it was measured", kLess,
-     kLui},
-    {"angle_cursor_error_deg", "doppler", "Angle cursor off the direction of flow", kLess, kLui},
+     kLui, kBelow60},
+    {"angle_cursor_error_deg", "doppler", "Angle cursor off the direction of flow", kLess, kLui,
+     kCursorAlong},
     {"peak_velocity_error_percent", "doppler", "Measured peak velocity off the true one", kLess,
-     kOutcome},
+     kOutcome, kCursorAlong},
 
-    {"probe_force_mean_n", "probe", "Force on the probe while it presses, mean", kLess},
-    {"probe_force_max_n", "probe", "Force on the probe, greatest", kLess},
-    {"probe_pressure_mean_kpa", "probe", "Pressure of the probe while it presses, mean", kLess},
-    {"press_time_over_limit_s", "probe", "Time above the exercise's limit of force", kLess},
+    {"probe_force_mean_n", "probe", "Force on the probe while it presses, mean", kLess, "",
+     kLessPressure},
+    {"probe_force_max_n", "probe", "Force on the probe, greatest", kLess, "", kLessPressure},
+    {"probe_pressure_mean_kpa", "probe", "Pressure of the probe while it presses, mean", kLess, "",
+     kLessPressure},
+    {"press_time_over_limit_s", "probe", "Time above the exercise's limit of force", kLess, "",
+     kLessPressure},
     {"compressions_done", "probe", "Veins pressed shut and opened again", kMore},
-    {"probe_usage_time_s", "probe", "Time with the probe on the skin", kNeutral},
-    {"probe_elapsed_time_s", "probe", "Time from its first reading to its last", kLess},
-    {"probe_path_length_mm", "probe", "Probe path length", kLess, kChin},
-    {"probe_filtered_path_length_mm", "probe", "Path length of the probe, jitter removed", kLess},
-    {"probe_average_velocity_mm_s", "probe", "Mean speed of the probe", kNeutral},
-    {"probe_motion_smoothness_mm_s3", "probe", "Jerkiness of the probe (lower is smoother)", kLess},
+    {"probe_usage_time_s", "probe", "Time with the probe on the skin", kNeutral, "", kHoldStill},
+    {"probe_elapsed_time_s", "probe", "Time from its first reading to its last", kLess, "",
+     kHoldStill},
+    {"probe_path_length_mm", "probe", "Probe path length", kLess, kChin, kHoldStill},
+    {"probe_filtered_path_length_mm", "probe", "Path length of the probe, jitter removed", kLess,
+     "", kHoldStill},
+    {"probe_average_velocity_mm_s", "probe", "Mean speed of the probe", kNeutral, "", kHoldStill},
+    {"probe_motion_smoothness_mm_s3", "probe", "Jerkiness of the probe (lower is smoother)", kLess,
+     "", kHoldStill},
     {"probe_path_inefficiency_percent", "probe", "Path length in excess of the straight line",
-     kLess},
-    {"probe_translational_actions", "probe", "Movements of the probe", kLess, kChin},
-    {"probe_rotational_actions", "probe", "Rotations of the probe", kLess},
-    {"probe_rotation_total_deg", "probe", "Total rotation", kLess},
-    {"probe_bounding_box_mm3", "probe", "Bounding box of the path of the probe", kLess},
+     kLess, "", kHoldStill},
+    {"probe_translational_actions", "probe", "Movements of the probe", kLess, kChin, kHoldStill},
+    {"probe_rotational_actions", "probe", "Rotations of the probe", kLess, "", kHoldStill},
+    {"probe_rotation_total_deg", "probe", "Total rotation", kLess, "", kHoldStill},
+    {"probe_bounding_box_mm3", "probe", "Bounding box of the path of the probe", kLess, "",
+     kHoldStill},
 };
 
 }  // namespace

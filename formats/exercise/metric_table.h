@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Every score by name: its meaning in one line, whether more or less of it is better, and what
-// shows that it means something. The window, the review page and docs/metrics.md, part 8, all show
-// this table. docs/metrics.md defines each; the name ends in the unit.
+// Every score by name: its meaning in one line, whether more or less of it is better, and the
+// evidence that it means something. The window, the review page and docs/metrics.md, part 8, show
+// this table. docs/metrics.md defines each score; the name ends in the unit.
 #pragma once
 
 #include <span>
@@ -19,9 +19,11 @@ struct MetricInfo {
     const char* group;  // "session", "needle", "probe", "targets", "guidance", "doppler"
     const char* title;
     MetricSense sense;
-    // The study in which it told experts from novices or went with harm, or "outcome": it is what
-    // the task is about. Empty: none is known; it is then shown folded.
+    // The study in which the score told experts from novices or was related to harm, or "outcome"
+    // if it is what the task is about. Empty: none is known, and the score is shown folded.
     const char* evidence = "";
+    // One sentence for a trainee who missed the pass mark of this score. Empty: none is known.
+    const char* advice = "";
 };
 
 // What a score can be: "0 to 1", "0 and up", ...

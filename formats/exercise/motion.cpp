@@ -14,7 +14,7 @@ namespace {
 constexpr double kTwoPi = 6.283185307179586;
 constexpr int kCellBricks = 2;  // a cell of the field is 2 x 2 x 2 bricks
 
-bool rides_on_the_diaphragm(const std::string& name) {
+bool moves_with_diaphragm(const std::string& name) {
     for (const char* part :
          {"liver", "kidney", "spleen", "pancreas", "gallbladder", "stomach", "duodenum", "adrenal",
           "lung", "heart", "portal", "hepatic", "diaphragm", "cyst", "lesion"}) {
@@ -23,22 +23,20 @@ bool rides_on_the_diaphragm(const std::string& name) {
     return false;
 }
 
-// Running mean over 2 * reach + 1 cells along one axis; the ends repeat.
-void box(std::vector<float>& cells, Int3 size, int axis, int reach) {
+// Running mean over 2 * reach + 1 cells along one axis; the values at the ends are repeated.
+void box_filter(std::vector<float>& cells, Int3 size, int axis, int reach) {
     const std::array<std::size_t, 3> stride{
         1, static_cast<std::size_t>(size.x),
         static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y)};
-    const std::size_t s = stride[static_cast<std::size_t>(axis)];
+    const std::size_t s = stride[axis];
     const int n = size[axis];
-    std::vector<float> line(static_cast<std::size_t>(n));
+    std::vector<float> line(n);
     for (std::size_t start = 0; start < cells.size(); ++start) {
         if (start / s % static_cast<std::size_t>(n) != 0) continue;
-        for (int i = 0; i < n; ++i)
-            line[static_cast<std::size_t>(i)] = cells[start + static_cast<std::size_t>(i) * s];
+        for (int i = 0; i < n; ++i) line[i] = cells[start + static_cast<std::size_t>(i) * s];
         for (int i = 0; i < n; ++i) {
             float sum = 0;
-            for (int j = -reach; j <= reach; ++j)
-                sum += line[static_cast<std::size_t>(std::clamp(i + j, 0, n - 1))];
+            for (int j = -reach; j <= reach; ++j) sum += line[std::clamp(i + j, 0, n - 1)];
             cells[start + static_cast<std::size_t>(i) * s] =
                 sum / static_cast<float>(2 * reach + 1);
         }
@@ -82,9 +80,9 @@ BreathingField::BreathingField(const CaseBundle& bundle) {
     const double shift = 0.5 * (edge - bundle.grid.spacing_mm.x);
     grid_.origin_mm = bundle.grid.origin_mm + Vector3{shift, shift, shift};
 
-    std::vector<float> rides;
+    std::vector<float> moves;
     for (const Label& l : bundle.labels)
-        rides.push_back(rides_on_the_diaphragm(l.name) ? 1.0f : 0.0f);
+        moves.push_back(moves_with_diaphragm(l.name) ? 1.0f : 0.0f);
     cells_.assign(grid_.voxel_count(), 0.0f);
     std::vector<float> count(cells_.size(), 0.0f);
     for (int k = 0; k < n.z; ++k) {
@@ -96,14 +94,14 @@ BreathingField::BreathingField(const CaseBundle& bundle) {
                           z = std::min(4 * k + 2, labels.size.z - 1);
                 const std::size_t cell =
                     grid_.index(i / kCellBricks, j / kCellBricks, k / kCellBricks);
-                cells_[cell] += rides[labels.at(x, y, z)];
+                cells_[cell] += moves[labels.at(x, y, z)];
                 count[cell] += 1;
             }
         }
     }
     for (std::size_t i = 0; i < cells_.size(); ++i) cells_[i] /= std::max(count[i], 1.0f);
     for (int pass = 0; pass < 2; ++pass) {
-        for (int axis = 0; axis < 3; ++axis) box(cells_, size, axis, 1);
+        for (int axis = 0; axis < 3; ++axis) box_filter(cells_, size, axis, 1);
     }
 }
 

@@ -2,11 +2,6 @@
 
 #include "formats/files/atomic_file.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cctype>
@@ -17,12 +12,19 @@
 #include <filesystem>
 #include <new>
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "formats/base/digest.h"
+
 namespace sonocase {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Closes on destruction, which releases its lock.
+// Closes the file on destruction, which releases its lock.
 class Descriptor {
   public:
     explicit Descriptor(int fd) : fd_(fd) {}
@@ -45,18 +47,18 @@ class Descriptor {
 
 Error system_error(const char* doing, int fault, const std::string& path, const char* expected) {
     if (fault == ENOENT) return {"no such file", path, "check the path"};
-    return {std::string(doing) + ": " + std::strerror(fault), path, expected};
+    return {Message(doing, {std::strerror(fault)}), path, expected};
 }
 
 template <class Bytes>
 Result<Bytes> read_whole(const std::string& path) {
-    if (const Status status = expect_regular_file(path); !status) return status.error();
+    SONOCASE_TRY_DONE(expect_regular_file(path));
     const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
     if (file.get() < 0)
-        return system_error("cannot open", errno, path, "check that it may be read");
+        return system_error("cannot open: {}", errno, path, "check that it may be read");
     struct stat status {};
     if (::fstat(file.get(), &status) != 0)
-        return system_error("cannot read", errno, path, "check the disk");
+        return system_error("cannot read: {}", errno, path, "check the disk");
     Bytes bytes;
     std::size_t filled = 0;
     try {
@@ -65,7 +67,7 @@ Result<Bytes> read_whole(const std::string& path) {
             if (filled == bytes.size()) bytes.resize(2 * bytes.size());
             const ssize_t n = ::read(file.get(), bytes.data() + filled, bytes.size() - filled);
             if (n < 0 && errno == EINTR) continue;
-            if (n < 0) return system_error("cannot read", errno, path, "check the disk");
+            if (n < 0) return system_error("cannot read: {}", errno, path, "check the disk");
             if (n == 0) break;
             filled += static_cast<std::size_t>(n);
         }
@@ -81,12 +83,13 @@ bool write_all(int fd, std::span<const std::uint8_t> bytes) {
         const ssize_t n = ::write(fd, bytes.data(), bytes.size());
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0) return false;
-        bytes = bytes.subspan(static_cast<std::size_t>(n));
+        bytes = bytes.subspan(n);
     }
     return true;
 }
 
-// A pipe or a device, or /dev/stdout, which may lead to a file: renaming would replace it.
+// Whether the path leads to a pipe or device, or is /dev/stdout or the like, which may lead to a
+// file: renaming would replace it.
 bool is_special(const std::string& path) {
     struct stat status {};
     const bool exists = ::stat(path.c_str(), &status) == 0;
@@ -95,8 +98,8 @@ bool is_special(const std::string& path) {
            path.starts_with("/proc/");
 }
 
-// Unique: within this process (counter), on this machine (process number), and in a folder shared
-// by machines (host name).
+// A name that is unique within this process (counter), on this machine (process number), and in a
+// folder shared by machines (host name).
 std::string temporary_name(const std::string& path) {
     static std::atomic<unsigned> counter{0};
     char host[64] = "host";
@@ -110,7 +113,7 @@ std::string temporary_name(const std::string& path) {
     return (whole.parent_path() / name).string();
 }
 
-// Whether the name is one of temporary_name: ".NAME.HOST.PID.COUNT.tmp", perhaps with an ending.
+// Whether the name was made by temporary_name: ".NAME.HOST.PID.COUNT.tmp", perhaps with an ending.
 bool is_temporary_name(const std::string& name) {
     const std::size_t tmp = name.rfind(".tmp");
     if (!name.starts_with('.') || tmp == std::string::npos || tmp < 2) return false;
@@ -127,14 +130,14 @@ bool open_locked(const std::string& path, Descriptor* file) {
     for (;;) {
         file->open(path, O_WRONLY | O_CREAT | O_TRUNC);
         if (file->get() < 0) return false;
-        // A file system without locks: remove_leftovers goes by age there.
+        // Without locks in this file system, remove_leftovers goes by age.
         if (::flock(file->get(), LOCK_EX) != 0) return true;
         struct stat status {};
         if (::fstat(file->get(), &status) != 0 || status.st_nlink > 0) return true;
     }
 }
 
-// The new name is on disk once its folder is flushed; if that fails, the write still succeeded.
+// Puts the new name on disk; if that fails, the write still succeeded.
 void flush_folder_of(const std::string& path) {
     const fs::path parent = fs::path(path).parent_path();
     const Descriptor folder(
@@ -147,7 +150,7 @@ void flush_folder_of(const std::string& path) {
 Status expect_regular_file(const std::string& path, const std::string& expected) {
     struct stat status {};
     if (::stat(path.c_str(), &status) != 0)
-        return system_error("cannot open", errno, path, "check that it may be read");
+        return system_error("cannot open: {}", errno, path, "check that it may be read");
     const char* what = S_ISREG(status.st_mode)    ? nullptr
                        : S_ISDIR(status.st_mode)  ? "is a folder"
                        : S_ISFIFO(status.st_mode) ? "is a pipe"
@@ -174,28 +177,28 @@ Status write_file(const std::string& path, std::span<const std::uint8_t> bytes) 
     if (is_special(path)) {
         file.open(path, O_WRONLY | O_APPEND);
         if (file.get() < 0 || !write_all(file.get(), bytes))
-            return system_error("cannot write", errno, path, "check that it may be written");
+            return system_error("cannot write: {}", errno, path, "check that it may be written");
         return Done{};
     }
     OutputFile output(path);
     if (!open_locked(output.temporary(), &file)) {
         int fault = errno;
-        if (fault == ENOENT) {  // the folder could not be made, for a reason of its own
+        if (fault == ENOENT) {  // the folder could not be made: report why
             std::error_code code;
             fs::create_directories(fs::path(path).parent_path(), code);
             if (code) fault = code.value();
         }
-        return Error{std::string("cannot write: ") + std::strerror(fault), path,
+        return Error{Message("cannot write: {}", {std::strerror(fault)}), path,
                      "check that the folder may be written"};
     }
     const bool written = write_all(file.get(), bytes) &&
                          (::fsync(file.get()) == 0 || errno == EINVAL || errno == EROFS);
     if (!written) {
-        return Error{std::string("cannot write: ") + std::strerror(errno), path,
+        return Error{Message("cannot write: {}", {std::strerror(errno)}), path,
                      "nothing was written; check the free space"};
     }
     // The lock is held until the file has its name.
-    if (const Status status = output.commit(); !status) return status;
+    SONOCASE_TRY_DONE(output.commit());
     flush_folder_of(path);
     return Done{};
 }
@@ -207,7 +210,7 @@ Status write_file(const std::string& path, std::string_view text) {
 
 OutputFile::OutputFile(std::string path)
     : path_(std::move(path)), temporary_(temporary_name(path_)) {
-    std::error_code code;  // a folder that cannot be made shows when the file is opened
+    std::error_code code;  // if the folder cannot be made, opening the file fails
     const fs::path parent = fs::path(path_).parent_path();
     if (!parent.empty()) fs::create_directories(parent, code);
 }
@@ -219,7 +222,7 @@ OutputFile::~OutputFile() {
 Status OutputFile::commit() {
     if (::rename(temporary_.c_str(), path_.c_str()) != 0) {
         if (errno == EISDIR) return Error{"is a folder", path_, "expected the name of a file"};
-        return Error{std::string("cannot write: ") + std::strerror(errno), path_,
+        return Error{Message("cannot write: {}", {std::strerror(errno)}), path_,
                      "check that the folder may be written"};
     }
     committed_ = true;
@@ -245,6 +248,11 @@ std::size_t remove_leftovers(const std::string& folder) {
         if (fs::remove(it->path(), item_code)) ++removed;
     }
     return removed;
+}
+
+Result<std::string> digest_of_file(const std::string& path) {
+    SONOCASE_TRY(const auto bytes, read_file(path));
+    return digest_of(bytes);
 }
 
 }  // namespace sonocase

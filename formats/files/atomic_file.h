@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Whole files in and out. A file appears under its name complete or not at all.
-// Separate from the parsers, which take bytes and so also run without a file system.
+// Reads and writes whole files. A file appears under its name complete or not at all.
+// Separate from the parsers, which take bytes and therefore also run without a file system.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/base/raw_vector.h"
+#include "formats/base/memory.h"
 #include "formats/base/result.h"
 
 namespace sonocase {
@@ -19,7 +19,7 @@ namespace sonocase {
 // Each reads a whole file. An error when it does not exist, may not be read, or is not a regular
 // file (see expect_regular_file).
 Result<std::vector<std::uint8_t>> read_file(const std::string& path);
-Result<RawVector<std::uint8_t>> read_large_file(const std::string& path);  // not cleared first
+Result<RawVector<std::uint8_t>> read_large_file(const std::string& path);  // memory not cleared
 Result<std::string> read_text_file(const std::string& path);
 
 // An error, in one line, unless `path` leads to a regular file: a folder, a device (/dev/zero never
@@ -53,8 +53,11 @@ class OutputFile {
 };
 
 // Removes the temporary files of write_file that killed programs left in `folder` and below;
-// returns their number. One in use holds a lock (flock), on any machine, and stays; on a file
-// system without locks, one that was modified within the last hour counts as in use.
+// returns their number. A file in use holds a lock (flock), on any machine, and stays; on a file
+// system without locks, a file that was modified within the last hour counts as in use.
 std::size_t remove_leftovers(const std::string& folder);
+
+// The digest of a whole file (formats/base/digest.h).
+Result<std::string> digest_of_file(const std::string& path);
 
 }  // namespace sonocase

@@ -16,8 +16,7 @@ namespace {
 constexpr std::string_view kEndLine = "ElementDataFile = LOCAL\n";
 constexpr std::string_view kSpentLine = "CommentRecorder = batch\n";
 static_assert(kEndLine.size() == kSpentLine.size());
-constexpr std::uint64_t kAlignment =
-    64;  // divides a sector: a line that starts there does not cross one
+constexpr std::uint64_t kAlignment = 64;  // a line that starts at a multiple stays in one sector
 
 std::string digits_of(std::size_t frames) {
     char text[16];
@@ -25,8 +24,8 @@ std::string digits_of(std::size_t frames) {
     return text;
 }
 
-// A comment that brings the text's end to a multiple of kAlignment in the file.
-void pad(std::string& text, std::uint64_t starts_at) {
+// Appends a comment that brings the text's end to a multiple of kAlignment in the file.
+void append_padding(std::string& text, std::uint64_t starts_at) {
     static constexpr std::string_view kComment = "Comment = ";
     const std::uint64_t end = starts_at + text.size() + kComment.size() + 1;
     text += kComment;
@@ -37,7 +36,7 @@ void pad(std::string& text, std::uint64_t starts_at) {
 }  // namespace
 
 Error GrowingSequence::fault(const char* doing, int number) const {
-    return {std::string(doing) + ": " + std::strerror(number), path_,
+    return {Message(doing, {std::strerror(number)}), path_,
             "earlier frames are kept; make room on the disk"};
 }
 
@@ -50,21 +49,21 @@ Result<GrowingSequence> GrowingSequence::create(const std::string& path, const S
     std::string text = sequence_head_text(empty, "1 1 " + digits_of(0));
     const std::string key = "DimSize = 1 1 ";
     out.size_digits_at_ = text.find(key) + key.size();
-    pad(text, 0);
+    append_padding(text, 0);
     out.end_line_at_ = text.size();
     text += kEndLine;
     // Under another name first, so that a full disk does not destroy the previous session.
     const std::string temporary = path + ".part-" + std::to_string(::getpid());
     out.fd_ = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (out.fd_ < 0) {
-        return Error{std::string("cannot record: ") + std::strerror(errno), path,
+        return Error{Message("cannot record: {}", {std::strerror(errno)}), path,
                      "check that the folder exists and is writable"};
     }
     if (!out.write_at(0, text) || ::fdatasync(out.fd_) != 0 ||
         ::rename(temporary.c_str(), path.c_str()) != 0) {
         const int number = errno;
         ::unlink(temporary.c_str());
-        return Error{std::string("cannot record: ") + std::strerror(number), path,
+        return Error{Message("cannot record: {}", {std::strerror(number)}), path,
                      "nothing was written"};
     }
     return out;
@@ -107,19 +106,19 @@ Status GrowingSequence::append(std::span<const SequenceFrame> frames) {
     for (std::size_t i = 0; i < frames.size(); ++i) {
         append_sequence_frame_text(text, transforms_, frames_ + i, frames[i]);
     }
-    pad(text, from);
+    append_padding(text, from);
     const std::uint64_t end_line_at = from + text.size();
     text += kEndLine;
     const std::size_t count = frames_ + frames.size();
-    // Pixels: the hole behind the text reads as zeros and takes no room.
+    // The pixels: the hole behind the text reads as zeros and takes no disk space.
     if (::ftruncate(fd_, static_cast<off_t>(from + text.size() + count)) != 0)
-        return fault("cannot record", errno);
-    if (!write_at(from, text)) return fault("cannot record", errno);
-    if (::fdatasync(fd_) != 0) return fault("cannot record", errno);
-    if (!write_at(end_line_at_, std::string(kSpentLine))) return fault("cannot record", errno);
+        return fault("cannot record: {}", errno);
+    if (!write_at(from, text)) return fault("cannot record: {}", errno);
+    if (::fdatasync(fd_) != 0) return fault("cannot record: {}", errno);
+    if (!write_at(end_line_at_, std::string(kSpentLine))) return fault("cannot record: {}", errno);
     end_line_at_ = end_line_at;
-    if (::fdatasync(fd_) != 0) return fault("cannot record", errno);
-    if (!write_at(size_digits_at_, digits_of(count))) return fault("cannot record", errno);
+    if (::fdatasync(fd_) != 0) return fault("cannot record: {}", errno);
+    if (!write_at(size_digits_at_, digits_of(count))) return fault("cannot record: {}", errno);
     frames_ = count;
     return Done{};
 }

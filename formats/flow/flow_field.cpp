@@ -2,18 +2,18 @@
 
 #include "formats/flow/flow_field.h"
 
+#include "formats/base/constants.h"
+
 namespace sonocase {
-namespace {
-constexpr double kPi = 3.14159265358979323846;
-}
 
 std::vector<SectionAxes> section_axes(const FlowField& field, const FlowVessel& vessel) {
     std::vector<SectionAxes> axes;
     Vector3 first;
     for (int i = 0; i < vessel.nodes; ++i) {
-        const Vector3 d = field.nodes[static_cast<std::size_t>(vessel.first_node + i)].direction;
+        const Vector3 d = field.nodes[vessel.first_node + i].direction;
         Vector3 across = first - dot(first, d) * d;
-        // At the first node, and where a vessel turns by a right angle within one step.
+        // There is no `first` at the first node, nor where a vessel turns by a right angle in one
+        // step.
         if (!(norm(across) > 1e-6)) across = any_perpendicular(d);
         first = normalized(across);
         axes.push_back({first, cross(d, first)});
@@ -34,7 +34,7 @@ double section_area_mm2(const std::array<float, kFlowRays>& radius_mm) {
 double wave_at(const FlowWave& wave, double phase) {
     double q = 1;
     for (int h = 1; h <= kFlowHarmonics; ++h) {
-        const FlowHarmonic& c = wave[static_cast<std::size_t>(h - 1)];
+        const FlowHarmonic& c = wave[h - 1];
         const double angle = 2 * kPi * h * (phase - std::floor(phase));
         q += static_cast<double>(c.re) * std::cos(angle) -
              static_cast<double>(c.im) * std::sin(angle);

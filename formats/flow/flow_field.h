@@ -3,22 +3,22 @@
 // Blood flow of a case: centrelines of its vessels with sections, and the flow through each.
 //
 // A vessel is a row of nodes from where its blood comes to where it goes. At a node, the section at
-// right angles to the flow is a star: radii at 16 equal angles from the centre, linear in between,
-// measured from a reference direction that is carried along the vessel without turning
+// right angles to the flow is a star: radii at 16 equal angles about the centre, linear in between.
+// The angles count from a reference direction that is carried along the vessel without turning
 // (section_axes). Between two nodes everything is linear.
 //
-// Flow through a vessel at time t, with p the phase of the heart beat (pulse_wave's) and s the
-// share of inspiration, (1 - cos) / 2 of the breathing's phase:
+// The flow through a vessel at time t, with p the phase of the heart beat (as in pulse_wave) and s
+// the share of inspiration, (1 - cos) / 2 of the phase of breathing:
 //
 //     Q(t) = mean_ml_s * (q(p) + breathing * (1/2 - s)),
 //     q(p) = 1 + sum_h re_h cos(2 pi h p) - im_h sin(2 pi h p),  h = 1..10
 //
-// Both parts are linear, so that flows add up at a junction at every instant when their
-// coefficients, weighted by the mean flows, do. Vessels that the labels lack (the renal arteries of
-// a CT without contrast) are outlets without nodes: they close the sums.
+// Both parts are linear, so that flows add up at a junction at every instant if their coefficients,
+// weighted by the mean flows, add up. Vessels that the labels lack (the renal arteries of a CT
+// without contrast) are outlets without nodes, which make the sums complete.
 //
-// All vessels pulse in phase, as the walls in the picture do: over 40 cm of torso the pulse wave
-// takes 60 ms, 7 % of a beat, which is left out.
+// All vessels pulse in phase, as the walls in the picture do. The pulse wave takes 60 ms over 40 cm
+// of torso, 7 % of a beat, which is neglected.
 //
 // Frame `mannequin`, mm, mL/s. docs/flow.md has sources and figures, docs/format.md the bytes.
 #pragma once
@@ -32,9 +32,9 @@
 
 namespace sonocase {
 
-inline constexpr int kFlowRays = 16;                  // of a section
-inline constexpr int kFlowHarmonics = 10;             // of a waveform
-inline constexpr double kBloodViscosity_mm2_s = 3.3;  // kinematic
+inline constexpr int kFlowRays = 16;                   // of a section
+inline constexpr int kFlowHarmonics = 10;              // of a waveform
+inline constexpr double kBloodViscosityMm2PerS = 3.3;  // kinematic
 
 enum class FlowKind : std::uint8_t { artery, vein, portal };
 
@@ -70,8 +70,9 @@ struct FlowField {
     bool empty() const { return vessels.empty(); }
 };
 
-// Two unit vectors at right angles to the flow at each of a vessel's nodes: angle 0 of its section,
-// and angle 90 degrees (direction x first). Carried from node to node without turning.
+// Two unit vectors at right angles to the flow at each of a vessel's nodes: at angle 0 of its
+// section and at 90 degrees (direction x first). They are carried from node to node without
+// turning.
 struct SectionAxes {
     Vector3 first, second;
 };
@@ -80,13 +81,13 @@ std::vector<SectionAxes> section_axes(const FlowField& field, const FlowVessel& 
 // Area of a star whose radius is linear in angle: pi/16 sum (a^2 + a b + b^2) / 3.
 double section_area_mm2(const std::array<float, kFlowRays>& radius_mm);
 
-// q at a phase, any real number. h harmonics; exact, in double.
+// The waveform q at a phase, which may be any real number.
 double wave_at(const FlowWave& wave, double phase);
 
-// Flow through a vessel.
+// The flow through a vessel. inspired: share of inspiration.
 double flow_ml_s(const FlowVessel& vessel, double phase, double inspired);
 
-// Share of inspiration, [0, 1], at a time: (1 - cos(2 pi t / period)) / 2.
+// The share of inspiration, [0, 1], at a time: (1 - cos(2 pi t / period)) / 2.
 double inspired_at(double time_s, double period_s);
 
 }  // namespace sonocase

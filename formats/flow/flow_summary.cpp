@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/flow/flow_at.h"
+#include "formats/base/constants.h"
+#include "formats/flow/flow_velocity.h"
 
 namespace sonocase {
 namespace {
-constexpr double kPi = 3.14159265358979323846;
 
 double length_mm(const FlowField& field, const FlowVessel& vessel) {
     double sum = 0;
@@ -52,7 +52,7 @@ std::vector<VesselSummary> vessel_summaries(const FlowField& field, double beat_
             out.push_back(s);
             continue;
         }
-        // Of a grown tree: its thickest vessel and its whole length.
+        // A grown tree shows its thickest vessel and its whole length.
         VesselSummary& sum = grown[kind];
         const double length = sum.length_mm + s.length_mm;
         if (count[kind]++ == 0 || s.diameter_mm > sum.diameter_mm) sum = s;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What `inspect` and the reports say of a flow field.
+// What `inspect` and the reports say about a flow field.
 #pragma once
 
 #include <string>
@@ -22,11 +22,11 @@ struct VesselSummary {
     double end_cm_s = 0;         // EDV: at the end of diastole
     double resistive_index = 0;  // (PSV - EDV) / PSV
 };
-// One per vessel, except round ones (grown trees), which are summed up in one entry each kind.
+// One per vessel; the round ones (grown trees) share one entry per kind.
 std::vector<VesselSummary> vessel_summaries(const FlowField& field, double beat_s);
 
-// Greatest relative difference between what flows into a junction and what leaves it, at any
-// phase; relative to the greatest flow through it.
+// The greatest difference between the flows into and out of a junction at any phase, relative to
+// the greatest flow through it.
 double worst_balance(const FlowField& field);
 
 const char* name_of(FlowKind kind);  // "artery"

@@ -9,7 +9,7 @@
 namespace sonocase {
 namespace {
 
-// Between four neighbours; the nearest ones beyond the edge.
+// Interpolates between four neighbours; beyond the edge the nearest ones count.
 template <class At>
 double bilinear(double x, double y, int width, int height, const At& at) {
     x = std::clamp(x, 0.0, width - 1.0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// B-mode pictures in beam space, where realism is judged: rows are depths, columns are scan lines.
+// B-mode pictures in beam space, where realism is scored: rows are depths, columns are scan lines.
 #pragma once
 
 #include <cstddef>
@@ -49,7 +49,7 @@ struct BeamImage {
 inline constexpr int kScoreLines = 256;
 inline constexpr double kFanSampleMm = 0.35, kLinearSampleMm = 0.1;
 
-// The scan's grid without grey, on the grid of the scores or on one of one's own.
+// The scan's grid without grey. sample_mm 0: that of the scores.
 BeamImage beam_grid(const ScanPlace& place, int lines = kScoreLines, double sample_mm = 0);
 
 struct PixelPoint {
@@ -61,12 +61,12 @@ struct BeamPoint {
     double sample = 0, line = 0;  // whole numbers at the grid's own samples
 };
 BeamPoint beam_of(const ScanPlace& place, const BeamImage& grid, PixelPoint pixel);
-// Within half a sample and half a line of the grid.
+// Whether a point lies within half a sample and half a line of the grid.
 bool in_grid(const BeamImage& grid, BeamPoint point);
 double grey_at(const BeamImage& image, BeamPoint point);  // bilinear
 
-// Bilinear, the nearest pixel beyond the edge. `pixels`: # width * height, rows from the top down.
-// Cost: 1 ms per 130,000 samples.
+// Samples a picture on the beams: bilinear, the nearest pixel beyond the edge. `pixels`:
+// # width * height, rows from the top down. Cost: 1 ms per 130,000 samples.
 BeamImage beam_from_picture(std::span<const std::uint8_t> pixels,
                             int width_px,
                             int height_px,

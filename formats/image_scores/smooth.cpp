@@ -40,7 +40,7 @@ std::vector<float> gaussian_smoothed(
             std::fill(sum.begin(), sum.end(), 0.0);
             for (int i = 1 - static_cast<int>(taps.size()); i < static_cast<int>(taps.size());
                  ++i) {
-                const double tap = taps[static_cast<std::size_t>(std::abs(i))];
+                const double tap = taps[std::abs(i)];
                 const float* from =
                     values.data() + static_cast<std::size_t>(mirrored(r + i, rows)) * width;
                 for (std::size_t c = 0; c < width; ++c)
@@ -57,13 +57,11 @@ std::vector<float> gaussian_smoothed(
         for (int r = 0; r < rows; ++r) {
             float* row = out.data() + static_cast<std::size_t>(r) * width;
             for (int c = -reach; c < columns + reach; ++c)
-                line[static_cast<std::size_t>(c + reach)] =
-                    static_cast<double>(row[mirrored(c, columns)]);
+                line[c + reach] = static_cast<double>(row[mirrored(c, columns)]);
             for (int c = 0; c < columns; ++c) {
                 const double* at = line.data() + c + reach;
                 double sum = taps[0] * *at;
-                for (int i = 1; i <= reach; ++i)
-                    sum += taps[static_cast<std::size_t>(i)] * (at[-i] + at[i]);
+                for (int i = 1; i <= reach; ++i) sum += taps[i] * (at[-i] + at[i]);
                 row[c] = static_cast<float>(sum);
             }
         }

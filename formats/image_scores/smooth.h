@@ -8,17 +8,17 @@
 
 namespace sonocase {
 
-// Rows of floats; the filter's tails are cut at 4 sigma and the picture is mirrored at its edges
-// (d c b a | a b c d), as scipy.ndimage.gaussian_filter does by default. A sigma of 0 leaves that
-// axis as it is. Cost: (8 sigma + 1) operations per sample and axis.
+// Smooths rows of floats. The filter's tails are cut at 4 sigma and the picture is mirrored at its
+// edges (d c b a | a b c d), as scipy.ndimage.gaussian_filter does by default. A sigma of 0 leaves
+// that axis as it is. Cost: (8 sigma + 1) operations per sample and axis.
 std::vector<float> gaussian_smoothed(
     std::span<const float> values, int rows, int columns, double sigma_rows, double sigma_columns);
 
 struct Moments {
     double mean = 0, sd = 0, skew = 0;
-    double kurtosis = 0;  // excess: 0 of a Gaussian
+    double kurtosis = 0;  // excess: 0 for a Gaussian
 };
-Moments moments_of(std::span<const float> values);  // of one value or equal values: sd 0, skew 0
+Moments moments_of(std::span<const float> values);  // sd and skew 0 if all values are equal
 
 double median_of(std::vector<double> values);  // NaN if empty
 double quantile_of(std::vector<double> values,

@@ -1,27 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// How an ultrasound machine draws: its beam, speckle, grey map, gain and artefacts, as data. Read
-// from the table [machine] of a TOML file (machine_toml.h); `sonocase look` measures one.
+// How an ultrasound machine draws: its beam, speckle, grey map, gain and artefacts, as data.
+// parse_machine() reads it from the table [machine] of a TOML file; `sonocase look` measures one.
 //
-// The defaults are those of the built-in machine `modern`, fitted to a living liver (fan). The
-// limits in brackets are those of the reader. Amplitudes are relative to e = 1: the mean amplitude
-// of healthy liver after time gain compensation. Depths are along the beam, from the probe's face.
+// The defaults are those of the built-in machine `modern`, fitted to a tracked sweep of a living
+// liver (fan; docs/realism.md). The limits in brackets are those of the reader. Amplitudes are
+// relative to e = 1: the mean amplitude of healthy liver after time gain compensation. Depths are
+// along the beam, from the probe's face.
 #pragma once
 
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "formats/base/result.h"
 
 namespace sonocase {
 
 // Widths are full widths at half height of the point spread's amplitude (two-way). A width given
 // here holds at reference_mhz and is scaled by reference_mhz / frequency.
 struct MachineBeam {
-    double frequency_mhz = 0;    // 0: the exercise's; else [0.5, 50]
+    double frequency_mhz = 0;    // 0: the exercise's; otherwise [0.5, 50]
     double reference_mhz = 3.5;  // [0.5, 50]
     double axial_mm = 0.75;      // along the beam; 0: from the frequency alone; [0, 10]
     // Along the face: width = lateral_mm sqrt(1 + ((r - focus) / range)^2). A dynamic receive focus
-    // keeps it narrow near the face, where its focus therefore lies.
+    // keeps the beam narrow near the face, so that the focus lies there.
     double lateral_mm = 0.85;      // at the focus; 0: from the frequency; [0, 20]
     double lateral_focus_mm = 1;   // 0: the exercise's; [0, 500]
     double lateral_range_mm = 65;  // [1, 1e4]
@@ -30,8 +34,8 @@ struct MachineBeam {
     double skirt = 0.5;       // 0: none; [0, 4]
     double skirt_width = 3;   // [1, 10]
     double elevation_mm = 0;  // slice thickness at the focus; 0: the exercise's; [0, 50]
-    // Width of the face that listens: what blocks a part of it casts a shadow whose edges soften on
-    // the way down. 0: they stay as they are; [0, 100].
+    // Width of the receiving face. Whatever blocks a part of it casts a shadow whose edges soften
+    // with depth. 0: the edges stay sharp; [0, 100].
     double aperture_mm = 17;
     int lines = 176;  // beams of a frame, [16, 1024]
     bool operator==(const MachineBeam&) const = default;
@@ -40,13 +44,13 @@ struct MachineBeam {
 // Independent speckle fields that are detected and averaged: spatial and frequency compounding.
 struct MachineLooks {
     int count = 2;        // [1, 16]
-    int near_count = 4;   // above near_mm, [1, 16]
+    int near_count = 4;   // at depths up to near_mm, [1, 16]
     double near_mm = 30;  // [0, 500]
     bool operator==(const MachineLooks&) const = default;
 };
 
-// power: grey = floor + level e^exponent, and knee_slope of that slope above the grey `knee`.
-// log:   grey = level + 255 / dynamic_range_db * 20 log10(e), not below floor.
+// power: grey = floor + level e^exponent; above the grey `knee` the slope is multiplied by
+// knee_slope. log:   grey = level + 255 / dynamic_range_db * 20 log10(e), not below floor.
 enum class GreyMap { power, log };
 struct MachineGrey {
     GreyMap map = GreyMap::power;
@@ -61,9 +65,9 @@ struct MachineGrey {
 
 struct MachineNoise {
     double level_db = -70;  // of the receiver, amplitude relative to e = 1, [-200, 20]
-    bool reject = true;     // nothing is drawn below the grey floor, noise neither
-    // Deviation of each sample's own gain, dB: a grain finer than the point spread that grows with
-    // the echo and stays in its place in the picture. 0: none; [0, 3].
+    bool reject = true;     // nothing below the grey floor is drawn, not even noise
+    // Standard deviation of each sample's own gain, dB: a grain finer than the point spread, which
+    // grows with the echo and stays in its place in the picture. 0: none; [0, 3].
     double grain_db = 0;
     bool operator==(const MachineNoise&) const = default;
 };
@@ -71,8 +75,8 @@ struct MachineNoise {
 struct MachineGain {
     double tgc_db_per_cm_mhz = 0;  // one way; 0: by the probe's shape; [0, 3]
     double far_from_mm = 100;      // beyond it the gain falls again, [0, 500]
-    double far_db_per_cm = 0.8;    // by so much, [0, 30]
-    double far_limit_db = 11;      // and no further, [0, 120]
+    double far_db_per_cm = 0.8;    // rate of that fall, [0, 30]
+    double far_limit_db = 11;      // limit of that fall, [0, 120]
     bool operator==(const MachineGain&) const = default;
 };
 
@@ -101,7 +105,7 @@ struct MachineHaze {
     double fraction = 0.2;  // 0: none; [0, 10]
     double decay_mm = 4.5;  // [0.1, 100]
     double across_mm = 2;   // full width of the mean, [0, 50]
-    // Side lobes: a part of the mean envelope of the neighbourhood, dB; -120: none; [-120, 0]
+    // Side lobes: level of a share of the neighbourhood's mean envelope, dB; -120: none; [-120, 0]
     double side_lobe_db = -120;
     bool operator==(const MachineHaze&) const = default;
 };
@@ -113,26 +117,25 @@ struct MachineContact {
     bool operator==(const MachineContact&) const = default;
 };
 
-// Gain evened out across the beams: where a beam differs from those beside it over some
-// millimetres, it goes half the way to them (physical/model/equaliser.h).
+// Equalisation of the gain across the beams: a beam that differs from its neighbours over some
+// millimetres is brought half the way to them.
 struct MachineEqualisation {
-    double amount = 1;    // of it, [0, 1]; 0: none
+    double amount = 1;    // [0, 1]; 0: none
     double from_mm = 35;  // deeper than this, [0, 500]
     bool operator==(const MachineEqualisation&) const = default;
 };
 
-// Detail that adaptive speckle reduction leaves: little in even ground, much where it takes it for
-// structure. Contrast about the local mean varies so much between places of the tissue, some
-// millimetres large (physical/model/speckle_reduction.h).
+// Adaptive speckle reduction leaves little detail in even tissue and much where it finds structure.
+// The contrast about the local mean therefore varies between places some millimetres large.
 struct MachineSpeckleReduction {
-    double variation = 0.3;  // deviation of the contrast, of which the mean is 1; 0: none; [0, 1]
+    double variation = 0.3;  // standard deviation of the contrast, whose mean is 1; 0: none; [0, 1]
     double from_mm = 20;     // deeper than this, [0, 500]
     bool operator==(const MachineSpeckleReduction&) const = default;
 };
 
 // Structures that a case does not hold and the renderer adds to its tissue, each an effect
 // (docs/effects.md); linings are the walls of vessels and the double line of capsules. A machine of
-// the nineties shows none of them, and its frames do not pay for them.
+// the nineties shows none of them, and its frames do not take the time for them.
 struct MachineStructures {
     bool parenchyma = true, streaks = true, diaphragm = true, wall = true, linings = true;
     bool operator==(const MachineStructures&) const = default;
@@ -152,13 +155,34 @@ struct Machine {
     MachineEqualisation equalisation;
     MachineSpeckleReduction speckle_reduction;
     MachineStructures structures;
-    // Weights of the frames that persistence blends, newest first; scaled to sum to 1. One: none.
+    // Weights of the frames that persistence blends, newest first; scaled to a sum of 1. A single
+    // weight: no persistence.
     std::vector<double> persistence{0.4, 0.3, 0.2, 0.1};  // 1 to 8 weights, [0, 1], the first > 0
     double edge_enhancement = 0;  // amount of the unsharp mask; 0: none; [0, 4]
     bool post_filter = false;     // speckle reduction: a binomial filter of three samples
-    // Level of tissues that somebody measured, dB over e = 1, by label. Optional.
+    // Measured levels of tissues, dB over e = 1, by label. Optional.
     std::map<std::string, double> tissue_db;  // [-60, 60]
     bool operator==(const Machine&) const = default;
 };
+
+// Reads a machine from text:
+//
+//     [machine]
+//     base = "modern"          # keys that are left out come from it; the default is modern
+//     name = "clinic"
+//     [machine.grey]
+//     level = 52
+//
+// `where` names the file in errors, which give the line, the key and its limits, and for an unknown
+// key the nearest valid one. A number that is NaN or infinite is out of range.
+Result<Machine> parse_machine(std::string_view toml, const std::string& where);
+
+// Writes every key: parse_machine(machine_toml(m)) equals m to the last bit. `m` must lie within
+// the limits above.
+std::string machine_toml(const Machine& machine);
+
+std::vector<std::string> machine_names();  // classic, modern, modern-linear
+// Errors: an unknown name, with the nearest valid one.
+Result<Machine> built_in_machine(std::string_view name);
 
 }  // namespace sonocase

@@ -2,7 +2,8 @@
 
 // The kinds of pathology: shape, parts, and the acoustic figures of each with their source.
 //
-// docs/pathology.md shows every kind in both image models. "(a)" in a source marks an assumption.
+// docs/pathology.md shows every kind in both image models. "(assumed)" in a source marks a figure
+// that is an assumption.
 #pragma once
 
 #include <span>

@@ -26,7 +26,7 @@ constexpr const char* kSchema =
     "CREATE TABLE score(session INTEGER NOT NULL REFERENCES session(id) ON DELETE CASCADE,"
     " metric TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY(session, metric)) WITHOUT ROWID;";
 
-// One prepared statement; texts are bound, never pasted.
+// A prepared statement. Texts are bound to it, never pasted into it.
 class Statement {
   public:
     Statement(sqlite3* db, const char* sql) { sqlite3_prepare_v2(db, sql, -1, &raw_, nullptr); }
@@ -106,7 +106,7 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
         return impl->fault("cannot open");
     }
     sqlite3_busy_timeout(impl->db, 5000);
-    // Deleted rows are overwritten: a trainee who is removed is gone from the file as well.
+    // secure_delete overwrites deleted rows: nothing of a removed trainee stays in the file.
     if (!impl->run("PRAGMA foreign_keys=ON; PRAGMA synchronous=FULL; PRAGMA secure_delete=ON;")) {
         return impl->fault("cannot open");
     }
@@ -229,9 +229,8 @@ Result<std::vector<std::string>> ProgressBook::trainees() const {
 
 Status ProgressBook::remove_trainee(const std::string& trainee,
                                     std::vector<std::string>* not_deleted) {
-    const auto entries = sessions(trainee, "");
-    if (!entries) return entries.error();
-    for (const ProgressEntry& e : *entries) {
+    SONOCASE_TRY(const auto entries, sessions(trainee, ""));
+    for (const ProgressEntry& e : entries) {
         if (e.recording.empty() || e.trainee != trainee) continue;
         std::string pictures = e.recording;
         const std::size_t ending = pictures.rfind(".igs.mha");
@@ -250,12 +249,11 @@ Status ProgressBook::remove_trainee(const std::string& trainee,
 
 Result<std::string> ProgressBook::csv(const std::string& trainee,
                                       const std::string& exercise) const {
-    const auto entries = sessions(trainee, exercise);
-    if (!entries) return entries.error();
+    SONOCASE_TRY(const auto entries, sessions(trainee, exercise));
     std::string out = "trainee,case,exercise,started,passed,seed";
     for (const MetricInfo& info : metric_table()) out += std::string(",") + info.name;
     out += "\r\n";
-    for (const ProgressEntry& e : *entries) {
+    for (const ProgressEntry& e : entries) {
         out += csv_cell(e.trainee) + "," + csv_cell(e.case_name) + "," + csv_cell(e.exercise) +
                "," + csv_cell(e.started) + "," + (e.passed ? "1" : "0") + "," +
                std::to_string(e.seed);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The history of all trainees: one row per session in an SQLite file on this machine. Nothing is
-// sent anywhere. A trainee is a freely chosen name, and can be removed with everything stored about
-// it.
+// sent anywhere. A trainee is a freely chosen name, and can be removed with everything that is
+// stored under it.
 //
 // A room of its own, so that nothing else depends on a database.
 #pragma once
@@ -22,8 +22,8 @@ struct ProgressEntry {
     std::string trainee, case_name, exercise, started;  // started: ISO 8601, UTC
     std::string recording;                              // path of the session file; empty: not kept
     bool passed = false;
-    std::uint64_t seed = 0;       // that the attempt's targets were drawn with; 0: as written
-    std::vector<Metric> metrics;  // those that were defined
+    std::uint64_t seed = 0;       // with which the attempt was drawn; 0: exercise as written
+    std::vector<Metric> metrics;  // only those with a finite value
 };
 
 class ProgressBook {

@@ -30,7 +30,8 @@ Result<std::vector<Pose>> parse_poses(std::string_view csv, const std::string& w
     std::array<std::size_t, kColumns.size()> column{};
     bool have_header = false;
     int number = 0;
-    if (csv.substr(0, 3) == "\xEF\xBB\xBF") csv.remove_prefix(3);  // what spreadsheets put first
+    if (csv.substr(0, 3) == "\xEF\xBB\xBF")
+        csv.remove_prefix(3);  // a byte order mark, as spreadsheets write
     while (!csv.empty()) {
         const std::size_t end = csv.find('\n');
         const std::string_view line = trimmed(csv.substr(0, end));

@@ -46,21 +46,21 @@ struct Sequence {
     std::vector<SequenceField> fields;  // of the whole sequence
     // Image of a frame; a recording without images has one of 1 x 1.
     int width = 1, height = 1, depth = 1, channels = 1;
-    std::string element =
-        "MET_UCHAR";  // MET_CHAR, _UCHAR, _SHORT, _USHORT, _INT, _UINT, _FLOAT, _DOUBLE
+    // MET_CHAR, _UCHAR, _SHORT, _USHORT, _INT, _UINT, _FLOAT, _DOUBLE
+    std::string element = "MET_UCHAR";
     std::array<double, 3> spacing_mm{1, 1, 1};
     std::vector<std::uint8_t> pixels;  // # frames * frame_bytes; empty is written as zeros
     std::size_t frame_bytes() const;   // 0 where `element` is none of the above
     int transform_index(std::string_view name) const;  // -1: none
 };
 
-// Rotation and translation if the matrix is rigid (within 1e-3); empty for scales, mirrors and NaN.
+// The rigid motion if the matrix is one (within 1e-3); empty for scales, mirrors and NaN.
 std::optional<Rigid> rigid_from_matrix(const std::array<double, 16>& to_from);
 std::array<double, 16> matrix_from_rigid(const Rigid& to_from);
 
 // Reads either form, recognised by its first bytes; zlib-compressed pixels are unpacked. Frames
-// that the header describes beyond its stated size are dropped: a recording that was cut off while
-// it grew has some.
+// that the header describes beyond its stated size are dropped: they occur in a recording that was
+// cut off while it grew.
 Result<Sequence> read_sequence(std::span<const std::uint8_t> bytes, const std::string& where);
 
 enum class SequenceForm { mha, nrrd };

@@ -38,8 +38,8 @@ bool has_word(const std::string& text, std::initializer_list<const char*> words)
                        [&](const char* word) { return text.find(word) != std::string::npos; });
 }
 
-// "name|detail"; several events of one frame are joined by ";". Both characters are removed from
-// the texts.
+// An event is written as "name|detail", and several events of one frame are joined by ";". Both
+// characters are replaced in the texts.
 std::string without(std::string text, const char* signs) {
     for (char& c : text) {
         if (std::string(signs).find(c) != std::string::npos) c = ',';
@@ -66,7 +66,8 @@ void read_events(const std::string& value,
     }
 }
 
-// "force_n=3.2 pressure_kpa=8 vein_open=0.4"; a word that is missing or no number leaves its value.
+// Reads "force_n=3.2 pressure_kpa=8 vein_open=0.4". A word that is missing or not a number leaves
+// its value as it is.
 bool read_press(const std::string& text, PressSample& to) {
     const auto number = [&](const char* key, double& value) {
         double read = 0;
@@ -85,7 +86,7 @@ std::string press_text(const PressSample& press) {
     return text;
 }
 
-// A label as one word of such a text.
+// The label as one word of such a text.
 std::string word_of(std::string label) {
     for (char& c : label) {
         if (std::string(" =,;|").find(c) != std::string::npos) c = '_';
@@ -93,7 +94,7 @@ std::string word_of(std::string label) {
     return label;
 }
 
-// "coloured=NAME,NAME", or "gate=NAME fill=0.9 angle_deg=52 cursor_deg=50 psv_cm_s=78 ...".
+// Reads "coloured=NAME,NAME", or "gate=NAME fill=0.9 angle_deg=52 cursor_deg=50 psv_cm_s=78 ...".
 bool read_doppler(const std::string& text, DopplerSample& to) {
     const auto number = [&](const char* key, double& value) {
         double read = 0;
@@ -132,7 +133,7 @@ std::string doppler_text(const DopplerSample& doppler) {
     return text + " beats=" + std::to_string(doppler.beats);
 }
 
-// Turns the needle's own frame so that its axis is z.
+// The rotation of the needle's own frame that makes its axis z.
 Rigid z_along(Vector3 axis) {
     const Vector3 z = normalized(axis);
     if (z == Vector3{0, 0, 1}) return {};
@@ -193,10 +194,10 @@ Result<Session> session_from_sequence(const Sequence& sequence,
     for (const auto& [name, index] :
          {std::pair(names.probe, probe), std::pair(names.needle, needle)}) {
         if (name.empty() || index >= 0) continue;
-        std::string there;
-        for (const std::string& t : sequence.transforms) there += (there.empty() ? "" : ", ") + t;
+        std::string known;
+        for (const std::string& t : sequence.transforms) known += (known.empty() ? "" : ", ") + t;
         return Error{"has no transform '" + name + "'", where,
-                     there.empty() ? "it has none" : "it has " + there};
+                     known.empty() ? "it has none" : "it has " + known};
     }
     const Rigid turn = z_along(names.needle_axis);
     session.samples.reserve(sequence.frames.size());
@@ -206,7 +207,7 @@ Result<Session> session_from_sequence(const Sequence& sequence,
         sample.frame = frame.number;
         const auto pose = [&](int index, Rigid& to) {
             if (index < 0) return false;
-            const SequencePose& from = frame.poses[static_cast<std::size_t>(index)];
+            const SequencePose& from = frame.poses[index];
             const auto rigid = rigid_from_matrix(from.to_from);
             if (!from.ok || !rigid) return false;
             to = *rigid;
@@ -272,7 +273,7 @@ std::uint64_t attempt_seed(const SessionHeader& header) {
 }
 
 Status check_session(const Session& session, const std::string& where) {
-    constexpr double kMetres = 2;  // no torso is that small in mm, nor that large in m
+    constexpr double kMetres = 2;  // no torso is that small in mm or that large in m
     if (session.samples.empty()) return Done{};
     long poses = 0;
     double farthest = 0;

@@ -22,7 +22,7 @@ struct SessionHeader {
     std::string case_digest;      // of the bundle's bytes; empty: not known
     std::string exercise;         // name
     std::string exercise_digest;  // of its TOML
-    std::string trainee;          // a chosen name; empty: nobody's
+    std::string trainee;          // a chosen name; empty: none
     std::string started;          // ISO 8601, UTC
     std::string program;          // "sonoplay 0.1.0"
     // What replay needs besides poses, as "key=value" words: model, effects, seed, size. Written by
@@ -36,17 +36,17 @@ struct SessionHeader {
 // What the probe did to the tissue in a frame (effect deformation).
 struct PressSample {
     double force_n = 0, pressure_kpa = 0;
-    // Area of the draining lumens under the face over that at rest, in the scan plane; negative:
-    // there is none, or nothing is pressed.
+    // Area of the draining lumens under the face in the scan plane, relative to that at rest.
+    // Negative: there is none, or nothing is pressed.
     double vein_open = -1;
     friend bool operator==(const PressSample&, const PressSample&) = default;
 };
 
-// What a Doppler mode showed in a frame, and what was true there. Vessels by their labels.
+// What a Doppler mode showed in a frame, and the true values. Vessels are named by their labels.
 struct DopplerSample {
-    std::vector<std::string> coloured;       // with colour in the box
-    std::string gate;                        // that most of the spectral gate lies in; empty: none
-    double gate_fill = 0;                    // share of the gate in its blood
+    std::vector<std::string> coloured;       // vessels with colour in the box
+    std::string gate;                        // vessel with most of the spectral gate; empty: none
+    double gate_fill = 0;                    // share of the gate in that vessel's blood
     double angle_deg = 0, cursor_deg = 0;    // of beam and flow, [0, 90]: true, and by the cursor
     double psv_cm_s = 0, true_psv_cm_s = 0;  // peak velocity: measured over `beats`, and true
     int beats = 0;
@@ -63,7 +63,7 @@ struct SessionSample {
     Rigid mannequin_from_drawn;   // as shown, after the bend constraint
     // Console settings that changed at this frame, as "key=value" words; empty: unchanged.
     std::string settings;
-    bool has_press = false;  // false in recordings of before, and of other programs
+    bool has_press = false;  // false in older recordings and in those of other programs
     PressSample press;
     bool has_doppler = false;  // a Doppler mode was on
     DopplerSample doppler;
@@ -98,16 +98,16 @@ struct SessionNames {
     Vector3 needle_axis{0, 0, 1};
 };
 
-// The most likely names in a recording: ours if it has them, else the first transform whose name
-// contains "Needle" or "Stylus", and the first with "Probe" or "Image".
+// The most likely names in a recording: ours if it has them, otherwise the first transform whose
+// name contains "Needle" or "Stylus", and the first with "Probe" or "Image".
 SessionNames guess_names(const Sequence& sequence);
 
 // Poses that are not rigid count as not tracked. An Error when a named transform is missing.
 Result<Session> session_from_sequence(const Sequence& sequence,
                                       const SessionNames& names,
                                       const std::string& where);
-// An Error for a session that nothing can be told of: no pose that counts, times that fall, or
-// places in metres. Where the scores would be zeros that look like a trainee's.
+// An Error for a session whose scores would be zeros that look like a trainee's: no usable pose,
+// times that fall, or places in metres.
 Status check_session(const Session& session, const std::string& where);
 Sequence sequence_from_session(const Session& session);
 
@@ -116,7 +116,7 @@ SequenceFrame frame_from_sample(const SessionSample& sample,
                                 const std::vector<SessionEvent>& events);
 std::vector<SequenceField> fields_from_header(const SessionHeader& header);
 
-// Seed of the attempt's target positions (formats/attempt); 0: the exercise as written.
+// Seed of the attempt (formats/scoring/draw_attempt.h); 0: the exercise as written.
 std::uint64_t attempt_seed(const SessionHeader& header);
 
 // Value of a key in "key=value key=value"; empty if the key is missing.

@@ -82,8 +82,8 @@ Result<Sequence> parse_transform_log(std::string_view xml, const std::string& wh
         frame.number = static_cast<std::int64_t>(sequence.frames.size());
         frame.timestamp_s = seconds + 1e-9 * nanoseconds;
         frame.unfiltered_timestamp_s = frame.timestamp_s;
-        frame.poses.resize(static_cast<std::size_t>(index) + 1);
-        frame.poses[static_cast<std::size_t>(index)] = pose;
+        frame.poses.resize(index + 1);
+        frame.poses[index] = pose;
         sequence.frames.push_back(std::move(frame));
     }
     for (SequenceFrame& frame : sequence.frames) frame.poses.resize(sequence.transforms.size());

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // PerkTutor's transform logs: one XML element per reading, `<log TimeStampSec= TimeStampNSec= type=
-// DeviceName= transform="16 numbers" />`, tools in turn. Read so that our scores can be computed
-// for sessions of that trainer.
+// DeviceName= transform="16 numbers" />`, tools in turn. We read them to score sessions of that
+// trainer.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ namespace sonocase {
 
 bool looks_like_transform_log(std::string_view text);
 
-// One frame per reading. All other tools are INVALID in that frame, so no pose is invented.
+// Makes one frame per reading. All other tools are INVALID in that frame: no pose is invented.
 // Messages become the field "Event" of the frame before them.
 Result<Sequence> parse_transform_log(std::string_view xml, const std::string& where);
 

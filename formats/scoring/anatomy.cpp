@@ -41,9 +41,9 @@ Point3 CaseAnatomy::moved(Point3 rest, double time_s) const {
     // centimetres and the shift is smaller, so it converges.
     const Vector3 shift = motion_at(breathing_, {}, time_s).breathing_mm;
     constexpr double kEnoughMm = 1e-9;
-    constexpr int kMost = 64;
+    constexpr int kMaxRounds = 64;
     Point3 p = rest;
-    for (int i = 0; i < kMost; ++i) {
+    for (int i = 0; i < kMaxRounds; ++i) {
         const Point3 next = rest + field_.weight(p) * shift;
         const double step_mm = distance(next, p);
         p = next;
@@ -57,7 +57,7 @@ int CaseAnatomy::label(Point3 p) const {
     const Vector3 d = p - grid.origin_mm;
     const double inverse_mm = 1 / grid.spacing_mm.x;
     const Vector3 v{d.x * inverse_mm, d.y * inverse_mm, d.z * inverse_mm};
-    // Not finite fails every comparison.
+    // Numbers that are not finite fail every comparison.
     if (!(v.x > -0.5 && v.y > -0.5 && v.z > -0.5 && v.x < grid.size.x - 0.5 &&
           v.y < grid.size.y - 0.5 && v.z < grid.size.z - 0.5)) {
         return 0;
@@ -75,7 +75,7 @@ int CaseAnatomy::label(Point3 p) const {
 }
 
 double CaseAnatomy::exit_distance(Point3 from, Vector3 direction, double reach) const {
-    constexpr double kGapMm = 5;  // pockets of outside inside a body are thinner
+    constexpr double kGapMm = 5;  // gaps inside a body that are labelled outside are shorter
     const double step = 0.5 * bundle_->grid.spacing_mm.x;
     double last_inside = 0;
     for (double s = step; s < reach + step; s += step) {
@@ -98,9 +98,9 @@ double CaseAnatomy::exit_distance(Point3 from, Vector3 direction, double reach) 
 
 namespace {
 
-// Parameter t >= 0 at which from + t direction meets the triangle; negative: it misses. `slack`, as
-// a fraction of an edge, widens the triangle.
-// Moeller and Trumbore, Journal of Graphics Tools 2:21 (1997).
+// The parameter t >= 0 at which from + t direction meets the triangle; negative if it misses.
+// slack, a fraction of an edge, widens the triangle.
+// Source: Moeller and Trumbore, Journal of Graphics Tools 2:21 (1997).
 double ray_triangle(
     Point3 from, Vector3 direction, Point3 a, Point3 b, Point3 c, double slack = 0) {
     const Vector3 e1 = b - a, e2 = c - a;
@@ -140,11 +140,11 @@ MeshAnatomy::MeshAnatomy(Surface mesh) : mesh_(std::move(mesh)) {
             return std::clamp(static_cast<int>((value - low) / column_mm_), 0, count - 1);
         };
         // Slightly wider, for the offset in inside().
-        const double hair = 1e-6 * column_mm_;
-        for (int y = cell(box.lower.y - hair, box_.lower.y, columns_y_);
-             y <= cell(box.upper.y + hair, box_.lower.y, columns_y_); ++y) {
-            for (int x = cell(box.lower.x - hair, box_.lower.x, columns_x_);
-                 x <= cell(box.upper.x + hair, box_.lower.x, columns_x_); ++x) {
+        const double margin = 1e-6 * column_mm_;
+        for (int y = cell(box.lower.y - margin, box_.lower.y, columns_y_);
+             y <= cell(box.upper.y + margin, box_.lower.y, columns_y_); ++y) {
+            for (int x = cell(box.lower.x - margin, box_.lower.x, columns_x_);
+                 x <= cell(box.upper.x + margin, box_.lower.x, columns_x_); ++x) {
                 triangles_of_column_[static_cast<std::size_t>(y) *
                                          static_cast<std::size_t>(columns_x_) +
                                      static_cast<std::size_t>(x)]

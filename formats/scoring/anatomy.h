@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "formats/base/geometry.h"
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 #include "formats/exercise/motion.h"
 #include "formats/volume/surface.h"
 
@@ -26,26 +26,26 @@ class Anatomy {
     // Palette index at a point; 0 outside. If structures are unknown, 1 everywhere inside.
     virtual int label(Point3 p) const { return inside(p) ? 1 : 0; }
     // Distance from `from` (inside) along the unit vector `direction` to where the body ends;
-    // `reach` if it does not end before. Runs of outside shorter than `gap_mm` do not end it.
+    // `reach` if it does not end before. Short gaps labelled outside do not end it.
     virtual double exit_distance(Point3 from, Vector3 direction, double reach) const = 0;
-    // Where the tissue that is at p now lies at rest, and where tissue that lies at `rest` is now;
-    // at most greatest_shift_mm() apart.
+    // The place at rest of the tissue that is now at p, and the place now of the tissue that is at
+    // `rest` when at rest; at most greatest_shift_mm() apart.
     virtual Point3 at_rest(Point3 p, double /*time_s*/) const { return p; }
     virtual Point3 moved(Point3 rest, double /*time_s*/) const { return rest; }
     virtual double greatest_shift_mm() const { return 0; }
-    // True if labels say where sound passes: then blocks_sound() and shadows mean something.
+    // True if labels say where sound passes, so that blocks_sound() and shadows are defined.
     virtual bool knows_tissue() const { return false; }
     virtual bool blocks_sound(int /*label*/) const { return false; }  // bone or gas
-    // True where the body is cut off and does not end: a surface there is no skin.
+    // True where the volume cuts the body off: a surface there is not skin.
     virtual bool at_edge(Point3 /*p*/) const { return false; }
 };
 
 // The cooked labels: a voxel's own label, or the second one beyond its boundary plane; the renderer
 // uses the same rule. The bundle must outlive this object. inside() and label() are constant time
-// and allocate nothing; exit_distance() costs reach / (half a voxel) of them.
+// and allocate nothing; exit_distance() makes reach / (half a voxel) such look-ups.
 class CaseAnatomy final : public Anatomy {
   public:
-    // breathing: as the picture shows it; none by default. Its field costs one look-up per brick.
+    // breathing: as the picture shows it; none by default. Cost: one look-up per brick.
     explicit CaseAnatomy(CaseView bundle, const BreathingMotion& breathing = {});
     bool inside(Point3 p) const override { return label(p) != 0; }
     int label(Point3 p) const override;
@@ -54,9 +54,7 @@ class CaseAnatomy final : public Anatomy {
     Point3 moved(Point3 rest, double time_s) const override;
     double greatest_shift_mm() const override { return std::abs(breathing_.amplitude_mm); }
     bool knows_tissue() const override { return true; }
-    bool blocks_sound(int label) const override {
-        return blocks_sound_[static_cast<std::size_t>(label)];
-    }
+    bool blocks_sound(int label) const override { return blocks_sound_[label]; }
     bool at_edge(Point3 p) const override;
 
   private:

@@ -2,7 +2,7 @@
 
 // When the needle passes through the skin and when it comes out, insensitive to jitter.
 //
-// Fed with the inserted length of each reading. An insertion begins when the length passes
+// update() takes the inserted length of each reading. An insertion begins when the length passes
 // enter_mm; it is dated back to the moment at which the tip went under the skin, and the direction
 // held there is the direction of entry (d_e of eq. (16)). It ends when the tip has been out for
 // exit_s, or is out by more than exit_mm at once; the end is dated back likewise. A tip that

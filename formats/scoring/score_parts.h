@@ -1,23 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The parts that score_session() puts together: one file per group of docs/metrics.md. Internal to
+// The parts that score_session() puts together, one per group of docs/metrics.md. Internal to
 // formats/scoring.
 #pragma once
 
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "formats/scoring/needle_readings.h"
 #include "formats/scoring/session_score.h"
+
+namespace sonocase {
+
+// Where the needle is in the body and in the picture, in one reading.
+struct NeedleReading {
+    // The tip, and the points ScoreOptions::puncture_mm before and behind it.
+    bool inside = false, ahead = false, behind = false;
+    bool touches = false;  // the tip is inside or nearer to the skin than contact_mm
+    bool no_go = false;    // any point of the inserted shaft is in a structure that must be spared
+    double depth_mm = 0;   // > 0 inside
+    Point3 skin;           // where the shaft passes it
+    bool seen = false;     // the probe is tracked in the same sample
+    double plane_mm = std::numeric_limits<double>::quiet_NaN();  // signed, of the tip
+    bool tip_in_view = false;  // in the image and reached by sound
+    double in_beam_mm = 0;     // inserted length in the image that sound reaches
+};
+
+// One per point of the needle. anatomy may be null: then nothing is inside. The readings are
+// independent and are distributed by options.jobs.
+std::vector<NeedleReading> look_up_readings(const Session& session,
+                                            const ToolTrack& needle,
+                                            const Exercise& exercise,
+                                            const Anatomy* anatomy,
+                                            const std::vector<Label>& labels,
+                                            const ScoreOptions& options);
+
+}  // namespace sonocase
 
 namespace sonocase::detail {
 
-inline constexpr double kDegrees = 180 / 3.14159265358979323846;
-
 using MetricValues = std::map<std::string, double>;
 
-// What every part reads. Index i is a reading of the needle: needle.points[i], readings[i].
+// The input of every part. Index i is a reading of the needle: needle.points[i], readings[i].
 struct ScoreInput {
     const Session& session;
     const Exercise& exercise;
@@ -48,7 +73,7 @@ void score_motion(const std::string& tool,
                   MetricValues& values);
 
 // Part 3: the needle in the body, apart from insertions. `has_no_go`: the body has at least one
-// of the structures to be spared.
+// of the structures that must be spared.
 void score_tissue(const ScoreInput& input,
                   bool has_no_go,
                   MetricValues& values,

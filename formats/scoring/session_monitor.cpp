@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "formats/base/portable_math.h"
-#include "formats/scoring/image_region.h"
 #include "formats/scoring/sight.h"
 #include "formats/text/number_text.h"
 
@@ -143,7 +142,7 @@ void SessionMonitor::watch_needle(double time_s, const Rigid& needle) {
     int touched = -1;
     for (double s = 0; s <= depth && touched < 0; s += options_.shaft_step_mm) {
         const int label = anatomy_->label(anatomy_->at_rest(tip - s * direction, time_s));
-        if (is_no_go_[static_cast<std::size_t>(label)]) touched = label;
+        if (is_no_go_[label]) touched = label;
     }
     if (touched >= 0) {
         if (no_go_now_ < 0) add(LiveEventKind::no_go_contact, time_s, touched);
@@ -207,7 +206,7 @@ std::span<const LiveEvent> SessionMonitor::update(double time_s,
     if (anatomy_ && probe_ok) {
         const bool now = probe_on_skin(*anatomy_, exercise_->probe, mannequin_from_probe);
         if (now) probe_off_s_ = time_s;
-        // A probe that skips over the skin does not write two events a frame.
+        // A probe that bounces on the skin must not give two events per frame.
         if (now || time_s - probe_off_s_ > options_.contact_pause_s) {
             watch_state(now, probe_on_skin_, time_s, LiveEventKind::probe_contact,
                         LiveEventKind::probe_lifted);

@@ -34,8 +34,8 @@ enum class LiveEventKind : std::uint8_t {
     key_frame,  // the player stored a picture
     session_end,
     tissue_puncture,  // index: label that the tip went into; value: force, N
-    posterior_wall,   // through the far wall of a vessel, likewise
-    needle_stopped,   // by something rigid, likewise
+    posterior_wall,   // the tip went through the far wall of a vessel; likewise
+    needle_stopped,   // something rigid stopped the needle; likewise
 };
 
 struct LiveEvent {

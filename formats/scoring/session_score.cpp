@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "formats/exercise/metric_table.h"
 #include "formats/scoring/score_parts.h"
+#include "formats/text/json_reader.h"
 
 namespace sonocase {
 namespace {
@@ -59,14 +61,17 @@ SessionCurves curves_of(const ScoreInput& input) {
     return c;
 }
 
-// Metrics in the order of their table, then pass marks.
-void finish(const Exercise& exercise, const MetricValues& values, SessionScore& out) {
+// Sets the metrics in the order of their table, and the pass marks.
+void fill_metrics(const Exercise& exercise, const MetricValues& values, SessionScore& out) {
     for (const MetricInfo& info : metric_table()) {
         const auto found = values.find(info.name);
         out.metrics.push_back({info.name, found == values.end() ? kNan : found->second});
     }
     for (const Exercise::PassMark& mark : exercise.pass_marks) {
-        PassResult result{mark.metric, out.value(mark.metric), mark.at_most, mark.at_least, false};
+        PassResult result{.metric = mark.metric,
+                          .value = out.value(mark.metric),
+                          .at_most = mark.at_most,
+                          .at_least = mark.at_least};
         result.passed = result.value <= mark.at_most && result.value >= mark.at_least;  // NaN fails
         out.passed = out.passed && result.passed;
         out.pass_marks.push_back(std::move(result));
@@ -117,8 +122,81 @@ SessionScore score_session(const Session& session,
     detail::score_press(input, values);
     detail::score_doppler(input, values);
     out.curves = curves_of(input);
-    finish(exercise, values, out);
+    fill_metrics(exercise, values, out);
     return out;
+}
+
+std::string score_json(const SessionScore& score, const Exercise& exercise) {
+    using detail::Json;
+    using detail::json_number;
+    using detail::json_of;
+    Json out = Json::object();
+    out["exercise"] = exercise.name;
+    Json metrics = Json::object();
+    for (const Metric& metric : score.metrics) metrics[metric.name] = json_number(metric.value);
+    out["metrics"] = std::move(metrics);
+    out["passed"] = score.passed;
+    Json marks = Json::array();
+    for (const PassResult& result : score.pass_marks) {
+        Json item = Json::object();
+        item["metric"] = result.metric;
+        item["value"] = json_number(result.value);
+        item["at_most"] = json_number(result.at_most);
+        item["at_least"] = json_number(result.at_least);
+        item["passed"] = result.passed;
+        marks.push_back(std::move(item));
+    }
+    out["pass_marks"] = std::move(marks);
+    Json insertions = Json::array();
+    for (const InsertionScore& s : score.insertions) {
+        Json item = Json::object();
+        item["entry_s"] = s.entry_s;
+        item["exit_s"] = s.exit_s;
+        item["still_in"] = s.still_in;
+        item["entry"] = json_of(s.entry);
+        item["entry_direction"] = json_of(s.entry_direction);
+        item["deepest_mm"] = s.deepest_mm;
+        item["deepest_s"] = s.deepest_s;
+        item["final_tip"] = json_of(s.final_tip);
+        item["target"] = s.target < 0 ? Json(nullptr) : Json(exercise.targets[s.target].name);
+        item["tip_to_target_mm"] = json_number(s.tip_to_target_mm);
+        insertions.push_back(std::move(item));
+    }
+    out["insertions"] = std::move(insertions);
+    Json targets = Json::array();
+    for (std::size_t t = 0; t < score.targets.size(); ++t) {
+        const auto when = [](double time_s) { return time_s < 0 ? Json(nullptr) : Json(time_s); };
+        Json item = Json::object();
+        item["name"] = exercise.targets[t].name;
+        item["first_hit_s"] = when(score.targets[t].first_hit_s);
+        item["first_scanned_s"] = when(score.targets[t].first_scanned_s);
+        item["first_seen_s"] = when(score.targets[t].first_seen_s);
+        targets.push_back(std::move(item));
+    }
+    out["targets"] = std::move(targets);
+    out["warnings"] = score.warnings;
+    return detail::json_text(out, true) + "\n";
+}
+
+BreathingMotion breathing_shown(const Exercise& exercise,
+                                bool physical_model,
+                                const std::vector<std::string>& effects) {
+    // A list of nothing but removals starts from all effects, any other list from none.
+    bool on = std::all_of(effects.begin(), effects.end(),
+                          [](const std::string& e) { return !e.empty() && e[0] == '-'; });
+    for (const std::string& e : effects) on = on || e == "auto" || e == "all";
+    for (const std::string& e : effects) {
+        if (e == "breathing") on = true;
+        if (e == "-breathing") on = false;
+    }
+    return physical_model && on ? exercise.breathing : BreathingMotion{};
+}
+
+BreathingMotion breathing_shown(const Exercise& exercise, const SessionHeader& header) {
+    std::vector<std::string> effects;
+    std::istringstream words(detail_value(header.render, "effects"));
+    for (std::string word; std::getline(words, word, ',');) effects.push_back(word);
+    return breathing_shown(exercise, detail_value(header.render, "model") == "physical", effects);
 }
 
 }  // namespace sonocase

@@ -33,7 +33,7 @@ struct Metric {
 };
 
 struct InsertionScore {
-    double entry_s = 0, exit_s = 0;  // exit: of the last reading where the needle stays in
+    double entry_s = 0, exit_s = 0;  // exit: the last reading if the needle stays in
     bool still_in = false;
     Point3 entry;  // on the skin
     Vector3 entry_direction;
@@ -64,7 +64,7 @@ struct SessionCurves {
 struct SessionScore {
     std::vector<Metric> metrics;  // in the order of metric_table()
     std::vector<InsertionScore> insertions;
-    std::vector<TargetScore> targets;  // # of the exercise's
+    std::vector<TargetScore> targets;  // # targets of the exercise
     std::vector<PassResult> pass_marks;
     bool passed = true;  // all pass marks; true without any
     SessionCurves curves;

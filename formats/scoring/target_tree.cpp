@@ -43,7 +43,7 @@ int TargetTree::build(std::uint32_t first, std::uint32_t count) {
         node.left = build(first, count / 2);
         node.right = build(first + count / 2, count - count / 2);
     }
-    nodes_[static_cast<std::size_t>(at)] = node;
+    nodes_[at] = node;
     return at;
 }
 

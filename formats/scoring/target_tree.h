@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A tree of boxes over targets: when few of many are near, whole branches are skipped.
+// A tree of balls over targets: a search skips whole branches of targets that are not near.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ class TargetTree {
     int build(std::uint32_t first, std::uint32_t count);
     template <class Keep, class Visit>
     std::uint32_t search(int at, Keep& keep, Visit& visit) {
-        Node& node = nodes_[static_cast<std::size_t>(at)];
+        Node& node = nodes_[at];
         if (node.open == 0 || !keep(node.centre, node.radius)) return node.open;
         if (node.left < 0) {
             for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {

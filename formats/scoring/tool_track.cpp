@@ -6,25 +6,24 @@
 #include <cmath>
 #include <limits>
 
+#include "formats/base/constants.h"
 #include "formats/base/portable_math.h"
 
 namespace sonocase {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kDegrees = 180 / 3.14159265358979323846;
 
 Point3 position(const TrackPoint& p) {
     return {p.pose.translation.x, p.pose.translation.y, p.pose.translation.z};
 }
 
 double turn_deg(const TrackPoint& from, const TrackPoint& to) {
-    return kDegrees * rotation_angle(to.pose.rotation * transpose(from.pose.rotation));
+    return kDegPerRad * rotation_angle(to.pose.rotation * transpose(from.pose.rotation));
 }
 
-// Counts periods in which `rate` is above the threshold. A change of state must have lasted for
-// longer than the pause since the last reading that agreed with the state before; a track begins at
-// rest.
+// Counts periods in which `rate` is above the threshold. The state changes once the last reading
+// that agreed with the old state is more than the pause ago; a track begins at rest.
 class ActionCounter {
   public:
     ActionCounter(double threshold, double pause_s, double start_s)
@@ -47,12 +46,12 @@ class ActionCounter {
     int count_ = 0;
 };
 
-// Neighbours within a hundredth of a second become one, so that the filter's cost does not depend
-// on the rate of the tracker.
 struct Knot {
     double time_s = 0;
     Point3 p;
 };
+// Joins readings within a hundredth of a second into one knot, so that the filter's cost does not
+// depend on the rate of the tracker.
 std::vector<Knot> knots_of(std::span<const TrackPoint> points) {
     constexpr double kBinS = 0.01;
     std::vector<Knot> knots;
@@ -172,7 +171,7 @@ double filtered_path_length_mm(std::span<const TrackPoint> points, double filter
 }
 
 MotionMetrics motion_metrics(std::span<const TrackPoint> points, const MotionOptions& options) {
-    MotionMetrics m{kNan, kNan, kNan, kNan, kNan, kNan, kNan, kNan, kNan, {kNan, kNan, kNan}, kNan};
+    MotionMetrics m;
     if (points.empty()) return m;
     m.elapsed_time_s = points.back().time_s - points.front().time_s;
     m.path_length_mm = m.rotation_total_deg = 0;
@@ -182,8 +181,7 @@ MotionMetrics motion_metrics(std::span<const TrackPoint> points, const MotionOpt
     std::size_t speed_count = 0;
     ActionCounter translations(options.action_speed_mm_s, options.action_pause_s, points[0].time_s);
     ActionCounter rotations(options.action_speed_deg_s, options.action_pause_s, points[0].time_s);
-    // Of the readings whose time is new: the last velocity and acceleration, and how many there
-    // are.
+    // The last reading with a new time, the last velocity and acceleration, and their number.
     std::size_t rated = 0;
     Vector3 velocity, acceleration;
     int differences = 0;

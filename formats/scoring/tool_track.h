@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -22,7 +23,7 @@ struct TrackPoint {
 struct ToolTrack {
     std::vector<TrackPoint> points;  // tracked readings, times never falling
     std::size_t untracked = 0;       // readings without a pose
-    std::size_t run_back = 0;        // dropped: earlier than a reading before them, or not finite
+    std::size_t run_back = 0;        // dropped: earlier than a reading before, or not finite
     double longest_gap_s = 0;        // between neighbours that are kept
 };
 
@@ -34,24 +35,26 @@ struct MotionOptions {
     double action_speed_mm_s = 50;
     double action_speed_deg_s = 50;
     double action_pause_s = 0.2;
-    // Of the filtered path: a local quadratic in time, Gaussian weights of this standard deviation,
+    // Standard deviation of the Gaussian weights of the filtered path: local quadratics in time,
     // joined by a cubic spline.
     double filter_s = 0.05;
 };
 
 // NaN: not defined for this track.
 struct MotionMetrics {
-    double elapsed_time_s;
-    double path_length_mm;           // sum of straight steps between readings
-    double filtered_path_length_mm;  // of the filtered path: does not grow with rate and jitter
-    double average_velocity_mm_s;
-    double motion_smoothness_mm_s3;
-    double path_inefficiency_percent;
-    double translational_actions;
-    double rotational_actions;
-    double rotation_total_deg;
-    Vector3 bounding_box_mm;  // extents
-    double bounding_box_mm3;
+    static constexpr double kUndefined = std::numeric_limits<double>::quiet_NaN();
+    double elapsed_time_s = kUndefined;
+    double path_length_mm = kUndefined;  // sum of straight steps between readings
+    double filtered_path_length_mm =
+        kUndefined;  // of the filtered path: does not grow with rate and jitter
+    double average_velocity_mm_s = kUndefined;
+    double motion_smoothness_mm_s3 = kUndefined;
+    double path_inefficiency_percent = kUndefined;
+    double translational_actions = kUndefined;
+    double rotational_actions = kUndefined;
+    double rotation_total_deg = kUndefined;
+    Vector3 bounding_box_mm{kUndefined, kUndefined, kUndefined};  // extents
+    double bounding_box_mm3 = kUndefined;
 };
 
 // Linear in the number of readings.

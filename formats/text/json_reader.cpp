@@ -12,7 +12,7 @@ const Json& nothing() {
     return none;
 }
 
-// Keeps nothing of a text but what is wrong with it.
+// Parses a text and keeps only the message that says what is wrong with it.
 struct ErrorListener final : nlohmann::json_sax<Json> {
     std::string what;
 
@@ -34,8 +34,8 @@ struct ErrorListener final : nlohmann::json_sax<Json> {
     }
 };
 
-// The parser's message for a text that is not JSON. A second pass, and the parser's only way of
-// saying so without an exception.
+// The parser's message for a text that is not JSON. This second pass is the only way to get it
+// without an exception.
 std::string parse_error_of(std::string_view text) {
     ErrorListener listener;
     Json::sax_parse(text.begin(), text.end(), &listener);
@@ -52,7 +52,7 @@ JsonObject::JsonObject(const Json& value, std::string path, JsonFault& fault)
     }
 }
 
-void JsonObject::complain(const char* key, const std::string& what, const std::string& expected) {
+void JsonObject::add_fault(const char* key, const std::string& what, const std::string& expected) {
     if (fault_->error) return;
     fault_->error =
         Error{(path_.empty() ? "" : path_ + ".") + key + " " + what, fault_->where, expected};
@@ -61,7 +61,7 @@ void JsonObject::complain(const char* key, const std::string& what, const std::s
 const Json* JsonObject::member(const char* key) {
     const auto found = value_->find(key);
     if (found == value_->end()) {
-        complain(key, "is missing");
+        add_fault(key, "is missing");
         return nullptr;
     }
     return &*found;
@@ -82,7 +82,7 @@ std::string JsonObject::text(const char* key) {
     const Json* found = member(key);
     if (!found) return {};
     if (!found->is_string()) {
-        complain(key, "is not text");
+        add_fault(key, "is not text");
         return {};
     }
     return found->get<std::string>();
@@ -96,7 +96,7 @@ bool JsonObject::flag_or(const char* key, bool otherwise) {
     if (!has(key)) return otherwise;
     const Json* found = member(key);
     if (!found->is_boolean()) {
-        complain(key, "is neither true nor false");
+        add_fault(key, "is neither true nor false");
         return otherwise;
     }
     return found->get<bool>();
@@ -106,7 +106,7 @@ double JsonObject::number(const char* key) {
     const Json* found = member(key);
     if (!found) return 0;
     if (!found->is_number() || !std::isfinite(found->get<double>())) {
-        complain(key, "is not a number");
+        add_fault(key, "is not a number");
         return 0;
     }
     return found->get<double>();
@@ -120,7 +120,7 @@ std::int64_t JsonObject::integer(const char* key, std::int64_t low, std::int64_t
     const double value = number(key);
     if (value != std::floor(value) || value < static_cast<double>(low) ||
         value > static_cast<double>(high)) {
-        complain(
+        add_fault(
             key, "is out of range",
             "expected a whole number from " + std::to_string(low) + " to " + std::to_string(high));
         return low;
@@ -139,13 +139,13 @@ std::vector<double> JsonObject::numbers(const char* key, std::size_t count) {
     const Json* found = member(key);
     std::vector<double> values;
     if (found && (!found->is_array() || (count != 0 && found->size() != count))) {
-        complain(key, "has the wrong shape",
-                 "expected a list of " + std::to_string(count) + " numbers");
+        add_fault(key, "has the wrong shape",
+                  "expected a list of " + std::to_string(count) + " numbers");
     } else if (found) {
         values.reserve(found->size());
         for (const Json& item : *found) {
             if (!item.is_number() || !std::isfinite(item.get<double>())) {
-                complain(key, "holds something that is not a number");
+                add_fault(key, "holds something that is not a number");
                 break;
             }
             values.push_back(item.get<double>());
@@ -159,11 +159,11 @@ std::vector<std::string> JsonObject::texts_or_none(const char* key) {
     std::vector<std::string> out;
     if (!has(key)) return out;
     const Json* found = member(key);
-    if (!found->is_array()) complain(key, "is not a list");
+    if (!found->is_array()) add_fault(key, "is not a list");
     if (!ok()) return out;
     for (const Json& item : *found) {
         if (!item.is_string()) {
-            complain(key, "holds something that is not text");
+            add_fault(key, "holds something that is not text");
             return out;
         }
         out.push_back(item.get<std::string>());
@@ -190,7 +190,7 @@ JsonObject JsonObject::object(const char* key) {
 std::vector<JsonObject> JsonObject::objects(const char* key) {
     std::vector<JsonObject> out;
     const Json* found = member(key);
-    if (found && !found->is_array()) complain(key, "is not a list");
+    if (found && !found->is_array()) add_fault(key, "is not a list");
     if (!found || !ok()) return out;
     const std::string base = (path_.empty() ? "" : path_ + ".") + key;
     for (std::size_t i = 0; i < found->size(); ++i) {
@@ -201,11 +201,12 @@ std::vector<JsonObject> JsonObject::objects(const char* key) {
 
 void expect_format(JsonObject& object, const char* format, int version, const std::string& verb) {
     if (object.text("format") != format) {
-        object.complain("format", "is not '" + std::string(format) + "'",
-                        "give a file made by sonocase " + verb);
+        object.add_fault("format", "is not '" + std::string(format) + "'",
+                         "give a file made by sonocase " + verb);
     }
     if (object.integer("version", 0, INT32_MAX) > version) {
-        object.complain("version", "is newer than this program", "update it or " + verb + " again");
+        object.add_fault("version", "is newer than this program",
+                         "update it or " + verb + " again");
     }
 }
 
@@ -255,8 +256,8 @@ Rigid rigid_from(JsonObject object) {
     t.translation = object.vector("translation");
     // 1e-3: the rounding of nine entries printed with six decimals, with a margin.
     if (object.ok() && (orthonormality_error(t.rotation) > 1e-3 || determinant(t.rotation) < 0)) {
-        object.complain("rotation", "is not a rotation",
-                        "expected nine numbers, row by row, of a right-handed rotation");
+        object.add_fault("rotation", "is not a rotation",
+                         "expected nine numbers, row by row, of a right-handed rotation");
     }
     return t;
 }

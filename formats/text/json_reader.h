@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Checked reading of JSON objects. Include it in .cpp files only, because it exposes a third
-// party's type.
+// Checked reading of JSON objects. Include this header in .cpp files only, because it exposes a
+// third-party type.
 //
 // The first fault is kept, with the path of keys that leads to it ("labels[3].name"), and
 // everything read after it is a default: a parser reads straight through and looks at the fault
@@ -15,8 +15,7 @@
 #include <string>
 #include <vector>
 
-// Errors of the parser come back as values here; the rest of its exceptions are our mistakes and
-// abort.
+// Errors of the parser come back as values; its other exceptions are mistakes of ours and abort.
 #ifndef JSON_NOEXCEPTION
 #define JSON_NOEXCEPTION
 #endif
@@ -50,7 +49,7 @@ class JsonObject {
                             std::int64_t otherwise,
                             std::int64_t low,
                             std::int64_t high);
-    // `count` 0: any number of them.
+    // count 0: any number of numbers.
     std::vector<double> numbers(const char* key, std::size_t count);
     std::vector<std::string> texts_or_none(const char* key);
     Vector3 vector(const char* key);
@@ -58,7 +57,7 @@ class JsonObject {
     JsonObject object(const char* key);
     std::vector<JsonObject> objects(const char* key);
     const std::string& path() const { return path_; }
-    void complain(const char* key, const std::string& what, const std::string& expected = "");
+    void add_fault(const char* key, const std::string& what, const std::string& expected = "");
     bool ok() const { return !fault_->error; }
 
   private:
@@ -68,8 +67,8 @@ class JsonObject {
     JsonFault* fault_;
 };
 
-// Complains unless the object's "format" is `format` and its "version" at most `version`. `verb`
-// makes such files, as "calibrate" does; the complaint says to use it again.
+// Adds a fault unless the object's "format" is `format` and its "version" is at most `version`.
+// verb: what makes such files, as "calibrate" does; the fault says to use it again.
 void expect_format(JsonObject& object, const char* format, int version, const std::string& verb);
 // Parses text into `out`; false, with a fault, when it is not a JSON object.
 bool parse_json(std::string_view text, Json& out, JsonFault& fault);

@@ -14,7 +14,7 @@ namespace sonocase {
 // a into b (optimal string alignment). O(|a| |b|) time, O(|b|) memory.
 int edit_distance(std::string_view a, std::string_view b);
 
-// The candidate nearest to `name`; the first of several. Empty when even the nearest is not a
+// The candidate nearest to `name`; of several the first. Empty when even the nearest is not a
 // likely typo: more edits away than a third of the longer name's length (one edit is always near
 // enough).
 std::string nearest_name(std::string_view name, std::span<const std::string> candidates);

@@ -20,7 +20,7 @@ locale_t plain_locale() {
     return plain;
 }
 
-// snprintf follows the locale as well: whatever stands for the decimal point becomes a point.
+// snprintf follows the locale as well: replaces its decimal separator by a point.
 void append_printed(std::string& out, const char* printed) {
     bool in_separator = false;
     for (const char* c = printed; *c; ++c) {
@@ -32,6 +32,16 @@ void append_printed(std::string& out, const char* printed) {
         }
         in_separator = !plain;
     }
+}
+
+// format: with a star for the precision.
+std::string printed(const char* format, int precision, double value) {
+    if (!std::isfinite(value)) return number_text(value);
+    std::array<char, 400> buffer;  // %f writes the 309 digits of the largest double
+    std::snprintf(buffer.data(), buffer.size(), format, precision, value);
+    std::string out;
+    append_printed(out, buffer.data());
+    return out;
 }
 
 }  // namespace
@@ -102,12 +112,11 @@ std::string number_text(double value) {
 }
 
 std::string number_text(double value, int digits) {
-    if (!std::isfinite(value)) return number_text(value);
-    std::array<char, 64> buffer;
-    std::snprintf(buffer.data(), buffer.size(), "%.*g", digits, value);
-    std::string out;
-    append_printed(out, buffer.data());
-    return out;
+    return printed("%.*g", digits, value);
+}
+
+std::string fixed_text(double value, int decimals) {
+    return printed("%.*f", decimals, value);
 }
 
 }  // namespace sonocase

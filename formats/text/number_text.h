@@ -17,8 +17,9 @@ bool parse_number(std::string_view text, std::int64_t& value);
 // Shortest text that reads back as the same double.
 void append_number(std::string& out, double value);
 std::string number_text(double value);
-// For people: `digits` significant digits.
+// For people: `digits` significant digits, or a fixed number of decimals.
 std::string number_text(double value, int digits);
+std::string fixed_text(double value, int decimals);
 
 std::string_view trimmed(std::string_view text);  // without blanks at either end
 

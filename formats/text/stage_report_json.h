@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Stage reports as JSON, their measures in an object of their own: manifests and registrations hold
-// a list of them, the stage cache single ones. A --report file is another form, with the measures
-// beside the other keys (pipeline/command_line).
+// Stage reports as JSON, with the measures in an object of their own: manifests and registrations
+// hold a list of them, the stage cache single ones. A --report file has another form, with the
+// measures beside the other keys.
 #pragma once
 
 #include <string>

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <utility>
 
-// toml++ 3.3 asserts of input what hostile input ("[[[") does not hold; without the assertion it
-// reports the error.
+// toml++ 3.3 has an assertion that hostile input ("[[[") breaks; without it, toml++ reports the
+// error.
 #define TOML_ASSERT(expr) static_cast<void>(0)
 #define TOML_EXCEPTIONS 0
 #define TOML_HEADER_ONLY 1
@@ -29,7 +29,7 @@ struct TomlTable::Part {
     std::shared_ptr<Document> document;
     const toml::table* table;
     std::string path;                // of keys, with a dot at the end: "targets[0]."
-    std::vector<std::string> asked;  // keys
+    std::vector<std::string> asked;  // keys that were asked for
 
     const toml::node* find(std::string_view key) {
         if (std::find(asked.begin(), asked.end(), key) == asked.end()) asked.emplace_back(key);
@@ -118,12 +118,12 @@ bool TomlTable::text(std::string_view key,
     const toml::node* node = part_->find(key);
     if (!node) return false;
     if (!node->is_string()) {
-        complain(key, "is " + plain_text_of(*node), "expected text in quotes");
+        add_fault(key, "is " + plain_text_of(*node), "expected text in quotes");
         return false;
     }
     const std::string& given = **node->as_string();
     if (!choices.empty() && std::find(choices.begin(), choices.end(), given) == choices.end()) {
-        complain(key, "has the unknown value '" + given + "'", suggest_name(given, choices));
+        add_fault(key, "has the unknown value '" + given + "'", suggest_name(given, choices));
         return false;
     }
     to = given;
@@ -141,13 +141,13 @@ bool TomlTable::texts(std::string_view key,
     } else if (const toml::array* list = node->as_array()) {
         for (const toml::node& item : *list) {
             if (!item.is_string()) {
-                complain(key, "holds " + plain_text_of(item), "expected texts in quotes");
+                add_fault(key, "holds " + plain_text_of(item), "expected texts in quotes");
                 return false;
             }
             items.push_back(**item.as_string());
         }
     } else {
-        complain(key, "is not a list", "expected a list of texts, as in [\"a\", \"b\"]");
+        add_fault(key, "is not a list", "expected a list of texts, as in [\"a\", \"b\"]");
         return false;
     }
     to = std::move(items);
@@ -163,11 +163,11 @@ bool TomlTable::number(
                                  (above_low ? " and up to " : " to ") + number_text(high, 6);
     const auto value = node->value<double>();
     if (!node->is_number() || !value) {
-        complain(key, "is " + plain_text_of(*node) + ", not a number", expected);
+        add_fault(key, "is " + plain_text_of(*node) + ", not a number", expected);
         return false;
     }
     if (!(*value >= low) || !(*value <= high) || (above_low && *value == low)) {
-        complain(key, "is " + plain_text_of(*node) + ", out of range", expected);
+        add_fault(key, "is " + plain_text_of(*node) + ", out of range", expected);
         return false;
     }
     to = *value;
@@ -178,7 +178,7 @@ bool TomlTable::whole(std::string_view key, int& to, double low, double high) co
     double value = 0;
     if (!number(key, value, low, high)) return false;
     if (value != std::floor(value)) {
-        complain(key, "is " + number_text(value, 6), "expected a whole number");
+        add_fault(key, "is " + number_text(value, 6), "expected a whole number");
         return false;
     }
     to = static_cast<int>(value);
@@ -189,12 +189,12 @@ bool TomlTable::numbers(std::string_view key,
                         std::vector<double>& to,
                         double low,
                         double high,
-                        std::size_t fewest,
-                        std::size_t most) const {
+                        std::size_t min_count,
+                        std::size_t max_count) const {
     const toml::node* node = part_->find(key);
     if (!node) return false;
     const toml::array* list = node->as_array();
-    bool good = list && list->size() >= fewest && list->size() <= most;
+    bool good = list && list->size() >= min_count && list->size() <= max_count;
     std::vector<double> read;
     for (std::size_t i = 0; good && i < list->size(); ++i) {
         const toml::node& item = *list->get(i);
@@ -203,9 +203,9 @@ bool TomlTable::numbers(std::string_view key,
         if (good) read.push_back(*value);
     }
     if (!good) {
-        complain(key, "is not such a list",
-                 "expected " + std::to_string(fewest) + " to " + std::to_string(most) +
-                     " numbers from " + number_text(low, 6) + " to " + number_text(high, 6));
+        add_fault(key, "is not such a list",
+                  "expected " + std::to_string(min_count) + " to " + std::to_string(max_count) +
+                      " numbers from " + number_text(low, 6) + " to " + number_text(high, 6));
         return false;
     }
     to = std::move(read);
@@ -216,7 +216,7 @@ bool TomlTable::flag(std::string_view key, bool& to) const {
     const toml::node* node = part_->find(key);
     if (!node) return false;
     if (!node->is_boolean()) {
-        complain(key, "is " + plain_text_of(*node), "expected true or false");
+        add_fault(key, "is " + plain_text_of(*node), "expected true or false");
         return false;
     }
     to = **node->as_boolean();
@@ -231,13 +231,13 @@ bool TomlTable::triple(std::string_view key, V& to) const {
     bool good = list && list->size() == 3;
     V read;
     for (int axis = 0; good && axis < 3; ++axis) {
-        const auto value = (*list)[static_cast<std::size_t>(axis)].value<double>();
+        const auto value = (*list)[axis].value<double>();
         good = value && std::isfinite(*value) && std::abs(*value) <= 1e5;
         if (good) read[axis] = *value;
     }
     if (!good) {
-        complain(key, "is not a list of 3 numbers",
-                 "expected numbers up to 1e5, as in [10, 20.5, 30]");
+        add_fault(key, "is not a list of 3 numbers",
+                  "expected numbers up to 1e5, as in [10, 20.5, 30]");
         return false;
     }
     to = read;
@@ -256,7 +256,7 @@ bool TomlTable::direction(std::string_view key, Vector3& to) const {
     Vector3 v;
     if (!triple(key, v)) return false;
     if (!(norm(v) > 1e-9)) {
-        complain(key, "is a direction of length zero", "expected a direction, as in [0, 0, 1]");
+        add_fault(key, "is a direction of length zero", "expected a direction, as in [0, 0, 1]");
         return false;
     }
     to = normalized(v);
@@ -280,7 +280,7 @@ std::optional<TomlTable> TomlTable::table(std::string_view key) const {
     const toml::node* node = part_->find(key);
     if (!node) return std::nullopt;
     if (!node->is_table()) {
-        complain(key, "is not a table", "expected [" + part_->path + std::string(key) + "]");
+        add_fault(key, "is not a table", "expected [" + part_->path + std::string(key) + "]");
         return std::nullopt;
     }
     return TomlTable(std::make_shared<Part>(
@@ -293,12 +293,12 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key) const {
     if (!node) return out;
     const toml::array* list = node->as_array();
     if (!list) {
-        complain(key, "is not a list of tables", "expected [[" + std::string(key) + "]]");
+        add_fault(key, "is not a list of tables", "expected [[" + std::string(key) + "]]");
         return out;
     }
     for (const toml::node& item : *list) {
         if (!item.is_table()) {
-            complain(key, "holds " + plain_text_of(item), "expected only tables");
+            add_fault(key, "holds " + plain_text_of(item), "expected only tables");
             return out;
         }
         const std::string index = "[" + std::to_string(out.size()) + "].";
@@ -318,9 +318,9 @@ void TomlTable::finish() const {
     }
 }
 
-void TomlTable::complain(std::string_view key,
-                         const std::string& what,
-                         const std::string& expected) const {
+void TomlTable::add_fault(std::string_view key,
+                          const std::string& what,
+                          const std::string& expected) const {
     const toml::node* node = part_->table->get(key);
     keep({part_->path + std::string(key) + " " + what,
           line_of(part_->document->where, node ? node->source() : part_->table->source()),

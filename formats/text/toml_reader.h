@@ -8,10 +8,10 @@
 //     root->finish();                         // keys that nothing asked for are errors
 //     if (root->fault()) return *root->fault();
 //
-// The first fault of the document is kept; everything after it reads on, so a parser runs straight
+// The first fault of the document is kept and reading goes on, so that a parser runs straight
 // through and looks at the fault once, at the end. A fault names the file and line
 // ("case.toml:12"), the key with the tables that lead to it ("targets[0].radius_mm"), what was
-// found and what is expected; for a name that is not known, the nearest one that is.
+// found and what is expected; for an unknown name, the nearest known one.
 //
 // A reading function leaves its result as it was where the key is absent or faulty. Those that
 // return bool return true when they have set it.
@@ -28,8 +28,8 @@
 
 namespace sonocase {
 
-// A table of a parsed document. Cheap to copy: copies mean the same table, and share what has been
-// asked for. The document lives as long as any of its tables.
+// A table of a parsed document. Cheap to copy: copies are the same table and share the list of keys
+// that were asked for. The document lives as long as any of its tables.
 class TomlTable {
   public:
     // `where` is the file's name, for faults. An error when the text is not TOML.
@@ -53,13 +53,13 @@ class TomlTable {
     bool number(
         std::string_view key, double& to, double low, double high, bool above_low = false) const;
     bool whole(std::string_view key, int& to, double low, double high) const;
-    // A list of `fewest` to `most` numbers, each from `low` to `high`.
+    // A list of min_count to max_count numbers, each from `low` to `high`.
     bool numbers(std::string_view key,
                  std::vector<double>& to,
                  double low,
                  double high,
-                 std::size_t fewest,
-                 std::size_t most) const;
+                 std::size_t min_count,
+                 std::size_t max_count) const;
     bool flag(std::string_view key, bool& to) const;
     bool point(std::string_view key, Point3& to) const;       // three coordinates, at most 1e5 mm
     bool vector(std::string_view key, Vector3& to) const;     // likewise
@@ -77,9 +77,12 @@ class TomlTable {
 
     // Call after every key has been asked for: any other is a fault.
     void finish() const;
-    // A fault of one's own: "KEY WHAT; EXPECTED", at the line of the key, or of the table.
-    void complain(std::string_view key, const std::string& what, const std::string& expected) const;
-    // A fault found elsewhere, with a place of its own.
+    // Adds a fault that the caller found: "KEY WHAT; EXPECTED", at the line of the key or the
+    // table.
+    void add_fault(std::string_view key,
+                   const std::string& what,
+                   const std::string& expected) const;
+    // Adds a fault that has a place of its own.
     void keep(Error error) const;
     const std::optional<Error>& fault() const;
 
@@ -92,7 +95,7 @@ class TomlTable {
     std::shared_ptr<Part> part_;
 };
 
-// What a fault of toml++ (error.description()) says, as an Error of ours.
+// Makes an Error of a fault of toml++ (error.description()).
 Error toml_fault(std::string_view description, const std::string& where);
 
 }  // namespace sonocase

@@ -10,7 +10,7 @@ namespace sonocase {
 namespace {
 
 std::uint32_t signed_byte(double value) {
-    // To the nearest, halves away from zero.
+    // Rounds to the nearest, halves away from zero.
     const auto r = static_cast<std::int32_t>(std::min(std::abs(value), 127.0) + 0.5);
     return static_cast<std::uint32_t>(value < 0 ? -r : r) & 0xFFu;
 }

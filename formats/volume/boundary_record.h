@@ -3,7 +3,7 @@
 // Where the surface between two labels runs through a voxel's neighbourhood, in four bytes.
 //
 //     d(x) = distance + normal . (x - x_voxel)
-//     label at x: the voxel's own label where d(x) >= 0, else the second label
+//     label at x: the voxel's own label where d(x) >= 0, otherwise the second label
 //
 // x in voxels of the cooked grid; the normal is a unit vector that points into the voxel's own
 // label. Packed: bits 0-7 second label, 8-15 distance (signed, 1/48 voxel, so +-2.6 voxels), 16-23

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "formats/base/geometry.h"
-#include "formats/base/raw_vector.h"
+#include "formats/base/memory.h"
 
 namespace sonocase {
 

@@ -23,7 +23,7 @@ Status check_region(const FineRegion& region, double case_voxel_mm, const std::s
     if (h.x != h.y || h.x != h.z || region.grid.direction != Matrix3{})
         return Error{"the voxels of the fine region are not cubes along the axes", where,
                      "cook the case again"};
-    if (!(h.x >= kFinestRegionMm && h.x < case_voxel_mm))
+    if (!(h.x >= kMinRegionVoxelMm && h.x < case_voxel_mm))
         return Error{"the fine region has voxels of " + std::to_string(h.x) + " mm", where,
                      "0.1 mm or more, and less than the case's " + std::to_string(case_voxel_mm)};
     for (int a = 0; a < 3; ++a) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Solid textures and the speckle volume: both tessellate in x, y and z.
+// Solid textures and the speckle volume. Both repeat seamlessly in x, y and z.
 #pragma once
 
 #include <cstdint>

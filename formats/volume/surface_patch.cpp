@@ -10,8 +10,9 @@
 namespace sonocase {
 namespace {
 
-// Compiles loops over a brick's voxels for the widest registers of the machine. They work on whole
-// numbers but for the division and rounding of the direction, which round alike on every machine.
+// Compiles loops over a brick's voxels for the widest registers of the machine. They work on
+// integers, except for the division and rounding of the direction, which round alike on every
+// machine.
 #if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define SONOCASE_WIDEST __attribute__((target_clones("avx2", "default")))
@@ -53,7 +54,7 @@ inline std::int32_t rounded(float v) {  // |v| <= 128
     return static_cast<std::int32_t>(v + 256.5f) - 256;
 }
 
-// Distance and direction packed as boundary_record.h has them, without the second label.
+// Distance and direction packed as in boundary_record.h, without the second label.
 inline std::uint32_t packed_plane(std::int32_t steps,
                                   std::int32_t x,
                                   std::int32_t y,
@@ -87,7 +88,7 @@ SONOCASE_WIDEST void records_from_one(const SurfacePatch& patch,
         const std::int32_t x = kPlaces.x[v], y = kPlaces.y[v], z = kPlaces.z[v];
         const std::int32_t side = label[v] == low ? 1 : -1;
         const std::int32_t steps = steps_of(std::max(side * distance_at(c, v), 0));
-        // 512 times q's change a half voxel along each axis.
+        // 512 times the change of q over half a voxel along each axis.
         const std::int32_t gx = 4 * c[1] + 2 * c[4] * x + c[7] * y + c[8] * z,
                            gy = 4 * c[2] + c[7] * x + 2 * c[5] * y + c[9] * z,
                            gz = 4 * c[3] + c[8] * x + c[9] * y + 2 * c[6] * z;
@@ -105,16 +106,16 @@ std::uint32_t nearer_of(std::uint32_t record, std::uint32_t other) {
     return nearer ? other : record;
 }
 
-// The 10 monomials of q are fitted in voxels. Only the lower half of the normal equations' matrix
-// is kept, row by row. What a voxel's record adds to it depends on the voxel's position alone, and
-// is a multiple of 1/16, so that its sums are exact in any order.
+// The 10 monomials of q are fitted in voxels. Only the lower half of the matrix of the normal
+// equations is kept, row by row. What a voxel's record adds to it depends only on the voxel's
+// position and is a multiple of 1/16, so that the sums are exact in any order.
 constexpr int kMatrix = kPatchCoefficients * (kPatchCoefficients + 1) / 2;
 constexpr int entry(int i, int j) {
     return i * (i + 1) / 2 + j;
 }
 
-// The four terms of the derivative along each axis. That the gradient should have length 1 makes q
-// a distance, and keeps the fit stable where there are few records.
+// The four terms of the derivative along each axis. Fitting them to unit normals makes q a distance
+// and keeps the fit stable where there are few records.
 constexpr int kSlopeAt[3][4] = {{1, 4, 7, 8}, {2, 5, 7, 9}, {3, 6, 8, 9}};
 
 struct Terms {
@@ -146,7 +147,7 @@ constexpr std::array<Terms, kBrickVoxels> terms_of_voxels() {
 }
 alignas(64) constexpr std::array<Terms, kBrickVoxels> kTerms = terms_of_voxels();
 
-// What a patch is fitted to: records of some voxels, signed from the patch's side.
+// The records that a patch is fitted to, signed from the patch's side.
 struct Samples {
     std::size_t count = 0;
     std::array<std::uint8_t, kBrickVoxels> voxel;
@@ -172,7 +173,8 @@ struct Fit {
         }
     }
 
-    // Cholesky. A small penalty on the curvatures decides what too few records leave undetermined.
+    // By Cholesky factors. A small penalty on the curvatures decides what too few records leave
+    // open.
     void solve(double* c) {
         constexpr double kCurvaturePenalty = 0.1, kRegularisation = 1e-9;
         double l[kPatchCoefficients][kPatchCoefficients];
@@ -226,10 +228,10 @@ SurfacePatch continued(const SurfacePatch& patch, int axis) {
     const int square = 4 + axis;
     const int cross[3][2] = {{7, 8}, {7, 9}, {8, 9}};  // the products that the axis is part of
     const int other[3][2] = {{2, 3}, {1, 3}, {1, 2}};  // and the linear terms that they add to
-    const auto at = [&](int i) { return static_cast<int>(patch.c[static_cast<std::size_t>(i)]); };
+    const auto at = [&](int i) { return static_cast<int>(patch.c[i]); };
     SurfacePatch out = patch;
     const auto put = [&](int i, int value) {  // wraps around on invalid input, as the reader does
-        out.c[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(value);
+        out.c[i] = static_cast<std::int16_t>(value);
     };
     put(0, at(0) + 2 * at(1 + axis) + 4 * at(square));
     put(1 + axis, at(1 + axis) + 4 * at(square));
@@ -272,10 +274,10 @@ std::vector<SurfacePatch> fit_patches(const BrickLabels& labels,
         fit.solve(c);
         for (int i = 0; i < kPatchCoefficients; ++i) {
             const double unit = (i == 0 ? 32.0 : i < 4 ? 64.0 : 128.0) / step;
-            const int most_steps = 32767 / step;  // whole steps that 16 bits hold
-            const double most = most_steps;
-            patch.c[static_cast<std::size_t>(i)] =
-                static_cast<std::int16_t>(step * std::lround(std::clamp(unit * c[i], -most, most)));
+            const int max_steps = 32767 / step;  // whole steps that 16 bits hold
+            const double max = max_steps;
+            patch.c[i] =
+                static_cast<std::int16_t>(step * std::lround(std::clamp(unit * c[i], -max, max)));
         }
         out.push_back(patch);
     }

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A piece of the surface between two labels inside one brick, as a quadric: a few bytes that stand
-// for the labels and boundary records of 64 voxels.
+// A piece of the surface between two labels inside one brick, as a quadric: a few bytes that
+// replace the labels and boundary records of 64 voxels.
 //
 //     q(u) = c0 + sum c_i u_i + sum_{i <= j} c_ij u_i u_j,   u = voxel - centre of brick, voxels
 //
 // q >= 0 on the side of label `low`. |q| is the distance to the surface and grad q its normal's
 // direction, so that q has to be close to a signed distance near its zero. Coefficients are whole
-// numbers of 1/32 (c0), 1/64 (c_i) and 1/128 (c_ij); all arithmetic is in integers but for the
-// direction's division, so that every machine makes the same bytes. docs/format.md, part 2.
+// multiples of 1/32 (c0), 1/64 (c_i) and 1/128 (c_ij). All arithmetic is in integers, except for
+// the division of the direction, so that every machine makes the same bytes. docs/format.md, part
+// 2.
 #pragma once
 
 #include <array>
@@ -35,9 +36,10 @@ using BrickRecords = std::array<std::uint32_t, kBrickVoxels>;
 // The side of the patch that each voxel lies on.
 void labels_from_patch(const SurfacePatch& patch, std::uint8_t* labels);
 
-// Boundary records of a brick with these labels: the nearest of the patches that separate a voxel's
-// label from another; none if that is further away than reach_steps of 1/48 voxel (1 to 127). A
-// voxel on the wrong side of its own patch has distance 0. Constant time; writes 64 records.
+// Writes the 64 boundary records of a brick with these labels. A voxel's record is made from the
+// nearest of the patches that separate its label from another; there is none if that lies farther
+// away than reach_steps of 1/48 voxel (1 to 127). A voxel on the wrong side of its own patch has
+// distance 0. Constant time.
 void records_from_patches(std::span<const SurfacePatch> patches,
                           const std::uint8_t* labels,
                           int reach_steps,
@@ -47,8 +49,8 @@ void records_from_patches(std::span<const SurfacePatch> patches,
 // brick's patch.
 SurfacePatch continued(const SurfacePatch& patch, int axis);
 
-// Least squares through the records' distances and normals, one patch for each pair of labels that
-// they separate, in the order of the pairs; coefficients are multiples of `step`. Empty: no
+// Fits the records' distances and normals by least squares, with one patch for each pair of labels
+// that they separate, in the order of the pairs; coefficients are multiples of `step`. Empty: no
 // records, or more than kMaxPatches pairs. Cost: 2 us per patch.
 std::vector<SurfacePatch> fit_patches(const BrickLabels& labels,
                                       const BrickRecords& records,

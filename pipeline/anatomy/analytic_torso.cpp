@@ -2,14 +2,17 @@
 
 #include "pipeline/anatomy/analytic_torso.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <random>
 
-#include "pipeline/anatomy/torso/torso_anatomy.h"
-#include "pipeline/anatomy/torso/trunk.h"
+#include "formats/base/constants.h"
+#include "pipeline/anatomy/torso_anatomy.h"
 #include "pipeline/base/parallel.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline anatomy {
+
 namespace {
 
 const TorsoAnatomy& anatomy_of(const AnalyticBody& body) {
@@ -75,7 +78,7 @@ double analytic_torso_signed_distance(int label, Point3 ct, double reach_mm) {
 Grid analytic_torso_grid(Vector3 spacing_mm) {
     Grid grid;
     grid.spacing_mm = spacing_mm;
-    const Vector3 half{175, 130, kTorsoHalfHeight_mm};
+    const Vector3 half{175, 130, kTorsoHalfHeightMm};
     for (int a = 0; a < 3; ++a) {
         grid.size[a] = static_cast<int>(std::floor(2 * half[a] / spacing_mm[a])) + 1;
         grid.origin_mm[a] = -0.5 * spacing_mm[a] * (grid.size[a] - 1);
@@ -86,7 +89,7 @@ Grid analytic_torso_grid(Vector3 spacing_mm) {
 LabelVolume sample_analytic_torso(const Grid& grid, const AnalyticBody& body) {
     LabelVolume out{grid, std::vector<std::uint8_t>(grid.voxel_count()),
                     analytic_torso_labels(body)};
-    parallel_for(static_cast<std::size_t>(grid.size.z), 1, [&](std::size_t begin, std::size_t end) {
+    parallel_for(grid.size.z, 1, [&](std::size_t begin, std::size_t end) {
         for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
             for (int j = 0; j < grid.size.y; ++j) {
                 for (int i = 0; i < grid.size.x; ++i) {
@@ -124,8 +127,7 @@ Registration analytic_torso_truth(double strength, const AnalyticBody& body) {
     for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 9; ++c) {
             for (int a = 0; a < 3; ++a) {
-                truth.quadratic
-                    .coefficients[static_cast<std::size_t>(r)][static_cast<std::size_t>(c + 1)] +=
+                truth.quadratic.coefficients[r][c + 1] +=
                     strength * rigid.rotation(r, a) * extra[a][c];
             }
         }
@@ -134,4 +136,102 @@ Registration analytic_torso_truth(double strength, const AnalyticBody& body) {
     return truth;
 }
 
-}  // namespace sonocase::pipeline
+// The mannequin: its readings, mesh and landmarks.
+
+namespace {
+
+// Not std::normal_distribution, whose sequence differs between standard libraries.
+class Gaussian {
+  public:
+    explicit Gaussian(std::uint64_t seed) : engine_(seed) {}
+    double uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+    double operator()() {
+        const double u = 1 - uniform(), v = uniform();
+        return std::sqrt(-2 * std::log(u)) * std::cos(2 * kPi * v);
+    }
+
+  private:
+    std::mt19937_64 engine_;
+};
+
+}  // namespace
+
+Surface analytic_torso_mannequin(const AnalyticMannequinOptions& options,
+                                 const AnalyticBody& body) {
+    const Registration truth = analytic_torso_truth(options.strength, body);
+    const double low = -kTorsoHalfHeightMm - 30, high = kTorsoHalfHeightMm + 30;
+    const auto skin_point = [&](double theta, double z) {
+        const Point3 p = trunk_point(theta, z, 0, body.belly_mm);
+        return mannequin_from_ct(truth, {p.x * body.width_scale, p.y * body.depth_scale, p.z});
+    };
+    Surface out;
+    if (options.mesh) {
+        // Nearly square cells: the trunk has a circumference of 800 mm and is 370 mm tall.
+        const int columns =
+            std::max(12, static_cast<int>(std::lround(std::sqrt(options.points * 800.0 / 370.0))));
+        const int rows = std::max(6, options.points / columns);
+        for (int r = 0; r < rows; ++r) {
+            for (int c = 0; c < columns; ++c) {
+                out.points.push_back(
+                    skin_point(2 * kPi * c / columns, low + (high - low) * r / (rows - 1)));
+            }
+        }
+        for (int r = 0; r + 1 < rows; ++r) {
+            for (int c = 0; c < columns; ++c) {
+                const auto at = [&](int row, int column) {
+                    return static_cast<std::uint32_t>(row * columns + column % columns);
+                };
+                out.triangles.push_back({at(r, c), at(r, c + 1), at(r + 1, c + 1)});
+                out.triangles.push_back({at(r, c), at(r + 1, c + 1), at(r + 1, c)});
+            }
+        }
+        return out;
+    }
+    Gaussian gaussian(options.seed);
+    while (static_cast<int>(out.points.size()) < options.points) {
+        const double theta = 2 * kPi * gaussian.uniform();
+        const double z = low + (high - low) * gaussian.uniform();
+        if (options.front_only && std::sin(theta) < -0.3) continue;
+        const Point3 p = skin_point(theta, z);
+        const double nx = gaussian(), ny = gaussian(), nz = gaussian();
+        out.points.push_back(p + options.noise_mm * Vector3{nx, ny, nz});
+    }
+    return out;
+}
+
+std::vector<AnalyticLandmark> analytic_torso_landmarks(int count,
+                                                       double noise_mm,
+                                                       const AnalyticMannequinOptions& options,
+                                                       const AnalyticBody& body) {
+    const struct {
+        const char* name;
+        double theta, z;  // direction from the axis, 0 right, pi/2 front; height, mm
+    } places[] = {{"navel", 0.5 * kPi, -40},
+                  {"xiphoid", 0.5 * kPi, 105},
+                  {"spinous_process_L4", 1.5 * kPi, -80},
+                  {"hip_bone_right", 0.12 * kPi, -105},
+                  {"hip_bone_left", 0.88 * kPi, -105},
+                  {"costal_margin_right", 0.2 * kPi, 35},
+                  {"costal_margin_left", 0.8 * kPi, 35},
+                  {"spinous_process_T10", 1.5 * kPi, 120},
+                  {"pubis", 0.5 * kPi, -145},
+                  {"rib_9_right", 0, 90},
+                  {"rib_9_left", kPi, 90},
+                  {"loin_right", 1.72 * kPi, -20},
+                  {"loin_left", 1.28 * kPi, -20},
+                  {"sacrum", 1.5 * kPi, -145}};
+    const Registration truth = analytic_torso_truth(options.strength, body);
+    Gaussian noise(options.seed + 1000);
+    std::vector<AnalyticLandmark> marks;
+    for (const auto& place : places) {
+        if (static_cast<int>(marks.size()) >= count) break;
+        const Point3 p = trunk_point(place.theta, place.z, 0, body.belly_mm);
+        const Point3 ct{p.x * body.width_scale, p.y * body.depth_scale, p.z};
+        const double nx = noise(), ny = noise(), nz = noise();
+        marks.push_back(
+            {place.name, ct, mannequin_from_ct(truth, ct) + noise_mm * Vector3{nx, ny, nz}});
+    }
+    return marks;
+}
+
+}  // namespace sonocase::pipeline::inline anatomy

@@ -15,11 +15,11 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/registration/registration.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/surface.h"
+#include "pipeline/registration/map/registration.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline anatomy {
 
 // The torso with other proportions, such that there is more than one known truth.
 struct AnalyticBody {
@@ -84,4 +84,4 @@ std::vector<AnalyticLandmark> analytic_torso_landmarks(int count,
                                                        const AnalyticMannequinOptions& options = {},
                                                        const AnalyticBody& body = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline anatomy

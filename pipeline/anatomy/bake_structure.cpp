@@ -5,24 +5,26 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
-#include "pipeline/anatomy/structure/boundary_layers.h"
-#include "pipeline/anatomy/structure/liver_vessels.h"
-#include "pipeline/anatomy/structure/voxel_structure.h"
+#include "pipeline/anatomy/boundary_layers.h"
+#include "pipeline/anatomy/liver_vessels.h"
+#include "pipeline/anatomy/voxel_structure.h"
 #include "pipeline/base/counter_random.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/base/stopwatch.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline anatomy {
+
 namespace {
 
-constexpr int kBlock = 32;         // voxels per edge of a block of BoundaryLayers
-constexpr float kLargest_db = 31;  // that an int8 of quarters holds
+constexpr int kBlock = 32;    // voxels per edge of a block of BoundaryLayers
+constexpr float kMaxDb = 31;  // that an int8 of quarters holds
 
 // A whole number of dB, in quarters.
 std::int8_t stored(float db) {
-    return static_cast<std::int8_t>(
-        4 * static_cast<int>(std::lround(std::clamp(db, -kLargest_db, kLargest_db))));
+    return static_cast<std::int8_t>(4 *
+                                    static_cast<int>(std::lround(std::clamp(db, -kMaxDb, kMaxDb))));
 }
 
 // Tissue of each label, # palette.
@@ -91,9 +93,7 @@ std::vector<std::int8_t> bake_voxels(const LabelVolume& cooked,
     std::vector<std::int8_t> offsets(cooked.voxels.size(), 0);
     const Int3 blocks{(size.x + kBlock - 1) / kBlock, (size.y + kBlock - 1) / kBlock,
                       (size.z + kBlock - 1) / kBlock};
-    const std::size_t block_count = static_cast<std::size_t>(blocks.x) *
-                                    static_cast<std::size_t>(blocks.y) *
-                                    static_cast<std::size_t>(blocks.z);
+    const std::size_t block_count = static_cast<std::size_t>(blocks.x) * blocks.y * blocks.z;
     parallel_for(block_count, 1, [&](std::size_t begin, std::size_t end) {
         BoundaryLayers layers;
         for (std::size_t b = begin; b < end; ++b) {
@@ -117,8 +117,8 @@ double level_labels(const LabelVolume& cooked,
                     const std::vector<LabelFacts>& facts,
                     std::vector<std::int8_t>* offsets) {
     const Int3 size = cooked.grid.size;
-    std::vector<std::vector<std::int64_t>> slice_sums(static_cast<std::size_t>(size.z));
-    const std::size_t slice = static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
+    std::vector<std::vector<std::int64_t>> slice_sums(size.z);
+    const std::size_t slice = static_cast<std::size_t>(size.x) * size.y;
     parallel_for(slice_sums.size(), 4, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             slice_sums[k].assign(256, 0);
@@ -159,12 +159,11 @@ Result<BakeStructureResult> bake_structure(const LabelVolume& cooked,
         std::abs(spacing.x - spacing.z) > 1e-6 * spacing.x) {
         return Error{"voxels are not cubes", "label volume", "resample the labels first"};
     }
-    const auto tissue_of = tissues_of(cooked, tissues);
-    if (!tissue_of) return tissue_of.error();
+    SONOCASE_TRY(const auto tissue_of, tissues_of(cooked, tissues));
     BakeStructureResult out;
-    out.report.stage = "structure";
+    out.report.stage = stage_names::kStructure;
     report_progress(progress, 0, "finding organs");
-    const VoxelStructure structure(cooked, *tissue_of, options);
+    const VoxelStructure structure(cooked, tissue_of, options);
     const std::vector<LabelFacts>& facts = structure.facts();
     for (const FibreField& f : structure.directions().fields) {
         if (f.label > 0) out.fibres.push_back(f);
@@ -196,4 +195,57 @@ Result<BakeStructureResult> bake_structure(const LabelVolume& cooked,
     return out;
 }
 
-}  // namespace sonocase::pipeline
+int structure_cell(double voxel_mm) {
+    for (const int cell : {4, 2}) {
+        if (cell * voxel_mm <= kStructureCellMm * 1.0001) return cell;
+    }
+    return 1;
+}
+
+Result<BakeStructureResult> bake_structure_in_cells(const LabelVolume& cooked,
+                                                    std::span<const Tissue> tissues,
+                                                    const BakeStructureOptions& options,
+                                                    const Progress& progress) {
+    const Grid& fine = cooked.grid;
+    const int cell = structure_cell(fine.spacing_mm.x);
+    if (cell == 1) return bake_structure(cooked, tissues, options, progress);
+    LabelVolume coarse;
+    coarse.labels = cooked.labels;
+    coarse.grid = fine;
+    for (int a = 0; a < 3; ++a) {
+        coarse.grid.size[a] = (fine.size[a] + cell - 1) / cell;
+        coarse.grid.spacing_mm[a] = cell * fine.spacing_mm[a];
+    }
+    const double middle = 0.5 * (cell - 1);
+    coarse.grid.origin_mm = fine.point_from_voxel({middle, middle, middle});
+    coarse.voxels.resize(coarse.grid.voxel_count());
+    const auto inside = [&](int at, int size) { return std::min(at * cell + cell / 2, size - 1); };
+    parallel_for(coarse.grid.size.z, 4, [&](std::size_t b, std::size_t e) {
+        for (int k = static_cast<int>(b); k < static_cast<int>(e); ++k) {
+            for (int j = 0; j < coarse.grid.size.y; ++j) {
+                const std::uint8_t* row =
+                    cooked.voxels.data() +
+                    fine.index(0, inside(j, fine.size.y), inside(k, fine.size.z));
+                std::uint8_t* to = coarse.voxels.data() + coarse.grid.index(0, j, k);
+                for (int i = 0; i < coarse.grid.size.x; ++i) to[i] = row[inside(i, fine.size.x)];
+            }
+        }
+    });
+    auto baked = bake_structure(coarse, tissues, options, progress);
+    if (!baked) return baked;
+    const std::vector<std::int8_t> values = dense_from_bricks(baked->echo_offset);
+    std::vector<std::int8_t> offsets(fine.voxel_count());
+    parallel_for(fine.size.z, 4, [&](std::size_t b, std::size_t e) {
+        for (int k = static_cast<int>(b); k < static_cast<int>(e); ++k) {
+            for (int j = 0; j < fine.size.y; ++j) {
+                const std::int8_t* row = values.data() + coarse.grid.index(0, j / cell, k / cell);
+                std::int8_t* to = offsets.data() + fine.index(0, j, k);
+                for (int i = 0; i < fine.size.x; ++i) to[i] = row[i / cell];
+            }
+        }
+    });
+    baked->echo_offset = bricks_from_dense<std::int8_t>(offsets, fine.size);
+    return baked;
+}
+
+}  // namespace sonocase::pipeline::inline anatomy

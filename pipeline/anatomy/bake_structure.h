@@ -8,7 +8,7 @@
 //
 //   parenchyma     smooth noise of Tissue::structure_db, grain 3 to 5 mm, in every soft tissue
 //   liver_vessels  portal and hepatic venous trees grown from the labelled roots, with dark lumen
-//                  and bright portal walls (structure/vessel_tree.h)
+//                  and bright portal walls (liver_vessels.h)
 //   kidney         cortex, pyramids and the sinus fat between them
 //   muscle_fibres  fascicles along the axis of a long muscle, or around the body in sheets;
 //                  2 voxels and at least 1.6 mm thick, 8 mm long (full widths)
@@ -33,12 +33,22 @@
 #include "formats/volume/brick_volume.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/tissue.h"
-#include "pipeline/anatomy/structure/muscle_directions.h"
-#include "pipeline/anatomy/structure/structure_options.h"
-#include "pipeline/anatomy/structure/vessel_tree.h"
+#include "pipeline/anatomy/liver_vessels.h"
+#include "pipeline/anatomy/muscle_fibres.h"
 #include "pipeline/base/progress.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline anatomy {
+
+struct BakeStructureOptions {
+    std::uint64_t seed = 1;
+    bool parenchyma = true;
+    bool liver_vessels = true;
+    bool kidney = true;
+    bool muscle_fibres = true;
+    bool fat_septa = true;
+    bool bowel_wall = true;
+    bool fascia = true;
+};
 
 struct BakeStructureResult {
     BrickVolume<std::int8_t> echo_offset;  // quarter dB, size of the grid
@@ -55,4 +65,22 @@ Result<BakeStructureResult> bake_structure(const LabelVolume& cooked,
                                            const BakeStructureOptions& options = {},
                                            const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+// Volumes finer than the structure itself have one echo offset per cell of 2 or 4 voxels per edge.
+//
+// bake_structure draws no detail below a millimetre that would remain visible under speckle, and
+// smaller voxels can therefore share a value: with an eighth of the values, in an eighth of the
+// time. A cell takes the label at its centre; at a surface, the offset of one side may extend half
+// a cell into the other.
+
+inline constexpr double kStructureCellMm = 1;
+
+// Voxels per edge of a cell: 1, 2 or 4, the largest that is within kStructureCellMm.
+int structure_cell(double voxel_mm);
+
+// Like bake_structure; echo_offset is on the grid of `cooked`.
+Result<BakeStructureResult> bake_structure_in_cells(const LabelVolume& cooked,
+                                                    std::span<const Tissue> tissues,
+                                                    const BakeStructureOptions& options = {},
+                                                    const Progress& progress = {});
+
+}  // namespace sonocase::pipeline::inline anatomy

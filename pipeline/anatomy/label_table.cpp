@@ -7,9 +7,9 @@
 
 #include "formats/files/atomic_file.h"
 #include "pipeline/anatomy/tissue_table.h"
-#include "pipeline/base/delimited_text.h"
+#include "pipeline/base/text.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline anatomy {
 namespace {
 
 // A whole number from -2^31 to 2^31 - 1.
@@ -29,7 +29,7 @@ int column_named(const TextRow& header, std::initializer_list<const char*> names
 
 std::string cell_at(const TextRow& row, int column) {
     if (column < 0 || static_cast<std::size_t>(column) >= row.cells.size()) return {};
-    return row.cells[static_cast<std::size_t>(column)];
+    return row.cells[column];
 }
 
 std::string decoded_entities(std::string_view text) {
@@ -84,7 +84,7 @@ std::uint8_t colour_byte(double value, bool unit) {
 std::string_view totalsegmentator_name(int value) {
     const auto names = total_segmentator_labels();
     if (value < 1 || static_cast<std::size_t>(value) > names.size()) return {};
-    return names[static_cast<std::size_t>(value - 1)];
+    return names[value - 1];
 }
 
 int totalsegmentator_value(std::string_view name) {
@@ -129,9 +129,8 @@ Result<LabelTable> parse_label_csv(std::string_view csv, const std::string& wher
 }
 
 Result<LabelTable> load_label_csv(const std::string& path) {
-    auto text = read_text_file(path);
-    if (!text) return text.error();
-    return parse_label_csv(*text, path);
+    SONOCASE_TRY(auto text, read_text_file(path));
+    return parse_label_csv(text, path);
 }
 
 Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& where) {
@@ -229,4 +228,4 @@ Result<LabelTable> segments_of_fields(const std::map<std::string, std::string>& 
     return table;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline anatomy

@@ -19,7 +19,7 @@
 
 #include "formats/base/result.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline anatomy {
 
 struct LabelTableEntry {
     int value = 0;
@@ -41,10 +41,8 @@ int totalsegmentator_value(std::string_view name);
 Result<LabelTable> parse_label_csv(std::string_view csv, const std::string& where);
 Result<LabelTable> load_label_csv(const std::string& path);
 
-// The table in a NIfTI header extension: <Label Key=".." Red=".." ...>NAME</Label>, the name as
-// text or as CDATA. Empty if the file has no table; a damaged header is reported by the reader of
-// the volume instead. Error: a damaged table.
-Result<LabelTable> load_nifti_label_table(const std::string& path);
+// The table in the extension of a NIfTI header: <Label Key=".." Red=".." ...>NAME</Label>, the name
+// as text or as CDATA. Empty if there is no table. Error: a damaged table.
 Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& where);
 
 // Slicer's fields Segment<N>_Name, _LabelValue, _Layer and _Color; empty without any. Error: a
@@ -52,4 +50,4 @@ Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& wher
 Result<LabelTable> segments_of_fields(const std::map<std::string, std::string>& fields,
                                       const std::string& where);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline anatomy

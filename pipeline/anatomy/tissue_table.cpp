@@ -7,7 +7,7 @@
 #include <cctype>
 #include <vector>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline anatomy {
 namespace {
 
 // Sources of the figures, as in docs/textures.md.
@@ -225,7 +225,7 @@ constexpr Rule kRules[] = {
     {"outside", "outside"},
     {"background", "outside"},
     {"air", "outside"},
-    // What a thing is made of tells more than where it lies: stomach_gas, bladder_wall, gallstone.
+    // The material says more than the place: stomach_gas, bladder_wall, gallstone.
     {"abdominal_wall", "muscle"},
     {"chest_wall", "muscle"},
     {"gas", "gas"},
@@ -389,4 +389,4 @@ std::span<const std::string_view> total_segmentator_labels() {
     return kTotalSegmentator;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline anatomy

@@ -6,8 +6,8 @@
 // (other_soft_tissue .. other_dense_bone_or_metal) and the labels of the analytic torso. An unknown
 // label becomes "soft_tissue", and the result says so.
 //
-// Echogenicity is in dB re liver. Tissue::source names the source of the figures; "(a)" in it marks
-// figures that are assumed or set by eye. A recipe may override any entry.
+// Echogenicity is in dB re liver. Tissue::source names the source of the figures;
+// "(assumed)" in it marks figures that are assumed or set by eye. A recipe may override any entry.
 #pragma once
 
 #include <span>
@@ -16,7 +16,7 @@
 
 #include "formats/volume/tissue.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline anatomy {
 
 // All built-in tissues; [0] is "outside". Names are unique.
 std::span<const Tissue> built_in_tissues();
@@ -35,4 +35,4 @@ TissueChoice tissue_for_label(std::string_view label_name);
 // Names of TotalSegmentator v2 "total", in the order of their values 1..117.
 std::span<const std::string_view> total_segmentator_labels();
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline anatomy

@@ -3,22 +3,22 @@
 // Counter-based random numbers: a value depends on (seed, counter) alone, and work split over
 // threads in any way gives the same bytes. Constant time, no state.
 //
-// Source: the mixing function of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
+// Source: the mixing function of SplitMix64 (formats/base/random.h).
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 
-namespace sonocase::pipeline {
+#include "formats/base/constants.h"
+#include "formats/base/random.h"
+
+namespace sonocase::pipeline::inline base {
 
 inline std::uint64_t mix_bits(std::uint64_t x) {
-    x += 0x9E3779B97F4A7C15ull;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBull;
-    return x ^ (x >> 31);
+    return mix64(x + kGoldenGamma);
 }
 
-// A separate seed per purpose, such that streams do not share values.
+// A separate seed for each purpose, such that streams do not share values.
 inline std::uint64_t derive_seed(std::uint64_t seed, std::uint64_t purpose) {
     return mix_bits(seed ^ mix_bits(purpose));
 }
@@ -35,9 +35,9 @@ struct GaussianPair {
 // Two independent standard normal values (Box-Muller).
 inline GaussianPair gaussian_pair_at(std::uint64_t seed, std::uint64_t counter) {
     const double u = 1 - uniform_at(seed, 2 * counter);  // (0, 1]: the logarithm is finite
-    const double angle = 6.283185307179586476925 * uniform_at(seed, 2 * counter + 1);
+    const double angle = 2 * kPi * uniform_at(seed, 2 * counter + 1);
     const double radius = std::sqrt(-2 * std::log(u));
     return {radius * std::cos(angle), radius * std::sin(angle)};
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

@@ -9,10 +9,10 @@
 #include <limits>
 #include <string>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline base {
 namespace {
 
-double lowest_mb = std::numeric_limits<double>::infinity();
+double lowest_mb = std::numeric_limits<double>::infinity();  // of all MemoryLimits
 
 }  // namespace
 
@@ -47,4 +47,4 @@ MemoryLimit::~MemoryLimit() {
     lowest_mb = before_mb_;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

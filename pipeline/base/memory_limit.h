@@ -4,17 +4,17 @@
 // bytes must not depend on it.
 #pragma once
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline base {
 
-// The least of the machine's memory and of the limits of the control groups that this process is
-// in, MB; infinite where neither is known.
+// The memory of the machine or the lowest limit of the control groups that this process is in,
+// whichever is smaller, MB; infinite where neither is known.
 double machine_memory_mb();
 
-// That, or the lowest of the limits set below.
+// The same, or the lowest limit that a MemoryLimit sets, if that is smaller.
 double memory_limit_mb();
 
-// Lowers memory_limit_mb() of the process during its lifetime; those made later must end earlier.
-// 0: does not.
+// Lowers memory_limit_mb() of the process during its lifetime; an object made later must be
+// destroyed earlier. 0 changes nothing.
 class MemoryLimit {
   public:
     explicit MemoryLimit(double mb);
@@ -26,4 +26,4 @@ class MemoryLimit {
     double before_mb_;
 };
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

@@ -8,7 +8,7 @@
 
 #include <optional>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline base {
 
 void parallel_for(std::size_t count,
                   std::size_t grain,
@@ -33,4 +33,4 @@ ThreadLimit::ThreadLimit(int threads) : impl_(std::make_unique<Impl>()) {
 
 ThreadLimit::~ThreadLimit() = default;
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

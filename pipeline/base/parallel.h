@@ -8,7 +8,7 @@
 #include <functional>
 #include <memory>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline base {
 
 // body(begin, end) over [0, count) in pieces of at most `grain`, in any order, on any thread.
 void parallel_for(std::size_t count,
@@ -29,4 +29,4 @@ class ThreadLimit {
     std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

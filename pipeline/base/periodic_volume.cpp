@@ -6,12 +6,11 @@
 #include <cstdint>
 #include <cstring>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline base {
 namespace {
 
 std::size_t cube(int edge) {
-    return static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge) *
-           static_cast<std::size_t>(edge);
+    return static_cast<std::size_t>(edge) * edge * edge;
 }
 
 // Unsigned key with the same order as the floats.
@@ -55,15 +54,12 @@ std::vector<float> double_resolution(const std::vector<float>& volume, int edge)
     for (int z = 0; z < edge; ++z) {
         for (int y = 0; y < edge; ++y) {
             for (int x = 0; x < edge; ++x) {
-                const auto to = static_cast<std::size_t>(2 * x) +
-                                static_cast<std::size_t>(n) *
-                                    (static_cast<std::size_t>(2 * y) +
-                                     static_cast<std::size_t>(n) * static_cast<std::size_t>(2 * z));
+                const auto to = 2 * x + static_cast<std::size_t>(n) *
+                                            (2 * y + static_cast<std::size_t>(n) *
+                                                         static_cast<std::size_t>(2 * z));
                 const auto from =
                     static_cast<std::size_t>(x) +
-                    static_cast<std::size_t>(edge) *
-                        (static_cast<std::size_t>(y) +
-                         static_cast<std::size_t>(edge) * static_cast<std::size_t>(z));
+                    static_cast<std::size_t>(edge) * (y + static_cast<std::size_t>(edge) * z);
                 out[to] = 8 * volume[from];
             }
         }
@@ -92,8 +88,8 @@ void match_distribution(std::span<float> values, std::span<const float> sorted) 
     for (std::size_t r = 0; r < n; ++r) {
         // the quantile at (r + 1/2) / n
         const std::size_t q = ((2 * r + 1) * m) / (2 * n);
-        values[static_cast<std::size_t>(items[r] & 0xFFFFFFFFu)] = sorted[std::min(q, m - 1)];
+        values[items[r] & 0xFFFFFFFFu] = sorted[std::min(q, m - 1)];
     }
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

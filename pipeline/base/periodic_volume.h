@@ -9,10 +9,10 @@
 #include <span>
 #include <vector>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline base {
 
-// In place: taps 1 4 6 4 1 over 16 along x, y and z, `gap` voxels apart. # edge^3. Cost: three
-// passes.
+// Filters in place with the taps 1 4 6 4 1 over 16 along x, y and z, `gap` voxels apart. volume: #
+// edge^3. Cost: three passes.
 void lowpass_periodic(std::vector<float>& volume, int edge, int gap);
 
 // Cube of edge 2 * edge, interpolated by the filter above; the coarse voxels are the even ones.
@@ -37,4 +37,4 @@ std::vector<double> steps_between_planes(std::span<const T> volume, int edge, in
     return step;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

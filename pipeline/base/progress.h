@@ -6,14 +6,14 @@
 #include <functional>
 #include <string_view>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline base {
 
-// fraction: of this stage, [0, 1]; doing: what it does. Called only from the thread that called the
-// stage.
+// fraction: how much of this stage is done, [0, 1]; doing: what it does now. Called only from the
+// thread that called the stage.
 using Progress = std::function<void(double fraction, std::string_view doing)>;
 
 inline void report_progress(const Progress& progress, double fraction, std::string_view doing) {
     if (progress) progress(fraction, doing);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

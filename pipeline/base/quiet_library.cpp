@@ -7,7 +7,7 @@
 
 #include <cstdio>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline base {
 
 QuietLibrary::QuietLibrary() {
     std::fflush(stdout);
@@ -34,4 +34,4 @@ QuietLibrary::~QuietLibrary() {
     }
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

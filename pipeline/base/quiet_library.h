@@ -12,7 +12,7 @@
 // meanwhile. Objects may be nested.
 #pragma once
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline base {
 
 class QuietLibrary {
   public:
@@ -26,4 +26,4 @@ class QuietLibrary {
     int saved_error_ = -1;
 };
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

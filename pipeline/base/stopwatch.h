@@ -6,14 +6,14 @@
 #include <chrono>
 #include <ctime>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline base {
 
 class Stopwatch {
   public:
-    // Since construction or the last lap.
+    // The time since construction or the last lap.
     double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
-    // As seconds(), and starts again from 0.
+    // Returns seconds() and starts again from 0.
     double lap() {
         const Clock::time_point now = Clock::now();
         const double elapsed = std::chrono::duration<double>(now - start_).count();
@@ -32,4 +32,4 @@ inline double processor_seconds() {
     return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline base

@@ -14,7 +14,7 @@
 #include "formats/calibration/needle.h"
 #include "formats/calibration/point.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline calibration {
 
 // Each writes FOLDER/NAME.png and .svg; the folder is made if it does not exist.
 Status draw_point_pictures(std::span<const Pose> poses,
@@ -45,4 +45,4 @@ Status draw_image_picture(const ImagePlaneInput& input,
                           const std::string& folder,
                           const std::string& name);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline calibration

@@ -12,7 +12,7 @@
 
 #include "formats/calibration/pose_screen.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline calibration {
 namespace {
 
 struct TipOnPivot {
@@ -49,7 +49,7 @@ RefinePointResult refine_point(std::span<const Pose> readings,
     const auto began = std::chrono::steady_clock::now();
     RefinePointResult out;
     const std::vector<Pose> poses = screen_poses(readings).poses;
-    // About the pivot, so that a far origin costs no digits.
+    // Places are taken about the pivot, so that a far origin costs no digits.
     const Vector3 origin{start.pivot_mm.x, start.pivot_mm.y, start.pivot_mm.z};
     double tip[3] = {start.tip_mm.x, start.tip_mm.y, start.tip_mm.z};
     double pivot[3] = {0, 0, 0};
@@ -118,4 +118,4 @@ RefinePointResult refine_point(std::span<const Pose> readings,
     return out;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline calibration

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Refinement of the point calibration that allows for noise in orientation as well as in position.
+// Refines the point calibration with an estimate that allows for noise in orientation as well as in
+// position.
 //
 // The linear fit takes the rotations as exact. If the tilt is small their noise biases it: the
 // swing is overestimated and the tip is drawn towards the position with the smallest residuals.
@@ -8,14 +9,14 @@
 //
 //     min sum |R_i exp(w_i) t + p_i - c|^2 / sigma_p^2 + |w_i|^2 / sigma_r^2
 //
-// with a Cauchy loss on the first term. Ceres, Schur complement on the w_i.
+// with a Cauchy loss on the first term, by Ceres with a Schur complement on the w_i.
 #pragma once
 
 #include <span>
 
 #include "formats/calibration/point.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline calibration {
 
 struct RefinePointOptions {
     double position_sigma_mm = 0.5;      // of one coordinate of a reading, > 0
@@ -40,4 +41,4 @@ RefinePointResult refine_point(std::span<const Pose> poses,
                                const PointFit& start,
                                const RefinePointOptions& options = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline calibration

@@ -6,9 +6,9 @@
 
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
-#include "pipeline/base/delimited_text.h"
+#include "pipeline/base/text.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline calibration {
 
 Result<NamedPoints> parse_named_points(std::string_view csv, const std::string& where) {
     NamedPoints out;
@@ -46,9 +46,8 @@ Result<NamedPoints> parse_named_points(std::string_view csv, const std::string& 
 }
 
 Result<NamedPoints> load_named_points(const std::string& path) {
-    const auto text = read_text_file(path);
-    if (!text) return text.error();
-    return parse_named_points(*text, path);
+    SONOCASE_TRY(const auto text, read_text_file(path));
+    return parse_named_points(text, path);
 }
 
 Result<std::pair<NamedPoints, NamedPoints>> pair_points(const NamedPoints& known,
@@ -72,7 +71,7 @@ Result<std::pair<NamedPoints, NamedPoints>> pair_points(const NamedPoints& known
         }
         a.names.push_back(touched.names[i]);
         b.names.push_back(touched.names[i]);
-        a.points.push_back(known.points[static_cast<std::size_t>(found - known.names.begin())]);
+        a.points.push_back(known.points[found - known.names.begin()]);
         b.points.push_back(touched.points[i]);
     }
     return std::pair{a, b};
@@ -101,9 +100,8 @@ Result<Signal> parse_signal(std::string_view csv, const std::string& where) {
 }
 
 Result<Signal> load_signal(const std::string& path) {
-    const auto text = read_text_file(path);
-    if (!text) return text.error();
-    return parse_signal(*text, path);
+    SONOCASE_TRY(const auto text, read_text_file(path));
+    return parse_signal(text, path);
 }
 
 std::string digest_of_points(const std::vector<Point3>& points) {
@@ -112,4 +110,4 @@ std::string digest_of_points(const std::vector<Point3>& points) {
     return digest.hex();
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline calibration

@@ -12,25 +12,25 @@
 #include "formats/base/result.h"
 #include "formats/calibration/lag.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline calibration {
 
 struct NamedPoints {
     std::vector<std::string> names;  // # points, or empty
     std::vector<Point3> points;
 };
 
-// Rows name,x,y,z, or x,y,z without names; mm; a header row is skipped. NaN is kept.
+// Reads rows name,x,y,z, or x,y,z without names; mm; a header row is skipped. NaN is kept.
 Result<NamedPoints> parse_named_points(std::string_view csv, const std::string& where);
 Result<NamedPoints> load_named_points(const std::string& path);
 
-// The two in pairs: by name if both have names, else by order, which needs equal numbers.
+// Returns the two in pairs: by name if both have names, else by order, which needs equal numbers.
 Result<std::pair<NamedPoints, NamedPoints>> pair_points(const NamedPoints& known,
                                                         const NamedPoints& touched);
 
-// Rows time_s,value.
+// Reads rows time_s,value.
 Result<Signal> parse_signal(std::string_view csv, const std::string& where);
 Result<Signal> load_signal(const std::string& path);
 
 std::string digest_of_points(const std::vector<Point3>& points);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline calibration

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Looks a case over as a careful colleague would: organs and their volumes, sides, vessels, units,
+// Checks a case as a careful colleague would: organs and their volumes, sides, vessels, units,
 // the fit, exercises and whether a needle reaches their targets.
 //
 // A fault has a name that a program can go by and a sentence that says what to do:
@@ -9,10 +9,10 @@
 //     sides-swapped    right and left, judged by liver and spleen and by pairs of labels
 //     wrong-unit       a body or organs of a size that no adult has
 //     vessel-broken    the aorta or the lower cava is in pieces
-//     fold             the fit's report does not prove the map free of folds
+//     fold             the fit's report does not prove that the map is free of folds
 //     label-renamed    an exercise names a label that is missing, or a label's name says another
 //                      tissue than it has
-//     texture-missing  a tissue asks for a solid texture that the bundle lacks
+//     texture-missing  a tissue names a solid texture that the bundle lacks
 //     target-in-bone   a target that no needle can enter
 //     unreachable      no window on the skin sees the target, or none lets a needle pass
 //     not-passable     a scripted expert plays the exercise through the first windows and misses a
@@ -26,7 +26,7 @@
 
 #include "formats/bundle/case_bundle.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline check {
 
 struct Fault {
     std::string name;
@@ -78,8 +78,8 @@ std::string check_json(const CaseBundle& bundle, const CheckResult& result);
 void check_anatomy(const CaseBundle& bundle, CheckResult& result);
 void check_exercises(const CaseBundle& bundle, CheckResult& result);
 
-// RGB rows from the top: organs and bones in their colours, shaded, seen along a direction through
-// a body from which skin, fat and muscle are taken; targets as white dots.
+// A view of organs and bones in their colours, shaded, along a direction; skin, fat and muscle are
+// left out, targets are white dots. RGB, rows from the top.
 struct BodyView {
     int width_px = 0, height_px = 0;
     std::vector<std::uint8_t> rgb;
@@ -89,4 +89,4 @@ BodyView body_view(const CaseBundle& bundle,
                    Vector3 up,
                    const std::vector<Point3>& marks);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline check

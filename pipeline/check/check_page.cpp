@@ -1,42 +1,152 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
-#include "formats/bundle/attribution.h"
-#include "pipeline/aim/exercise_targets.h"
+#include "formats/base/base64.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/text/number_text.h"
+#include "pipeline/check/case_labels.h"
 #include "pipeline/check/check_case.h"
 #include "pipeline/pictures/markup.h"
 #include "pipeline/pictures/png.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline check {
+
+extern const std::string_view kCheckPageHtml;  // check_page.html, embedded by CMake
+
 namespace {
 
-constexpr const char* kHead =
-    "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Check</title><style>"
-    "body{font:15px/1.5 sans-serif;max-width:70em;margin:2em auto;padding:0 1em;color:#222}"
-    "table{border-collapse:collapse}td,th{padding:.15em .8em;text-align:left;"
-    "border-bottom:1px solid #ddd}.bad{color:#a00;font-weight:bold}.good{color:#060}"
-    "img{image-rendering:pixelated;max-width:32%;border:1px solid #888;background:#000}"
-    "</style></head><body>";
+constexpr int kMaxPx = 600;
+constexpr double kAmbient = 0.25;
+
+// The labels that are drawn: everything but the covers of the body.
+std::vector<std::uint8_t> seen_labels(const CaseLabels& labels) {
+    std::vector<std::uint8_t> seen;
+    for (std::size_t l = 0; l < labels.bundle().labels.size(); ++l) {
+        const int label = static_cast<int>(l);
+        const TissueKind kind = labels.kind(label);
+        seen.push_back(kind != TissueKind::outside && !labels.is_plain(label) &&
+                       !labels.is_skin(label));
+    }
+    return seen;
+}
+
+// The view without the white margin around it.
+BodyView cropped(const BodyView& view) {
+    int left = view.width_px, right = -1, top = view.height_px, bottom = -1;
+    const auto at = [&](int x, int y) {
+        return view.rgb.begin() + 3 * static_cast<std::ptrdiff_t>(y * view.width_px + x);
+    };
+    for (int y = 0; y < view.height_px; ++y)
+        for (int x = 0; x < view.width_px; ++x) {
+            if (std::all_of(at(x, y), at(x, y) + 3, [](int c) { return c == 255; })) continue;
+            left = std::min(left, x);
+            right = std::max(right, x);
+            top = std::min(top, y);
+            bottom = std::max(bottom, y);
+        }
+    if (right < left) return view;
+    BodyView out{right - left + 1, bottom - top + 1, {}};
+    for (int y = top; y <= bottom; ++y)
+        out.rgb.insert(out.rgb.end(), at(left, y), at(right, y) + 3);
+    return out;
+}
+
+}  // namespace
+
+// Casts one ray per pixel in steps of a voxel. The shade follows the slope of the surface, found
+// from the drawn voxels around the point.
+BodyView body_view(const CaseBundle& bundle,
+                   Vector3 along,
+                   Vector3 up,
+                   const std::vector<Point3>& marks) {
+    const CaseLabels labels(bundle);
+    const std::vector<std::uint8_t> seen = seen_labels(labels);
+    const Vector3 right = cross(along, up);
+    const Box3 box = bundle.grid.bounds();
+    const Point3 middle = box.centre();
+    double half_u = 0, half_v = 0, half_d = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        const Vector3 c =
+            Point3{corner & 1 ? box.upper.x : box.lower.x, corner & 2 ? box.upper.y : box.lower.y,
+                   corner & 4 ? box.upper.z : box.lower.z} -
+            middle;
+        half_u = std::max(half_u, std::abs(dot(c, right)));
+        half_v = std::max(half_v, std::abs(dot(c, up)));
+        half_d = std::max(half_d, std::abs(dot(c, along)));
+    }
+    BodyView view;
+    const double mm = 2 * half_v / kMaxPx;  // per pixel
+    view.height_px = kMaxPx;
+    view.width_px = std::max(1, static_cast<int>(2 * half_u / mm));
+    view.rgb.assign(3 * view.width_px * view.height_px, 255);
+    const double step = labels.voxel_mm();
+    const auto solid = [&](Point3 p) { return seen[labels.label(p)] ? 1.0 : 0.0; };
+    for (int y = 0; y < view.height_px; ++y)
+        for (int x = 0; x < view.width_px; ++x) {
+            const Point3 pixel = middle + (x * mm - half_u) * right + (half_v - y * mm) * up;
+            std::uint8_t* const out = &view.rgb[3 * (y * view.width_px + x)];
+            bool body = false;
+            for (double t = -half_d; t <= half_d; t += step) {
+                const Point3 p = pixel + t * along;
+                const int label = labels.label(p);
+                body = body || label != 0;
+                if (!seen[label]) continue;
+                Vector3 inwards;
+                for (const double r : {1.0, 2.0, 3.0})
+                    for (int axis = 0; axis < 3; ++axis) {
+                        Vector3 off;
+                        off[axis] = r * step;
+                        inwards[axis] += solid(p + off) - solid(p - off);
+                    }
+                const double facing = std::abs(dot(normalized(inwards), along));
+                const double light = kAmbient + (1 - kAmbient) * facing;
+                const auto& colour = bundle.labels[label].colour;
+                for (int c = 0; c < 3; ++c)
+                    out[c] = static_cast<std::uint8_t>(light * colour[c] + 0.5);
+                break;
+            }
+            if (body && out[0] == 255 && out[1] == 255 && out[2] == 255)
+                std::fill(out, out + 3, std::uint8_t{225});  // only covers lie here
+        }
+    for (const Point3 mark : marks) {
+        const Vector3 off = mark - middle;
+        const int u = static_cast<int>(std::lround((dot(off, right) + half_u) / mm));
+        const int v = static_cast<int>(std::lround((half_v - dot(off, up)) / mm));
+        for (int y = v - 4; y <= v + 4; ++y)
+            for (int x = u - 4; x <= u + 4; ++x) {
+                const int r2 = (x - u) * (x - u) + (y - v) * (y - v);
+                if (r2 > 18 || x < 0 || y < 0 || x >= view.width_px || y >= view.height_px)
+                    continue;
+                std::uint8_t* const out = &view.rgb[3 * (y * view.width_px + x)];
+                std::fill(out, out + 3, r2 > 8 ? std::uint8_t{0} : std::uint8_t{255});
+            }
+    }
+    return cropped(view);
+}
+
+namespace {
+
+const HtmlTemplate& html() {
+    static const HtmlTemplate page(kCheckPageHtml);
+    return page;
+}
 
 std::string number(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, value < 10 ? "%.1f" : "%.0f", value);
-    return text;
+    return fixed_text(value, value < 10 ? 1 : 0);
 }
 
 std::string picture(const char* alt, const std::vector<std::uint8_t>& png) {
-    return std::string("<img alt=\"") + alt + "\" src=\"data:image/png;base64," + base64(png) +
-           "\">";
+    return html().filled("picture", {{"alt", alt}, {"png", base64(png)}});
 }
 
 // Organs and bones from the front, the right and the back, targets as white dots.
 std::string views(const CaseBundle& bundle, const CheckResult& result) {
     Vector3 forwards = result.forwards, up = result.up;
-    if (!(norm(up) > 0)) {  // nothing tells: the grid's own axes
+    if (!(norm(up) > 0)) {  // unknown: the grid's own axes
         forwards = {0, 1, 0};
         up = {0, 0, 1};
     }
@@ -48,18 +158,17 @@ std::string views(const CaseBundle& bundle, const CheckResult& result) {
     std::string out;
     for (const auto& [alt, along] : from) {
         const BodyView view = body_view(bundle, along, up, marks);
-        out += picture(alt, png_from_rgb(view.rgb.data(), view.width_px, view.height_px)) + " ";
+        out += picture(alt, png_from_rgb(view.rgb.data(), view.width_px, view.height_px));
     }
     return out;
 }
 
-// A plane through the middle of the volume, labels in their colours; axis: the one it is across.
+// A plane through the middle of the volume at right angles to `axis`, labels in their colours.
 std::string plane(const CaseBundle& bundle, int axis) {
     const Int3 size = bundle.grid.size;
     const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
     const int width = size[u], height = size[v];
-    std::vector<std::uint8_t> rgb(static_cast<std::size_t>(3) * static_cast<std::size_t>(width) *
-                                  static_cast<std::size_t>(height));
+    std::vector<std::uint8_t> rgb(static_cast<std::size_t>(3) * width * height);
     std::size_t at = 0;
     for (int y = height - 1; y >= 0; --y)
         for (int x = 0; x < width; ++x) {
@@ -73,68 +182,82 @@ std::string plane(const CaseBundle& bundle, int axis) {
     return picture("plane", png_from_rgb(rgb.data(), width, height));
 }
 
-std::string row(std::initializer_list<std::string> cells) {
-    std::string out = "<tr>";
-    for (const std::string& cell : cells) out += "<td>" + cell + "</td>";
-    return out + "</tr>";
+std::string faults_part(const CheckResult& result) {
+    if (result.faults.empty()) return html().filled("no_fault", {});
+    std::string rows;
+    for (const Fault& fault : result.faults)
+        rows += html().filled("fault", {{"name", escaped_html(fault.name)},
+                                        {"what", escaped_html(fault.what)},
+                                        {"remedy", escaped_html(fault.remedy)}});
+    return html().filled("faults", {{"rows", rows}});
+}
+
+std::string target_rows(const CheckResult& result) {
+    std::string rows;
+    for (const TargetRow& t : result.targets)
+        rows += html().filled("target", {{"exercise", escaped_html(t.exercise)},
+                                         {"target", escaped_html(t.target)},
+                                         {"windows", std::to_string(t.windows)},
+                                         {"depth", number(t.depth_mm)},
+                                         {"blocked", number(100 * t.blocked)},
+                                         {"needle", t.needle ? "yes" : "no"},
+                                         {"visible", number(100 * t.visible)}});
+    return rows;
+}
+
+std::string exercise_rows(const CheckResult& result) {
+    std::string rows;
+    for (const ExerciseRow& exercise : result.exercises) {
+        std::string missed;
+        for (const std::string& mark : exercise.missed)
+            missed += (missed.empty() ? "" : ", ") + mark;
+        const bool failed = exercise.played && !exercise.missed.empty();
+        rows += html().filled("exercise", {{"exercise", escaped_html(exercise.exercise)},
+                                           {"class", failed ? "bad" : ""},
+                                           {"passed", !exercise.played ? "not played"
+                                                      : failed         ? "no"
+                                                                       : "yes"},
+                                           {"missed", escaped_html(missed)}});
+    }
+    return rows;
+}
+
+std::string organ_rows(const CheckResult& result) {
+    std::string rows;
+    for (const OrganRow& organ : result.organs) {
+        const bool known = organ.high_ml > 0;
+        const bool odd = known && (organ.ml < organ.low_ml || organ.ml > organ.high_ml);
+        rows += html().filled(
+            "organ",
+            {{"label", escaped_html(organ.label)},
+             {"class", odd ? "bad" : ""},
+             {"ml", number(organ.ml)},
+             {"normal", known ? number(organ.low_ml) + " to " + number(organ.high_ml) : ""}});
+    }
+    return rows;
 }
 
 }  // namespace
 
 std::string check_page(const CaseBundle& bundle, const CheckResult& result) {
-    std::string page = kHead;
-    page += "<h1>" + escaped_html(bundle.manifest.case_name) + "</h1>";
-    if (result.faults.empty())
-        page += "<p class=\"good\">No fault found.</p>";
-    else
-        page += "<h2>Faults</h2><table><tr><th>fault</th><th>found</th><th>do</th></tr>";
-    for (const Fault& fault : result.faults)
-        page += row({"<span class=\"bad\">" + escaped_html(fault.name) + "</span>",
-                     escaped_html(fault.what), escaped_html(fault.remedy)});
-    if (!result.faults.empty()) page += "</table>";
-    page += "<h2>Planes through the middle</h2><p>" + plane(bundle, 0) + " " + plane(bundle, 1) +
-            " " + plane(bundle, 2) + "</p>";
-    page +=
-        "<h2>In space</h2><p>" + views(bundle, result) +
-        "</p><p>From the front, the right and the back, without skin, fat and muscle; targets are "
-        "white dots. Ribs: " +
-        std::to_string(result.ribs_right) + " on the right, " + std::to_string(result.ribs_left) +
-        " on the left.</p>";
-    page +=
-        "<h2>Targets</h2><table><tr><th>exercise</th><th>target</th><th>windows</th>"
-        "<th>depth, mm</th><th>blocked</th><th>needle passes</th><th>of it seen</th></tr>";
-    for (const TargetRow& t : result.targets)
-        page += row({escaped_html(t.exercise), escaped_html(t.target), std::to_string(t.windows),
-                     number(t.depth_mm), number(100 * t.blocked) + " %", t.needle ? "yes" : "no",
-                     number(100 * t.visible) + " %"});
-    page +=
-        "</table><h2>Exercises, played by a script through the first windows</h2>"
-        "<table><tr><th>exercise</th><th>passed</th><th>missed</th></tr>";
-    for (const ExerciseRow& exercise : result.exercises) {
-        std::string missed;
-        for (const std::string& mark : exercise.missed)
-            missed += (missed.empty() ? "" : ", ") + mark;
-        page += row({escaped_html(exercise.exercise),
-                     !exercise.played          ? "not played"
-                     : exercise.missed.empty() ? "yes"
-                                               : "<span class=\"bad\">no</span>",
-                     escaped_html(missed)});
-    }
-    page += "</table><h2>Structures</h2><table><tr><th>label</th><th>ml</th><th>normal</th></tr>";
-    for (const OrganRow& organ : result.organs) {
-        const bool odd = organ.high_ml > 0 && (organ.ml < organ.low_ml || organ.ml > organ.high_ml);
-        page +=
-            row({escaped_html(organ.label),
-                 (odd ? "<span class=\"bad\">" : "<span>") + number(organ.ml) + "</span>",
-                 organ.high_ml > 0 ? number(organ.low_ml) + " to " + number(organ.high_ml) : ""});
-    }
-    page += "</table><h2>Remarks</h2><ul>";
+    std::string remarks;
     for (const std::string& remark : result.remarks)
-        page += "<li>" + escaped_html(remark) + "</li>";
-    page += "</ul>";
-    if (const std::string text = attribution_of(bundle); !text.empty())
-        page += "<p><small>" + escaped_html(text) + "</small></p>";
-    return page + "</body></html>\n";
+        remarks += html().filled("remark", {{"text", escaped_html(remark)}});
+    const std::string source = attribution_of(bundle);
+    return html().filled(
+        "page",
+        {{"case", escaped_html(bundle.manifest.case_name)},
+         {"faults", faults_part(result)},
+         {"planes", plane(bundle, 0) + plane(bundle, 1) + plane(bundle, 2)},
+         {"views", views(bundle, result)},
+         {"ribs_right", std::to_string(result.ribs_right)},
+         {"ribs_left", std::to_string(result.ribs_left)},
+         {"targets", target_rows(result)},
+         {"exercises", exercise_rows(result)},
+         {"organs", organ_rows(result)},
+         {"remarks", remarks},
+         {"attribution",
+          source.empty() ? "" : html().filled("attribution", {{"text", escaped_html(source)}})}});
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline check

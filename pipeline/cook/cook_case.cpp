@@ -6,10 +6,11 @@
 #include <optional>
 
 #include "formats/text/nearest_name.h"
-#include "pipeline/cook/input_files.h"
-#include "pipeline/pack/pack_case.h"
+#include "pipeline/cook/input_digests.h"
+#include "pipeline/stages/pack_case.h"
+#include "pipeline/stages/roles.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline cook {
 namespace {
 
 // What is wrong with where the run is to stop.
@@ -43,21 +44,21 @@ double seconds_of(const CookResult& cooked) {
 Result<CookResult> cook_case(const Recipe& recipe,
                              const CookOptions& options,
                              const Progress& progress) {
-    auto inputs =
-        digest_inputs(recipe, [](const std::string& path) { return digest_of_input(path); });
-    if (!inputs) return inputs.error();
-    const std::vector<PlannedStage> plan = plan_stages(recipe, *inputs);
+    SONOCASE_TRY(auto inputs, digest_inputs(recipe, [](const std::string& path) {
+                     return digest_of_input(path);
+                 }));
+    const std::vector<PlannedStage> plan = plan_stages(recipe, inputs);
     if (const auto error = check_goal(plan, options, recipe.path)) return *error;
     StageRunner runner(recipe, plan, {options.cache_folder, options.cache_bytes, options.until},
                        progress);
-    if (auto status = runner.run(); !status) return status.error();
+    SONOCASE_TRY_DONE(runner.run());
     if (!options.until.empty() && options.until != plan.back().stage)
         return CookResult{{}, std::move(runner.runs), runner.digest()};
 
-    CookResult result{runner.result().take<PackResult>().bundle, std::move(runner.runs), ""};
+    CookResult result{runner.result().take(kCase).bundle, std::move(runner.runs), ""};
     CaseManifest& manifest = result.bundle.manifest;
     manifest.producer = options.producer;
-    manifest.inputs = std::move(inputs->files);
+    manifest.inputs = std::move(inputs.files);
     for (const StageRun& run : result.stages) {
         manifest.stages.push_back(run.report);
         manifest.stages.back().seconds = 0;
@@ -66,4 +67,4 @@ Result<CookResult> cook_case(const Recipe& recipe,
     return result;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline cook

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// From a recipe to a case bundle: runs the stages of the recipe's table in order, each through the
-// cache (pipeline/stages/built_in_stages.h).
+// Cooks a recipe into a case bundle: runs the stages of the recipe's table in order, each through
+// the cache (pipeline/stages/built_in_stages.h).
 //
 // The bundle's bytes depend on inputs, options and seed alone: the seconds that stages took, and
 // what happened in the cache, are not in it but in CookResult::stages, and beside the bundle in
@@ -15,10 +15,10 @@
 #include "formats/base/result.h"
 #include "formats/bundle/case_bundle.h"
 #include "pipeline/base/progress.h"
-#include "pipeline/stage/recipe.h"
-#include "pipeline/stage/stage_runner.h"
+#include "pipeline/stages/recipe.h"
+#include "pipeline/stages/stage_runner.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline cook {
 
 struct CookOptions {
     std::string cache_folder;       // empty: no cache
@@ -43,4 +43,4 @@ Result<CookResult> cook_case(const Recipe& recipe,
                              const CookOptions& options = {},
                              const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline cook

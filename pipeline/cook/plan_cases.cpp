@@ -9,11 +9,10 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/files/atomic_file.h"
-#include "pipeline/cook/case_size.h"
-#include "pipeline/cook/digest_memo.h"
-#include "pipeline/cook/input_files.h"
+#include "pipeline/cook/case_cost.h"
+#include "pipeline/cook/input_digests.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline cook {
 namespace {
 
 namespace fs = std::filesystem;
@@ -68,24 +67,22 @@ Result<CasePlan> plan_case(const std::string& path,
                            const StageTable& table,
                            DigestMemo& memo,
                            std::map<std::string, std::string>& recipe_of) {
-    auto recipe = load_recipe(path, overrides, table);
-    if (!recipe) return recipe.error();
-    if (!is_file_name(recipe->name))
-        return Error{"name '" + recipe->name + "' cannot be a file name", path,
+    SONOCASE_TRY(auto recipe, load_recipe(path, overrides, table));
+    if (!is_file_name(recipe.name))
+        return Error{"name '" + recipe.name + "' cannot be a file name", path,
                      "expected letters, digits, '-', '_' and '.'"};
-    const auto [named, fresh] = recipe_of.emplace(recipe->name, path);
+    const auto [named, fresh] = recipe_of.emplace(recipe.name, path);
     if (!fresh)
-        return Error{"another case is called '" + recipe->name + "'", path,
+        return Error{"another case is called '" + recipe.name + "'", path,
                      "that of " + named->second + "; give one of them another name"};
-    auto inputs =
-        digest_inputs(*recipe, [&](const std::string& file) { return memo.digest(file); });
-    if (!inputs) return inputs.error();
+    SONOCASE_TRY(auto inputs,
+                 digest_inputs(recipe, [&](const std::string& file) { return memo.digest(file); }));
     CasePlan plan;
-    plan.name = recipe->name;
-    plan.stages = plan_stages(*recipe, *inputs);
+    plan.name = recipe.name;
+    plan.stages = plan_stages(recipe, inputs);
     std::erase_if(plan.stages, [](const PlannedStage& stage) { return stage.is_step(); });
     compare(plan, folder, memo);
-    if (!plan.done) plan.size = case_size(*recipe);
+    if (!plan.done) plan.size = case_size(recipe);
     return plan;
 }
 
@@ -112,7 +109,7 @@ Result<std::vector<CasePlan>> plan_cases(const std::vector<std::string>& recipes
         plan->recipe = path;
         plans.push_back(std::move(*plan));
     }
-    if (auto status = memo.save(); !status) return status.error();
+    SONOCASE_TRY_DONE(memo.save());
     return plans;
 }
 
@@ -146,4 +143,4 @@ std::string plan_json(const std::vector<CasePlan>& plans, const RecipeOverrides&
     return json.dump(1) + "\n";
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline cook

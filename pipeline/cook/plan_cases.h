@@ -4,7 +4,7 @@
 //
 // A farm's folder:
 //     plan.json                    what plan_json returns
-//     digests                      content hashes, remembered (digest_memo.h)
+//     digests                      content hashes, remembered (input_digests.h)
 //     state/CASE/STAGE.KEY.json    the report of a stage that was done under that plan key
 //     cases/CASE.sonocase          the bundles
 // A stage is done when its state file exists; modification times play no part. A state file of
@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "pipeline/recipe/read_recipe.h"
-#include "pipeline/stage/stage_plan.h"
+#include "pipeline/stages/read_recipe.h"
+#include "pipeline/stages/stage_runner.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline cook {
 
 struct CasePlan {
     std::string recipe;  // absolute path
@@ -42,4 +42,4 @@ Result<std::vector<CasePlan>> plan_cases(const std::vector<std::string>& recipes
 // [{"stage", "key", "needs": [stage], "threads", "memory_mb"}]} or {"name", "recipe", "error"}]}
 std::string plan_json(const std::vector<CasePlan>& plans, const RecipeOverrides& overrides);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline cook

@@ -11,10 +11,9 @@
 #include "formats/files/atomic_file.h"
 #include "formats/volume/brick_volume.h"
 #include "pipeline/export/inspect_case.h"
-#include "pipeline/export/labels/export_seg_nrrd.h"
-#include "pipeline/export/labels/nrrd_file.h"
+#include "pipeline/export/nrrd_file.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline exporting {
 namespace {
 
 template <class T>
@@ -82,8 +81,7 @@ std::vector<std::uint8_t> ply_file(const Surface& surface, const std::string& co
                                  static_cast<float>(p.z)};
         if (normals)
             for (int axis = 0; axis < 3; ++axis)
-                row[static_cast<std::size_t>(3 + axis)] =
-                    static_cast<float>(surface.normals[i][axis]);
+                row[3 + axis] = static_cast<float>(surface.normals[i][axis]);
         append(row.data(), (normals ? 6 : 3) * sizeof(float));
     }
     for (const auto& triangle : surface.triangles) {
@@ -133,4 +131,4 @@ Result<std::vector<std::string>> export_case(const CaseBundle& bundle, const std
     return folder.names;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline exporting

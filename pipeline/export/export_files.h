@@ -10,9 +10,10 @@
 #include "formats/base/result.h"
 #include "formats/bundle/case_bundle.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline exporting {
 
-// Binary PLY in mm, float coordinates; normals and triangles where the surface has them.
+// A surface as binary PLY in mm, with float coordinates; normals and triangles where the surface
+// has them.
 std::vector<std::uint8_t> ply_file(const Surface& surface, const std::string& comment);
 
 // Writes into `folder`, which is created: labels.seg.nrrd with Slicer's segments, echo-offset.nrrd,
@@ -20,4 +21,4 @@ std::vector<std::uint8_t> ply_file(const Surface& surface, const std::string& co
 // exercises, manifest.json. Returns the names written, in that order.
 Result<std::vector<std::string>> export_case(const CaseBundle& bundle, const std::string& folder);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline exporting

@@ -12,7 +12,7 @@
 #include "formats/text/nearest_name.h"
 #include "pipeline/segmentation/distance/label_distance.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline exporting {
 namespace {
 
 constexpr int kHalfWidth = 3;  // voxels, OpenVDB's own default
@@ -94,4 +94,4 @@ Status export_level_sets(const LabelVolume& volume,
     }
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline exporting

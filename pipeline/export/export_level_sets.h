@@ -11,19 +11,20 @@
 #include "formats/volume/label_volume.h"
 #include "pipeline/base/progress.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline exporting {
 
 struct LevelSetExportOptions {
-    double sigma_vx = 1;              // smoothing; 0: none, steps of the voxels stay
+    double sigma_vx = 1;              // smoothing; 0: none, the steps of the voxels stay
     std::vector<std::string> labels;  // names; empty: all but the outside
 };
 
-// One FloatGrid of class LEVEL_SET per label, named like it, with metadata "tissue": signed
-// distance in mm, negative inside, 3 voxels to either side; world coordinates are the volume's
-// frame. Errors: an unknown name, voxels that are not cubic, a file that cannot be written.
+// Writes one FloatGrid of class LEVEL_SET per label, with its name and the metadata "tissue":
+// signed distance in mm, negative inside, 3 voxels to either side; world coordinates are the
+// volume's frame. Errors: an unknown name, voxels that are not cubic, a file that cannot be
+// written.
 Status export_level_sets(const LabelVolume& volume,
                          const std::string& path,
                          const LevelSetExportOptions& options = {},
                          const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline exporting

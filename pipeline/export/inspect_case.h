@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "formats/bundle/case_bundle.h"
-#include "pipeline/pack/error_budget.h"
+#include "pipeline/export/error_budget.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline exporting {
 
 struct LabelVolumes {
     std::vector<double> ml;  // # labels
@@ -18,7 +18,8 @@ struct LabelVolumes {
 // Volume of every label in millilitres. Cost: one pass over the bricks.
 LabelVolumes label_volumes(const CaseBundle& bundle);
 
-// Stages' seconds, from the report beside the bundle; negative: not recorded. # manifest.stages.
+// The seconds of the stages, from the report beside the bundle; negative: not recorded.
+// # manifest.stages.
 std::vector<double> recorded_seconds(const CaseBundle& bundle,
                                      const std::string& bundle_path,
                                      const std::string& bundle_digest);
@@ -46,7 +47,7 @@ struct Finding {
     std::string text;
 };
 
-// Beyond what the reader refuses: palette and tissues fit together, textures are there, boundary
+// Checks what the reader does not: palette and tissues fit together, textures are there, boundary
 // records agree with the labels, exercises parse and their targets lie in the body, surfaces lie at
 // the body, volumes are not zero.
 std::vector<Finding> validate_case(const CaseBundle& bundle);
@@ -54,4 +55,4 @@ std::vector<Finding> validate_case(const CaseBundle& bundle);
 // Tissues that ask for a texture that the bundle lacks. They point into the bundle.
 std::vector<const Tissue*> tissues_without_texture(const CaseBundle& bundle);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline exporting

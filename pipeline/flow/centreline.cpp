@@ -9,11 +9,11 @@
 #include <queue>
 #include <utility>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline flow {
 namespace {
 
 constexpr double kSpurRadii = 3, kMiddleReach = 2.5;
-constexpr std::size_t kMostLines = 200;
+constexpr std::size_t kMaxLines = 200;
 
 // The voxels of a part as a graph of 26 neighbours.
 class VoxelGraph {
@@ -38,8 +38,7 @@ class VoxelGraph {
     }
     std::size_t size() const { return voxel_.size(); }
     Point3 place(std::size_t v) const {
-        const std::size_t at = voxel_[v], x = static_cast<std::size_t>(part_.grid.size.x),
-                          y = static_cast<std::size_t>(part_.grid.size.y);
+        const std::size_t at = voxel_[v], x = part_.grid.size.x, y = part_.grid.size.y;
         return part_.grid.point_from_voxel({static_cast<double>(at % x),
                                             static_cast<double>(at / x % y),
                                             static_cast<double>(at / x / y)});
@@ -48,8 +47,7 @@ class VoxelGraph {
     template <class Visit>
     void each_neighbour(std::size_t v, Visit visit) const {
         for (std::size_t q = 0; q < offset_.size(); ++q) {
-            const std::size_t at =
-                static_cast<std::size_t>(static_cast<std::ptrdiff_t>(voxel_[v]) + offset_[q]);
+            const std::size_t at = voxel_[v] + offset_[q];
             visit(part_.beyond[at] != 0 ? -2 : number_[at], length_[q]);
         }
     }
@@ -85,7 +83,7 @@ std::vector<double> wall_distance(const VoxelGraph& graph, double voxel_mm) {
         if (at > d[v]) continue;
         graph.each_neighbour(v, [&, from = at](std::int32_t n, double length) {
             if (n < 0) return;
-            const auto next = static_cast<std::size_t>(n);
+            const std::size_t next = n;
             if (from + length < d[next]) {
                 d[next] = from + length;
                 open.push({d[next], next});
@@ -106,7 +104,7 @@ std::vector<double> middle_distance(const VoxelGraph& graph, const std::vector<d
         const Point3 here = graph.place(v);
         graph.each_neighbour(v, [&](std::int32_t n, double) {
             if (n < 0) return;
-            const std::size_t candidate = middle[static_cast<std::size_t>(n)];
+            const std::size_t candidate = middle[n];
             if (d[candidate] > d[middle[v]] &&
                 distance(here, graph.place(candidate)) < kMiddleReach * d[candidate])
                 middle[v] = candidate;
@@ -117,7 +115,7 @@ std::vector<double> middle_distance(const VoxelGraph& graph, const std::vector<d
     return out;
 }
 
-// Least cost and least length from the lines so far to every voxel; lowered as lines are added.
+// The smallest cost and length from the lines so far to every voxel; lowered as lines are added.
 class Reach {
   public:
     explicit Reach(const VoxelGraph& graph, std::vector<double> price)
@@ -139,11 +137,10 @@ class Reach {
             false);
     }
     const std::vector<double>& length_mm() const { return length_mm_; }  // from the nearest line
-    // From a voxel to the line that it joins.
+    // The path from a voxel to the line that it joins.
     std::vector<std::size_t> path_from(std::size_t end) const {
         std::vector<std::size_t> path{end};
-        while (cost_[path.back()] > 0)
-            path.push_back(static_cast<std::size_t>(parent_[path.back()]));
+        while (cost_[path.back()] > 0) path.push_back(parent_[path.back()]);
         return path;
     }
 
@@ -165,7 +162,7 @@ class Reach {
             if (at > value[v]) continue;
             graph_.each_neighbour(v, [&, from = at, here = v](std::int32_t n, double length) {
                 if (n < 0) return;
-                const auto next = static_cast<std::size_t>(n);
+                const std::size_t next = n;
                 const double to = from + price(here, next, length);
                 if (to >= value[next]) return;
                 value[next] = to;
@@ -244,13 +241,12 @@ void go_on(CentreLine& line, int node, CentreLine more, int to) {
     if (at_first) turn(line);
 }
 
-// Two side vessels that leave a wide trunk close to each other leave between them a line too short
-// to have a course: the trunk would end there. The two forks become one.
+// Joins forks that are close to each other. Two side vessels that leave a wide trunk close together
+// leave a line between them that is too short to have a course: the trunk would end there.
 void join_forks(double join_mm, CentreTree& tree) {
     for (std::size_t l = 0; l < tree.lines.size();) {
         const CentreLine line = tree.lines[l];
-        CentreNode &kept = tree.nodes[static_cast<std::size_t>(line.first)],
-                   &gone = tree.nodes[static_cast<std::size_t>(line.last)];
+        CentreNode &kept = tree.nodes[line.first], &gone = tree.nodes[line.last];
         // A place that no wall bounds, at the map's border, has no width.
         const double thick = std::max(kept.radius_mm, gone.radius_mm),
                      near = thick < 1e29 ? std::max(join_mm, thick) : join_mm;
@@ -259,7 +255,7 @@ void join_forks(double join_mm, CentreTree& tree) {
             ++l;
             continue;
         }
-        tree.lines.erase(tree.lines.begin() + static_cast<std::ptrdiff_t>(l));
+        tree.lines.erase(tree.lines.begin() + l);
         for (CentreLine& other : tree.lines)
             while (other.first == line.last || other.last == line.last)
                 go_on(other, line.last, line, line.first);
@@ -271,21 +267,17 @@ void join_forks(double join_mm, CentreTree& tree) {
 
 }  // namespace
 
-CentreTree centre_tree(const VesselPart& part, double least_mm, double join_mm) {
+CentreTree centre_tree(const VesselPart& part, double min_mm, double join_mm) {
     const VoxelGraph graph(part);
     if (graph.size() == 0) return {};
     const Vector3 s = part.grid.spacing_mm;
     const std::vector<double> d = wall_distance(graph, std::min({s.x, s.y, s.z}));
     const std::vector<double> middle = middle_distance(graph, d);
-    const auto start = static_cast<std::size_t>(std::max_element(d.begin(), d.end(),
-                                                                 [](double a, double b) {
-                                                                     // What no wall bounds lies at
-                                                                     // the map's border and is no
-                                                                     // middle.
-                                                                     return (a > 1e29 ? 0 : a) <
-                                                                            (b > 1e29 ? 0 : b);
-                                                                 }) -
-                                                d.begin());
+    // What no wall bounds lies at the map's border and is not a middle.
+    const auto thickest = std::max_element(d.begin(), d.end(), [](double a, double b) {
+        return (a > 1e29 ? 0 : a) < (b > 1e29 ? 0 : b);
+    });
+    const std::size_t start = thickest - d.begin();
     std::vector<double> price(graph.size());
     for (std::size_t v = 0; v < price.size(); ++v) {
         const double off = 6 * (1 - d[v] / middle[v]);
@@ -294,14 +286,13 @@ CentreTree centre_tree(const VesselPart& part, double least_mm, double join_mm) 
     Reach reach(graph, std::move(price));
     reach.add({start});
     std::vector<std::vector<std::size_t>> added;
-    while (added.size() < kMostLines) {
+    while (added.size() < kMaxLines) {
         // The voxel farthest from all lines, beyond what the width of its own vessel explains.
         std::size_t end = start;
         double farthest = 0;
         for (std::size_t v = 0; v < graph.size(); ++v) {
             const double away = reach.length_mm()[v];
-            if (away < 1e29 && away > farthest && away > least_mm &&
-                away > kSpurRadii * middle[v]) {
+            if (away < 1e29 && away > farthest && away > min_mm && away > kSpurRadii * middle[v]) {
                 farthest = away;
                 end = v;
             }
@@ -315,4 +306,4 @@ CentreTree centre_tree(const VesselPart& part, double least_mm, double join_mm) 
     return tree;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline flow

@@ -2,10 +2,10 @@
 
 // Centrelines of a piece of vessels, as a tree of lines.
 //
-// It begins at the thickest place. Again and again the voxel that is farthest from all lines,
+// The tree begins at the thickest place. Again and again the voxel that is farthest from all lines,
 // within the vessel, is joined to them by a path of least cost, where a step costs 1 + (6 (1 - d /
 // D))^3 times its length, d being the distance to the wall and D that of the middle nearby. It ends
-// where no voxel is farther than least_mm and three radii of its own vessel: what is left are
+// where no voxel is farther than min_mm and three radii of its own vessel: what is left are
 // walls, ends and spurs. Forks nearer to each other than join_mm, or than the vessel there is
 // thick, are one fork: all lines go on to the first of them, so that no part of the trunk between
 // them is without a line. After Bitter et al., IEEE TVCG 7:195 (2001), with a cost of our own.
@@ -16,7 +16,7 @@
 #include "formats/base/geometry.h"
 #include "pipeline/flow/vessel_parts.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline flow {
 
 struct CentreNode {        // where lines meet or end
     Point3 place;          // frame of the part's grid
@@ -37,6 +37,6 @@ struct CentreTree {
 };
 
 // Cost: 5 us per voxel of vessel and 1 us per voxel and line.
-CentreTree centre_tree(const VesselPart& part, double least_mm = 25, double join_mm = 6);
+CentreTree centre_tree(const VesselPart& part, double min_mm = 25, double join_mm = 6);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline flow

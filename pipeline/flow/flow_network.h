@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The flow through a tree of vessels, from what its ends take.
+// Finds the flow through a tree of vessels from what its ends take.
 //
 // Arteries and veins are rooted at their thickest end, the portal system at its thickest end in the
-// liver. What each other end takes or gives, and each vessel that the labels lack (renal arteries,
-// ... "taps" along the line), is found by weighted least squares,
+// liver. What each other end takes or gives, and what each vessel that the labels lack does (renal
+// arteries and others: "taps" along the line), is found by weighted least squares,
 //
 //     min  sum_j ((Q_j - Qref_j) / sd_j)^2 + sum_i ((k_i Q_i / A_i - PSVref_i) / sd_i)^2,
 //
 // Q_i being the sum of the outlets beyond vessel i and k_i its peak over its mean velocity, which
-// depends on the waveform and is found anew in six rounds. A parent's waveform is the sum of its
-// children's, so that flow is conserved at every junction at every instant.
+// depends on the waveform and is computed again in each of six rounds. A parent's waveform is the
+// sum of its children's, so that flow is conserved at every junction at every instant.
 #pragma once
 
 #include <string>
@@ -20,7 +20,7 @@
 #include "pipeline/flow/flow_reference.h"
 #include "pipeline/flow/vessel_course.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline flow {
 
 // Where vessels leave or join that the labels lack; absent ones have no value. Frame of the labels.
 struct Landmarks {
@@ -57,4 +57,4 @@ void add_network(const LabelVolume& labels,
                  SolvedOutlets& solved,
                  FlowField& field);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline flow

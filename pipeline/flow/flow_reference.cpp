@@ -7,16 +7,17 @@
 #include <cmath>
 #include <vector>
 
-namespace sonocase::pipeline {
-namespace {
+#include "formats/base/constants.h"
 
-constexpr double kPi = 3.14159265358979323846;
+namespace sonocase::pipeline::inline flow {
+namespace {
 
 bool contains(std::string_view text, std::string_view word) {
     return text.find(word) != std::string_view::npos;
 }
 
-// Shapes are assumed, from published resistive indices and the triphasic pattern of a leg at rest.
+// The shapes are (assumed), from published resistive indices and the triphasic pattern of a leg at
+// rest.
 constexpr WavePoint kLeg[] = {{0, .3},     {.05, 2.5}, {.12, 7.6}, {.20, 5.2}, {.30, .4},
                               {.38, -1.6}, {.48, -.2}, {.60, .7},  {.75, .45}, {.9, .3}};
 constexpr WavePoint kRenal[] = {{0, .66},    {.06, 1.35}, {.13, 1.95}, {.25, 1.5},
@@ -77,11 +78,11 @@ FlowWave wave_through(const WavePoint* points, int count) {
         double re = 0, im = 0;
         for (int s = 0; s < samples; ++s) {
             const double angle = 2 * kPi * h * s / samples;
-            re += q[static_cast<std::size_t>(s)] * std::cos(angle);
-            im -= q[static_cast<std::size_t>(s)] * std::sin(angle);
+            re += q[s] * std::cos(angle);
+            im -= q[s] * std::sin(angle);
         }
-        wave[static_cast<std::size_t>(h - 1)] = {static_cast<float>(2 * re / samples / mean),
-                                                 static_cast<float>(2 * im / samples / mean)};
+        wave[h - 1] = {static_cast<float>(2 * re / samples / mean),
+                       static_cast<float>(2 * im / samples / mean)};
     }
     return wave;
 }
@@ -126,4 +127,4 @@ double usual_mean_mm_s(FlowKind kind) {
     return kind == FlowKind::artery ? 150 : kind == FlowKind::vein ? 80 : 110;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline flow

@@ -8,7 +8,7 @@
 
 #include "formats/flow/flow_field.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline flow {
 
 enum class Outlet {
     leg,
@@ -22,14 +22,14 @@ enum class Outlet {
 };
 
 struct OutletReference {
-    const char* name;  // of an outlet that the labels lack
+    const char* name;  // of the outlet, where the labels lack it
     double ml_s, sd_ml_s;
     FlowWave artery;   // its waveform
     double breathing;  // of the vein's flow: FlowVessel::breathing
 };
 const OutletReference& outlet_reference(Outlet outlet);
 
-// Waveforms of veins, by kind.
+// The waveform of veins of a kind.
 FlowWave vein_wave(FlowKind kind);
 // "steady", "artery", "vein": for vessels whose names say nothing.
 FlowWave named_wave(std::string_view name);
@@ -41,14 +41,14 @@ struct VesselReference {
 };
 VesselReference vessel_reference(std::string_view label, FlowKind kind);
 
-// Mean velocity that flow by size assumes, mm/s.
+// The mean velocity that flow by size assumes (assumed), mm/s.
 double usual_mean_mm_s(FlowKind kind);
 
-// Harmonics of a waveform given by values at phases, rising in [0, 1); periodic and monotone
-// between them (Fritsch, Carlson 1980), scaled to mean 1.
+// Returns the harmonics of a waveform given by values at phases, rising in [0, 1); periodic and
+// monotone between them (Fritsch, Carlson 1980), scaled to mean 1.
 struct WavePoint {
     double phase, value;
 };
 FlowWave wave_through(const WavePoint* points, int count);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline flow

@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
-namespace sonocase::pipeline {
+#include "formats/base/constants.h"
+
+namespace sonocase::pipeline::inline flow {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kMostOfMedian = 1.5, kLongestRayMm = 40;
-constexpr double kMostOfWall = 2.2;            // of the middle's distance to the wall: a flat vein
+constexpr double kMaxOfMedian = 1.5, kLongestRayMm = 40;
+constexpr double kMaxOfWall = 2.2;             // of the middle's distance to the wall: a flat vein
 constexpr double kEndRadii = 1.2, kEndMm = 2;  // of a free end that is dropped
 
 using Line = std::vector<Point3>;
@@ -35,7 +36,7 @@ class Lumen {
             const int label =
                 voxel(static_cast<int>(fx) + (c & 1), static_cast<int>(fy) + (c >> 1 & 1),
                       static_cast<int>(fz) + (c >> 2));
-            if (kinds_[static_cast<std::size_t>(label)] == kind_) sum += wx * wy * wz;
+            if (kinds_[label] == kind_) sum += wx * wy * wz;
         }
         return sum;
     }
@@ -43,7 +44,7 @@ class Lumen {
         const Point3 v = labels_.grid.voxel_from_point(p);
         const int l = voxel(static_cast<int>(std::lround(v.x)), static_cast<int>(std::lround(v.y)),
                             static_cast<int>(std::lround(v.z)));
-        return kinds_[static_cast<std::size_t>(l)] == kind_ ? l : 0;
+        return kinds_[l] == kind_ ? l : 0;
     }
     double voxel_mm() const { return labels_.grid.spacing_mm.x; }
     bool in_map(Point3 p) const {
@@ -70,7 +71,7 @@ double length_of(const Line& line) {
     return sum;
 }
 
-// Evenly spaced points, the ends included.
+// Returns evenly spaced points of the line, its ends included.
 Line resampled(const Line& line, double step_mm) {
     const double length = length_of(line);
     const int pieces = std::max(1, static_cast<int>(std::lround(length / step_mm)));
@@ -92,17 +93,16 @@ Line resampled(const Line& line, double step_mm) {
     return out;
 }
 
-// Gaussian along the line; reflected through its ends, so that they stay.
+// Smooths with a Gaussian along the line, reflected through its ends so that they stay.
 Line smoothed(const Line& line, double sigma_mm) {
     const auto n = static_cast<int>(line.size());
     if (n < 3) return line;
     const double step = length_of(line) / (n - 1);
     const int reach = std::min(n - 1, static_cast<int>(std::ceil(3 * sigma_mm / step)));
     const auto at = [&](int i) {
-        if (i < 0) return line.front() + (line.front() - line[static_cast<std::size_t>(-i)]);
-        if (i >= n)
-            return line.back() + (line.back() - line[static_cast<std::size_t>(2 * (n - 1) - i)]);
-        return line[static_cast<std::size_t>(i)];
+        if (i < 0) return line.front() + (line.front() - line[-i]);
+        if (i >= n) return line.back() + (line.back() - line[2 * (n - 1) - i]);
+        return line[i];
     };
     Line out;
     for (int i = 0; i < n; ++i) {
@@ -125,24 +125,23 @@ Line part_of(const Line& line, double from, double to) {
     const auto first = static_cast<std::size_t>(std::lround(from / step)),
                last = std::min(static_cast<std::size_t>(std::lround(to / step)), fine.size() - 1);
     if (first + 1 >= last) return {};
-    return {fine.begin() + static_cast<std::ptrdiff_t>(first),
-            fine.begin() + static_cast<std::ptrdiff_t>(last) + 1};
+    return {fine.begin() + first, fine.begin() + last + 1};
 }
 
 Vector3 direction_at(const Line& line, std::size_t i) {
     const std::size_t a = i > 0 ? i - 1 : i, b = i + 1 < line.size() ? i + 1 : i;
-    // As a bundle keeps it, so that rays are counted from the same direction there.
+    // Rounded as a bundle keeps it, so that rays are counted from the same direction there.
     Vector3 d = normalized(line[b] - line[a]);
     for (int axis = 0; axis < 3; ++axis) d[axis] = std::round(d[axis] * 32767) / 32767;
     return d;
 }
 
 // Goes straight on from the end of a line to the end of the lumen.
-void run_on(const Lumen& lumen, Line& line, double most_mm) {
+void run_on(const Lumen& lumen, Line& line, double max_mm) {
     const std::size_t n = line.size(), back = std::min<std::size_t>(n - 1, 12);
     const Vector3 d = normalized(line[n - 1] - line[n - 1 - back]);
     Point3 p = line.back();
-    for (double s = 0; s < most_mm; s += 0.5) {
+    for (double s = 0; s < max_mm; s += 0.5) {
         p = p + 0.5 * d;
         if (!lumen.in_map(p) || lumen.at(p) < 0.5) break;
         line.push_back(p);
@@ -163,7 +162,7 @@ double ray_radius(const Lumen& lumen, Point3 centre, Vector3 d) {
 std::array<float, kFlowRays> section(const Lumen& lumen,
                                      Point3 centre,
                                      SectionAxes axes,
-                                     double most_mm) {
+                                     double max_radius_mm) {
     std::array<double, kFlowRays> r{};
     for (std::size_t ray = 0; ray < kFlowRays; ++ray) {
         const double angle = 2 * kPi * static_cast<double>(ray) / kFlowRays;
@@ -179,7 +178,7 @@ std::array<float, kFlowRays> section(const Lumen& lumen,
     std::array<float, kFlowRays> out{};
     for (std::size_t ray = 0; ray < kFlowRays; ++ray) {
         const double kept = std::clamp(
-            r[ray], 0.25 * vx, std::max(std::min(kMostOfMedian * median, most_mm), 0.25 * vx));
+            r[ray], 0.25 * vx, std::max(std::min(kMaxOfMedian * median, max_radius_mm), 0.25 * vx));
         out[ray] = static_cast<float>(kept + moment / (2 * std::max(kept, vx)));
     }
     return out;
@@ -215,7 +214,7 @@ struct Held {
     double first_mm = 0, last_mm = 0;
 };
 
-void centre_line(const Lumen& lumen, const Held& held, double most_mm, Line& line) {
+void centre_line(const Lumen& lumen, const Held& held, double max_radius_mm, Line& line) {
     for (int pass = 0; pass < 2; ++pass) {
         const auto axes = axes_along(line);
         const double step = length_of(line) / static_cast<double>(line.size() - 1);
@@ -223,23 +222,21 @@ void centre_line(const Lumen& lumen, const Held& held, double most_mm, Line& lin
         for (std::size_t i = 0; i < line.size(); ++i) {
             const double at = step * static_cast<double>(i);
             if (at < held.first_mm || length_of(line) - at < held.last_mm) continue;
-            moved[i] = line[i] + centroid_of(section(lumen, line[i], axes[i], most_mm), axes[i]);
+            moved[i] =
+                line[i] + centroid_of(section(lumen, line[i], axes[i], max_radius_mm), axes[i]);
         }
         line = smoothed(moved, 0.8 * step);
     }
 }
 
-// Within a fork, the next section outside it; one pass of smoothing along the vessel elsewhere.
-void settle_sections(const Held& held, double step, std::vector<FlowNode>& nodes) {
+// Gives nodes within a fork the next section outside it, and smooths once along the vessel
+// elsewhere.
+void finish_sections(const Held& held, double step, std::vector<FlowNode>& nodes) {
     const auto n = static_cast<int>(nodes.size());
     const int low = std::min(n / 2, static_cast<int>(std::ceil(held.first_mm / step))),
               high = std::max(n / 2, n - 1 - static_cast<int>(std::ceil(held.last_mm / step)));
-    for (int i = 0; i < low; ++i)
-        nodes[static_cast<std::size_t>(i)].radius_mm =
-            nodes[static_cast<std::size_t>(low)].radius_mm;
-    for (int i = high + 1; i < n; ++i)
-        nodes[static_cast<std::size_t>(i)].radius_mm =
-            nodes[static_cast<std::size_t>(high)].radius_mm;
+    for (int i = 0; i < low; ++i) nodes[i].radius_mm = nodes[low].radius_mm;
+    for (int i = high + 1; i < n; ++i) nodes[i].radius_mm = nodes[high].radius_mm;
     const std::vector<FlowNode> raw = nodes;
     for (std::size_t i = 1; i + 1 < nodes.size(); ++i)
         for (std::size_t ray = 0; ray < kFlowRays; ++ray)
@@ -262,8 +259,9 @@ void measure(const Lumen& lumen, VesselCourse& course) {
     vessel.nodes = static_cast<int>(course.nodes.size());
     const auto axes = section_axes(field, vessel);
     for (std::size_t i = 0; i < course.nodes.size(); ++i)
-        course.nodes[i].radius_mm = section(lumen, course.nodes[i].centre, axes[i], course.most_mm);
-    settle_sections({course.fork_first_mm, course.fork_last_mm}, step_of(course.nodes),
+        course.nodes[i].radius_mm =
+            section(lumen, course.nodes[i].centre, axes[i], course.max_radius_mm);
+    finish_sections({course.fork_first_mm, course.fork_last_mm}, step_of(course.nodes),
                     course.nodes);
 }
 
@@ -274,8 +272,7 @@ VesselCourse course_of(const Lumen& lumen,
     VesselCourse course;
     course.first = from.first;
     course.last = from.last;
-    const CentreNode &a = tree.nodes[static_cast<std::size_t>(from.first)],
-                     &b = tree.nodes[static_cast<std::size_t>(from.last)];
+    const CentreNode &a = tree.nodes[from.first], &b = tree.nodes[from.last];
     const double length = length_of(from.points);
     const auto drop = [&](const CentreNode& node, double radius) {
         return node.degree == 1 ? std::min(kEndRadii * radius + kEndMm, 0.3 * length) : 0.0;
@@ -284,11 +281,11 @@ VesselCourse course_of(const Lumen& lumen,
     Line line = part_of(from.points, drop(a, middle), length - drop(b, middle));
     if (line.size() < 4) return course;
     line = smoothed(resampled(line, 1), options.smooth_mm);
-    const double most = 3 * middle + 10;
-    if (b.degree == 1) run_on(lumen, line, most);
+    const double max_mm = 3 * middle + 10;
+    if (b.degree == 1) run_on(lumen, line, max_mm);
     if (a.degree == 1) {
         std::reverse(line.begin(), line.end());
-        run_on(lumen, line, most);
+        run_on(lumen, line, max_mm);
         std::reverse(line.begin(), line.end());
     }
     line = resampled(line, options.node_mm);
@@ -298,13 +295,13 @@ VesselCourse course_of(const Lumen& lumen,
     const Held held{fork(a), fork(b)};
     auto sorted = from.radius_mm;
     std::sort(sorted.begin(), sorted.end());
-    course.most_mm = kMostOfWall * sorted[sorted.size() / 2] + lumen.voxel_mm();
-    centre_line(lumen, held, course.most_mm, line);
+    course.max_radius_mm = kMaxOfWall * sorted[sorted.size() / 2] + lumen.voxel_mm();
+    centre_line(lumen, held, course.max_radius_mm, line);
     course.fork_first_mm = held.first_mm;
     course.fork_last_mm = held.last_mm;
     std::array<int, 256> votes{};
     for (std::size_t i = 0; i < line.size(); ++i) {
-        ++votes[static_cast<std::size_t>(lumen.label(line[i]))];
+        ++votes[lumen.label(line[i])];
         course.nodes.push_back({line[i], direction_at(line, i), {}});
     }
     measure(lumen, course);
@@ -330,7 +327,7 @@ void measure_sections(const LabelVolume& labels, FlowKind kind, VesselCourse& co
     measure(Lumen(labels, kind), course);
 }
 
-void turn_round(const LabelVolume& labels, FlowKind kind, VesselCourse& course) {
+void reverse_course(const LabelVolume& labels, FlowKind kind, VesselCourse& course) {
     std::reverse(course.nodes.begin(), course.nodes.end());
     for (FlowNode& node : course.nodes) node.direction = -node.direction;
     std::swap(course.first, course.last);
@@ -338,4 +335,4 @@ void turn_round(const LabelVolume& labels, FlowKind kind, VesselCourse& course) 
     measure_sections(labels, kind, course);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline flow

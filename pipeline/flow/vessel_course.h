@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The courses of vessels: smooth, evenly spaced nodes with sections, from centrelines in voxels.
+// Courses of vessels: smooth, evenly spaced nodes with sections, made from centrelines in voxels.
 #pragma once
 
 #include <vector>
@@ -8,14 +8,14 @@
 #include "formats/flow/flow_field.h"
 #include "pipeline/flow/centreline.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline flow {
 
 // A vessel of the tree, in the order of its line; which way blood runs is not known yet.
 struct VesselCourse {
     int first = -1, last = -1;  // nodes of the tree
     std::vector<FlowNode> nodes;
     int label = 0;                               // palette index that most of it lies in
-    double most_mm = 40;                         // radius that a section can have
+    double max_radius_mm = 40;                   // of a section
     double fork_first_mm = 0, fork_last_mm = 0;  // within a fork at either end
 };
 
@@ -34,11 +34,11 @@ std::vector<VesselCourse> vessel_courses(const LabelVolume& labels,
                                          const CentreTree& tree,
                                          const CourseOptions& options = {});
 
-// Measures the sections anew, from centres and directions: after a course was turned round or cut,
-// since rays are counted from a direction that the first node gives.
+// Measures the sections again, from centres and directions, after a course was reversed or cut:
+// rays are counted from a direction that the first node gives.
 void measure_sections(const LabelVolume& labels, FlowKind kind, VesselCourse& course);
 
-// The same vessel from its other end; sections are measured anew.
-void turn_round(const LabelVolume& labels, FlowKind kind, VesselCourse& course);
+// Makes the course start at its other end; sections are measured again.
+void reverse_course(const LabelVolume& labels, FlowKind kind, VesselCourse& course);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline flow

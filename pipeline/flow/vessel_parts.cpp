@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "formats/volume/tissue_mechanics.h"
+#include "formats/volume/tissue.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline flow {
 namespace {
 
 bool contains(std::string_view text, std::string_view word) {
@@ -33,7 +33,7 @@ Box box_of(const LabelVolume& labels, const std::array<std::uint8_t, 256>& kinds
     return box;
 }
 
-// The kind's voxels on a padded box, every `step`-th of the map's.
+// Returns the kind's voxels on a padded box, every `step`-th of the map's.
 VesselPart cropped(const LabelVolume& labels,
                    const std::array<std::uint8_t, 256>& kinds,
                    int kind,
@@ -68,13 +68,13 @@ VesselPart cropped(const LabelVolume& labels,
     return part;
 }
 
-// Numbers the pieces from 1; count[i] voxels of piece i.
+// Numbers the pieces from 1. count[i]: voxels of piece i.
 std::vector<std::int32_t> pieces_of(const VesselPart& part, std::vector<std::size_t>& count) {
     const Grid& grid = part.grid;
     std::vector<std::int32_t> piece(part.label.size(), 0);
     std::vector<std::size_t> open;
     count.assign(1, 0);
-    const auto x = static_cast<std::size_t>(grid.size.x), y = static_cast<std::size_t>(grid.size.y);
+    const std::size_t x = grid.size.x, y = grid.size.y;
     for (std::size_t start = 0; start < piece.size(); ++start) {
         if (part.label[start] == 0 || piece[start] != 0) continue;
         const auto number = static_cast<std::int32_t>(count.size());
@@ -87,10 +87,7 @@ std::vector<std::int32_t> pieces_of(const VesselPart& part, std::vector<std::siz
             ++count.back();
             // The padding keeps neighbours inside the box.
             for (int q = 0; q < 27; ++q) {
-                const std::size_t next = at + static_cast<std::size_t>(q % 3) +
-                                         x * (static_cast<std::size_t>(q / 3 % 3) +
-                                              y * static_cast<std::size_t>(q / 9)) -
-                                         1 - x - x * y;
+                const std::size_t next = at + q % 3 + x * (q / 3 % 3 + y * (q / 9)) - 1 - x - x * y;
                 if (part.label[next] == 0 || piece[next] != 0) continue;
                 piece[next] = number;
                 open.push_back(next);
@@ -100,7 +97,7 @@ std::vector<std::int32_t> pieces_of(const VesselPart& part, std::vector<std::siz
     return piece;
 }
 
-// One piece on its own box.
+// Returns one piece on a box of its own.
 VesselPart piece_alone(const VesselPart& part,
                        const std::vector<std::int32_t>& piece,
                        std::int32_t number,
@@ -161,8 +158,8 @@ std::array<std::uint8_t, 256> flow_kinds(const std::vector<Label>& palette) {
 }
 
 std::vector<VesselPart> vessel_parts(const LabelVolume& labels,
-                                     double least_ml,
-                                     std::size_t most_voxels) {
+                                     double min_ml,
+                                     std::size_t max_voxels) {
     const auto kinds = flow_kinds(labels.labels);
     std::vector<VesselPart> out;
     for (int kind = 1; kind <= 3; ++kind) {
@@ -172,13 +169,13 @@ std::vector<VesselPart> vessel_parts(const LabelVolume& labels,
         const auto size = [&](int axis) {
             return static_cast<std::size_t>((box.high[axis] - box.low[axis]) / step + 3);
         };
-        while (size(0) * size(1) * size(2) > most_voxels) ++step;
+        while (size(0) * size(1) * size(2) > max_voxels) ++step;
         const VesselPart all = cropped(labels, kinds, kind, box, step);
         std::vector<std::size_t> count;
         const auto piece = pieces_of(all, count);
         const double voxel_ml = all.grid.voxel_volume_mm3() / 1000;
         for (std::size_t number = 1; number < count.size(); ++number) {
-            if (static_cast<double>(count[number]) * voxel_ml < least_ml) continue;
+            if (static_cast<double>(count[number]) * voxel_ml < min_ml) continue;
             out.push_back(
                 piece_alone(all, piece, static_cast<std::int32_t>(number), count[number]));
         }
@@ -190,4 +187,4 @@ std::vector<VesselPart> vessel_parts(const LabelVolume& labels,
     return out;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline flow

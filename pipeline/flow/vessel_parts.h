@@ -13,13 +13,13 @@
 #include "formats/flow/flow_field.h"
 #include "formats/volume/label_volume.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline flow {
 
-// The system that a label belongs to, by words of its name and its tissue (`blood`, or one named
-// like it). None for what holds no flowing blood: other tissues, a thrombus, the heart.
+// Returns the system that a label belongs to, by words of its name and its tissue (`blood`, or one
+// named like it). None for what holds no flowing blood: other tissues, a thrombus, the heart.
 std::optional<FlowKind> flow_kind(std::string_view label, std::string_view tissue);
 
-// Per palette entry: 0 none, 1 + FlowKind otherwise.
+// Returns for each palette entry 0 where it is none, else 1 + FlowKind.
 std::array<std::uint8_t, 256> flow_kinds(const std::vector<Label>& palette);
 
 struct VesselPart {
@@ -30,10 +30,10 @@ struct VesselPart {
     std::size_t voxels = 0;
 };
 
-// Pieces (26-connected) of at least least_ml. Boxes of more than most_voxels are taken at every
+// Pieces (26-connected) of at least min_ml. Boxes of more than max_voxels are taken at every
 // second, third ... voxel. Largest first. Cost: two passes over the map.
 std::vector<VesselPart> vessel_parts(const LabelVolume& labels,
-                                     double least_ml = 0.2,
-                                     std::size_t most_voxels = 16'000'000);
+                                     double min_ml = 0.2,
+                                     std::size_t max_voxels = 16'000'000);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline flow

@@ -6,9 +6,12 @@
 #include <array>
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "formats/image_scores/smooth.h"
+#include "formats/text/json_reader.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
+
 namespace {
 
 constexpr double kInlierPx = 1.5;
@@ -16,13 +19,13 @@ constexpr double kInlierPx = 1.5;
 struct EdgePoint {
     double x, y;
 };
-// x = at + slope y; support: points on it.
+// x = at + slope y; support: how many points lie on it.
 struct EdgeLine {
     double at = 0, slope = 0;
     int support = 0;
 };
 
-// Grey of the picture's surroundings: the most common one of its border.
+// The grey of the picture's surroundings: the most common one along its border.
 int background_of(const FramePile& pile) {
     std::array<int, 256> count{};
     for (int x = 0; x < pile.width_px; ++x) {
@@ -34,7 +37,7 @@ int background_of(const FramePile& pile) {
         ++count[pile.highest[pile.index(pile.width_px - 1, y)]];
     }
     const auto most = std::max_element(count.begin(), count.end());
-    // A scan that fills its picture has no surroundings: black ones are assumed.
+    // A scan that fills its picture has no surroundings; they are taken as black.
     return *most * 4 > 2 * (pile.width_px + pile.height_px) ? static_cast<int>(most - count.begin())
                                                             : 0;
 }
@@ -68,12 +71,12 @@ void keep_large_places(std::vector<std::uint8_t>& mask, const FramePile& pile) {
     if (sizes.empty()) return;
     const std::size_t largest = *std::max_element(sizes.begin(), sizes.end());
     for (std::size_t i = 0; i < mask.size(); ++i) {
-        if (mask[i] && sizes[static_cast<std::size_t>(place[i])] * 8 < largest) mask[i] = 0;
+        if (mask[i] && sizes[place[i]] * 8 < largest) mask[i] = 0;
     }
 }
 
-// `outward` -1: nothing may lie at smaller x (left side); +1: at greater x. Every pair of some 120
-// points is tried.
+// The line on which most points lie with none beyond it. `outward` -1: nothing may lie at smaller x
+// (left side); +1: at greater x. Every pair of some 120 points is tried.
 EdgeLine supporting_line(const std::vector<EdgePoint>& points, int outward) {
     EdgeLine best;
     const std::size_t step = std::max<std::size_t>(points.size() / 120, 1);
@@ -193,16 +196,15 @@ void measure_radii(const std::vector<std::uint8_t>& mask, const FramePile& pile,
     if (outer.size() < 5) {
         scan.warnings.push_back(
             "The picture cuts the fan at every depth: its end is taken where the picture ends. "
-            "Give "
-            "the geometry if it is known.");
+            "Give the geometry if it is known.");
     }
 }
 
 }  // namespace
 
 Result<FoundScan> find_scan(const FramePile& pile, const std::vector<std::uint8_t>& burnt) {
-    // The mean, since compression rings over the edges of a bright frame; what moves is an echo
-    // even where it is dark on average.
+    // The mean is used because compression artefacts ring beyond the edges of a single bright
+    // frame. Pixels that move are echoes even where they are dark on average.
     constexpr int kOverBackground = 3, kMoves = 40;
     const int background = background_of(pile);
     std::vector<std::uint8_t> mask(pile.highest.size());
@@ -277,4 +279,69 @@ ScanPlace scan_place(const FoundScan& scan, double mm_per_px) {
     return place;
 }
 
-}  // namespace sonocase::pipeline
+namespace {
+
+void expect_between(
+    detail::JsonObject& json, const char* key, double value, double low, double high) {
+    if (value >= low && value <= high) return;
+    json.add_fault(key, "is out of range",
+                   "expected " + std::to_string(low) + " to " + std::to_string(high));
+}
+
+void read_fan(detail::JsonObject& json, ScanPlace& place) {
+    const auto apex = json.numbers("apex_px", 2);
+    const double inner = json.number("r_in_mm"), outer = json.number("r_out_mm");
+    const double degrees = json.number("half_angle_deg");
+    if (!json.ok()) return;
+    expect_between(json, "half_angle_deg", degrees, 1, 89);
+    expect_between(json, "r_in_mm", inner, 0, 1000);
+    expect_between(json, "r_out_mm", outer, inner + 5, inner + 500);
+    place.apex_x_px = apex[0];
+    place.apex_y_px = apex[1];
+    place.radius_mm = inner;
+    place.depth_mm = outer - inner;
+    place.half_angle_rad = degrees * kRadPerDeg;
+}
+
+void read_linear(detail::JsonObject& json, ScanPlace& place) {
+    const double left = json.number("left_px"), right = json.number("right_px"),
+                 top = json.number("top_px"), bottom = json.number("bottom_px");
+    if (!json.ok()) return;
+    expect_between(json, "right_px", right, left + 16, left + 16384);
+    expect_between(json, "bottom_px", bottom, top + 16, top + 16384);
+    place.apex_x_px = 0.5 * (left + right - 1);
+    place.apex_y_px = top - 0.5;
+    place.width_mm = (right - left) * place.mm_per_px;
+    place.depth_mm = (bottom - top) * place.mm_per_px;
+}
+
+}  // namespace
+
+Result<GivenScan> parse_scan(const std::string& text, const std::string& where) {
+    detail::JsonFault fault{where, {}};
+    detail::Json value;
+    if (!detail::parse_json(text, value, fault)) return *fault.error;
+    detail::JsonObject json(value, "", fault);
+    GivenScan scan;
+    const std::string kind = json.text("kind");
+    scan.place.mm_per_px = json.number("mm_per_px");
+    if (json.ok()) {
+        expect_between(json, "mm_per_px", scan.place.mm_per_px, 0.001, 10);
+        if (kind == "fan") {
+            read_fan(json, scan.place);
+        } else if (kind == "linear") {
+            read_linear(json, scan.place);
+        } else {
+            json.add_fault("kind", "is '" + kind + "'", "expected \"fan\" or \"linear\"");
+        }
+    }
+    if (json.ok() && json.has("use")) {
+        for (const double index : json.numbers("use", 0)) {
+            if (index >= 0 && index < 1e9) scan.use.push_back(static_cast<std::size_t>(index));
+        }
+    }
+    if (fault.error) return *fault.error;
+    return scan;
+}
+
+}  // namespace sonocase::pipeline::inline look

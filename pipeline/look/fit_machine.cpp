@@ -5,15 +5,175 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
+#include "formats/base/constants.h"
 #include "formats/image_scores/smooth.h"
 #include "formats/text/number_text.h"
-#include "pipeline/look/fit_gain.h"
 #include "pipeline/look/fit_texture.h"
-#include "pipeline/look/look_simulation.h"
+#include "pipeline/look/stand_in.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
+
 namespace {
+
+// The level of parenchyma in a band.
+struct Level {
+    double depth_mm, db, weight;
+};
+
+// level(r) = top - slope clamp(r - from, 0, to - from), each level being a mean over a patch.
+struct Fall {
+    double from_mm = 0, to_mm = 0, slope = 0;  // dB per mm
+    double squares = std::numeric_limits<double>::infinity();
+};
+
+// The top and slope that fit best for a fall between two depths.
+Fall fall_between(const std::vector<Level>& levels, double half_mm, double from, double to) {
+    double n = 0, u1 = 0, u2 = 0, v1 = 0, v2 = 0, uv = 0;
+    for (const Level& level : levels) {
+        constexpr int kParts = 6;
+        double u = 0;
+        for (int i = 0; i < kParts; ++i) {
+            const double r = level.depth_mm + half_mm * ((2 * i + 1.0) / kParts - 1);
+            u += std::clamp(r - from, 0.0, to - from) / kParts;
+        }
+        n += level.weight;
+        u1 += level.weight * u;
+        v1 += level.weight * level.db;
+        u2 += level.weight * u * u;
+        v2 += level.weight * level.db * level.db;
+        uv += level.weight * u * level.db;
+    }
+    const double uu = u2 - u1 * u1 / n, vv = v2 - v1 * v1 / n, cross = uv - u1 * v1 / n;
+    constexpr double kSteepest = 3;  // dB per mm: the limit of the reader of machines
+    const double slope = uu > 1e-9 ? std::clamp(-cross / uu, 0.0, kSteepest) : 0;
+    return {from, to, slope, std::max(vv + 2 * slope * cross + slope * slope * uu, 0.0)};
+}
+
+// Below the middle depths a band counts only if its speckle has the contrast of parenchyma.
+std::vector<Level> levels_of(const LookMeasures& m, const MachineGrey& grey) {
+    const auto contrast = [&](const LookBand& band) {
+        return band.local_sd /
+               (grey.map == GreyMap::log ? 1 : std::max(band.mean - grey.floor, 1.0));
+    };
+    std::vector<double> contrasts;
+    int max_patches = 0;
+    for (const LookBand& band : m.bands) {
+        contrasts.push_back(contrast(band));
+        max_patches = std::max(max_patches, band.patches);
+    }
+    const double usual = median_of(contrasts);
+    constexpr double kOff = 0.35;
+    std::vector<Level> levels;
+    double weights = 0;
+    for (const LookBand& band : m.all_bands) {
+        const double amplitude = amplitude_of(grey, band.upper_mean);
+        if (!(amplitude > 0)) continue;
+        const bool deep = band.depth_mm > m.highest_mm + 0.1;
+        if (deep &&
+            (std::abs(contrast(band) / usual - 1) > kOff || !counts_at_depth(band, max_patches)))
+            continue;
+        const double weight = std::sqrt(static_cast<double>(band.patches));
+        levels.push_back({band.depth_mm, 20 * std::log10(amplitude), weight});
+        weights += weight;
+    }
+    for (Level& level : levels) level.weight *= static_cast<double>(levels.size()) / weights;
+    return levels;
+}
+
+// Finds the far gain from the levels of the bands.
+void find_fall(const LookMeasures& m, const BeamImage& grid, FittedMachine& fit) {
+    MachineGain& gain = fit.machine.gain;
+    const std::vector<Level> levels = levels_of(m, fit.machine.grey);
+    const double half = 0.5 * kPatch * grid.sample_mm;
+    if (levels.size() < 5) {
+        fit.kept.push_back("gain (far gain): too little parenchyma at depth");
+        return;
+    }
+    const double first = levels.front().depth_mm - half, last = levels.back().depth_mm + half,
+                 step = (last - first) / 60, endless = 1e9;
+    const double flat = fall_between(levels, half, endless, 2 * endless).squares;
+    Fall open, ended;
+    for (int i = 0; i < 60; ++i) {
+        const double from = first + i * step;
+        if (from > levels[levels.size() - 3].depth_mm) break;  // three bands must show it
+        const Fall to_the_end = fall_between(levels, half, from, endless);
+        if (to_the_end.squares < open.squares) open = to_the_end;
+        for (int j = i + 3; j < 60; ++j) {
+            const double to = first + j * step;
+            if (to > levels.back().depth_mm) break;  // its end must be seen
+            const Fall fall = fall_between(levels, half, from, to);
+            if (fall.squares < ended.squares) ended = fall;
+        }
+    }
+    // A fall, and its end, must explain more than the chance differences between bands.
+    constexpr double kChance = 0.3;  // dB
+    const auto n = static_cast<double>(levels.size());
+    const auto better = [&](double with, double without, double parameters) {
+        const double chance = std::max(with / std::max(n - parameters, 1.0), kChance * kChance);
+        return without - with > 8 * chance;
+    };
+    Fall found = better(ended.squares, open.squares, 4) ? ended : open;
+    const bool falls =
+        found.slope > 0 && better(found.squares, flat, found.to_mm < endless ? 4 : 3);
+    if (!falls) {
+        if (gain.far_from_mm + 2 * half > levels.back().depth_mm) {
+            fit.kept.push_back("gain (far gain): no even parenchyma is seen below " +
+                               number_text(levels.back().depth_mm, 3) +
+                               " mm, and no fall above it");
+            return;
+        }
+        gain.far_db_per_cm = 0;
+        return;
+    }
+    // A slow fall is attenuation beyond the machine's compensation, which the case itself adds.
+    const double slowest = grid.fan ? 1.2 : 2;  // dB per cm
+    if (10 * found.slope < slowest) {
+        fit.kept.push_back("gain (far gain): the level of parenchyma falls by " +
+                           number_text(10 * found.slope, 2) +
+                           " dB/cm, which is taken for attenuation");
+        return;
+    }
+    const double base_limit_db = gain.far_limit_db;
+    gain.far_from_mm = std::max(found.from_mm, 0.0);
+    gain.far_db_per_cm = 10 * found.slope;
+    // If no end is seen, the fall ends where the levels end, or at the base's limit if that is
+    // more.
+    const double seen = std::min(found.to_mm, levels.back().depth_mm + half) - found.from_mm;
+    gain.far_limit_db = found.slope * seen;
+    if (!(found.to_mm < endless)) gain.far_limit_db = std::max(gain.far_limit_db, base_limit_db);
+    gain.far_limit_db = std::min(gain.far_limit_db, 120.0);
+}
+
+// The loss by the far gain at a depth, dB.
+double far_fall_db(const MachineGain& gain, double depth_mm) {
+    return std::min(gain.far_limit_db,
+                    std::max(depth_mm - gain.far_from_mm, 0.0) / 10 * gain.far_db_per_cm);
+}
+
+// Sets the far gain from the levels of the bands through the grey map of `fit.machine`: flat to
+// far_from_mm, then a straight fall to far_limit_db. The level of the grey map, until here that of
+// the middle depths, becomes that of the flat part. What the depths seen do not show (a fall, its
+// end) stays the base's.
+void fit_far_gain(const LookMeasures& m, const BeamImage& grid, FittedMachine& fit) {
+    find_fall(m, grid, fit);
+    // Until here the grey map's level is that of the middle depths, where the fall may have begun.
+    const MachineGain& gain = fit.machine.gain;
+    double middle = 0, patches = 0;
+    for (const LookBand& band : m.bands) {
+        if (band.depth_mm < m.lowest_mm - 0.1 || band.depth_mm > m.highest_mm + 0.1) continue;
+        middle += band.patches * far_fall_db(gain, band.depth_mm);
+        patches += band.patches;
+    }
+    if (!(patches > 0)) return;
+    MachineGrey& grey = fit.machine.grey;
+    const double shift = middle / patches;
+    grey.level = grey.map == GreyMap::log ? grey.level + 255 / grey.dynamic_range_db * shift
+                                          : grey.level * std::pow(10.0, grey.exponent * shift / 20);
+    grey.level = std::clamp(grey.level, 1.0, 255.0);
+}
 
 double db(double amplitude) {
     return 20 * std::log10(std::max(amplitude, 1e-6));
@@ -34,7 +194,7 @@ bool fit_face_lines(const std::vector<double>& e,
         for (std::ptrdiff_t j = -wide; j <= wide; ++j) {
             const std::ptrdiff_t k = static_cast<std::ptrdiff_t>(i) + j;
             if (k < 0 || k >= static_cast<std::ptrdiff_t>(e.size())) continue;
-            around += e[static_cast<std::size_t>(k)];
+            around += e[k];
             ++n;
         }
         if (e[i] < 1.05 * around / n) continue;
@@ -57,8 +217,9 @@ bool fit_face_lines(const std::vector<double>& e,
     return true;
 }
 
-// Darkness at the face and the level of the ringing, whose decay is the base's, together: either
-// would be taken for the other. The ringing gives the profile its mean, the darkness its shape.
+// Fits the darkness at the face and the level of the ringing, whose decay is the base's, together:
+// one alone would be taken for the other. The ringing gives the profile its mean, the darkness its
+// shape.
 void fit_ring(const std::vector<double>& e,
               double sample_mm,
               double reach_mm,
@@ -70,7 +231,8 @@ void fit_ring(const std::vector<double>& e,
         const double r = (static_cast<double>(i) + 0.5) * sample_mm;
         double lines = 1;
         for (int k = 0; k < near.lines; ++k) {
-            const double z = (r - near.first_mm - k * near.spacing_mm) / (near.line_mm / 2.3548);
+            const double z =
+                (r - near.first_mm - k * near.spacing_mm) / (near.line_mm / kFullWidthPerSigma);
             lines += std::pow(10.0, (near.line_db - k * near.line_step_db) / 20) *
                      std::exp(-0.5 * z * z);
         }
@@ -150,7 +312,7 @@ void fit_contact(const LookMeasures& m, FittedMachine& fit) {
         contact.edge_db = 0;
         return;
     }
-    // Where half of the loss is made good; it falls linearly from the edge.
+    // The line at which the loss is half of that at the edge; it falls linearly from there.
     std::size_t half = 0;
     while (half < n / 4 && (level[half] + level[n - 1 - half]) / 2 < ground - contact.edge_db / 2)
         ++half;
@@ -158,8 +320,8 @@ void fit_contact(const LookMeasures& m, FittedMachine& fit) {
         std::clamp(2 * static_cast<double>(half) / static_cast<double>(n), 0.02, 0.25);
 }
 
-// Three significant digits: more would pretend a precision that no clip gives, and would differ
-// between processors.
+// Rounds to three significant digits: more would claim a precision that no clip gives, and would
+// differ between processors.
 void round_values(Machine& m) {
     const auto tidy = [](double& v) { (void)parse_number(number_text(v, 3), v); };
     for (double* v : {&m.beam.axial_mm,
@@ -230,4 +392,4 @@ FittedMachine fit_machine(const LookMeasures& measures,
     return fit;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline look

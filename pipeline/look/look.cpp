@@ -8,13 +8,13 @@
 #include <optional>
 
 #include "formats/files/atomic_file.h"
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/base/stopwatch.h"
 #include "pipeline/look/find_scan.h"
 #include "pipeline/look/look_frames.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
 namespace {
 
 struct Clip {
@@ -26,26 +26,24 @@ struct Clip {
 
 Result<Clip> open_clip(const LookInput& input,
                        const std::vector<std::size_t>& use,
-                       int most,
+                       int max_frames,
                        const Progress& progress) {
-    const auto all = list_frames(input.frames);
-    if (!all) return all.error();
+    SONOCASE_TRY(const auto all, list_frames(input.frames));
     Clip clip;
-    clip.given = all->size();
+    clip.given = all.size();
     std::vector<std::string> usable;
     for (const std::size_t i : use) {
-        if (i < all->size()) usable.push_back((*all)[i]);
+        if (i < all.size()) usable.push_back(all[i]);
     }
-    if (usable.empty()) usable = *all;
-    for (const std::size_t i : spread_indices(usable.size(), static_cast<std::size_t>(most)))
+    if (usable.empty()) usable = all;
+    for (const std::size_t i : spread_indices(usable.size(), static_cast<std::size_t>(max_frames)))
         clip.paths.push_back(usable[i]);
     for (std::size_t i = 0; i < clip.paths.size(); ++i) {
         report_progress(progress,
                         0.3 * static_cast<double>(i) / static_cast<double>(clip.paths.size()),
                         "reading frames");
-        const auto frame = read_look_frame(clip.paths[i]);
-        if (!frame) return frame.error();
-        if (const Status added = clip.pile.add(*frame, clip.paths[i]); !added) return added.error();
+        SONOCASE_TRY(const auto frame, read_look_frame(clip.paths[i]));
+        SONOCASE_TRY_DONE(clip.pile.add(frame, clip.paths[i]));
     }
     clip.burnt = burnt_in(clip.pile);
     return clip;
@@ -116,7 +114,7 @@ struct Masks {
     std::map<std::string, std::vector<std::uint8_t>> tissues;
 };
 
-// Liver and rectangles without a name are where the texture is measured.
+// The texture is measured in rectangles of liver and in those without a name.
 Result<Masks> masks_of(const Clip& clip,
                        const LookInput& input,
                        const ScanPlace& place,
@@ -255,48 +253,41 @@ Result<LookResult> measure_look_of(const LookInput& input,
     const Stopwatch watch;
     std::optional<GivenScan> given;
     if (!input.geometry_path.empty()) {
-        const auto text = read_text_file(input.geometry_path);
-        if (!text) return text.error();
-        auto scan = parse_scan(*text, input.geometry_path);
-        if (!scan) return scan.error();
-        given = std::move(*scan);
+        SONOCASE_TRY(const auto text, read_text_file(input.geometry_path));
+        SONOCASE_TRY(auto scan, parse_scan(text, input.geometry_path));
+        given = std::move(scan);
     }
-    const auto clip =
-        open_clip(input, given ? given->use : std::vector<std::size_t>{}, options.frames, progress);
-    if (!clip) return clip.error();
-    const auto placed = place_of(*clip, given, options);
-    if (!placed) return placed.error();
+    SONOCASE_TRY(const auto clip, open_clip(input, given ? given->use : std::vector<std::size_t>{},
+                                            options.frames, progress));
+    SONOCASE_TRY(const auto placed, place_of(clip, given, options));
 
     LookResult result;
-    result.place = placed->place;
-    result.place_found = placed->found;
-    result.frames_given = clip->given;
-    result.report.warnings = placed->warnings;
-    const auto base = built_in_machine(!options.base.empty() ? options.base
-                                       : result.place.fan()  ? "modern"
-                                                             : "modern-linear");
-    if (!base) return base.error();
+    result.place = placed.place;
+    result.place_found = placed.found;
+    result.frames_given = clip.given;
+    result.report.warnings = placed.warnings;
+    SONOCASE_TRY(const auto base, built_in_machine(!options.base.empty() ? options.base
+                                                   : result.place.fan()  ? "modern"
+                                                                         : "modern-linear"));
     const BeamImage grid = beam_grid(result.place);
     if (grid.samples < kPatch) {
         return Error{"a scan of " + std::to_string(result.place.depth_mm) + " mm is too shallow",
-                     clip->paths.front(), "expected more than 17 mm of a fan, 5 of a linear scan"};
+                     clip.paths.front(), "expected more than 17 mm of a fan, 5 of a linear scan"};
     }
-    const auto masks = masks_of(*clip, input, result.place, grid);
-    if (!masks) return masks.error();
-    auto real = measure_frames(*clip, result.place, *masks, result.frame, progress);
-    if (!real) return real.error();
-    result.real = std::move(*real);
+    SONOCASE_TRY(const auto masks, masks_of(clip, input, result.place, grid));
+    SONOCASE_TRY(auto real, measure_frames(clip, result.place, masks, result.frame, progress));
+    result.real = std::move(real);
     report_progress(progress, 0.7, "fitting the machine");
     FitOptions fit;
-    fit.base = *base;
+    fit.base = base;
     fit.seed = options.seed;
     result.fit =
-        fit_machine(result.real, result.place, clip->pile.width_px, clip->pile.height_px, fit);
+        fit_machine(result.real, result.place, clip.pile.width_px, clip.pile.height_px, fit);
     result.fit.machine.name = options.name;
     result.fit.machine.title = options.title.empty() ? "Measured: " + options.name : options.title;
-    draw_and_score(*masks, options, result);
+    draw_and_score(masks, options, result);
     add_report(result, watch.seconds());
     return result;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline look

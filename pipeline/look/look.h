@@ -8,11 +8,11 @@
 
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
-#include "formats/image_scores/score_limits.h"
+#include "formats/image_scores/realism_scores.h"
 #include "pipeline/base/progress.h"
 #include "pipeline/look/fit_machine.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
 
 inline constexpr int kLookVersion = 2;  // raised when the same frames give another machine
 
@@ -27,7 +27,7 @@ struct LookOptions {
     std::string title;          // empty: made from the name
     std::string base;           // built-in machine; empty: modern, or modern-linear
     double depth_mm = 0;        // of the picture's last row, from the face; 0: from the geometry
-    int frames = 120;           // at most so many are measured, evenly spread
+    int frames = 120;           // how many are measured at most, evenly spread
     std::uint64_t seed = 1;     // of the stand-ins
 };
 
@@ -55,11 +55,12 @@ struct LookResult {
     StageReport report;
 };
 
-// Two passes over the frames that are measured: what stands still, then what is seen. Memory: some
-// pictures, whatever the number of frames. Errors: no frames, a file that is not a picture, frames
-// of different sizes, black pictures, no scan found, or no scale. Cost: 0.1 s per frame and 6 s.
+// Reads the frames that are measured twice: for what stands still, then for the scores. Memory:
+// some pictures, whatever the number of frames. Errors: no frames, a file that is not a picture,
+// frames of different sizes, black pictures, no scan found, or no scale. Cost: 0.1 s per frame and
+// 6 s.
 Result<LookResult> measure_look_of(const LookInput& input,
                                    const LookOptions& options,
                                    const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline look

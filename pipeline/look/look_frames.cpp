@@ -6,10 +6,10 @@
 #include <cmath>
 #include <filesystem>
 
-#include "pipeline/base/delimited_text.h"
-#include "pipeline/texture/example/read_example.h"
+#include "pipeline/base/text.h"
+#include "pipeline/texture/read_example.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
 namespace {
 
 constexpr const char* kExpected = "expected PNG frames of one clip, or a folder of them";
@@ -33,8 +33,8 @@ std::vector<std::uint8_t> widened(const std::vector<std::uint8_t>& mask,
     return out;
 }
 
-// Clears groups of touching pixels of fewer than `least`.
-void drop_small_groups(const FramePile& pile, int least, std::vector<std::uint8_t>& mask) {
+// Clears groups of fewer than min_size touching pixels.
+void drop_small_groups(const FramePile& pile, int min_size, std::vector<std::uint8_t>& mask) {
     std::vector<std::uint8_t> open = mask;
     std::vector<std::size_t> group;
     for (std::size_t start = 0; start < open.size(); ++start) {
@@ -53,7 +53,7 @@ void drop_small_groups(const FramePile& pile, int least, std::vector<std::uint8_
                 }
             }
         }
-        if (static_cast<int>(group.size()) >= least) continue;
+        if (static_cast<int>(group.size()) >= min_size) continue;
         for (const std::size_t i : group) mask[i] = 0;
     }
 }
@@ -87,14 +87,13 @@ Result<std::vector<std::string>> list_frames(const std::vector<std::string>& inp
 }
 
 Result<LookFrame> read_look_frame(const std::string& path) {
-    const auto image = read_example(path);
-    if (!image) return image.error();
-    LookFrame frame{image->width, image->height, {}, {}};
-    frame.grey.resize(image->count());
-    frame.colour.resize(image->count());
-    for (std::size_t i = 0; i < image->count(); ++i) {
-        const float grey = image->grey[i];
-        frame.colour[i] = !image->used(i);
+    SONOCASE_TRY(const auto image, read_example(path));
+    LookFrame frame{image.width, image.height, {}, {}};
+    frame.grey.resize(image.count());
+    frame.colour.resize(image.count());
+    for (std::size_t i = 0; i < image.count(); ++i) {
+        const float grey = image.grey[i];
+        frame.colour[i] = !image.used(i);
         frame.grey[i] = std::isfinite(grey)
                             ? static_cast<std::uint8_t>(std::lround(std::clamp(grey, 0.0f, 255.0f)))
                             : 0;
@@ -153,4 +152,4 @@ std::vector<std::uint8_t> burnt_in(const FramePile& pile) {
     return widened(mask, pile, kRim);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline look

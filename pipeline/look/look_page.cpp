@@ -4,15 +4,18 @@
 
 #include <cmath>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/base/base64.h"
+#include "formats/base/constants.h"
+#include "formats/machine/machine.h"
 #include "formats/text/json_reader.h"
 #include "formats/text/number_text.h"
-#include "pipeline/look/look_page_html.h"
-#include "pipeline/pictures/html_template.h"
 #include "pipeline/pictures/markup.h"
 #include "pipeline/pictures/png.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
+
+extern const std::string_view kLookPageHtml;  // look_page.html, embedded by CMake
+
 namespace {
 
 const HtmlTemplate& page_template() {
@@ -51,7 +54,7 @@ std::string scan_text(const LookResult& r) {
     const ScanPlace& p = r.place;
     std::string text = std::to_string(r.real.frames) + " of " + std::to_string(r.frames_given) +
                        " frames; " + (p.fan() ? "fan of " : "linear scan of ");
-    text += p.fan() ? number(p.half_angle_rad * 360 / 3.14159265358979) + " degrees, face radius " +
+    text += p.fan() ? number(p.half_angle_rad * 360 / kPi) + " degrees, face radius " +
                           number(p.radius_mm) + " mm"
                     : number(p.width_mm) + " mm";
     return text + ", " + number(p.depth_mm) + " mm deep, " + number(p.mm_per_px) +
@@ -104,7 +107,7 @@ std::string look_json(const LookResult& r) {
     scan["mm_per_px"] = r.place.mm_per_px;
     scan["apex_px"] = {r.place.apex_x_px, r.place.apex_y_px};
     scan["radius_mm"] = r.place.radius_mm;
-    scan["half_angle_deg"] = r.place.half_angle_rad * 180 / 3.14159265358979;
+    scan["half_angle_deg"] = r.place.half_angle_rad * kDegPerRad;
     scan["width_mm"] = r.place.width_mm;
     scan["depth_mm"] = r.place.depth_mm;
     json["frames"] = {{"given", r.frames_given}, {"measured", r.real.frames}};
@@ -132,4 +135,4 @@ std::string look_json(const LookResult& r) {
     return detail::json_text(json, true) + "\n";
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline look

@@ -7,11 +7,11 @@
 
 #include "pipeline/look/look.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
 
 std::string look_page(const LookResult& result);
 // {"machine", "scan": {...}, "frames": {...}, "looks": [...], "scores": [...], "kept": [...],
 // "warnings": [...]}; what was not measured is null.
 std::string look_json(const LookResult& result);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline look

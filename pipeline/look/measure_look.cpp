@@ -8,12 +8,13 @@
 
 #include "formats/image_scores/smooth.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
 namespace {
 
 constexpr int kStride = 24;
 
-// Share of the depth that parenchyma is looked for in: below the wall, above the weakest echoes.
+// Parenchyma is looked for between these shares of the depth: below the wall, above the weakest
+// echoes.
 constexpr double kFirstShare = 0.18, kLastShare = 0.52;
 
 double correlation(const std::vector<float>& a, const std::vector<float>& b) {
@@ -31,7 +32,7 @@ double correlation(const std::vector<float>& a, const std::vector<float>& b) {
     return power > 1e-9 ? (ab - sa * sb / n) / std::sqrt(power) : 0;
 }
 
-// Column by column median over frames.
+// The median over frames, column by column.
 std::vector<double> median_profile(const std::vector<std::vector<float>>& profiles) {
     std::vector<double> out;
     for (std::size_t i = 0; !profiles.empty() && i < profiles.front().size(); ++i) {
@@ -42,20 +43,20 @@ std::vector<double> median_profile(const std::vector<std::vector<float>>& profil
     return out;
 }
 
-// Grey that only a 500th of the samples lie below, away from the borders of the scan and its face.
+// The grey below which only a 500th of the samples lie, away from the borders of the scan and its
+// face.
 double darkest_grey(const BeamImage& image, const std::vector<std::uint8_t>& use) {
     std::array<int, 256> count{};
     int total = 0;
     for (int k = static_cast<int>(kFirstShare * image.samples); k < image.samples - 4; ++k) {
         for (int l = image.lines / 16; l < image.lines - image.lines / 16; ++l) {
             if (!use[image.index(k, l)]) continue;
-            ++count[static_cast<std::size_t>(std::lround(image.at(k, l)))];
+            ++count[std::lround(image.at(k, l))];
             ++total;
         }
     }
     int below = 0, grey = 0;
-    while (grey < 255 && below + count[static_cast<std::size_t>(grey)] < total / 500)
-        below += count[static_cast<std::size_t>(grey++)];
+    while (grey < 255 && below + count[grey] < total / 500) below += count[grey++];
     return grey;
 }
 
@@ -215,7 +216,7 @@ LookMeasures LookGauge::result() const {
     StreakScore streaks;
     std::vector<double> first, layers, thickness, peak, across[5];
     std::vector<std::vector<float>> near, by_line;
-    std::vector<double> stills, ad, wd, bd, sd;
+    std::vector<double> stills, peaks, widths, blacks, black_sds;
     std::map<std::string, std::vector<double>> tissues;
     const std::size_t apart = parts_.size() / 3;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
@@ -238,10 +239,10 @@ LookMeasures LookGauge::result() const {
         if (apart > 0 && i + apart < parts_.size())
             stills.push_back(correlation(part.near_lines, parts_[i + apart].near_lines));
         if (part.diaphragm) {
-            ad.push_back(part.diaphragm->peak_grey);
-            wd.push_back(part.diaphragm->width_mm);
-            bd.push_back(part.diaphragm->black_grey);
-            sd.push_back(part.diaphragm->black_sd);
+            peaks.push_back(part.diaphragm->peak_grey);
+            widths.push_back(part.diaphragm->width_mm);
+            blacks.push_back(part.diaphragm->black_grey);
+            black_sds.push_back(part.diaphragm->black_sd);
         }
         for (const auto& [tissue, grey] : part.tissue_sum) tissues[tissue].push_back(grey);
     }
@@ -257,10 +258,10 @@ LookMeasures LookGauge::result() const {
     m.by_line = median_profile(by_line);
     m.near_still = stills.empty() ? 0 : median_of(stills);
     m.moves = !stills.empty() && m.near_still < 0.995;
-    // A line that a quarter of the frames show is one.
-    if (ad.size() * 4 >= parts_.size() && !ad.empty()) {
-        m.diaphragm = DiaphragmScore{static_cast<int>(ad.size()), median_of(ad), median_of(wd),
-                                     median_of(bd), median_of(sd)};
+    // A line that a quarter of the frames show is taken as the diaphragm.
+    if (peaks.size() * 4 >= parts_.size() && !peaks.empty()) {
+        m.diaphragm = DiaphragmScore{static_cast<int>(peaks.size()), median_of(peaks),
+                                     median_of(widths), median_of(blacks), median_of(black_sds)};
     }
     for (const auto& [tissue, grey] : tissues) m.tissue_grey[tissue] = median_of(grey);
 
@@ -268,7 +269,7 @@ LookMeasures LookGauge::result() const {
         double depth = 0, n = 0;
         for (std::size_t i = 0; i < mask.size(); ++i) {
             if (!mask[i]) continue;
-            depth += grid_.depth_mm(static_cast<int>(i / static_cast<std::size_t>(grid_.lines)));
+            depth += grid_.depth_mm(static_cast<int>(i / grid_.lines));
             ++n;
         }
         if (n > 0) m.tissue_depth_mm[tissue] = depth / n;
@@ -286,4 +287,4 @@ LookMeasures LookGauge::result() const {
     return m;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline look

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What can be measured of a machine's look in its frames, before anything is fitted.
+// What can be measured of a machine's appearance in its frames, before anything is fitted.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/image_scores/patch_scores.h"
-#include "formats/image_scores/structure_scores.h"
+#include "formats/image_scores/realism_scores.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
 
 // A place of known tissue, in pixels of the picture.
 struct LookRectangle {
@@ -29,12 +28,12 @@ struct LookBand {
     double grain_along_mm = 0, grain_across_mm = 0;
 };
 
-// Bands as wide as patches are apart, those of fewer than three patches left out.
+// Bands as wide as the distance between patches; bands of fewer than three patches are left out.
 std::vector<LookBand> look_bands(const std::vector<PatchScores>& patches, const BeamImage& grid);
-// At depth what is left of a band says little if hardly any of it is even: an eighth of the `most`
-// patches of the bands above must be.
-inline bool counts_at_depth(const LookBand& band, int most) {
-    return band.patches * 8 >= most;
+// At depth, a band of which hardly any part is even says little: it needs an eighth of max_patches,
+// the largest number of patches of the bands above.
+inline bool counts_at_depth(const LookBand& band, int max_patches) {
+    return band.patches * 8 >= max_patches;
 }
 
 struct LookMeasures {
@@ -45,7 +44,7 @@ struct LookMeasures {
     PatchScores texture;      // medians over the even patches of the middle depths
     double lowest_mm = 0, highest_mm = 0;  // depths that they span
     std::vector<LookBand> bands;           // of these depths, shallow to deep
-    std::vector<LookBand> all_bands;       // and of those below, where other tissue may lie
+    std::vector<LookBand> all_bands;       // these and the deeper ones, where other tissue may lie
     double streaks_per_cm2 = 0;
     WallScores wall;           // fans only
     double first_4_mm = 0;     // mean grey
@@ -68,7 +67,7 @@ class LookGauge {
               std::vector<std::uint8_t> parenchyma,
               std::map<std::string, std::vector<std::uint8_t>> tissues);
 
-    // What one frame gives; frames may be measured at the same time.
+    // What one frame contributes; frames may be measured at the same time.
     struct Part {
         std::vector<PatchScores> patches, deep;  // of patches that are not black; deep: below them
         std::vector<double> dark, dark_sd;       // means and sd of smooth squares, grey
@@ -95,7 +94,7 @@ class LookGauge {
     std::vector<Part> parts_;
 };
 
-// Patches of parenchyma: bright enough over `black`, without shading, walls or vessels.
+// Whether a patch is parenchyma: bright enough over `black`, without shading, walls or vessels.
 bool is_even(const PatchScores& patch, double black);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline look

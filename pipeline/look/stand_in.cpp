@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "formats/image_scores/smooth.h"
 #include "pipeline/base/counter_random.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
 namespace {
 
-constexpr double kSigmaPerWidth = 1 / 2.3548200450309493;  // full width at half height
+constexpr double kSigmaPerWidth = 1 / kFullWidthPerSigma;  // full width at half height
 enum Purpose : std::uint64_t { kScatterers = 1, kMiddle = 100, kFine, kDepthOfFine, kStreaks };
 
 // Gaussian taps whose squares sum to 1, so that white noise keeps its power.
@@ -28,20 +29,14 @@ std::vector<float> unit_power_taps(double sigma) {
     return out;
 }
 
-// Filters a margin-padded field: rows have `pad` more columns on each side, and `pad` rows above
-// and below.
+// A field with a margin of `pad` values on each side.
 struct Padded {
     int rows, columns, pad;
     std::vector<float> values;
     Padded(int r, int c, int p)
-        : rows(r),
-          columns(c),
-          pad(p),
-          values(static_cast<std::size_t>(r + 2 * p) * static_cast<std::size_t>(c + 2 * p)) {}
+        : rows(r), columns(c), pad(p), values(static_cast<std::size_t>(r + 2 * p) * (c + 2 * p)) {}
     float* row(int r) {
-        return values.data() +
-               static_cast<std::size_t>(r + pad) * static_cast<std::size_t>(columns + 2 * pad) +
-               pad;
+        return values.data() + static_cast<std::size_t>(r + pad) * (columns + 2 * pad) + pad;
     }
 };
 
@@ -49,25 +44,21 @@ std::vector<float> filtered(Padded& field,
                             const std::vector<float>& along,
                             const std::vector<std::vector<float>>& across) {
     const int reach = static_cast<int>(along.size()) / 2;
-    std::vector<float> out(static_cast<std::size_t>(field.rows) *
-                           static_cast<std::size_t>(field.columns));
-    std::vector<float> line(static_cast<std::size_t>(field.columns + 2 * field.pad));
+    std::vector<float> out(static_cast<std::size_t>(field.rows) * field.columns);
+    std::vector<float> line(field.columns + 2 * field.pad);
     for (int r = 0; r < field.rows; ++r) {
         std::fill(line.begin(), line.end(), 0.0f);
         for (int i = -reach; i <= reach; ++i) {
-            const float tap = along[static_cast<std::size_t>(i + reach)];
+            const float tap = along[i + reach];
             const float* from = field.row(r + i) - field.pad;
             for (std::size_t c = 0; c < line.size(); ++c) line[c] += tap * from[c];
         }
-        const std::vector<float>& taps = across[static_cast<std::size_t>(r)];
+        const std::vector<float>& taps = across[r];
         const int wide = static_cast<int>(taps.size()) / 2;
         for (int c = 0; c < field.columns; ++c) {
             float sum = 0;
-            for (int i = -wide; i <= wide; ++i)
-                sum += taps[static_cast<std::size_t>(i + wide)] *
-                       line[static_cast<std::size_t>(c + field.pad + i)];
-            out[static_cast<std::size_t>(r) * static_cast<std::size_t>(field.columns) +
-                static_cast<std::size_t>(c)] = sum;
+            for (int i = -wide; i <= wide; ++i) sum += taps[i + wide] * line[c + field.pad + i];
+            out[static_cast<std::size_t>(r) * field.columns + c] = sum;
         }
     }
     return out;
@@ -79,8 +70,7 @@ std::vector<float> smooth_noise(const BeamImage& grid,
                                 double across_mm,
                                 std::uint64_t seed) {
     std::vector<float> noise;
-    const std::size_t count =
-        static_cast<std::size_t>(grid.samples) * static_cast<std::size_t>(grid.lines);
+    const std::size_t count = static_cast<std::size_t>(grid.samples) * grid.lines;
     for (std::size_t i = 0; i < count; ++i)
         noise.push_back(static_cast<float>(gaussian_pair_at(seed, i).a));
     const double pitch = grid.pitch_mm(grid.samples / 2);
@@ -92,10 +82,9 @@ std::vector<float> smooth_noise(const BeamImage& grid,
     return noise;
 }
 
-// Factor of the echo's amplitude that the tissue's structure gives.
+// The factor by which the tissue's structure changes the amplitude of the echo.
 std::vector<float> echo_factor(const BeamImage& grid, const Parenchyma& t, std::uint64_t seed) {
-    const std::size_t count =
-        static_cast<std::size_t>(grid.samples) * static_cast<std::size_t>(grid.lines);
+    const std::size_t count = static_cast<std::size_t>(grid.samples) * grid.lines;
     std::vector<float> factor(count, 1.0f);
     if (t.middle_db == 0 && t.fine_db == 0) return factor;
     const double scale = grid.fan ? 1 : 0.4;  // linear scans show smaller things
@@ -146,7 +135,7 @@ ScanPlace stand_in_fan() {
 }
 
 double axial_width_mm(const Machine& m) {
-    constexpr double kUnknown = 0.58;  // of model `physical` at 3.5 MHz
+    constexpr double kUnknown = 0.58;  // that of the model `physical` at 3.5 MHz
     return (m.beam.axial_mm > 0 ? m.beam.axial_mm : kUnknown) * frequency_scale(m);
 }
 
@@ -313,4 +302,4 @@ BeamImage stand_in(const Machine& m,
     return image;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline look

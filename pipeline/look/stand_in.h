@@ -12,9 +12,9 @@
 #include "formats/image_scores/beam_image.h"
 #include "formats/machine/machine.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline look {
 
-// A curved probe's picture of this size, for stand-ins that nobody's frames ask for.
+// The picture of a curved probe, for stand-ins that no frames are given for.
 inline constexpr int kStandInWidth = 520, kStandInHeight = 430;
 ScanPlace stand_in_fan();
 
@@ -34,25 +34,25 @@ std::vector<float> speckle_power(const Machine& machine,
                                  int first_look,
                                  int looks,
                                  std::uint64_t seed);
-// Adds the streaks' power, in units of the tissue's.
+// Adds the power of the streaks, in units of the tissue's mean power.
 void add_streaks(const BeamImage& grid,
                  const Machine& machine,
                  const Parenchyma& tissue,
                  std::uint64_t seed,
                  std::vector<float>& power);
 
-// Grey of an amplitude, e = 1 being the tissue's mean, and back. [0, 255]
+// The grey, [0, 255], of an amplitude e, where 1 is the tissue's mean; and the amplitude of a grey.
 double grey_of(const MachineGrey& grey, double e);
 double amplitude_of(const MachineGrey& grey, double level);
 
-// Widths that a machine has at a depth, mm: full widths at half height of the amplitude.
+// Full widths of the point spread at half height of the amplitude, mm.
 double axial_width_mm(const Machine& machine);
 double lateral_width_mm(const Machine& machine, const BeamImage& grid, double depth_mm);
 
-// All of it: texture, far gain, near field, poor contact, grey map, noise floor.
+// The whole picture: texture, far gain, near field, poor contact, grey map, noise floor.
 BeamImage stand_in(const Machine& machine,
                    const ScanPlace& place,
                    const Parenchyma& tissue,
                    std::uint64_t seed);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline look

@@ -10,7 +10,7 @@
 #include "formats/base/digest.h"
 #include "pipeline/segmentation/distance/marked_distance.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pathology {
 namespace {
 
 constexpr double kDepthReachMm = 150, kVesselReachMm = 40;
@@ -19,15 +19,15 @@ Vector3 as_vector(Int3 v) {
     return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
 }
 
-// The distance from the nearest of some voxels to the nearest voxel of these labels, mm, and which
-// label that is; limit_mm and 0 where there is none within it. The search widens as it has to; what
-// lies farther than 24 mm is looked for on a coarser grid.
+// The distance from some voxels to the nearest voxel of these labels, mm, and which label that is;
+// limit_mm and 0 if there is none within limit_mm. The search widens step by step; beyond 24 mm it
+// runs on a coarser grid.
 struct Nearest {
     double mm = 0;
     std::uint8_t label = 0;
 };
 Nearest nearest(const LabelVolume& volume,
-                const Labels& labels,
+                const LabelSet& labels,
                 const VoxelRange& tight,
                 const std::vector<Int3>& voxels,
                 double limit_mm) {
@@ -41,19 +41,15 @@ Nearest nearest(const LabelVolume& volume,
             wide.low[axis] = std::max(0, tight.low[axis] - margin);
             wide.high[axis] = std::min(volume.grid.size[axis] - 1, tight.high[axis] + margin);
         }
-        // From the lesion outwards, so that the label found is known.
+        // Distances are taken from the lesion outwards, so that the label found is known.
         const Int3 size{(wide.high.x - wide.low.x) / step + 1,
                         (wide.high.y - wide.low.y) / step + 1,
                         (wide.high.z - wide.low.z) / step + 1};
         const auto index = [&](int i, int j, int k) {
-            return static_cast<std::size_t>(i) +
-                   static_cast<std::size_t>(size.x) *
-                       (static_cast<std::size_t>(j) +
-                        static_cast<std::size_t>(size.y) * static_cast<std::size_t>(k));
+            return i +
+                   static_cast<std::size_t>(size.x) * (j + static_cast<std::size_t>(size.y) * k);
         };
-        std::vector<std::uint8_t> marked(static_cast<std::size_t>(size.x) *
-                                         static_cast<std::size_t>(size.y) *
-                                         static_cast<std::size_t>(size.z));
+        std::vector<std::uint8_t> marked(static_cast<std::size_t>(size.x) * size.y * size.z);
         for (const Int3 v : voxels)
             marked[index((v.x - wide.low.x) / step, (v.y - wide.low.y) / step,
                          (v.z - wide.low.z) / step)] = 1;
@@ -96,8 +92,8 @@ constexpr std::string_view kMeasures[] = {
 
 void measure_lesion(const LabelVolume& volume,
                     const VoxelRange& range,
-                    const Labels& inside,
-                    const Labels& vessels,
+                    const LabelSet& inside,
+                    const LabelSet& vessels,
                     PathologyEntry& entry) {
     const Grid& grid = volume.grid;
     const double voxel_mm = grid.spacing_mm.x;
@@ -131,7 +127,7 @@ void measure_lesion(const LabelVolume& volume,
     entry.centre = grid.point_from_voxel(Point3{} + centre);
     entry.volume_ml = static_cast<double>(voxels.size()) * grid.voxel_volume_mm3() / 1000;
     entry.diameters_mm = diameters_mm(voxels, mean, voxel_mm);
-    entry.depth_mm = nearest(volume, Labels{}.set(0), tight, voxels, kDepthReachMm).mm;
+    entry.depth_mm = nearest(volume, LabelSet{}.set(0), tight, voxels, kDepthReachMm).mm;
     const Nearest vessel = nearest(volume, vessels, tight, voxels, kVesselReachMm);
     entry.vessel_mm = vessel.mm;
     if (vessel.label != 0) entry.vessel = volume.labels[vessel.label].name;
@@ -188,4 +184,4 @@ std::vector<PathologyEntry> key_of(const StageReport& report) {
     return key;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pathology

@@ -7,7 +7,7 @@
 
 #include "formats/volume/boundary_record.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pathology {
 namespace {
 
 std::uint32_t record_at(const BoundaryBricks& boundary, Int3 v) {
@@ -19,7 +19,8 @@ struct FineVoxel {
     std::uint32_t record = kNoBoundary;
 };
 
-// from_centre: of the case's voxel, in its voxels. ratio: of the region's voxels in one of those.
+// A voxel of the region inside a painted voxel of the case. from_centre: its centre from that of
+// the case's voxel, in voxels of the case. ratio: voxels of the region along one of those.
 FineVoxel painted(
     std::uint8_t label, std::uint32_t bits, Vector3 from_centre, double ratio, double reach_vx) {
     FineVoxel out{label, kNoBoundary};
@@ -80,11 +81,11 @@ std::size_t carry_into_region(const PaintedLabels& before,
     if (changed == 0) return 0;
     region->label_bricks = bricks_from_dense<std::uint8_t>(labels, fine.size);
     if (records.empty()) return changed;
-    // The packer fits patches anew.
+    // Patches are left out: the packer fits them anew.
     const int step = region->boundary.patches.step;
     region->boundary = BoundaryBricks(bricks_from_dense<std::uint32_t>(records, fine.size));
     region->boundary.patches.step = step;
     return changed;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pathology

@@ -6,7 +6,7 @@
 #include "formats/volume/fine_region.h"
 #include "formats/volume/label_volume.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pathology {
 
 struct PaintedLabels {
     const LabelVolume& volume;
@@ -22,4 +22,4 @@ std::size_t carry_into_region(const PaintedLabels& before,
                               double reach_vx,
                               FineRegion* region);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pathology

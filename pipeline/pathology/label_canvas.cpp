@@ -9,7 +9,7 @@
 
 #include "pipeline/base/parallel.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pathology {
 namespace {
 
 std::size_t place_in_brick(Int3 v) {
@@ -21,7 +21,7 @@ Vector3 as_vector(Int3 v) {
     return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
 }
 
-// Voxels of a range in order, x fastest; visit(n, v).
+// Calls visit(n, v) for the voxels of a range in order, x fastest.
 template <class Visit>
 void each_voxel(const VoxelRange& range, Visit visit) {
     std::size_t n = 0;
@@ -75,7 +75,7 @@ void LabelCanvas::set(Int3 v, std::uint8_t label, std::uint32_t record) {
         const Int3 first{v.x / kBrickEdge * kBrickEdge, v.y / kBrickEdge * kBrickEdge,
                          v.z / kBrickEdge * kBrickEdge};
         for (int n = 0; n < kBrickVoxels; ++n)
-            brick->second[static_cast<std::size_t>(n)] =
+            brick->second[n] =
                 before_.at(std::min(first.x + n % kBrickEdge, grid().size.x - 1),
                            std::min(first.y + n / kBrickEdge % kBrickEdge, grid().size.y - 1),
                            std::min(first.z + n / kBrickEdge / kBrickEdge, grid().size.z - 1));
@@ -102,7 +102,7 @@ VoxelRange LabelCanvas::around(Vector3 centre_vx, double radius_vx) const {
 
 double LabelCanvas::threshold(const VoxelRange& range,
                               const VoxelField& rank,
-                              const Labels& into,
+                              const LabelSet& into,
                               std::size_t voxels,
                               std::size_t* found) const {
     *found = 0;
@@ -125,7 +125,7 @@ double LabelCanvas::threshold(const VoxelRange& range,
 std::size_t LabelCanvas::paint(const VoxelRange& range,
                                const VoxelField& distance,
                                std::uint8_t painted,
-                               const Labels& into) {
+                               const LabelSet& into) {
     if (range.empty()) return 0;
     // Records of the voxels around the range see the new surface as well.
     VoxelRange wide = range;
@@ -243,4 +243,4 @@ VoxelField distance_to_level(VoxelField rank, double threshold, double scale_vx)
     };
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pathology

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <array>
-#include <bitset>
 #include <cstdint>
 #include <functional>
 #include <unordered_map>
@@ -14,15 +13,14 @@
 #include "formats/volume/boundary_record.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/surface_patch.h"
+#include "pipeline/base/label_set.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pathology {
 
-using Labels = std::bitset<256>;
-
-// In continuous voxel coordinates; what it is (a rank, a signed distance in voxels) its user says.
+// A function of continuous voxel coordinates: a rank, or a signed distance in voxels.
 using VoxelField = std::function<double(Vector3 voxel)>;
 
-// Voxels low .. high, both included.
+// The voxels from low to high, both included.
 struct VoxelRange {
     Int3 low{0, 0, 0}, high{-1, -1, -1};
     bool empty() const { return high.x < low.x || high.y < low.y || high.z < low.z; }
@@ -47,7 +45,7 @@ class LabelCanvas {
     std::uint32_t record(Int3 v) const;
     void set(Int3 v, std::uint8_t label, std::uint32_t record);
 
-    // Appends to the palette; the index.
+    // Appends to the palette and returns the index.
     std::uint8_t add_label(Label label);
 
     // All voxels of a ball, cut to the grid. radius_vx >= 0.
@@ -56,11 +54,11 @@ class LabelCanvas {
         return {{0, 0, 0}, {grid().size.x - 1, grid().size.y - 1, grid().size.z - 1}};
     }
 
-    // The threshold at which `voxels` voxels of these labels have a lower rank, half-way to the
-    // next; `found`: how many there are in the range, where they are fewer.
+    // The threshold below which `voxels` voxels of these labels have their rank, half-way to the
+    // next rank. found: the number of voxels of these labels in the range, which may be smaller.
     double threshold(const VoxelRange& range,
                      const VoxelField& rank,
-                     const Labels& into,
+                     const LabelSet& into,
                      std::size_t voxels,
                      std::size_t* found) const;
 
@@ -70,7 +68,7 @@ class LabelCanvas {
     std::size_t paint(const VoxelRange& range,
                       const VoxelField& distance,
                       std::uint8_t label,
-                      const Labels& into);
+                      const LabelSet& into);
 
     // Moves the result out.
     LabelVolume take_volume() { return std::move(volume_); }
@@ -91,4 +89,4 @@ VoxelField distance_to_level(VoxelField rank, double threshold, double scale_vx)
 // Gradient by central differences of half a voxel.
 Vector3 gradient(const VoxelField& field, Vector3 at);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pathology

@@ -7,10 +7,9 @@
 
 #include "pipeline/base/counter_random.h"
 #include "pipeline/pathology/lesion_shape.h"
-#include "pipeline/pathology/region_shapes.h"
-#include "pipeline/pathology/requested_parts.h"
+#include "pipeline/pathology/place_pathology.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pathology {
 namespace {
 
 constexpr double kThinnestVx = 0.75;
@@ -133,7 +132,7 @@ Result<PaintedLesion> paint_lesion(LabelCanvas& canvas,
     };
     const std::uint8_t own =
         new_label("", kind.tissue, request.tissue.empty() ? kind.tissue.name : request.tissue);
-    Labels into = lesion.into;
+    LabelSet into = lesion.into;
     double rim_vx = 0;
     for (const LesionPart& part : kind.parts) {
         if (!(part_size(request, part) > 0)) continue;
@@ -176,4 +175,4 @@ Result<PaintedLesion> paint_lesion(LabelCanvas& canvas,
     return painted;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pathology

@@ -6,11 +6,11 @@
 #include <cmath>
 
 #include "pipeline/base/counter_random.h"
-#include "pipeline/pathology/pathology.h"
-#include "pipeline/pathology/region_shapes.h"
+#include "pipeline/pathology/lesion_shape.h"
+#include "pipeline/pathology/place_pathology.h"
 #include "pipeline/segmentation/distance/marked_distance.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pathology {
 namespace {
 
 constexpr int kSurfacePoints = 240;
@@ -24,15 +24,14 @@ Vector3 voxel_of(const VoxelBox& box, std::uint32_t index) {
             static_cast<double>(box.first.z) + index / x / y};
 }
 
-// To the surface half a voxel before the nearest voxel of these labels, mm, in a box sampled at
-// every `step`-th voxel.
+// Distances to the surface half a voxel before the nearest voxel of these labels, mm, in a box
+// sampled at every `step`-th voxel.
 std::vector<float> distances_mm(
-    const LabelVolume& volume, const VoxelBox& box, int step, const Labels& labels, double mm) {
+    const LabelVolume& volume, const VoxelBox& box, int step, const LabelSet& labels, double mm) {
     const Int3 size{(box.size.x + step - 1) / step, (box.size.y + step - 1) / step,
                     (box.size.z + step - 1) / step};
     std::vector<std::uint8_t> marked;
-    marked.reserve(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
-                   static_cast<std::size_t>(size.z));
+    marked.reserve(static_cast<std::size_t>(size.x) * size.y * size.z);
     for (int k = 0; k < size.z; ++k)
         for (int j = 0; j < size.y; ++j)
             for (int i = 0; i < size.x; ++i)
@@ -61,8 +60,8 @@ bool clear_of(const std::vector<PlacedLesion>& earlier,
 }  // namespace
 
 Clearances::Clearances(const LabelVolume& volume,
-                       const Labels& host,
-                       const Labels& vessels,
+                       const LabelSet& host,
+                       const LabelSet& vessels,
                        bool skin) {
     const std::vector<VoxelBox> boxes = label_boxes(volume);
     VoxelRange range{{1 << 30, 1 << 30, 1 << 30}, {-1, -1, -1}};
@@ -75,7 +74,7 @@ Clearances::Clearances(const LabelVolume& volume,
         }
     }
     if (range.empty()) return;
-    for (int axis = 0; axis < 3; ++axis) {  // so that what lies beside the host counts
+    for (int axis = 0; axis < 3; ++axis) {  // what lies beside the host counts as well
         range.low[axis] = std::max(0, range.low[axis] - kMarginVx);
         range.high[axis] = std::min(volume.grid.size[axis] - 1, range.high[axis] + kMarginVx);
     }
@@ -84,10 +83,10 @@ Clearances::Clearances(const LabelVolume& volume,
     border_ = distances_mm(volume, box_, 1, ~(host | vessels), mm);
     vessel_ = distances_mm(volume, box_, 1, vessels, mm);
     if (!skin) return;
-    // The skin lies far away: a coarse look at the whole volume is enough.
+    // The skin lies far away: coarse samples of the whole volume are enough.
     coarse_ = std::max(1, static_cast<int>(3 / mm));
     const VoxelBox whole{{0, 0, 0}, volume.grid.size};
-    skin_ = distances_mm(volume, whole, coarse_, Labels{}.set(0), mm);
+    skin_ = distances_mm(volume, whole, coarse_, LabelSet{}.set(0), mm);
     for (int axis = 0; axis < 3; ++axis)
         coarse_box_.size[axis] = (volume.grid.size[axis] + coarse_ - 1) / coarse_;
 }
@@ -154,7 +153,7 @@ std::optional<Vector3> find_place(const RoughEllipsoid& shape,
                                   const std::vector<PlacedLesion>& earlier,
                                   std::uint64_t seed) {
     std::vector<std::uint32_t> centres =
-        clear.deeper_than(radius_mm * shape.least_radius() + rules.shell_mm + rules.capsule_mm);
+        clear.deeper_than(radius_mm * shape.min_radius() + rules.shell_mm + rules.capsule_mm);
     if (rules.near_vx)
         std::erase_if(centres, [&](std::uint32_t c) {
             return norm(voxel_of(clear.box(), c) - *rules.near_vx) * rules.voxel_mm > rules.near_mm;
@@ -196,4 +195,4 @@ std::optional<Vector3> find_lowest(double radius_mm,
     return best;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pathology

@@ -11,20 +11,20 @@
 #include "pipeline/pathology/lesion_shape.h"
 #include "pipeline/segmentation/distance/signed_distance.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pathology {
 
-// Distances in mm at the voxels of a box round the host, trilinear between them.
+// Distances in mm, at the voxels of a box round the host and trilinear between them.
 class Clearances {
   public:
     // host: labels that the lesion may lie in; vessels: labels that it keeps away from, which do
     // not count as the host's border. skin: whether depths are asked for.
-    Clearances(const LabelVolume& volume, const Labels& host, const Labels& vessels, bool skin);
+    Clearances(const LabelVolume& volume, const LabelSet& host, const LabelSet& vessels, bool skin);
 
     const VoxelBox& box() const { return box_; }
     double to_border_mm(Vector3 voxel) const { return at(border_, box_, voxel); }  // 0 outside
     double to_vessel_mm(Vector3 voxel) const { return at(vessel_, box_, voxel); }
     double below_skin_mm(Vector3 voxel) const;
-    // Centres at least this far inside the host, as indices into box().
+    // Voxels at least this far inside the host, as indices into box().
     std::vector<std::uint32_t> deeper_than(double mm) const;
     double deepest_mm() const;
 
@@ -59,7 +59,7 @@ bool fits(const RoughEllipsoid& shape,
           const PlaceRules& rules,
           const std::vector<PlacedLesion>& earlier);
 
-// The first of kPlacementTries voxels, in an order that the seed draws, where it fits.
+// The first of kPlacementTries voxels, drawn by the seed, at which the shape fits; empty if none.
 std::optional<Vector3> find_place(const RoughEllipsoid& shape,
                                   double radius_mm,
                                   const Clearances& clear,
@@ -81,4 +81,4 @@ std::vector<Vector3> surface_points(const RoughEllipsoid& shape,
                                     double shell_vx,
                                     Vector3 centre_vx);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pathology

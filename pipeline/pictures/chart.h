@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Plots for the reports: VTK's charts, drawn on our own canvas, so that no display is needed and
-// the bytes are the same on every machine. Legends fit their words; long ones are drawn outside the
-// plot.
+// Plots for the reports: axes with round ticks, linear or logarithmic, lines, marks, bars and a
+// legend, drawn on a canvas. No display is needed, and the bytes are the same on every machine. No
+// text lies on another: ticks are thinned until their labels fit, titles that are too long are set
+// smaller, and a legend moves to a free corner or out of the plot.
 #pragma once
 
 #include <array>
@@ -12,17 +13,17 @@
 
 #include "formats/base/result.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pictures {
 
-enum class SeriesLook { line, points, line_and_points, bars, dashed, crosses, diamonds };
+enum class SeriesStyle { line, points, line_and_points, bars, dashed, crosses, diamonds };
 
 struct Series {
     std::string name;       // in the legend; empty: not shown there
     std::vector<double> x;  // # y; pairs that are not finite are left out
     std::vector<double> y;
-    SeriesLook look = SeriesLook::line;
+    SeriesStyle style = SeriesStyle::line;
     std::array<std::uint8_t, 3> colour{0, 0, 0};  // all zero: the next of a palette
-    double width_px = 2;                          // of the line, or of the mark
+    double width_px = 2;  // of the line; a third of the width of a mark; bars need none
 };
 
 struct Chart {
@@ -48,9 +49,9 @@ struct ChartSheet {
     int height_px = 480;
 };
 
-// Written under a temporary name and renamed. Error: the file cannot be written. Cost: about 50 ms
+// Written under a temporary name and renamed. Error: the file cannot be written. Cost: about 10 ms
 // per chart.
 Status write_chart_png(const ChartSheet& sheet, const std::string& path);
 Status write_chart_svg(const ChartSheet& sheet, const std::string& path);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pictures

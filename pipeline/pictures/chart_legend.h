@@ -11,13 +11,13 @@
 #include "pipeline/pictures/canvas.h"
 #include "pipeline/pictures/chart.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pictures {
 
 struct LegendItem {
     std::string name;
-    SeriesLook look = SeriesLook::line;
+    SeriesStyle style = SeriesStyle::line;
     CanvasColour colour{0, 0, 0, 255};
-    double width_px = 2;  // of the line, or of the mark
+    double width_px = 2;  // as in Series
 };
 
 // Pixels, y up, relative to the lower left corner of the legend's frame.
@@ -35,11 +35,14 @@ struct Legend {
     std::vector<LegendEntry> entries;  // from the top down
 };
 
-// Measures the words. The frame is at most most_width_px wide (at least 80); longer names are
+// Measures the words. The frame is at most max_width_px wide (at least 80); longer names are
 // shortened.
-Legend lay_out_legend(std::span<const LegendItem> items, double most_width_px);
+Legend lay_out_legend(std::span<const LegendItem> items, double max_width_px);
 
 // The frame, filled with white, and the entries; `corner` is the frame's lower left corner.
 void draw_legend(Canvas& canvas, const Legend& legend, CanvasPoint corner);
 
-}  // namespace sonocase::pipeline
+// The mark of a point of a series: a cross, a diamond or a disc.
+void draw_mark(Canvas& canvas, const LegendItem& item, CanvasPoint centre, double radius_px);
+
+}  // namespace sonocase::pipeline::inline pictures

@@ -2,7 +2,10 @@
 
 #include "pipeline/pictures/markup.h"
 
-namespace sonocase::pipeline {
+#include <algorithm>
+#include <cassert>
+
+namespace sonocase::pipeline::inline pictures {
 
 std::string escaped_html(std::string_view text) {
     std::string out;
@@ -19,22 +22,39 @@ std::string escaped_html(std::string_view text) {
     return out;
 }
 
-std::string base64(const std::vector<std::uint8_t>& bytes) {
-    static constexpr char kDigits[] =
-        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string out;
-    out.reserve(bytes.size() * 4 / 3 + 4);
-    for (std::size_t i = 0; i < bytes.size(); i += 3) {
-        const std::size_t left = bytes.size() - i;
-        const std::uint32_t v = static_cast<std::uint32_t>(bytes[i] << 16) |
-                                (left > 1 ? static_cast<std::uint32_t>(bytes[i + 1] << 8) : 0) |
-                                (left > 2 ? bytes[i + 2] : 0u);
-        out += kDigits[v >> 18];
-        out += kDigits[(v >> 12) & 63];
-        out += left > 1 ? kDigits[(v >> 6) & 63] : '=';
-        out += left > 2 ? kDigits[v & 63] : '=';
+HtmlTemplate::HtmlTemplate(std::string_view html) {
+    constexpr std::string_view kBegin = "<!--begin:", kTail = "-->";
+    for (std::size_t at = 0; (at = html.find(kBegin, at)) != std::string_view::npos;) {
+        const std::size_t name_at = at + kBegin.size(), name_end = html.find(kTail, name_at);
+        assert(name_end != std::string_view::npos);
+        const std::string_view name = html.substr(name_at, name_end - name_at);
+        const std::size_t first = name_end + kTail.size();
+        const std::size_t last = html.find("<!--end:" + std::string(name) + "-->", first);
+        assert(last != std::string_view::npos);
+        blocks_[name] = html.substr(first, last - first);
+        at = last;
     }
-    return out;
 }
 
-}  // namespace sonocase::pipeline
+std::string HtmlTemplate::filled(std::string_view block, HtmlValues values) const {
+    const auto found = blocks_.find(block);
+    assert(found != blocks_.end());
+    const std::string_view text = found->second;
+    std::string out;
+    std::size_t at = 0;
+    for (;;) {
+        const std::size_t open = text.find("{{", at);
+        out += text.substr(at, open - at);
+        if (open == std::string_view::npos) return out;
+        const std::size_t close = text.find("}}", open);
+        assert(close != std::string_view::npos);
+        const std::string_view key = text.substr(open + 2, close - open - 2);
+        const auto value = std::find_if(values.begin(), values.end(),
+                                        [&](const auto& pair) { return pair.first == key; });
+        assert(value != values.end());
+        out += value->second;
+        at = close + 2;
+    }
+}
+
+}  // namespace sonocase::pipeline::inline pictures

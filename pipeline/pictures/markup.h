@@ -3,17 +3,37 @@
 // Text in the HTML and SVG that this program writes.
 #pragma once
 
-#include <cstdint>
+#include <initializer_list>
+#include <map>
 #include <string>
 #include <string_view>
-#include <vector>
+#include <utility>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pictures {
 
 // The text with the five special characters of markup escaped; suitable for attributes as well.
 std::string escaped_html(std::string_view text);
 
-// For pictures inside a page: src="data:image/png;base64,...".
-std::string base64(const std::vector<std::uint8_t>& bytes);
+// Pages from an .html file that is embedded in the program (sonocase_page in CMakeLists.txt): named
+// blocks with placeholders.
+//
+//     <!--begin:row--><tr><td>{{name}}</td></tr><!--end:row-->
+//
+// Blocks do not nest; what stands between them is ignored. Values are inserted as they are: escape
+// text with escaped_html. The template belongs to the program, so that a block or a value that is
+// missing is a mistake of the caller (assert).
 
-}  // namespace sonocase::pipeline
+using HtmlValues = std::initializer_list<std::pair<std::string_view, std::string_view>>;
+
+class HtmlTemplate {
+  public:
+    explicit HtmlTemplate(std::string_view html);  // which must outlive the template
+
+    // The block with every {{key}} replaced by its value.
+    std::string filled(std::string_view block, HtmlValues values) const;
+
+  private:
+    std::map<std::string_view, std::string_view> blocks_;
+};
+
+}  // namespace sonocase::pipeline::inline pictures

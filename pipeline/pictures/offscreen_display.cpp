@@ -11,13 +11,20 @@
 #include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkRenderWindow.h>
+#include <vtkWindowToImageFilter.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <string>
 #include <utility>
 
-namespace sonocase::pipeline {
+#include "pipeline/pictures/png.h"
+
+namespace sonocase::pipeline::inline pictures {
 namespace {
 
 // Whether a local X server answers for $DISPLAY. Displays on other machines are assumed to.
@@ -58,7 +65,7 @@ OffscreenDisplay::~OffscreenDisplay() {
 Result<OffscreenDisplay> OffscreenDisplay::open() {
     OffscreenDisplay display;
     if (!display_answers()) {
-        if (auto status = display.start(); !status) return status.error();
+        SONOCASE_TRY_DONE(display.start());
     }
     return display;
 }
@@ -100,4 +107,20 @@ Status OffscreenDisplay::start() {
     return Done{};
 }
 
-}  // namespace sonocase::pipeline
+std::vector<std::uint8_t> png_of_window(vtkRenderWindow& window) {
+    window.Render();
+    vtkNew<vtkWindowToImageFilter> grab;
+    grab->SetInput(&window);
+    grab->ReadFrontBufferOff();
+    grab->Update();
+    vtkImageData* image = grab->GetOutput();  // RGB, rows from the bottom up
+    const int width = image->GetDimensions()[0], height = image->GetDimensions()[1];
+    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(3) * width;
+    const auto* pixels = static_cast<const std::uint8_t*>(image->GetScalarPointer());
+    std::vector<std::uint8_t> turned(height * row);
+    for (int y = 0; y < height; ++y)
+        std::copy_n(pixels + y * row, row, turned.data() + (height - 1 - y) * row);
+    return png_from_rgb(turned.data(), width, height);
+}
+
+}  // namespace sonocase::pipeline::inline pictures

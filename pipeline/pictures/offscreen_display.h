@@ -7,12 +7,16 @@
 // drawn.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "formats/base/result.h"
 
-namespace sonocase::pipeline {
+class vtkRenderWindow;
+
+namespace sonocase::pipeline::inline pictures {
 
 // Holds a display open. The function that renders owns one and declares it before its first VTK
 // window, so that the windows close first.
@@ -38,4 +42,7 @@ class OffscreenDisplay {
     std::optional<std::string> previous_display_;
 };
 
-}  // namespace sonocase::pipeline
+// Renders the window; the picture as a PNG file in memory.
+std::vector<std::uint8_t> png_of_window(vtkRenderWindow& window);
+
+}  // namespace sonocase::pipeline::inline pictures

@@ -2,41 +2,36 @@
 
 #include "pipeline/pictures/png.h"
 
-#include <vtkImageData.h>
-#include <vtkNew.h>
-#include <vtkPNGWriter.h>
-#include <vtkUnsignedCharArray.h>
+#include <png.h>
 
-#include <algorithm>
-
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pictures {
 namespace {
 
-std::vector<std::uint8_t> png_of(const std::uint8_t* pixels, int width, int height, int channels) {
-    vtkNew<vtkImageData> image;
-    image->SetDimensions(width, height, 1);
-    image->AllocateScalars(VTK_UNSIGNED_CHAR, channels);
-    auto* to = static_cast<std::uint8_t*>(image->GetScalarPointer());
-    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(channels) * width;
-    // VTK's rows run upwards.
-    for (int y = 0; y < height; ++y)
-        std::copy_n(pixels + y * row, row, to + (height - 1 - y) * row);
-    vtkNew<vtkPNGWriter> writer;
-    writer->WriteToMemoryOn();
-    writer->SetInputData(image);
-    writer->Write();
-    vtkUnsignedCharArray* bytes = writer->GetResult();
-    return {bytes->GetPointer(0), bytes->GetPointer(0) + bytes->GetNumberOfValues()};
+std::vector<std::uint8_t> png_of(const std::uint8_t* pixels,
+                                 int width_px,
+                                 int height_px,
+                                 png_uint_32 format) {
+    if (width_px <= 0 || height_px <= 0) return {};
+    png_image image{};
+    image.version = PNG_IMAGE_VERSION;
+    image.width = static_cast<png_uint_32>(width_px);
+    image.height = static_cast<png_uint_32>(height_px);
+    image.format = format;
+    std::vector<std::uint8_t> bytes(PNG_IMAGE_PNG_SIZE_MAX(image));
+    png_alloc_size_t size = bytes.size();
+    if (!png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels, 0, nullptr)) return {};
+    bytes.resize(size);
+    return bytes;
 }
 
 }  // namespace
 
 std::vector<std::uint8_t> png_from_grey(const std::uint8_t* pixels, int width_px, int height_px) {
-    return png_of(pixels, width_px, height_px, 1);
+    return png_of(pixels, width_px, height_px, PNG_FORMAT_GRAY);
 }
 
 std::vector<std::uint8_t> png_from_rgb(const std::uint8_t* pixels, int width_px, int height_px) {
-    return png_of(pixels, width_px, height_px, 3);
+    return png_of(pixels, width_px, height_px, PNG_FORMAT_RGB);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pictures

@@ -2,12 +2,12 @@
 
 #include "pipeline/pictures/preview_picture.h"
 
-#include <png.h>
-
 #include <algorithm>
 #include <cmath>
 
-namespace sonocase::pipeline {
+#include "pipeline/pictures/png.h"
+
+namespace sonocase::pipeline::inline pictures {
 namespace {
 
 constexpr int kPanelHeight = 256;
@@ -67,11 +67,10 @@ void draw(const LabelVolume& volume,
             const int label = label_at(x, y);
             if (label == 0) continue;
             const bool border = label_at(x + 1, y) != label || label_at(x, y + 1) != label;
-            const auto& colour = volume.labels[static_cast<std::size_t>(label)].colour;
+            const auto& colour = volume.labels[label].colour;
             for (std::size_t c = 0; c < 3; ++c)
-                picture.rgb[3 * (static_cast<std::size_t>(y + top_px) *
-                                     static_cast<std::size_t>(picture.width_px) +
-                                 static_cast<std::size_t>(x + left_px)) +
+                picture.rgb[3 * (static_cast<std::size_t>(y + top_px) * picture.width_px + x +
+                                 left_px) +
                             c] = static_cast<std::uint8_t>(border ? colour[c] / 2 : colour[c]);
         }
     }
@@ -95,8 +94,7 @@ Picture preview_picture(const LabelVolume& volume) {
     picture.width_px = kGap;
     for (const Cut& cut : kCuts)
         picture.width_px += static_cast<int>(std::lround(extent[cut.across] / mm_per_px)) + kGap;
-    picture.rgb.assign(3 * static_cast<std::size_t>(picture.width_px) *
-                           static_cast<std::size_t>(picture.height_px),
+    picture.rgb.assign(static_cast<std::size_t>(3) * picture.width_px * picture.height_px,
                        kBackground);
     int left = kGap;
     for (const Cut& cut : kCuts) {
@@ -107,20 +105,7 @@ Picture preview_picture(const LabelVolume& volume) {
 }
 
 std::vector<std::uint8_t> png_of(const Picture& picture) {
-    if (picture.width_px <= 0 || picture.height_px <= 0) return {};
-    png_image image{};
-    image.version = PNG_IMAGE_VERSION;
-    image.width = static_cast<png_uint_32>(picture.width_px);
-    image.height = static_cast<png_uint_32>(picture.height_px);
-    image.format = PNG_FORMAT_RGB;
-    png_alloc_size_t size = 0;
-    if (!png_image_write_to_memory(&image, nullptr, &size, 0, picture.rgb.data(), 0, nullptr))
-        return {};
-    std::vector<std::uint8_t> bytes(size);
-    if (!png_image_write_to_memory(&image, bytes.data(), &size, 0, picture.rgb.data(), 0, nullptr))
-        return {};
-    bytes.resize(size);
-    return bytes;
+    return png_from_rgb(picture.rgb.data(), picture.width_px, picture.height_px);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pictures

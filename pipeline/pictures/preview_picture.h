@@ -8,7 +8,7 @@
 
 #include "formats/volume/label_volume.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline pictures {
 
 struct Picture {
     int width_px = 0, height_px = 0;
@@ -16,11 +16,11 @@ struct Picture {
 };
 
 // Axial, coronal and sagittal cuts side by side, each through the middle of the body's box, at one
-// scale, about 256 pixels high. The cuts run along the grid's axes; the patient's head
-// direction is not needed. Labels in their colours, darker at their borders.
+// scale, about 256 pixels high. The cuts run along the grid's axes, whatever
+// the direction of the head. Labels in their colours, darker at their borders.
 Picture preview_picture(const LabelVolume& volume);
 
-// As a PNG file in memory; the same bytes for the same picture.
+// The picture as a PNG file in memory; the same picture gives the same bytes.
 std::vector<std::uint8_t> png_of(const Picture& picture);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline pictures

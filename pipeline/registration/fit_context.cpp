@@ -5,32 +5,32 @@
 #include <algorithm>
 #include <cmath>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 namespace {
 
-constexpr double kFineSkin_mm = 6, kCoarseSkin_mm = 13;
-constexpr double kLattice_mm = 20;
-constexpr double kShallowest_mm = 20;  // below the skin: above are skin, fat and body wall
+constexpr double kFineSkinMm = 6, kCoarseSkinMm = 13;
+constexpr double kLatticeMm = 20;
+constexpr double kShallowestMm = 20;  // below the skin: above are skin, fat and body wall
 
 std::vector<Point3> points_inside(const SkinModel& skin, const Box3& box) {
     const PointIndex index(skin.points);
     std::vector<Point3> inside;
     const Vector3 e = box.extent();
-    for (double z = 0.5 * kLattice_mm; z < e.z; z += kLattice_mm) {
-        for (double y = 0.5 * kLattice_mm; y < e.y; y += kLattice_mm) {
-            for (double x = 0.5 * kLattice_mm; x < e.x; x += kLattice_mm) {
+    for (double z = 0.5 * kLatticeMm; z < e.z; z += kLatticeMm) {
+        for (double y = 0.5 * kLatticeMm; y < e.y; y += kLatticeMm) {
+            for (double x = 0.5 * kLatticeMm; x < e.x; x += kLatticeMm) {
                 const Point3 p = box.lower + Vector3{x, y, z};
                 const std::uint32_t n = index.nearest(p);
                 const Vector3 d = p - skin.points[n];
-                if (norm(d) > kShallowest_mm && dot(d, skin.normals[n]) < 0) inside.push_back(p);
+                if (norm(d) > kShallowestMm && dot(d, skin.normals[n]) < 0) inside.push_back(p);
             }
         }
     }
     return inside;
 }
 
-// What the landmarks say of the open side: > 0 that it is the patient's back, < 0 the front. Each
-// that lies clearly in front of or behind the middle of both bodies has a say.
+// What the landmarks say about the open side: > 0 that it is the patient's back, < 0 the front.
+// Each landmark counts that lies clearly in front of or behind the middle of both bodies.
 double vote_of_landmarks(const FitContext& s) {
     Box3 skin, readings;
     for (Point3 p : s.fine.points) skin.include(p);
@@ -89,13 +89,11 @@ void decide_open_side(const std::string& wanted, FitContext* s) {
 }  // namespace
 
 Result<FitContext> prepare_fit(const RegisterInput& input, const RegisterOptions& options) {
-    Result<TargetSurface> target = prepare_target(input.mannequin, options.target);
-    if (!target) return target.error();
-    FitContext s{input.skin, std::move(*target), {}, {}, {}, {}, {}, {}, {}, {},
-                 {},         input.labels,       {}};
+    SONOCASE_TRY(TargetSurface target, prepare_target(input.mannequin, options.target));
+    FitContext s{.skin = input.skin, .target = std::move(target), .labels = input.labels};
     const Point3 origin = input.skin.box.centre();
-    s.fine = thin_skin(input.skin.skin, input.skin.on_rim, origin, kFineSkin_mm);
-    s.coarse = thin_skin(input.skin.skin, input.skin.on_rim, origin, kCoarseSkin_mm);
+    s.fine = thin_skin(input.skin.skin, input.skin.on_rim, origin, kFineSkinMm);
+    s.coarse = thin_skin(input.skin.skin, input.skin.on_rim, origin, kCoarseSkinMm);
     s.box.include(Point3{} + (input.skin.box.lower - origin));
     s.box.include(Point3{} + (input.skin.box.upper - origin));
     s.readings = thin_target(s.target, 0);
@@ -133,4 +131,4 @@ Registration in_frames(const FitContext& s, const RigidQuadratic& q) {
     return r;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration

@@ -11,7 +11,6 @@
 #include <vtkDoubleArray.h>
 #include <vtkLookupTable.h>
 #include <vtkNew.h>
-#include <vtkPNGWriter.h>
 #include <vtkPlane.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
@@ -23,21 +22,19 @@
 #include <vtkScalarBarActor.h>
 #include <vtkTextActor.h>
 #include <vtkTextProperty.h>
-#include <vtkWindowToImageFilter.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 
 #include "formats/files/atomic_file.h"
-#include "pipeline/base/quiet_library.h"
 #include "pipeline/pictures/offscreen_display.h"
-#include "pipeline/registration/fit_measure.h"
+#include "pipeline/registration/fit/fit_measure.h"
 
 VTK_MODULE_INIT(vtkRenderingOpenGL2)
 VTK_MODULE_INIT(vtkRenderingFreeType)
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 namespace {
 
 // In the mannequin's frame, turned so that x, y and z point to the patient's right, front and head.
@@ -98,27 +95,11 @@ void title(vtkRenderer* renderer, const char* text) {
 }
 
 Status write_png(vtkRenderWindow* window, const std::string& path) {
-    window->Render();
-    vtkNew<vtkWindowToImageFilter> grab;
-    grab->SetInput(window);
-    grab->ReadFrontBufferOff();
-    grab->Update();
-    OutputFile out(path);
-    vtkNew<vtkPNGWriter> writer;
-    writer->SetFileName(out.temporary().c_str());
-    writer->SetInputConnection(grab->GetOutputPort());
-    {
-        const QuietLibrary quiet;  // a full disk is reported below
-        writer->Write();
-    }
-    if (writer->GetErrorCode() != 0)
-        return Error{"cannot write the picture", path,
-                     "check that the folder is writable and has room"};
-    return out.commit();
+    return write_file(path, png_of_window(*window));
 }
 
-// aspect: width of the view over its height.
-void look(vtkRenderer* renderer, const Box3& box, Vector3 from, Vector3 up, double aspect) {
+// Aims the camera at the box from a direction. aspect: width of the view over its height.
+void aim_camera(vtkRenderer* renderer, const Box3& box, Vector3 from, Vector3 up, double aspect) {
     const Point3 centre = box.centre();
     const Vector3 e = box.extent();
     vtkCamera* camera = renderer->GetActiveCamera();
@@ -154,7 +135,7 @@ Status views(const Scene& scene, const std::string& path, double limit) {
         vtkNew<vtkActor> actor;
         actor->SetMapper(mapper);
         renderer->AddActor(actor);
-        look(renderer, scene.box, sides[n].from, {0, 0, 1}, 0.23 * 1600 / 560);
+        aim_camera(renderer, scene.box, sides[n].from, {0, 0, 1}, 0.23 * 1600 / 560);
         title(renderer, sides[n].name);
         window->AddRenderer(renderer);
     }
@@ -230,7 +211,7 @@ Status cuts(const Scene& scene, const std::string& path) {
         renderer->SetBackground(0.98, 0.98, 0.98);
         add_cut(renderer, scene.mannequin, scene.box.centre(), planes[n].normal, mannequin);
         add_cut(renderer, scene.skin, scene.box.centre(), planes[n].normal, patient);
-        look(renderer, scene.box, planes[n].from, planes[n].up, 1600 / 3.0 / 560);
+        aim_camera(renderer, scene.box, planes[n].from, planes[n].up, 1600 / 3.0 / 560);
         title(renderer, planes[n].name);
         window->AddRenderer(renderer);
     }
@@ -244,27 +225,25 @@ Status write_fit_pictures(const SkinSurfaceResult& skin,
                           const Registration& registration,
                           const std::string& folder,
                           double limit_mm) {
-    const Result<TargetSurface> target = prepare_target(mannequin);
-    if (!target) return target.error();
+    SONOCASE_TRY(const TargetSurface target, prepare_target(mannequin));
     // Before the first window: without a display VTK would end the program.
-    const Result<OffscreenDisplay> display = OffscreenDisplay::open();
-    if (!display) return display.error();
+    SONOCASE_TRY([[maybe_unused]] const OffscreenDisplay display, OffscreenDisplay::open());
     std::error_code made;
     std::filesystem::create_directories(folder, made);
     if (made) return Error{"folder cannot be made", folder, made.message()};
     Scene scene;
-    scene.skin = mapped_skin(skin.skin, registration, target->origin);
-    scene.gap = signed_gaps(scene.skin, *target);
+    scene.skin = mapped_skin(skin.skin, registration, target.origin);
+    scene.gap = signed_gaps(scene.skin, target);
     const Matrix3 turn = transpose(registration.mannequin_from_ct.rotation);
     for (Point3& p : scene.skin.points) {
         p = Point3{} + turn * (p - Point3{});
         scene.box.include(p);
     }
-    for (Point3 p : target->points)
+    for (Point3 p : target.points)
         scene.mannequin.points.push_back(Point3{} + turn * (p - Point3{}));
-    scene.mannequin.triangles = target->triangles;
-    if (auto s = views(scene, folder + "/fit_views.png", limit_mm); !s) return s.error();
+    scene.mannequin.triangles = target.triangles;
+    SONOCASE_TRY_DONE(views(scene, folder + "/fit_views.png", limit_mm));
     return cuts(scene, folder + "/fit_cuts.png");
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "formats/registration/registration.h"
 #include "formats/volume/surface.h"
+#include "pipeline/registration/map/registration.h"
 #include "pipeline/registration/skin/skin_surface.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 
 // Writes fit_views.png and fit_cuts.png into the folder, which is made if it does not exist.
 // Distances are clipped at +-limit_mm: blue inside the mannequin, red outside, grey without a
@@ -24,4 +24,4 @@ Status write_fit_pictures(const SkinSurfaceResult& skin,
                           const std::string& folder,
                           double limit_mm = 5);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "formats/files/atomic_file.h"
-#include "pipeline/base/delimited_text.h"
+#include "pipeline/base/text.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 
 Result<std::vector<Landmark>> parse_landmarks(std::string_view csv, const std::string& where) {
     std::vector<Landmark> landmarks;
@@ -47,9 +47,8 @@ Result<std::vector<Landmark>> parse_landmarks(std::string_view csv, const std::s
 }
 
 Result<std::vector<Landmark>> load_landmarks(const std::string& path) {
-    const Result<std::string> text = read_text_file(path);
-    if (!text) return text.error();
-    return parse_landmarks(*text, path);
+    SONOCASE_TRY(const std::string text, read_text_file(path));
+    return parse_landmarks(text, path);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration

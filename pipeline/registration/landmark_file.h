@@ -11,10 +11,10 @@
 #include "formats/base/result.h"
 #include "pipeline/registration/register_surfaces.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 
 // A header row is allowed. Errors name file and line.
 Result<std::vector<Landmark>> parse_landmarks(std::string_view csv, const std::string& where);
 Result<std::vector<Landmark>> load_landmarks(const std::string& path);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration

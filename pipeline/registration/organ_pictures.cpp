@@ -2,34 +2,27 @@
 
 #include "pipeline/registration/organ_pictures.h"
 
-#include <vtkAutoInit.h>
-#include <vtkNew.h>
-#include <vtkTextProperty.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 #include "formats/files/atomic_file.h"
-#include "pipeline/base/line_text.h"
 #include "pipeline/base/parallel.h"
+#include "pipeline/base/text.h"
 #include "pipeline/pictures/canvas.h"
-#include "pipeline/pictures/chart_text.h"
 #include "pipeline/pictures/png.h"
 #include "pipeline/registration/elastic/tissue_lattice.h"
+#include "pipeline/registration/fit/fit_measure.h"
+#include "pipeline/registration/fit/point_index.h"
 #include "pipeline/registration/map/inverse_map.h"
-#include "pipeline/registration/matching/point_index.h"
-#include "pipeline/registration/path_choice.h"
-#include "pipeline/registration/unfitted_skin.h"
+#include "pipeline/registration/warp_fit.h"
 
-VTK_MODULE_INIT(vtkRenderingFreeType)
-
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 namespace {
 
 constexpr int kPanelWidth = 440, kPanelHeight = 330, kTitle = 26, kTable = 470, kRow = 18;
 constexpr int kCuts = 3;
-constexpr double kNear_mm = 5;
+constexpr double kNearMm = 5;
 constexpr CanvasColour kInk{30, 30, 30, 255}, kAlarm{190, 20, 20, 255};
 constexpr std::array<std::uint8_t, 3> kReading{0, 190, 220}, kFitted{250, 250, 250},
     kUnfitted{255, 90, 40};
@@ -38,7 +31,7 @@ struct TissueColour {
     std::string_view tissue;
     std::array<std::uint8_t, 3> colour;
 };
-// As an anatomist paints them; structures of other tissues keep the colour of their label.
+// Colours as in an anatomical atlas; structures of other tissues keep the colour of their label.
 constexpr TissueColour kColours[] = {
     {"fat", {228, 204, 120}},     {"skin", {214, 170, 130}},  {"soft_tissue", {214, 180, 130}},
     {"muscle", {150, 62, 74}},    {"bone", {240, 236, 220}},  {"cartilage", {206, 214, 216}},
@@ -84,7 +77,8 @@ void put(Pixels& page, int width, int x, int y, std::array<std::uint8_t, 3> colo
               page.begin() + 3 * (static_cast<std::ptrdiff_t>(y) * width + x));
 }
 
-// ct_of  the point of the CT that lies at a place of the mannequin; false: none
+// Draws a cut through the labels. ct_of(p, &ct): the point of the CT that lies at the place p of
+// the mannequin; false if there is none.
 template <class CtOf>
 void draw_cut(const LabelVolume& labels,
               const Plane& plane,
@@ -95,7 +89,7 @@ void draw_cut(const LabelVolume& labels,
               int top,
               int width,
               Pixels& page) {
-    std::vector<std::uint8_t> cut(static_cast<std::size_t>(kPanelWidth * kPanelHeight), 0);
+    std::vector<std::uint8_t> cut(kPanelWidth * kPanelHeight, 0);
     parallel_for(kPanelHeight, 8, [&](std::size_t begin, std::size_t end) {
         for (std::size_t y = begin; y < end; ++y) {
             for (std::size_t x = 0; x < kPanelWidth; ++x) {
@@ -109,13 +103,13 @@ void draw_cut(const LabelVolume& labels,
     const auto at = [&](int x, int y) {
         return x < 0 || y < 0 || x >= kPanelWidth || y >= kPanelHeight
                    ? 0
-                   : static_cast<int>(cut[static_cast<std::size_t>(x + kPanelWidth * y)]);
+                   : static_cast<int>(cut[x + kPanelWidth * y]);
     };
     for (int y = 0; y < kPanelHeight; ++y) {
         for (int x = 0; x < kPanelWidth; ++x) {
             const int label = at(x, y);
             std::array<std::uint8_t, 3> colour{20, 20, 24};
-            if (label > 0) colour = colours[static_cast<std::size_t>(label)];
+            if (label > 0) colour = colours[label];
             const bool border = at(x + 1, y) != label || at(x, y + 1) != label;
             if (border && label > 0) {
                 for (std::uint8_t& c : colour) c = static_cast<std::uint8_t>(c * 0.45);
@@ -125,14 +119,14 @@ void draw_cut(const LabelVolume& labels,
             if (skin) {
                 double d2 = 0;
                 index.nearest(plane.place(x, y), &d2);
-                colour = d2 > kNotFitted_mm * kNotFitted_mm ? kUnfitted : kFitted;
+                colour = d2 > kNotFittedMm * kNotFittedMm ? kUnfitted : kFitted;
             }
             put(page, width, left + x, top + y, colour);
         }
     }
     for (const Point3 p : readings) {
         const Vector3 d = p - plane.middle;
-        if (std::abs(dot(d, plane.normal)) > kNear_mm) continue;
+        if (std::abs(dot(d, plane.normal)) > kNearMm) continue;
         const int x = static_cast<int>(
             std::lround(0.5 * kPanelWidth + dot(d, plane.across) / plane.mm_per_px));
         const int y =
@@ -147,16 +141,12 @@ void draw_cut(const LabelVolume& labels,
 }
 
 void write(Canvas& canvas, const std::string& words, double x, double y, bool alarm, bool right) {
-    vtkNew<vtkTextProperty> style;
-    style->SetFontFamilyToArial();
-    style->SetFontSize(12);
-    const CanvasColour ink = alarm ? kAlarm : kInk;
-    style->SetColor(ink[0] / 255.0, ink[1] / 255.0, ink[2] / 255.0);
-    if (right) style->SetJustificationToRight();
-    draw_text(canvas, *style, words, {x, y});
+    canvas.text(
+        words, {x, y + 2},
+        {.colour = alarm ? kAlarm : kInk, .anchor = right ? TextAnchor::end : TextAnchor::start});
 }
 
-// Bones as one and solid organs first, then the largest others.
+// The rows of the table: all bones together, solid organs, then the others from the largest.
 std::vector<OrganChange> rows_of(const std::vector<OrganChange>& changes) {
     std::vector<OrganChange> rows, others;
     const OrganChange bones = joint_change(changes, "all bones", is_bone);
@@ -189,7 +179,7 @@ void draw_table(const std::vector<OrganChange>& changes, Canvas& canvas) {
         if (y < kRow) break;
         const bool watched = is_bone(c.tissue) || is_solid_organ(c.tissue) || c.tissue.empty();
         const bool alarm =
-            watched && c.before_ml >= kLeastOrgan_ml &&
+            watched && c.before_ml >= kMinOrganMl &&
             (std::abs(c.volume_ratio - 1) > kVolumeTolerance || c.shape_change > kShapeTolerance);
         row(c.label, text("%.0f", c.before_ml), text("%.0f", c.before_ml * c.volume_ratio),
             text("%+.0f %%", 100 * (c.volume_ratio - 1)), text("%.2f", c.shape_change), alarm);
@@ -235,7 +225,7 @@ Status write_organ_pictures(const LabelVolume& labels,
     Pixels page = canvas.rgb();
     for (int n = 0; n < kCuts; ++n) {
         const int top = n * (kPanelHeight + kTitle) + kTitle;
-        const Plane& plane = planes[static_cast<std::size_t>(n)];
+        const Plane& plane = planes[n];
         const auto rigid = [&](Point3 p, Point3* ct) {
             *ct = back * p;
             return true;
@@ -250,4 +240,4 @@ Status write_organ_pictures(const LabelVolume& labels,
     return write_file(folder + "/fit_organs.png", png);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration

@@ -6,12 +6,12 @@
 #include <string>
 
 #include "formats/base/result.h"
-#include "formats/registration/registration.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/surface.h"
 #include "pipeline/registration/elastic/organ_change.h"
+#include "pipeline/registration/map/registration.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 
 // Writes fit_organs.png into the folder, which exists. Left: the patient laid on the mannequin
 // rigidly; middle: through the map; each with outlines of the structures and the mannequin's
@@ -24,4 +24,4 @@ Status write_organ_pictures(const LabelVolume& labels,
                             const std::vector<OrganChange>& changes,
                             const std::string& folder);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration

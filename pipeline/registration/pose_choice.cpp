@@ -5,21 +5,20 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/base/line_text.h"
+#include "formats/base/constants.h"
 #include "pipeline/base/parallel.h"
+#include "pipeline/base/text.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
 // Candidates are compared after a quadratic of this stiffness, by gaps with this Cauchy scale; a
 // point without a counterpart costs as much as this gap.
-constexpr double kJudgeConstraint_mm = 10, kJudgeScale_mm = 5, kNoCounterpart_mm = 12;
+constexpr double kJudgeConstraintMm = 10, kJudgeScaleMm = 5, kNoCounterpartMm = 12;
 constexpr double kCloseScore = 1.10, kQuarterTurn = 1.25;
 
 double penalty(double gap) {
-    return kJudgeScale_mm * kJudgeScale_mm *
-           std::log1p(gap * gap / (kJudgeScale_mm * kJudgeScale_mm));
+    return kJudgeScaleMm * kJudgeScaleMm * std::log1p(gap * gap / (kJudgeScaleMm * kJudgeScaleMm));
 }
 
 // A candidate after a stiff quadratic and a coarse field; its score sums the costs of gaps, missing
@@ -39,7 +38,7 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
     options.landmarks = s.landmarks;
     options.landmark_weight = s.hints.landmark_weight;
     double deformation = 0;
-    for (double constraint : {3 * kJudgeConstraint_mm, kJudgeConstraint_mm}) {
+    for (double constraint : {3 * kJudgeConstraintMm, kJudgeConstraintMm}) {
         options.constraint_mm = constraint;
         options.iterations = 5;
         const RefineResult refined =
@@ -62,7 +61,7 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
         double sum = 0;
         for (const Match& m : list) sum += penalty(m.gap_mm);
         const auto count = static_cast<double>(std::max<std::size_t>(1, queries));
-        return (sum + (count - static_cast<double>(list.size())) * penalty(kNoCounterpart_mm)) /
+        return (sum + (count - static_cast<double>(list.size())) * penalty(kNoCounterpartMm)) /
                count;
     };
     const Matches& matches = fit.matches;
@@ -118,7 +117,7 @@ RunnerUp described(const JudgedPose& best, const JudgedPose& other) {
     r.score_mm = other.score_mm;
     r.coverage = other.coverage;
     const Rigid &a = best.rigid.target_from_skin, &b = other.rigid.target_from_skin;
-    r.turn_deg = rotation_angle(transpose(a.rotation) * b.rotation) / kDegree;
+    r.turn_deg = rotation_angle(transpose(a.rotation) * b.rotation) / kRadPerDeg;
     r.shift_mm = norm(a.translation - b.translation);
     const double head = dot(a.rotation.column(2), b.rotation.column(2));
     const double front = dot(a.rotation.column(1), b.rotation.column(1));
@@ -227,4 +226,4 @@ PoseChoice choose_pose(const FitContext& s,
     return choice;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration

@@ -8,14 +8,14 @@
 
 #include "pipeline/registration/fit_context.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 
 // A candidate after a stiff quadratic and a coarse field.
 struct JudgedPose {
     RigidCandidate rigid;
     RigidQuadratic quadratic;
-    double score_mm =
-        0;  // root of the total cost: gaps, missing counterparts, deformation and hints
+    // Root of the total cost: gaps, missing counterparts, deformation and hints.
+    double score_mm = 0;
     double coverage = 0;
     double back_cost_mm2 = 0;  // the part of score_mm^2 for the open side of the sweep
 };
@@ -32,4 +32,4 @@ PoseChoice choose_pose(const FitContext& s,
                        const RegisterOptions& options,
                        const Progress& progress);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration

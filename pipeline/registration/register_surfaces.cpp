@@ -2,20 +2,182 @@
 
 #include "pipeline/registration/register_surfaces.h"
 
-#include <chrono>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
 
-#include "pipeline/registration/register_report.h"
+#include "pipeline/base/stopwatch.h"
+#include "pipeline/base/text.h"
+#include "pipeline/registration/elastic/tissue_lattice.h"
+#include "pipeline/registration/map/map_proofs.h"
+#include "pipeline/registration/pose_choice.h"
+#include "pipeline/registration/warp_fit.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
+
 namespace {
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+// The reports of a registration: measures for --report, warnings for people.
+
+void add_fit(StageReport& report, const std::string& step, const FitMeasure& fit) {
+    report.measures.push_back({step + "_rms_mm", fit.rms_mm});
+    report.measures.push_back({step + "_median_mm", fit.median_mm});
+    report.measures.push_back({step + "_p95_mm", fit.p95_mm});
+    report.measures.push_back({step + "_max_mm", fit.max_mm});
+    report.measures.push_back({step == "skin" ? "coverage" : step + "_coverage", fit.coverage});
+}
+
+void add_target(StageReport& report, const TargetSurface& t) {
+    report.measures.push_back({"readings", static_cast<double>(t.points.size())});
+    report.measures.push_back({"readings_not_finite", static_cast<double>(t.not_finite)});
+    report.measures.push_back({"readings_repeated", static_cast<double>(t.repeated)});
+    report.measures.push_back({"readings_lifted_off", static_cast<double>(t.lift_offs)});
+    report.measures.push_back({"table_readings", static_cast<double>(t.table.readings)});
+    report.measures.push_back({"reading_spacing_mm", t.spacing_mm});
+}
+
+void add_organs(StageReport& report, const std::vector<OrganChange>& organs) {
+    MeasureGroup volume{"volume_change", {}}, shape{"shape_change", {}};
+    for (const OrganChange& c : organs) {
+        volume.values.push_back({c.label, c.volume_ratio});
+        shape.values.push_back({c.label, c.shape_change});
+    }
+    report.groups = {std::move(volume), std::move(shape)};
+}
+
+void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure& fit) {
+    const TargetSurface& t = s.target;
+    if (t.not_finite > 0) {
+        report.warnings.push_back(
+            text("%ld rows of the surface are not finite and were left out", t.not_finite));
+    }
+    // A careful sweep has none. Those nearer to the skin than the limit are not found.
+    if (t.lift_offs > static_cast<long>(t.points.size()) / 50) {
+        report.warnings.push_back(
+            text("%ld of %ld readings lie off the surface of their neighbours: keep the sensor on "
+                 "the skin",
+                 t.lift_offs, static_cast<long>(t.points.size())));
+    }
+    if (t.points.size() < 300) {
+        report.warnings.push_back(text("only %ld readings: 500 or more make the fit trustworthy",
+                                       static_cast<long>(t.points.size())));
+    }
+    if (fit.coverage < 0.5) {
+        report.warnings.push_back(text(
+            "only %.0f %% of the readings have a counterpart on the patient's skin: is it the same "
+            "part of the body?",
+            100 * fit.coverage));
+    }
+    if (fit.skin_coverage < 0.65 && !(s.hints.up && !s.landmarks.empty()) &&
+        s.landmarks.size() < 3) {
+        report.warnings.push_back(text(
+            "the readings cover only %.0f %% of the patient's skin: tilt and place along the body "
+            "are weakly determined; %s",
+            100 * fit.skin_coverage,
+            s.hints.up
+                ? "add a landmark low on the body, such as the crotch (--landmarks FILE.csv)"
+                : "give the head direction (--up X,Y,Z) and a landmark low on the body, such "
+                  "as the crotch (--landmarks FILE.csv)"));
+    }
+}
+
+// A landmark is wrong if neither its own error nor that of the map explains its distance: four
+// standard deviations per axis are exceeded by one distance in a thousand.
+void warn_of_landmarks(StageReport& report, const RegisterOptions& options, const WarpFit& w) {
+    const double map_mm = w.trust.inside_mm;
+    const double usual =
+        4 * std::sqrt(options.landmark_mm * options.landmark_mm + map_mm * map_mm / 3);
+    for (const Landmark& mark : options.landmarks) {
+        const double off = distance(mannequin_from_ct(w.registration, mark.ct), mark.mannequin);
+        if (off > usual) {
+            report.warnings.push_back(
+                text("landmark '%s' ends %.0f mm from its place, more than the %.0f mm that its "
+                     "own error and the map's allow: check its coordinates",
+                     mark.name.c_str(), off, usual));
+        }
+    }
+}
+
+StageReport align_report(const FitContext& s,
+                         const PoseChoice& choice,
+                         const FitMeasure& fit,
+                         double seconds) {
+    StageReport report;
+    report.stage = stage_names::kAlign;
+    report.version = kRegisterVersion;
+    report.seconds = seconds;
+    add_target(report, s.target);
+    add_fit(report, "rigid", fit);
+    report.measures.push_back({"pose_score_mm", choice.best.score_mm});
+    report.measures.push_back({"mirror_score_mm", choice.mirror_score_mm});
+    report.measures.push_back({"open_side_size", s.open_side.size});
+    if (choice.open_side_dropped) {
+        report.notes = {
+            {"open_side", "none"},
+            {"open_side_reason", "the sweep is of a flank, which says nothing of the back"}};
+    } else {
+        report.notes = {{"open_side", s.open_side_is}, {"open_side_reason", s.open_side_why}};
+    }
+    if (!choice.runners_up.empty()) {
+        const RunnerUp& r = choice.runners_up.front();
+        report.measures.push_back({"runner_up_score_mm", r.score_mm});
+        report.measures.push_back({"runner_up_turn_deg", r.turn_deg});
+        report.measures.push_back({"runner_up_shift_mm", r.shift_mm});
+        report.measures.push_back({"runner_up_coverage", r.coverage});
+    }
+    report.warnings = choice.warnings;
+    return report;
+}
+
+StageReport warp_report(const FitContext& s,
+                        const WarpFit& w,
+                        const RegisterOptions& options,
+                        double seconds) {
+    StageReport report;
+    report.stage = stage_names::kWarp;
+    report.version = kRegisterVersion;
+    report.seconds = seconds;
+    add_fit(report, "skin", w.fit);
+    report.measures.push_back({"min_det_jacobian", w.min_det});
+    report.measures.push_back({"sampled_min_det_jacobian", w.sampled_det});
+    report.measures.push_back({"skin_bias_mm", w.fit.mean_signed_mm});
+    report.measures.push_back({"skin_coverage", w.fit.skin_coverage});
+    report.measures.push_back({"skin_behind_table_mm", w.fit.behind_table_mm});
+    report.measures.push_back({"counterparts", static_cast<double>(w.fit.counterparts)});
+    report.measures.push_back({"unexplained_readings", static_cast<double>(w.fit.unexplained)});
+    add_fit(report, "quadratic", w.quadratic_fit);
+    report.measures.push_back({"consensus", w.ransac.consensus});
+    report.measures.push_back({"rigid_consensus", w.ransac.rigid_consensus});
+    report.measures.push_back({"consensus_mm", w.ransac.consensus_mm});
+    report.measures.push_back({"folding_trials", static_cast<double>(w.ransac.folding_trials)});
+    report.measures.push_back({"constraint_mm", w.constraint_mm});
+    report.measures.push_back({"quadratic_condition", w.condition});
+    report.measures.push_back({"gap_standard_error_mm", w.trust.standard_error_mm});
+    report.measures.push_back({"held_out_mm", w.trust.held_out_mm});
+    report.measures.push_back({"rigid_held_out_mm", w.rigid_trust.fitted_mm});
+    report.measures.push_back({"predicted_interior_mm", w.trust.inside_mm});
+    report.measures.push_back({"residual_warp", w.residual.used ? 1.0 : 0.0});
+    report.measures.push_back({"residual_bending", w.residual.used ? w.residual.bending : 0.0});
+    report.measures.push_back({"residual_mean_mm", w.residual_mean_mm});
+    report.measures.push_back(
+        {"residual_interior_move_mm", w.residual.used ? w.residual.inside_mm : 0.0});
+    report.measures.push_back({"residual_iterations", static_cast<double>(w.residual.iterations)});
+    report.measures.push_back({"least_minor", w.one_to_one.min_minor()});
+    report.measures.push_back({"elastic_stiffness", w.stiffness});
+    report.measures.push_back({"elastic_refits", static_cast<double>(w.elastic_refits)});
+    report.measures.push_back({"elastic_strain_mm2", w.elastic.strain_mm2});
+    report.measures.push_back({"elastic_iterations", static_cast<double>(w.elastic.iterations)});
+    report.notes = {{"path", w.path}, {"path_reason", w.reason}};
+    if (!w.organs.empty()) add_organs(report, w.organs);
+    report.warnings = w.warnings;
+    warn_of_readings(report, s, w.fit);
+    warn_of_landmarks(report, options, w);
+    return report;
 }
 
 RegisterResult align(const FitContext& s,
                      const RegisterOptions& options,
-                     std::chrono::steady_clock::time_point start,
+                     const Stopwatch& watch,
                      const Progress& progress) {
     const PoseChoice choice = choose_pose(s, options, progress);
     const Rigid pose =
@@ -26,7 +188,7 @@ RegisterResult align(const FitContext& s,
     result.rigid_fit = result.quadratic_fit = result.fit =
         measure_fit(s.skin, s.target, result.registration);
     result.runners_up = choice.runners_up;
-    result.report = align_report(s, choice, result.fit, seconds_since(start));
+    result.report = align_report(s, choice, result.fit, watch.seconds());
     result.registration.reports = {result.report};
     return result;
 }
@@ -34,7 +196,7 @@ RegisterResult align(const FitContext& s,
 RegisterResult warp(const FitContext& s,
                     const Rigid& mannequin_from_ct,
                     const RegisterOptions& options,
-                    std::chrono::steady_clock::time_point start,
+                    const Stopwatch& watch,
                     const Progress& progress) {
     const Rigid pose{mannequin_from_ct.rotation,
                      mannequin_from_ct * s.fine.origin - s.target.origin};
@@ -45,7 +207,7 @@ RegisterResult warp(const FitContext& s,
     result.quadratic_fit = w.quadratic_fit;
     result.fit = w.fit;
     result.organs = w.organs;
-    result.report = warp_report(s, w, options, seconds_since(start));
+    result.report = warp_report(s, w, options, watch.seconds());
     result.registration.reports = {result.report};
     return result;
 }
@@ -55,31 +217,28 @@ RegisterResult warp(const FitContext& s,
 Result<RegisterResult> align_surfaces(const RegisterInput& input,
                                       const RegisterOptions& options,
                                       const Progress& progress) {
-    const auto start = std::chrono::steady_clock::now();
-    Result<FitContext> s = prepare_fit(input, options);
-    if (!s) return s.error();
-    return align(*s, options, start, progress);
+    const Stopwatch watch;
+    SONOCASE_TRY(FitContext s, prepare_fit(input, options));
+    return align(s, options, watch, progress);
 }
 
 Result<RegisterResult> warp_surfaces(const RegisterInput& input,
                                      const Rigid& mannequin_from_ct,
                                      const RegisterOptions& options,
                                      const Progress& progress) {
-    const auto start = std::chrono::steady_clock::now();
-    Result<FitContext> s = prepare_fit(input, options);
-    if (!s) return s.error();
-    return warp(*s, mannequin_from_ct, options, start, progress);
+    const Stopwatch watch;
+    SONOCASE_TRY(FitContext s, prepare_fit(input, options));
+    return warp(s, mannequin_from_ct, options, watch, progress);
 }
 
 Result<RegisterResult> register_surfaces(const RegisterInput& input,
                                          const RegisterOptions& options,
                                          const Progress& progress) {
-    const auto start = std::chrono::steady_clock::now();
-    Result<FitContext> s = prepare_fit(input, options);
-    if (!s) return s.error();
-    const RegisterResult aligned = align(*s, options, start, progress);
-    RegisterResult result = warp(*s, aligned.registration.mannequin_from_ct, options,
-                                 std::chrono::steady_clock::now(), progress);
+    const Stopwatch watch;
+    SONOCASE_TRY(FitContext s, prepare_fit(input, options));
+    const RegisterResult aligned = align(s, options, watch, progress);
+    RegisterResult result =
+        warp(s, aligned.registration.mannequin_from_ct, options, Stopwatch(), progress);
     result.runners_up = aligned.runners_up;
     const StageReport align_stage = aligned.report, warp_stage = result.report;
     result.registration.reports = {align_stage, warp_stage};
@@ -93,9 +252,52 @@ Result<RegisterResult> register_surfaces(const RegisterInput& input,
                                   align_stage.warnings.end());
     result.report.measures.push_back({"align_seconds", align_stage.seconds});
     result.report.measures.push_back({"warp_seconds", warp_stage.seconds});
-    result.report.seconds = seconds_since(start);
+    result.report.seconds = watch.seconds();
     report_progress(progress, 1, "done");
     return result;
 }
 
-}  // namespace sonocase::pipeline
+namespace {
+
+constexpr double kGoodSkinMm = 2.7, kGoodVolume = 0.08, kGoodCoverage = 0.6;
+
+}  // namespace
+
+double Misfit::worst() const {
+    return std::max({skin, volume, shape, coverage});
+}
+
+Misfit misfit_of(const RegisterResult& result) {
+    Misfit m;
+    const FitMeasure& fit = result.fit;
+    m.skin = fit.p95_mm >= 0 ? fit.p95_mm / kGoodSkinMm : INFINITY;
+    m.coverage = fit.coverage > 0 ? kGoodCoverage / fit.coverage : INFINITY;
+    const auto count = [&](const OrganChange& c) {
+        if (c.before_ml < kMinOrganMl) return;
+        m.volume = std::max(m.volume, std::abs(c.volume_ratio - 1) / kGoodVolume);
+        m.shape = std::max(m.shape, c.shape_change / kShapeTolerance);
+    };
+    count(joint_change(result.organs, "bones", is_bone));
+    for (const OrganChange& c : result.organs) {
+        if (is_solid_organ(c.tissue)) count(c);
+    }
+    const auto minor = std::find_if(result.report.measures.begin(), result.report.measures.end(),
+                                    [](const Measure& x) { return x.name == "least_minor"; });
+    m.proven = result.registration.min_det_jacobian > kMinDetJacobian &&
+               minor != result.report.measures.end() && minor->value > 0;
+    return m;
+}
+
+std::vector<std::size_t> rank_results(const std::vector<RegisterResult>& results) {
+    std::vector<std::size_t> order(results.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::vector<Misfit> misfit;
+    for (const RegisterResult& r : results) misfit.push_back(misfit_of(r));
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        if (misfit[a].proven != misfit[b].proven) return misfit[a].proven;
+        return misfit[a].worst() < misfit[b].worst();
+    });
+    return order;
+}
+
+}  // namespace sonocase::pipeline::inline registration

@@ -20,19 +20,19 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "formats/registration/registration.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/surface.h"
 #include "pipeline/base/progress.h"
 #include "pipeline/registration/elastic/elastic_warp.h"
 #include "pipeline/registration/elastic/organ_change.h"
-#include "pipeline/registration/fit_measure.h"
+#include "pipeline/registration/fit/fit_measure.h"
+#include "pipeline/registration/fit/quadratic_warp.h"
+#include "pipeline/registration/fit/residual_warp.h"
+#include "pipeline/registration/fit/rigid_alignment.h"
+#include "pipeline/registration/map/registration.h"
 #include "pipeline/registration/skin/skin_surface.h"
-#include "pipeline/registration/warp/quadratic_warp.h"
-#include "pipeline/registration/warp/residual_warp.h"
-#include "pipeline/registration/warp/rigid_alignment.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 
 inline constexpr int kRegisterVersion = 4;
 
@@ -59,11 +59,11 @@ struct RegisterOptions {
     // so that directions which the readings determine are hardly constrained, and the others are.
     double constraint_mm = 0;
     double strain = 0.03;  // expected slopes of the map beyond a rotation, standard deviation
-    double least_constraint_mm = 0.3;
+    double min_constraint_mm = 0.3;
     double wanted_det = 0.35;  // a weight whose proven det J is below this is rejected
     bool residual_warp = true;
     // Which displacement follows the quadratic. auto: the residual warp where it suffices
-    // (path_choice.h), else the elastic warp; residual, elastic: that one.
+    // (warp_fit.h), else the elastic warp; residual, elastic: that one.
     std::string path = "auto";
     ResidualOptions residual;
     ElasticOptions elastic;
@@ -108,4 +108,20 @@ Result<RegisterResult> warp_surfaces(const RegisterInput& input,
                                      const RegisterOptions& options = {},
                                      const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+// Which of several mannequins fits a patient best.
+//
+// How a fit compares with a good one: each figure over what is good, so that 1 or less is good.
+struct Misfit {
+    double skin = 0;      // 95th percentile of readings to skin over 2.7 mm
+    double volume = 0;    // largest change of a solid organ or of all bones over 8 %
+    double shape = 0;     // largest change of the shape of a solid organ over 0.2
+    double coverage = 0;  // 0.6 over the share of readings with a counterpart
+    bool proven = true;   // free of folds and one to one
+    double worst() const;
+};
+Misfit misfit_of(const RegisterResult& result);
+
+// Indices of the results, best first: proven maps before others, then by the worst figure.
+std::vector<std::size_t> rank_results(const std::vector<RegisterResult>& results);
+
+}  // namespace sonocase::pipeline::inline registration

@@ -1,16 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // From a rigid pose to the complete map: RANSAC, the point-to-surface quadratic with as much
-// freedom as the data justify, the residual field, and the checks between them.
+// freedom as the data justify, then the displacement that follows it.
+//
+// Which displacement follows the quadratic: none, the residual warp or the elastic warp.
+//
+// The residual warp suffices if the readings end close to the skin, the map is proven free of folds
+// and one to one, and bones and solid organs keep their volume. Otherwise the elastic warp is
+// fitted, which takes the patient's tissues into account and closes some 50 mm. Where its proofs
+// fail it is fitted again, stiffer; where no fit can be proven, or the bodies differ by more than
+// it closes, the map falls back to the quadratic, and a warning says so.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "pipeline/registration/elastic/elastic_warp.h"
+#include "pipeline/registration/elastic/organ_change.h"
 #include "pipeline/registration/fit_context.h"
-#include "pipeline/registration/map/one_to_one_proof.h"
+#include "pipeline/registration/map/map_proofs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration {
 
 struct WarpFit {
     Registration registration;
@@ -19,7 +29,7 @@ struct WarpFit {
     double condition = 0;
     QuadraticTrust trust, rigid_trust;
     bool kept_rigid = false;  // the quadratic did not explain left-out patches better
-    double least_det = 1, sampled_det = 1;
+    double min_det = 1, sampled_det = 1;
     ResidualReport residual;
     std::string path = "quadratic", reason;  // "quadratic", "residual" or "elastic", and why
     ElasticFit elastic;
@@ -37,4 +47,17 @@ WarpFit fit_warp(const FitContext& s,
                  const RegisterOptions& options,
                  const Progress& progress);
 
-}  // namespace sonocase::pipeline
+// What the residual warp has to reach to be kept.
+inline constexpr double kSufficientP95Mm = 3, kSufficientVolume = 0.08, kMinOrganMl = 20;
+// What a structure may change by before a warning says so.
+inline constexpr double kVolumeTolerance = 0.1, kShapeTolerance = 0.2;
+
+// Chooses the displacement of w, which holds the residual warp if that was fitted. Sets its path,
+// reason, one-to-one bounds, organs and warnings, and replaces its map if the elastic warp is
+// taken.
+void choose_warp(const FitContext& s,
+                 const RegisterOptions& options,
+                 const Progress& progress,
+                 WarpFit* w);
+
+}  // namespace sonocase::pipeline::inline registration

@@ -4,15 +4,14 @@
 
 #include <filesystem>
 
-#include "formats/attempt/draw_attempt.h"
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
-#include "formats/files/bundle_file.h"
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
+#include "formats/files/thread_jobs.h"
+#include "formats/scoring/draw_attempt.h"
 #include "formats/text/nearest_name.h"
-#include "formats/threads/thread_jobs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline review {
 namespace {
 
 std::string pictures_of(const std::string& session_path) {
@@ -31,9 +30,8 @@ Result<Exercise> find_review_exercise(const CaseBundle& bundle,
                                       const std::string& named_by_session,
                                       std::vector<std::string>& warnings) {
     if (wanted.find(".toml") != std::string::npos) {
-        const auto text = read_text_file(wanted);
-        if (!text) return text.error();
-        return parse_exercise(*text, wanted);
+        SONOCASE_TRY(const auto text, read_text_file(wanted));
+        return parse_exercise(text, wanted);
     }
     const std::string name = wanted.empty() ? named_by_session : wanted;
     std::vector<std::string> names;
@@ -60,32 +58,29 @@ Result<ReviewInput> load_review(const std::string& session_path,
                                 const ReviewOptions& options) {
     ReviewInput input;
     input.session_path = session_path;
-    // The file as it is goes before the session is looked at: of eight hours it is a gigabyte.
-    auto session = [&]() -> Result<Session> {
+    // The file as read, a gigabyte for eight hours, is freed before the session is evaluated.
+    SONOCASE_TRY(auto session, [&]() -> Result<Session> {
         const auto sequence = load_recording_file(session_path);
         if (!sequence) return sequence.error();
         return session_from_sequence(*sequence, guess_names(*sequence), session_path);
-    }();
-    if (!session) return session.error();
-    if (const auto status = check_session(*session, session_path); !status)
+    }());
+    if (const auto status = check_session(session, session_path); !status)
         input.warnings.push_back("The session cannot be judged: " + status.error().message() + ".");
-    input.session = std::move(*session);
+    input.session = std::move(session);
     if (input.session.samples.empty()) {
         return Error{"holds no reading", session_path, "record a session with sonoplay --record"};
     }
-    auto bundle = load_bundle(bundle_path);
-    if (!bundle) return bundle.error();
-    input.bundle = std::move(*bundle);
+    SONOCASE_TRY(auto bundle, load_bundle(bundle_path));
+    input.bundle = std::move(bundle);
     const SessionHeader& header = input.session.header;
     if (!header.case_name.empty() && header.case_name != input.bundle.manifest.case_name) {
         input.warnings.push_back("The session was recorded on the case '" + header.case_name +
                                  "' and not on '" + input.bundle.manifest.case_name + "'.");
     }
-    auto exercise =
-        find_review_exercise(input.bundle, options.exercise, header.exercise, input.warnings);
-    if (!exercise) return exercise.error();
+    SONOCASE_TRY(auto exercise, find_review_exercise(input.bundle, options.exercise,
+                                                     header.exercise, input.warnings));
     const CaseAnatomy at_rest(input.bundle);
-    AttemptDraw drawn = draw_attempt(*exercise, at_rest, input.bundle.labels, attempt_seed(header));
+    AttemptDraw drawn = draw_attempt(exercise, at_rest, input.bundle.labels, attempt_seed(header));
     input.exercise = std::move(drawn.exercise);
     input.warnings.insert(input.warnings.end(), drawn.warnings.begin(), drawn.warnings.end());
     if (options.exercise.empty() && !header.exercise_digest.empty()) {
@@ -116,15 +111,13 @@ Result<ReviewInput> load_review(const std::string& session_path,
     }
     if (!options.progress_path.empty() && !header.trainee.empty() &&
         std::filesystem::exists(options.progress_path)) {
-        const auto book = ProgressBook::open(options.progress_path);
-        if (!book) return book.error();
-        const auto all = book->sessions(header.trainee, header.exercise);
-        if (!all) return all.error();
-        for (const ProgressEntry& entry : *all) {
+        SONOCASE_TRY(const auto book, ProgressBook::open(options.progress_path));
+        SONOCASE_TRY(const auto all, book.sessions(header.trainee, header.exercise));
+        for (const ProgressEntry& entry : all) {
             if (entry.started < header.started) input.earlier.push_back(entry);
         }
     }
     return input;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline review

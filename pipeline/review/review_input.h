@@ -14,7 +14,7 @@
 #include "formats/recording/session.h"
 #include "formats/scoring/session_score.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline review {
 
 struct ReviewOptions {
     std::string exercise;  // name in the bundle, or a TOML file; empty: the one the session names
@@ -38,10 +38,11 @@ Result<ReviewInput> load_review(const std::string& session_path,
                                 const std::string& bundle_path,
                                 const ReviewOptions& options);
 
-// The exercise of a bundle by name, or of a TOML file, or a free scan if there is neither.
+// Returns the exercise of that name in the bundle, or of that TOML file, or a free scan if there is
+// neither.
 Result<Exercise> find_review_exercise(const CaseBundle& bundle,
                                       const std::string& wanted,
                                       const std::string& named_by_session,
                                       std::vector<std::string>& warnings);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline review

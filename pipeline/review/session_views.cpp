@@ -2,10 +2,17 @@
 
 #include "pipeline/review/session_views.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
 #include <vtkActor.h>
 #include <vtkAutoInit.h>
 #include <vtkCamera.h>
 #include <vtkCellArray.h>
+#include <vtkDiscreteFlyingEdges3D.h>
 #include <vtkFloatArray.h>
 #include <vtkImageData.h>
 #include <vtkLight.h>
@@ -22,20 +29,71 @@
 #include <vtkSmartPointer.h>
 #include <vtkSphereSource.h>
 #include <vtkTubeFilter.h>
-#include <vtkWindowToImageFilter.h>
+#include <vtkWindowedSincPolyDataFilter.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-
+#include "formats/bundle/case_bundle.h"
+#include "formats/volume/surface.h"
 #include "pipeline/pictures/offscreen_display.h"
-#include "pipeline/pictures/png.h"
-#include "pipeline/review/label_surface.h"
 
 VTK_MODULE_INIT(vtkRenderingOpenGL2)
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline review {
 namespace {
+
+// The smoothed surface around the voxels whose label is chosen (# 256), taken at every `step`-th
+// voxel. Mannequin frame, mm; without normals; empty if no voxel is chosen.
+Surface label_surface(const CaseBundle& bundle, const std::vector<bool>& chosen, int step) {
+    const Int3 size = bundle.grid.size;
+    // A layer of zeros around closes surfaces at the border of the volume.
+    const int nx = size.x / step + 2, ny = size.y / step + 2, nz = size.z / step + 2;
+    vtkNew<vtkImageData> image;
+    image->SetDimensions(nx, ny, nz);
+    image->AllocateScalars(VTK_UNSIGNED_CHAR, 1);
+    auto* to = static_cast<std::uint8_t*>(image->GetScalarPointer());
+    std::fill(to, to + static_cast<std::ptrdiff_t>(nx) * ny * nz, std::uint8_t{0});
+    const double voxel = bundle.grid.spacing_mm.x;
+    image->SetSpacing(step * voxel, step * voxel, step * voxel);
+    const Point3 o = bundle.grid.origin_mm;
+    image->SetOrigin(o.x - step * voxel, o.y - step * voxel, o.z - step * voxel);
+    bool any = false;
+    for (int k = 0; k * step < size.z; ++k) {
+        for (int j = 0; j * step < size.y; ++j) {
+            std::uint8_t* row = to + static_cast<std::ptrdiff_t>(nx) *
+                                         (j + 1 + static_cast<std::ptrdiff_t>(ny) * (k + 1));
+            for (int i = 0; i * step < size.x; ++i) {
+                const bool in = chosen[bundle.label_bricks.at(i * step, j * step, k * step)];
+                if (i + 1 < nx && j + 1 < ny && k + 1 < nz) row[i + 1] = in;
+                any = any || in;
+            }
+        }
+    }
+    if (!any) return {};
+    vtkNew<vtkDiscreteFlyingEdges3D> edges;
+    edges->SetInputData(image);
+    edges->SetValue(0, 1);
+    vtkNew<vtkWindowedSincPolyDataFilter> smooth;
+    smooth->SetInputConnection(edges->GetOutputPort());
+    smooth->SetNumberOfIterations(20);
+    smooth->SetPassBand(0.05);
+    smooth->NormalizeCoordinatesOn();
+    smooth->Update();
+    vtkPolyData& mesh = *smooth->GetOutput();
+    Surface surface;
+    for (vtkIdType i = 0; i < mesh.GetNumberOfPoints(); ++i) {
+        double p[3];
+        mesh.GetPoint(i, p);
+        surface.points.push_back({p[0], p[1], p[2]});
+    }
+    vtkIdType count = 0;
+    const vtkIdType* ids = nullptr;
+    vtkCellArray* polygons = mesh.GetPolys();
+    for (polygons->InitTraversal(); polygons->GetNextCell(count, ids);) {
+        surface.triangles.push_back({static_cast<std::uint32_t>(ids[0]),
+                                     static_cast<std::uint32_t>(ids[1]),
+                                     static_cast<std::uint32_t>(ids[2])});
+    }
+    return surface;
+}
 
 using Colour = std::array<double, 3>;
 constexpr Colour kSkin{0.93, 0.78, 0.68}, kSpared{0.86, 0.22, 0.18}, kOrgan{0.62, 0.36, 0.30};
@@ -177,11 +235,12 @@ Point3 at(const Rigid& t) {
     return {t.translation.x, t.translation.y, t.translation.z};
 }
 
-// At most `most` of the points, evenly spaced along the path.
-std::vector<Point3> thinned(const std::vector<Point3>& path, std::size_t most) {
-    if (path.size() <= most) return path;
+// At most max_points of the points, evenly spaced along the path.
+std::vector<Point3> thinned(const std::vector<Point3>& path, std::size_t max_points) {
+    if (path.size() <= max_points) return path;
     std::vector<Point3> out;
-    for (std::size_t i = 0; i < most; ++i) out.push_back(path[i * (path.size() - 1) / (most - 1)]);
+    for (std::size_t i = 0; i < max_points; ++i)
+        out.push_back(path[i * (path.size() - 1) / (max_points - 1)]);
     return out;
 }
 
@@ -293,27 +352,14 @@ std::vector<std::uint8_t> shoot(
     camera->ParallelProjectionOn();
     camera->SetParallelScale(reach_mm);
     scene.renderer->ResetCameraClippingRange();
-    scene.window->Render();
-    vtkNew<vtkWindowToImageFilter> grab;
-    grab->SetInput(scene.window);
-    grab->ReadFrontBufferOff();
-    grab->Update();
-    vtkImageData* image = grab->GetOutput();  // rows upwards
-    const auto row = static_cast<std::ptrdiff_t>(3) * image->GetDimensions()[0];
-    const int rows = image->GetDimensions()[1];
-    const auto* pixels = static_cast<const std::uint8_t*>(image->GetScalarPointer());
-    std::vector<std::uint8_t> turned(static_cast<std::size_t>(rows * row));
-    for (int y = 0; y < rows; ++y)
-        std::copy_n(pixels + y * row, row, turned.data() + (rows - 1 - y) * row);
-    return png_from_rgb(turned.data(), image->GetDimensions()[0], rows);
+    return png_of_window(*scene.window);
 }
 
 }  // namespace
 
 Result<std::vector<SessionView>> render_session_views(const ReviewInput& input,
                                                       const ReviewOptions& options) {
-    const Result<OffscreenDisplay> display = OffscreenDisplay::open();
-    if (!display) return display.error();
+    SONOCASE_TRY([[maybe_unused]] const OffscreenDisplay display, OffscreenDisplay::open());
     Scene scene;
     scene.window->SetOffScreenRendering(1);
     scene.window->SetMultiSamples(0);
@@ -362,4 +408,4 @@ Result<std::vector<SessionView>> render_session_views(const ReviewInput& input,
     return views;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline review

@@ -11,7 +11,7 @@
 #include "formats/base/result.h"
 #include "pipeline/review/review_input.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline review {
 
 struct SessionView {
     std::string title;
@@ -24,4 +24,4 @@ struct SessionView {
 Result<std::vector<SessionView>> render_session_views(const ReviewInput& input,
                                                       const ReviewOptions& options);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline review

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation {
 
 std::vector<double> label_volumes_ml(const LabelVolume& volume) {
     std::array<std::size_t, 256> counts{};
@@ -64,4 +64,4 @@ void report_changes(const std::vector<LabelChange>& changes,
     report->measures.push_back({"max_abs_volume_change", worst});
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation

@@ -9,7 +9,7 @@
 #include "formats/base/stage_report.h"
 #include "formats/volume/label_volume.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation {
 
 struct LabelChange {
     int label = 0;  // palette index
@@ -32,7 +32,7 @@ std::vector<LabelChange> compare_volumes(const std::vector<Label>& labels,
                                          const std::vector<double>& after_ml);
 
 // Relative change of volume above which a label is named in a warning.
-inline constexpr double kLargestExpectedChange = 0.2;
+inline constexpr double kMaxExpectedChange = 0.2;
 
 // Adds the measures labels, lost_labels, mean_abs_volume_change and max_abs_volume_change, and a
 // warning per label that is lost or has changed by more than `warn_above`.
@@ -40,4 +40,4 @@ void report_changes(const std::vector<LabelChange>& changes,
                     double warn_above,
                     StageReport* report);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation

@@ -11,7 +11,7 @@
 #include "pipeline/base/stopwatch.h"
 #include "pipeline/segmentation/distance/signed_distance.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation {
 namespace {
 
 // phi of one label in its box, and the voxels that move.
@@ -87,9 +87,7 @@ float sample(const VoxelBox& box, const std::vector<float>& field, float x, floa
     cell(z, box.size.z, &k, &w);
     const std::size_t sx = box.size.x > 1 ? 1 : 0;
     const std::size_t sy = box.size.y > 1 ? static_cast<std::size_t>(box.size.x) : 0;
-    const std::size_t sz =
-        box.size.z > 1 ? static_cast<std::size_t>(box.size.x) * static_cast<std::size_t>(box.size.y)
-                       : 0;
+    const std::size_t sz = box.size.z > 1 ? static_cast<std::size_t>(box.size.x) * box.size.y : 0;
     const float* p = field.data() + box.index(i, j, k);
     const auto line = [&](const float* q) { return q[0] + u * (q[sx] - q[0]); };
     const float a = line(p), b = line(p + sy), c = line(p + sz), d = line(p + sy + sz);
@@ -146,7 +144,7 @@ std::optional<Error> check(const Grid& grid, const LevelSetOptions& options, dou
         std::snprintf(found, sizeof found, "voxels of %g x %g x %g mm", h.x, h.y, h.z);
         return Error{found, where, "cubic voxels: resample first"};
     }
-    const double limit = greatest_stable_step(options.k0, h.x);
+    const double limit = max_stable_step(options.k0, h.x);
     if (!(options.k0 > 0) || options.iterations < 1 || !(time_step <= limit)) {
         char found[128];
         std::snprintf(found, sizeof found, "time step %g with K0 %g and %d iterations", time_step,
@@ -178,15 +176,18 @@ Layer make_layer(const LabelVolume& volume, std::uint8_t label, const VoxelBox& 
 }
 
 // Gives the label the voxels where its phi is the smallest so far.
-void claim(const Layer& layer, std::uint8_t label, std::vector<float>* least, LabelVolume* volume) {
+void claim(const Layer& layer,
+           std::uint8_t label,
+           std::vector<float>* smallest,
+           LabelVolume* volume) {
     for (int k = 0; k < layer.box.size.z; ++k) {
         for (int j = 0; j < layer.box.size.y; ++j) {
             const float* phi = layer.phi.data() + layer.box.index(0, j, k);
             const std::size_t to =
                 volume->grid.index(layer.box.first.x, layer.box.first.y + j, layer.box.first.z + k);
             for (std::size_t i = 0; i < static_cast<std::size_t>(layer.box.size.x); ++i) {
-                if (phi[i] < (*least)[to + i]) {
-                    (*least)[to + i] = phi[i];
+                if (phi[i] < (*smallest)[to + i]) {
+                    (*smallest)[to + i] = phi[i];
                     volume->voxels[to + i] = label;
                 }
             }
@@ -196,7 +197,7 @@ void claim(const Layer& layer, std::uint8_t label, std::vector<float>* least, La
 
 }  // namespace
 
-double greatest_stable_step(double k0, double voxel_mm) {
+double max_stable_step(double k0, double voxel_mm) {
     return 2 / (k0 + 8 / (voxel_mm * voxel_mm));
 }
 
@@ -205,13 +206,13 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
                                            const Progress& progress) {
     const Stopwatch watch;
     const double h = volume.grid.spacing_mm.x;
-    const double limit = greatest_stable_step(options.k0, h);
+    const double limit = max_stable_step(options.k0, h);
     const double dt = options.time_step > 0 ? options.time_step : 0.8 * limit;
     if (auto error = check(volume.grid, options, dt)) return *error;
     LevelSetResult result;
     result.time_step = dt;
     result.volume = volume;
-    std::vector<float> least(volume.grid.voxel_count(), INFINITY);
+    std::vector<float> smallest(volume.grid.voxel_count(), INFINITY);
     const std::vector<VoxelBox> boxes = label_boxes(volume);
     for (std::size_t l = 0; l < boxes.size(); ++l) {
         if (boxes[l].empty()) continue;
@@ -220,7 +221,7 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
         const auto label = static_cast<std::uint8_t>(l);
         Layer layer = make_layer(volume, label, boxes[l], std::max(3.0, options.band_vx) * h);
         evolve(&layer, options, static_cast<float>(dt));
-        claim(layer, label, &least, &result.volume);
+        claim(layer, label, &smallest, &result.volume);
     }
     result.changes =
         compare_volumes(volume.labels, label_volumes_ml(volume), label_volumes_ml(result.volume));
@@ -228,15 +229,15 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
         if (c.change() < -0.2)
             c.note = "the curvature term removes what is thinner than 4 / sqrt(K0)";
     }
-    result.report.stage = "smooth";
+    result.report.stage = stage_names::kSmooth;
     result.report.measures = {{"k0", options.k0},
                               {"iterations", static_cast<double>(options.iterations)},
                               {"time_step", dt},
                               {"time_step_limit", limit}};
-    report_changes(result.changes, kLargestExpectedChange, &result.report);
+    report_changes(result.changes, kMaxExpectedChange, &result.report);
     result.report.seconds = watch.seconds();
     report_progress(progress, 1, "level sets");
     return result;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation

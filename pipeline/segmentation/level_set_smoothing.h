@@ -27,19 +27,19 @@
 #include "pipeline/base/progress.h"
 #include "pipeline/segmentation/label_changes.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation {
 
 struct LevelSetOptions {
     double k0 = 0.3;            // > 0
     int iterations = 40;        // >= 1
-    double time_step = 0;       // 0: 0.8 of the greatest stable step
+    double time_step = 0;       // 0: 0.8 of the largest stable step
     bool closest_point = true;  // curvature at the closest surface point, as printed
     double band_vx = 4;         // half-width of the band that moves, voxels, >= 3
 };
 
 // Largest stable time step, mm^2. Above it the iteration oscillates, and its result is wrong
 // without any NaN.
-double greatest_stable_step(double k0, double voxel_mm);
+double max_stable_step(double k0, double voxel_mm);
 
 struct LevelSetResult {
     LabelVolume volume;
@@ -54,4 +54,4 @@ Result<LevelSetResult> level_set_smoothing(const LabelVolume& volume,
                                            const LevelSetOptions& options = {},
                                            const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation

@@ -6,14 +6,14 @@
 #include <utility>
 
 #include "pipeline/base/stopwatch.h"
-#include "pipeline/segmentation/field/cooked_grid.h"
-#include "pipeline/segmentation/field/label_field.h"
-#include "pipeline/segmentation/field/nearest_labels.h"
-#include "pipeline/segmentation/field/sampled_field.h"
-#include "pipeline/segmentation/field/volume_correction.h"
+#include "pipeline/segmentation/cooked_grid.h"
+#include "pipeline/segmentation/label_field.h"
+#include "pipeline/segmentation/nearest_labels.h"
+#include "pipeline/segmentation/sampled_field.h"
 #include "pipeline/segmentation/snap_surfaces.h"
+#include "pipeline/segmentation/volume_correction.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation {
 namespace {
 
 FieldMap map_to(const Grid& grid, const Registration& registration, const InverseMap& inverse_map) {
@@ -36,12 +36,11 @@ Result<FineRegion> cook_region(const RegionRequest& request,
                                const InverseMap& inverse_map,
                                LabelField* field,
                                StageReport* report) {
-    const auto box = region_box(request, cooked, registration);
-    if (!box) return box.error();
+    SONOCASE_TRY(const auto box, region_box(request, cooked, registration));
     FineRegion region;
     region.name = request.name;
-    region.box = *box;
-    region.grid = region_grid(*box, request.voxel_mm);
+    region.box = box;
+    region.grid = region_grid(box, request.voxel_mm);
     const FieldMap map = map_to(region.grid, registration, inverse_map);
     SampledField sampled =
         sample_label_field(field, region.grid, map, {options.record_band_vx, false}, {});
@@ -94,10 +93,9 @@ Result<SampledField> resample_by_shape(const ResampleInput& input,
     report->measures.push_back({"volume_steps", static_cast<double>(corrected.iterations)});
     report->measures.push_back({"volume_miss", corrected.largest_error});
     if (options.region) {
-        auto region = cook_region(*options.region, options, sampled.volume, registration,
-                                  inverse_map, &field, report);
-        if (!region) return region.error();
-        result->region = std::move(*region);
+        SONOCASE_TRY(auto region, cook_region(*options.region, options, sampled.volume,
+                                              registration, inverse_map, &field, report));
+        result->region = std::move(region);
         result->seconds.region = watch.lap();
     }
     return sampled;
@@ -136,32 +134,30 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
     if (options.region && !shape)
         return Error{"method '" + options.method + "' cannot cook a region", "resample.method",
                      "shape, or a recipe without [[region]]"};
-    const auto grid =
-        cooked_grid(input.ct_labels, input.registration, {options.voxel_mm, options.margin_mm});
-    if (!grid) return grid.error();
+    SONOCASE_TRY(const auto grid, cooked_grid(input.ct_labels, input.registration,
+                                              {options.voxel_mm, options.margin_mm}));
     ResampleResult result;
     PreimageCounts counts;
     std::vector<int> rescued;
-    result.report.stage = "resample";
+    result.report.stage = stage_names::kResample;
     result.report.version = kResampleVersion;
     result.report.measures = {{"voxel_mm", options.voxel_mm},
-                              {"voxels", static_cast<double>(grid->voxel_count())}};
+                              {"voxels", static_cast<double>(grid.voxel_count())}};
     if (!shape) {
         result.volume =
-            nearest_labels(input.ct_labels, input.registration, *grid, &counts, progress);
+            nearest_labels(input.ct_labels, input.registration, grid, &counts, progress);
         if (paper) {
-            auto level_set = level_set_smoothing(result.volume, options.level_set, progress);
-            if (!level_set) return level_set.error();
-            result.volume = std::move(level_set->volume);
-            result.report.measures.push_back({"time_step", level_set->time_step});
+            SONOCASE_TRY(auto level_set,
+                         level_set_smoothing(result.volume, options.level_set, progress));
+            result.volume = std::move(level_set.volume);
+            result.report.measures.push_back({"time_step", level_set.time_step});
         }
     } else {
-        auto sampled = resample_by_shape(input, options, *grid, progress, &result);
-        if (!sampled) return sampled.error();
-        result.volume = std::move(sampled->volume);
-        result.boundary = std::move(sampled->boundary);
-        counts = sampled->counts;
-        rescued = std::move(sampled->rescued);
+        SONOCASE_TRY(auto sampled, resample_by_shape(input, options, grid, progress, &result));
+        result.volume = std::move(sampled.volume);
+        result.boundary = std::move(sampled.boundary);
+        counts = sampled.counts;
+        rescued = std::move(sampled.rescued);
     }
     result.changes = compare_volumes(input.ct_labels.labels,
                                      mapped_volumes_ml(input.ct_labels, input.registration),
@@ -170,9 +166,9 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
     result.report.measures.push_back({"outside_voxels", static_cast<double>(counts.outside)});
     result.report.measures.push_back(
         {"no_preimage_voxels", static_cast<double>(counts.no_preimage)});
-    report_changes(result.changes, kLargestExpectedChange, &result.report);
+    report_changes(result.changes, kMaxExpectedChange, &result.report);
     result.report.seconds = watch.seconds();
     return result;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation

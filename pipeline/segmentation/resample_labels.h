@@ -3,9 +3,9 @@
 // From the patient to the mannequin: resamples a label map on any grid in `ct`, through the inverse
 // of the registration, into cubic voxels in `mannequin`. Methods:
 //
-// shape    The labels become one smooth partition of space (field/label_field.h): thick slices are
+// shape    The labels become one smooth partition of space (label_field.h): thick slices are
 //          interpolated by shape, steps are smoothed, and every label keeps its volume
-//          (field/volume_correction.h). The partition is evaluated at the preimage of each voxel;
+//          (volume_correction.h). The partition is evaluated at the preimage of each voxel;
 //          near a surface, a boundary record says where the surface runs within the voxel.
 // nearest  The paper's: the label of the nearest CT voxel; no records.
 // paper    `nearest`, then the level sets of eq. (10) per label (level_set_smoothing.h).
@@ -23,15 +23,15 @@
 
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
-#include "formats/registration/registration.h"
 #include "formats/volume/label_volume.h"
 #include "formats/volume/surface_patch.h"
 #include "pipeline/base/progress.h"
+#include "pipeline/registration/map/registration.h"
+#include "pipeline/segmentation/cooked_grid.h"
 #include "pipeline/segmentation/label_changes.h"
 #include "pipeline/segmentation/level_set_smoothing.h"
-#include "pipeline/segmentation/region_request.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation {
 
 struct ResampleInput {
     const LabelVolume& ct_labels;  // `ct`, any spacing and orientation
@@ -80,4 +80,4 @@ Result<ResampleResult> resample_labels(const ResampleInput& input,
                                        const ResampleOptions& options = {},
                                        const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation

@@ -6,12 +6,12 @@
 #include <utility>
 
 #include "pipeline/base/stopwatch.h"
-#include "pipeline/segmentation/field/label_field.h"
-#include "pipeline/segmentation/field/sampled_field.h"
-#include "pipeline/segmentation/field/volume_correction.h"
+#include "pipeline/segmentation/label_field.h"
+#include "pipeline/segmentation/sampled_field.h"
 #include "pipeline/segmentation/snap_surfaces.h"
+#include "pipeline/segmentation/volume_correction.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation {
 namespace {
 
 SampledField sample_on_own_grid(LabelField* field,
@@ -42,11 +42,10 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
                                    const Progress& progress) {
     SmoothResult result;
     if (options.method == "level_set") {
-        auto level_set = level_set_smoothing(volume, options.level_set, progress);
-        if (!level_set) return level_set.error();
-        result.volume = std::move(level_set->volume);
-        result.changes = std::move(level_set->changes);
-        result.report = std::move(level_set->report);
+        SONOCASE_TRY(auto level_set, level_set_smoothing(volume, options.level_set, progress));
+        result.volume = std::move(level_set.volume);
+        result.changes = std::move(level_set.changes);
+        result.report = std::move(level_set.report);
         return result;
     }
     if (options.method != "joint") {
@@ -86,7 +85,7 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
             c.note = "thinner than the smoothing, kept as one voxel";
         }
     }
-    result.report.stage = "smooth";
+    result.report.stage = stage_names::kSmooth;
     result.report.version = kSmoothVersion;
     result.report.measures = {{"sigma_vx", options.sigma_vx},
                               {"volume_steps", static_cast<double>(corrected.iterations)},
@@ -96,9 +95,9 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
         result.report.warnings.emplace_back(
             "the voxels are not cubic, so that no boundary records were made; resample first");
     }
-    report_changes(result.changes, kLargestExpectedChange, &result.report);
+    report_changes(result.changes, kMaxExpectedChange, &result.report);
     result.report.seconds = watch.seconds();
     return result;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation

@@ -3,7 +3,7 @@
 // Smoothing of a label volume, all labels at once. Methods:
 //
 // joint      The labels become one smooth partition of space in which every label keeps its volume
-//            (field/label_field.h, field/volume_correction.h), evaluated on the same voxels, with
+//            (label_field.h, volume_correction.h), evaluated on the same voxels, with
 //            boundary records. Gaps, overlaps and lost labels are impossible. On thick slices the
 //            steps remain steps of whole voxels; resample_labels.h makes cubic voxels of them.
 // level_set  The paper's eq. (10) per label (level_set_smoothing.h): cubic voxels only, no records.
@@ -21,7 +21,7 @@
 #include "pipeline/segmentation/label_changes.h"
 #include "pipeline/segmentation/level_set_smoothing.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation {
 
 struct SmoothOptions {
     std::string method = "joint";  // joint | level_set
@@ -51,4 +51,4 @@ Result<SmoothResult> smooth_labels(const LabelVolume& volume,
                                    const SmoothOptions& options = {},
                                    const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation

@@ -7,14 +7,13 @@
 #include <cmath>
 #include <vector>
 
+#include "formats/base/constants.h"
 #include "formats/volume/boundary_record.h"
 #include "formats/volume/surface_patch.h"
 #include "pipeline/base/parallel.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation {
 namespace {
-
-constexpr double kDegrees = 57.29577951308232;  // per radian
 
 struct Change {
     std::size_t bricks = 0, snapped = 0, missed = 0, labels = 0, records = 0;
@@ -65,7 +64,7 @@ class Snapper {
     explicit Snapper(const SnapOptions& options)
         : options_(options),
           reach_(static_cast<int>(std::lround(options.band_vx * kBoundaryStepsPerVoxel))),
-          cosine_(std::cos(options.normal_deg / kDegrees)) {}
+          cosine_(std::cos(options.normal_deg / kDegPerRad)) {}
 
     // Returns the patches that the brick now follows; empty: the brick is unchanged.
     std::vector<SurfacePatch> operator()(Brick* brick, Change* change) const {
@@ -185,7 +184,7 @@ BrickPatches by_stored_brick(const std::vector<SnappedLayer>& layers, std::size_
     return out;
 }
 
-// Snaps one brick whose first voxel is (i, j, k).
+// Snaps the brick that begins at voxel `first`.
 void snap_brick(const Snapper& snap,
                 Int3 first,
                 std::uint32_t entry,
@@ -216,14 +215,12 @@ void snap_layer(
         for (int bx = 0; bx < bricks.x; ++bx) {
             const std::size_t b =
                 static_cast<std::size_t>(bx) +
-                static_cast<std::size_t>(bricks.x) *
-                    (static_cast<std::size_t>(by) +
-                     static_cast<std::size_t>(bricks.y) * static_cast<std::size_t>(bz));
+                static_cast<std::size_t>(bricks.x) * (by + static_cast<std::size_t>(bricks.y) * bz);
             const std::uint32_t entry = boundary->table[b];
             if (entry & kUniformBrick) continue;
             ++out->change.bricks;
             const Int3 first{bx * kBrickEdge, by * kBrickEdge, bz * kBrickEdge};
-            // The last bricks repeat the voxels at the border, which no quadric does.
+            // The last bricks repeat the voxels at the border, and no quadric fits those.
             if (first.x + kBrickEdge > size.x || first.y + kBrickEdge > size.y ||
                 first.z + kBrickEdge > size.z)
                 continue;
@@ -255,7 +252,7 @@ SnapReport snap_surfaces(LabelVolume* volume,
                          const SnapOptions& options) {
     const SnapOptions allowed = scaled(options, volume->grid.spacing_mm.x);
     const Snapper snap(allowed);
-    std::vector<SnappedLayer> layers(static_cast<std::size_t>(brick_count(volume->grid.size).z));
+    std::vector<SnappedLayer> layers(brick_count(volume->grid.size).z);
     parallel_for(layers.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t bz = begin; bz < end; ++bz)
             snap_layer(snap, static_cast<int>(bz), volume, boundary, &layers[bz]);
@@ -271,7 +268,7 @@ SnapReport snap_surfaces(LabelVolume* volume,
     report.labels = sum.labels;
     const double n = static_cast<double>(std::max<std::size_t>(sum.records, 1));
     report.distance_rms_vx = std::sqrt(sum.distance_sum / n);
-    report.normal_rms_deg = kDegrees * std::sqrt(sum.normal_sum / n);
+    report.normal_rms_deg = kDegPerRad * std::sqrt(sum.normal_sum / n);
     return report;
 }
 
@@ -284,4 +281,4 @@ void add_measures(const SnapReport& snapped, StageReport* report) {
     report->measures.push_back({"snap_rms_deg", snapped.normal_rms_deg});
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation

@@ -13,7 +13,7 @@
 #include "formats/volume/label_volume.h"
 #include "formats/volume/surface_patch.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation {
 
 struct SnapOptions {
     double band_vx = 1.5;  // records exist up to this distance
@@ -42,4 +42,4 @@ SnapReport snap_surfaces(LabelVolume* volume,
 // Adds record_bricks, snapped_bricks, snap_missed, snap_labels, snap_rms_vx and snap_rms_deg.
 void add_measures(const SnapReport& snapped, StageReport* report);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation

@@ -2,9 +2,7 @@
 
 #include "pipeline/stages/built_in_stages.h"
 
-#include "pipeline/stages/pathology_stage.h"
-
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
 StageTable make_table() {
@@ -28,8 +26,8 @@ const StageTable& built_in_stages() {
     return table;
 }
 
-std::uint64_t case_seed(const Recipe& recipe) {
-    return static_cast<std::uint64_t>(recipe.settings.of<CaseOptions>("case").seed);
+std::uint64_t case_seed(const StageSettings& settings) {
+    return static_cast<std::uint64_t>(settings.of<CaseOptions>().seed);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The step "tissues": textures and structure take the tissues and not the labels, so that textures
-// stay in the cache when only voxels change.
 #include "pipeline/stages/case_tissues.h"
 
 #include <algorithm>
@@ -11,11 +9,12 @@
 #include "formats/text/nearest_name.h"
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/import/mesh/node_table.h"
-#include "pipeline/pathology/pathology.h"
+#include "pipeline/pathology/place_pathology.h"
 #include "pipeline/stages/built_in_stages.h"
-#include "pipeline/stages/key_text.h"
+#include "pipeline/stages/roles.h"
+#include "pipeline/stages/stage_table.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
 // The tissues that the palette uses, in the table's order, outside first.
@@ -32,14 +31,12 @@ std::vector<Tissue> used_tissues(const std::vector<Tissue>& all, const std::vect
 }
 
 Result<StageValue> run(StageInputs& inputs, const Progress&) {
-    const auto labels = inputs.get<LabelFile>("labels");
-    if (!labels) return labels.error();
+    SONOCASE_TRY(const auto labels, inputs.get(kLabels));
     CaseTissues result;
-    result.palette = (*labels)->volume.labels;
-    if (auto status = assign_tissues(inputs.recipe(), result.palette); !status)
-        return status.error();
+    result.palette = labels->volume.labels;
+    SONOCASE_TRY_DONE(assign_tissues(inputs.recipe(), result.palette));
     result.tissues = used_tissues(inputs.recipe().tissues, result.palette);
-    return StageValue::of(std::move(result));
+    return StageValue::of(kTissues, std::move(result));
 }
 
 // Empty for a tissue without figures of its own, whose bundle holds none either.
@@ -57,8 +54,7 @@ std::string palette_text(const std::vector<Label>& palette) {
 }
 
 bool is_pathology(const Recipe& recipe, const std::string& label) {
-    for (const PathologyRequest& request :
-         recipe.settings.of<PathologyOptions>("pathology").requests)
+    for (const PathologyRequest& request : recipe.settings.of<PathologyOptions>().requests)
         for (const std::string& name : pathology_labels(request))
             if (name == label) return true;
     return false;
@@ -97,7 +93,7 @@ Status assign_tissues(const Recipe& recipe, std::vector<Label>& labels) {
             return Error{"label '" + choice.label + "' is not in the label map", where,
                          suggest_name(choice.label, names)};
         }
-        labels[static_cast<std::size_t>(found - names.begin())].tissue = choice.tissue;
+        labels[found - names.begin()].tissue = choice.tissue;
     }
     return Done{};
 }
@@ -116,8 +112,8 @@ std::string tissues_text(const std::vector<Tissue>& tissues) {
 StageDescriptor tissues_step() {
     StageDescriptor step;
     step.name = "tissues";
-    step.takes = {"labels"};
-    step.provides = "tissues";
+    step.takes = {kLabels};
+    step.provides = kTissues;
     // Which tissues a case uses is known once its labels exist; the plan takes all of them.
     step.key_texts = [](const Recipe& recipe, const InputDigests&) {
         std::vector<std::string> texts{tissues_text(recipe.tissues)};
@@ -127,10 +123,10 @@ StageDescriptor tissues_step() {
     };
     step.run = run;
     step.digest = [](const StageValue& value) {
-        const CaseTissues& result = value.as<CaseTissues>();
+        const CaseTissues& result = value.as(kTissues);
         return digest_of(tissues_text(result.tissues) + palette_text(result.palette));
     };
     return step;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

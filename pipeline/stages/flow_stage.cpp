@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// flow: courses of the vessels, and the blood that runs through them.
+// flow: finds the courses of the vessels, and the blood that runs through them.
+#include "formats/bundle/codec/chunk_file.h"
 #include "formats/bundle/codec/flow_codec.h"
 #include "formats/bundle/stage_files.h"
-#include "formats/container/chunk_file.h"
 #include "formats/files/atomic_file.h"
 #include "formats/text/stage_report_json.h"
 #include "pipeline/flow/cook_flow.h"
-#include "pipeline/flow/flow_table.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
 #include "pipeline/stages/label_codec.h"
+#include "pipeline/stages/roles.h"
 
 #include <array>
 #include <string_view>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
 constexpr std::string_view kFlowKind = "FLOW";
@@ -45,16 +45,13 @@ OptionGroup options() {
 }
 
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
-    const auto labels = inputs.get<LabelFile>("labels");
-    if (!labels) return labels.error();
-    const auto used = inputs.get<CaseTissues>("tissues");
-    if (!used) return used.error();
+    SONOCASE_TRY(const auto labels, inputs.get(kLabels));
+    SONOCASE_TRY(const auto used, inputs.get(kTissues));
     // The same voxels with the tissues of the recipe; one byte per voxel is copied.
-    LabelVolume volume = (*labels)->volume;
-    volume.labels = (*used)->palette;
-    auto result = cook_flow(volume, inputs.options<FlowOptions>("flow"), progress);
-    if (!result) return result.error();
-    return StageValue::of(std::move(*result));
+    LabelVolume volume = labels->volume;
+    volume.labels = used->palette;
+    SONOCASE_TRY(auto result, cook_flow(volume, inputs.options<FlowOptions>(), progress));
+    return StageValue::of(kFlow, std::move(result));
 }
 
 Bytes encode(const FlowResult& result) {
@@ -66,33 +63,28 @@ Bytes encode(const FlowResult& result) {
 }
 
 Result<FlowResult> decode(const Bytes& bytes, const std::string& where) {
-    const auto reader = ChunkReader::open(bytes, kFlowKind, kFlowChunks, where);
-    if (!reader) return reader.error();
-    const auto flow = reader->read("flow", detail::kMaxFlowBytes);
-    if (!flow) return flow.error();
-    auto field = detail::flow_from_bytes(*flow, where);
-    if (!field) return field.error();
-    const auto text = reader->read("report", reader->raw_bytes("report"));
-    if (!text) return text.error();
-    auto report =
-        parse_stage_report({reinterpret_cast<const char*>(text->data()), text->size()}, where);
-    if (!report) return report.error();
-    return FlowResult{std::move(*field), std::move(*report)};
+    SONOCASE_TRY(const auto reader, ChunkReader::open(bytes, kFlowKind, kFlowChunks, where));
+    SONOCASE_TRY(const auto flow, reader.read("flow", detail::kMaxFlowBytes));
+    SONOCASE_TRY(auto field, detail::flow_from_bytes(flow, where));
+    SONOCASE_TRY(const auto text, reader.read("report", reader.raw_bytes("report")));
+    SONOCASE_TRY(
+        auto report,
+        parse_stage_report({reinterpret_cast<const char*>(text.data()), text.size()}, where));
+    return FlowResult{std::move(field), std::move(report)};
 }
 
 StageVerb verb() {
     StageVerb verb;
-    verb.files = {label_input("labels", "Cooked labels, as resample or smooth writes them")};
+    verb.files = {label_input(kLabels, "Cooked labels, as resample or smooth writes them")};
     verb.output_type = "OUT.csv";
     verb.output_meaning = "Where to write the table of the vessels";
     verb.save = [](StageInputs& inputs, const StageValue& value, const std::string& path) {
-        return write_file(path, flow_table_csv(value.as<FlowResult>().field,
-                                               inputs.options<FlowOptions>("flow").rate_per_min));
+        return write_file(path, flow_table_csv(value.as(kFlow).field,
+                                               inputs.options<FlowOptions>().rate_per_min));
     };
     verb.pictures_meaning = "Folder for pictures of courses, profiles and waveforms";
     verb.draw = [](StageInputs& inputs, const StageValue& value, const std::string& folder) {
-        return draw_flow(value.as<FlowResult>().field,
-                         inputs.options<FlowOptions>("flow").rate_per_min, folder);
+        return draw_flow(value.as(kFlow).field, inputs.options<FlowOptions>().rate_per_min, folder);
     };
     return verb;
 }
@@ -101,22 +93,20 @@ StageVerb verb() {
 
 StageDescriptor flow_stage() {
     StageDescriptor stage;
-    stage.name = "flow";
+    stage.name = stage_names::kFlow;
     stage.version = kFlowVersion;
     stage.summary = "find vessels and the blood that runs through them";
     stage.about = "Find the courses of labelled vessels and the blood that runs through them";
-    stage.takes = {"labels", "tissues"};
-    stage.provides = "flow";
+    stage.takes = {kLabels, kTissues};
+    stage.provides = kFlow;
     stage.options = options();
     stage.run = run;
-    stage.codec = codec_of<FlowResult>(encode, decode);
-    stage.reports = [](const StageValue& value) {
-        return std::vector<StageReport>{value.as<FlowResult>().report};
-    };
+    stage.codec = codec_of(kFlow, encode, decode);
+    stage.reports = reports_of(kFlow);
     stage.share = 0.03;
-    stage.cost = {1, 240, 0, 0, 3};
+    stage.cost = {.threads = 1, .base_mb = 240, .per_cooked_voxel = 3};
     stage.verb = verb();
     return stage;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// import: a segmented CT, or the analytic torso, becomes labels in the `ct` frame.
-#include "pipeline/stages/import_inputs.h"
+// import: reads a segmented CT, or samples the analytic torso, into labels in the `ct` frame.
+#include "pipeline/stages/import_stage.h"
 
-#include "formats/files/stage_file.h"
+#include "formats/files/load_save.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
-#include "pipeline/stages/key_text.h"
 #include "pipeline/stages/label_codec.h"
+#include "pipeline/stages/roles.h"
+#include "pipeline/stages/stage_table.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
 LabelFile sample_analytic(const AnalyticInput& in) {
@@ -19,7 +20,7 @@ LabelFile sample_analytic(const AnalyticInput& in) {
     file.volume =
         sample_analytic_torso(analytic_torso_grid({across, across, in.slice_mm}), in.body);
     StageReport report;
-    report.stage = "import";
+    report.stage = stage_names::kImport;
     report.version = kImportVersion;
     const Vector3 extent = body_box(file.volume).extent();
     report.measures = {{"labels", static_cast<double>(file.volume.labels.size() - 1)},
@@ -128,15 +129,16 @@ OptionGroup options() {
 
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     const RecipeInputs& in = inputs.recipe().inputs;
-    if (in.analytic) return StageValue::of(sample_analytic(in.torso));
-    auto imported =
-        import_inputs(inputs.recipe(), inputs.options<MeshImportOptions>("import"), progress);
-    if (!imported) return imported.error();
+    if (in.analytic) return StageValue::of(kCtLabels, sample_analytic(in.torso));
+    SONOCASE_TRY(auto imported,
+                 import_inputs(inputs.recipe(), inputs.options<MeshImportOptions>(), progress));
     return StageValue::of(
-        LabelFile{"ct", std::move(imported->labels), {}, {}, {std::move(imported->report)}});
+        kCtLabels,
+        LabelFile{"ct", std::move(imported.labels), {}, {}, {std::move(imported.report)}});
 }
 
-// Everything that the labels depend on; of the analytic torso, what its label map shows of it.
+// The texts hold everything that the labels depend on; for the analytic torso, what its label map
+// shows of it.
 std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
     const RecipeInputs& in = recipe.inputs;
     const AnalyticBody& body = in.torso.body;
@@ -164,7 +166,7 @@ StageVerb verb() {
     verb.output_type = "CT.labels";
     verb.output_meaning = "Where to write";
     verb.save = [](StageInputs&, const StageValue& value, const std::string& path) {
-        LabelFile file = value.as<LabelFile>();
+        LabelFile file = value.as(kCtLabels);
         file.reports = without_seconds(file.reports);
         return save_label_file(file, path);
     };
@@ -191,25 +193,25 @@ Result<ImportedLabels> import_inputs(const Recipe& recipe,
 
 StageDescriptor import_stage() {
     StageDescriptor stage;
-    stage.name = "import";
+    stage.name = stage_names::kImport;
     stage.version = kImportVersion;
     stage.summary = "read a label map of any kind";
     stage.about = "Read a label map of any kind into labels in the ct frame (RAS+, mm)";
-    stage.provides = "ct_labels";
+    stage.provides = kCtLabels;
     stage.options = options();
     stage.key_texts = key_texts;
     stage.run = run;
-    stage.codec = label_codec();
-    stage.reports = label_reports;
+    stage.codec = label_codec(kCtLabels);
+    stage.reports = reports_of(kCtLabels);
     // A mistake in the recipe's [labels] is reported now, long before its tissues are used.
     stage.check = [](const Recipe& recipe, const StageValue& value) -> Status {
-        std::vector<Label> labels = value.as<LabelFile>().volume.labels;
+        std::vector<Label> labels = value.as(kCtLabels).volume.labels;
         return assign_tissues(recipe, labels);
     };
     stage.share = 0.03;
-    stage.cost = {1, 240, 1.2, 4, 0};
+    stage.cost = {.threads = 1, .base_mb = 240, .per_label_mb = 1.2, .per_label_voxel = 4};
     stage.verb = verb();
     return stage;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

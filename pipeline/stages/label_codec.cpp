@@ -2,13 +2,40 @@
 
 #include "pipeline/stages/label_codec.h"
 
+#include <string>
 #include <utility>
 
-#include "formats/threads/thread_jobs.h"
-#include "pipeline/export/labels/label_files.h"
+#include "formats/bundle/stage_files.h"
+#include "formats/files/load_save.h"
+#include "formats/files/thread_jobs.h"
+#include "pipeline/export/nrrd_file.h"
+#include "pipeline/import/volume/label_map.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
+
 namespace {
+
+// Reads a .labels file, or any label map that import reads.
+Result<LabelFile> load_any_labels(const std::string& path) {
+    if (path.ends_with(".labels")) return load_label_file(path);
+    SONOCASE_TRY(auto imported, import_label_map(path));
+    LabelFile file;
+    file.frame = "ct";
+    file.volume = std::move(imported.labels);
+    file.reports = {imported.report};
+    return file;
+}
+
+// The file's name decides: .labels keeps records and reports; .nrrd (.seg.nrrd) the labels alone.
+Status save_any_labels(const LabelFile& file, const std::string& path) {
+    if (path.ends_with(".nrrd")) return export_seg_nrrd(file.volume, path);
+    if (!path.ends_with(".labels")) {
+        return Error{"unknown kind of output file", path, "OUT.labels or OUT.seg.nrrd"};
+    }
+    LabelFile copy = file;
+    copy.reports = without_seconds(copy.reports);  // same input, same bytes
+    return save_label_file(copy, path);
+}
 
 Bytes encode(const LabelFile& file) {
     LabelFile copy = file;
@@ -24,20 +51,15 @@ Result<LabelFile> decode(const Bytes& bytes, const std::string& where) {
 
 }  // namespace
 
-StageCodec label_codec() {
-    return codec_of<LabelFile>(encode, decode);
+StageCodec label_codec(const Role<LabelFile>& role) {
+    return codec_of(role, encode, decode);
 }
 
-std::vector<StageReport> label_reports(const StageValue& value) {
-    return value.as<LabelFile>().reports;
-}
-
-VerbFile label_input(const std::string& role, const std::string& meaning) {
+VerbFile label_input(const Role<LabelFile>& role, const std::string& meaning) {
     return {role, "labels,--labels", "FILE", meaning,
-            [](const std::string& path) -> Result<StageValue> {
-                auto file = load_any_labels(path);
-                if (!file) return file.error();
-                return StageValue::of(std::move(*file));
+            [role](const std::string& path) -> Result<StageValue> {
+                SONOCASE_TRY(auto file, load_any_labels(path));
+                return StageValue::of(role, std::move(file));
             }};
 }
 
@@ -49,4 +71,4 @@ Status save_labels(const LabelFile& file,
     return save_any_labels(copy, path);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

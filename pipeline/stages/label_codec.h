@@ -8,30 +8,30 @@
 #include <vector>
 
 #include "formats/bundle/stage_files.h"
-#include "pipeline/stage/stage_table.h"
+#include "pipeline/stages/roles.h"
+#include "pipeline/stages/stage_table.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 
-// Of a result of type LabelFile.
-StageCodec label_codec();
-std::vector<StageReport> label_reports(const StageValue& value);
+StageCodec label_codec(const Role<LabelFile>& role);
 
 // The labels of a stage in the frame `mannequin`, with its boundary records and its report.
-// Result: of resample_labels, smooth_labels or place_pathology.
+// Result: the type that resample_labels, smooth_labels or place_pathology returns.
 template <class Result>
 StageValue label_value(const std::string& frame,
                        Result&& result,
                        std::optional<FineRegion> region = {}) {
-    return StageValue::of(LabelFile{frame,
-                                    std::move(result.volume),
-                                    std::move(result.boundary),
-                                    {},
-                                    {std::move(result.report)},
-                                    std::move(region)});
+    LabelFile file;
+    file.frame = frame;
+    file.volume = std::move(result.volume);
+    file.boundary = std::move(result.boundary);
+    file.reports = {std::move(result.report)};
+    file.region = std::move(region);
+    return StageValue::of(kLabels, std::move(file));
 }
 
 // A label file for a verb's flag: a .labels of ours, or any label map that import reads.
-VerbFile label_input(const std::string& role, const std::string& meaning);
+VerbFile label_input(const Role<LabelFile>& role, const std::string& meaning);
 
 // Saves a stage's labels for other stages or other tools. `before`: reports that the file carries
 // ahead of the stage's own.
@@ -40,4 +40,4 @@ Status save_labels(const LabelFile& file, std::vector<StageReport> before, const
 inline constexpr const char* kLabelOutput =
     "Where to write: OUT.labels, or OUT.seg.nrrd for other tools";
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

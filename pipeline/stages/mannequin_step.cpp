@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The step "mannequin": the digitised surface, read from its file or made from the analytic torso.
-#include "pipeline/import/surface/surface_file.h"
+#include "pipeline/stages/mannequin_step.h"
+#include "pipeline/import/mesh/surface_file.h"
 #include "pipeline/stages/built_in_stages.h"
-#include "pipeline/stages/key_text.h"
-#include "pipeline/stages/mannequin_surface.h"
+#include "pipeline/stages/roles.h"
+#include "pipeline/stages/stage_table.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
 Result<StageValue> run(StageInputs& inputs, const Progress&) {
-    auto mannequin = read_mannequin(inputs.recipe());
-    if (!mannequin) return mannequin.error();
-    return StageValue::of(std::move(*mannequin));
+    SONOCASE_TRY(auto mannequin, read_mannequin(inputs.recipe()));
+    return StageValue::of(kMannequin, std::move(mannequin));
 }
 
-// Of the analytic torso, everything that its mannequin can depend on.
+// The texts hold everything that the mannequin can depend on, for the analytic torso as well.
 std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
     const RecipeInputs& in = recipe.inputs;
     if (!in.analytic) return {key_text(digests.surface, {in.surface_scale})};
@@ -40,9 +39,9 @@ Result<Mannequin> read_mannequin(const Recipe& recipe) {
     }
     SurfaceFileOptions options;
     options.scale = in.surface_scale;
-    auto surface = import_surface(recipe.resolve(in.surface), options, &mannequin.report);
-    if (!surface) return surface.error();
-    mannequin.surface = std::move(*surface);
+    SONOCASE_TRY(auto surface,
+                 import_surface(recipe.resolve(in.surface), options, &mannequin.report));
+    mannequin.surface = std::move(surface);
     return mannequin;
 }
 
@@ -55,16 +54,16 @@ Vector3 extent_of(const Surface& surface) {
 StageDescriptor mannequin_step() {
     StageDescriptor step;
     step.name = "mannequin";
-    step.provides = "mannequin";
+    step.provides = kMannequin;
     step.key_texts = key_texts;
     step.run = run;
     step.warnings = [](const StageValue& value) {
         std::vector<std::string> warnings;
-        for (const std::string& warning : value.as<Mannequin>().report.warnings)
+        for (const std::string& warning : value.as(kMannequin).report.warnings)
             warnings.push_back("surface: " + warning);
         return warnings;
     };
     return step;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// resample: the patient's labels through the fitted map into cubic voxels in `mannequin`.
-#include "formats/files/registration_file.h"
-#include "formats/registration/registration.h"
+// resample: carries the patient's labels through the fitted map into cubic voxels in `mannequin`.
+#include <algorithm>
+#include <optional>
+
+#include "formats/text/toml_reader.h"
 #include "pipeline/base/memory_limit.h"
-#include "pipeline/export/labels/segmentation_pictures.h"
+#include "pipeline/export/segmentation_pictures.h"
+#include "pipeline/registration/map/registration.h"
+#include "pipeline/segmentation/cooked_grid.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/stages/built_in_stages.h"
-#include "pipeline/stages/key_text.h"
 #include "pipeline/stages/label_codec.h"
+#include "pipeline/stages/roles.h"
+#include "pipeline/stages/stage_table.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
-using Resample = ResampleOptions;
-
-void add_grid(OptionsOf<Resample>& options) {
+void add_grid(OptionsOf<ResampleOptions>& options) {
     options
         .number(
             "voxel_mm", [](auto& o) { return &o.voxel_mm; }, 0.2, 10, "mm",
@@ -36,7 +39,7 @@ void add_grid(OptionsOf<Resample>& options) {
             "how labels go through the map");
 }
 
-void add_shape(OptionsOf<Resample>& options) {
+void add_shape(OptionsOf<ResampleOptions>& options) {
     options.help_group("Method shape")
         .number(
             "sigma_vx", [](auto& o) { return &o.sigma_vx; }, 0, 4, "voxels of the map",
@@ -86,7 +89,7 @@ void add_shape(OptionsOf<Resample>& options) {
                 "bricks where no quadric is that near are kept as they are"});
 }
 
-void add_paper(OptionsOf<Resample>& options) {
+void add_paper(OptionsOf<ResampleOptions>& options) {
     options.help_group("Method paper")
         .number(
             "k0", [](auto& o) { return &o.level_set.k0; }, 0.001, 100, "1/mm^2",
@@ -100,11 +103,62 @@ void add_paper(OptionsOf<Resample>& options) {
 }
 
 OptionGroup options() {
-    OptionsOf<Resample> options("resample");
+    OptionsOf<ResampleOptions> options("resample");
     add_grid(options);
     add_shape(options);
     add_paper(options);
     return options;
+}
+
+constexpr double kMaxRegionMm = 1000;
+
+// Either size_mm, or a ball's radius.
+void read_region_size(const TomlTable& table, RegionRequest& request) {
+    std::vector<double> size;
+    double radius_mm = 0;
+    const bool has_size = table.numbers("size_mm", size, 1, kMaxRegionMm, 3, 3);
+    const bool has_radius = table.number("radius_mm", radius_mm, 1, kMaxRegionMm / 2);
+    if (has_size) request.size_mm = {size[0], size[1], size[2]};
+    if (has_radius) request.size_mm = {2 * radius_mm, 2 * radius_mm, 2 * radius_mm};
+    if (has_size == has_radius && !table.fault())
+        table.add_fault("size_mm", has_size ? "is given beside radius_mm" : "is missing",
+                        "expected size_mm = [x, y, z] or radius_mm");
+}
+
+void read_region(const TomlTable& table, RegionRequest& request) {
+    table.text("name", request.name);
+    table.number("voxel_mm", request.voxel_mm, kMinRegionVoxelMm, 2);
+    Point3 centre;
+    if (table.point("centre", centre)) request.centre = centre;
+    table.text("label", request.label);
+    table.text("target", request.target);
+    const int places = (request.centre ? 1 : 0) + (request.label.empty() ? 0 : 1) +
+                       (request.target.empty() ? 0 : 1);
+    if (places != 1 && !table.fault())
+        table.add_fault("centre", places == 0 ? "is missing" : "is given beside another place",
+                        "expected one of centre, label and target");
+    if (request.centre) {
+        std::string frame = "mannequin";
+        table.text("frame", frame, {"ct", "mannequin"});
+        request.in_ct = frame == "ct";
+    }
+    if (request.label.empty())
+        read_region_size(table, request);
+    else
+        table.number("margin_mm", request.margin_mm, 0, 200);
+    table.finish();
+}
+
+// Reads [[region]].
+void read_sections(const TomlTable& root, Recipe& recipe) {
+    std::optional<RegionRequest>& region = recipe.settings.of<ResampleOptions>().region;
+    for (const TomlTable& table : root.tables("region")) {
+        if (region) {
+            table.add_fault("name", "is that of a second region", "expected one [[region]] a case");
+            return;
+        }
+        read_region(table, region.emplace());
+    }
 }
 
 // What the limit leaves for distances when all else has been taken: the program, the map's copies,
@@ -116,7 +170,7 @@ double room_for_distances_mb(const LabelVolume& ct, double voxel_mm) {
 }
 
 Status can_do(const Recipe& recipe) {
-    const auto& resample = recipe.settings.of<ResampleOptions>("resample");
+    const auto& resample = recipe.settings.of<ResampleOptions>();
     if (resample.region && resample.method != "shape")
         return Error{"method '" + resample.method + "' cannot cook a region", "resample.method",
                      "shape, or a recipe without [[region]]"};
@@ -124,21 +178,18 @@ Status can_do(const Recipe& recipe) {
 }
 
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
-    const auto ct = inputs.get<LabelFile>("ct_labels");
-    if (!ct) return ct.error();
-    const auto registration = inputs.get<Registration>("registration");
-    if (!registration) return registration.error();
-    ResampleOptions options = inputs.options<ResampleOptions>("resample");
-    options.held_mb = room_for_distances_mb((*ct)->volume, options.voxel_mm);
-    auto result = resample_labels({(*ct)->volume, **registration}, options, progress);
-    if (!result) return result.error();
-    std::optional<FineRegion> region = std::move(result->region);
-    return label_value("mannequin", std::move(*result), std::move(region));
+    SONOCASE_TRY(const auto ct, inputs.get(kCtLabels));
+    SONOCASE_TRY(const auto registration, inputs.get(kRegistration));
+    ResampleOptions options = inputs.options<ResampleOptions>();
+    options.held_mb = room_for_distances_mb(ct->volume, options.voxel_mm);
+    SONOCASE_TRY(auto result, resample_labels({ct->volume, *registration}, options, progress));
+    std::optional<FineRegion> region = std::move(result.region);
+    return label_value("mannequin", std::move(result), std::move(region));
 }
 
 // Nothing where the recipe has no region, so that keys of other cases stay.
 std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests&) {
-    const auto& region = recipe.settings.of<ResampleOptions>("resample").region;
+    const auto& region = recipe.settings.of<ResampleOptions>().region;
     if (!region) return {};
     const Point3 at = region->centre.value_or(Point3{});
     return {key_text(
@@ -149,28 +200,25 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests&) {
 
 StageVerb verb() {
     StageVerb verb;
-    verb.files = {label_input("ct_labels", "Labels in the ct frame: .labels or any label map"),
-                  {"registration", "--registration", "REG.json", "The fit, as register writes it",
+    verb.files = {label_input(kCtLabels, "Labels in the ct frame: .labels or any label map"),
+                  {kRegistration, "--registration", "REG.json", "The fit, as register writes it",
                    [](const std::string& path) -> Result<StageValue> {
-                       auto registration = load_registration(path);
-                       if (!registration) return registration.error();
-                       return StageValue::of(std::move(*registration));
+                       SONOCASE_TRY(auto registration, load_registration(path));
+                       return StageValue::of(kRegistration, std::move(registration));
                    }}};
     verb.output_type = "OUT";
     verb.output_meaning = kLabelOutput;
     verb.save = [](StageInputs&, const StageValue& value, const std::string& path) {
-        return save_labels(value.as<LabelFile>(), {}, path);
+        return save_labels(value.as(kLabels), {}, path);
     };
     verb.pictures_meaning = "Folder for pictures of before and after in three planes";
     verb.draw = [](StageInputs& inputs, const StageValue& value,
                    const std::string& folder) -> Status {
-        const auto ct = inputs.get<LabelFile>("ct_labels");
-        if (!ct) return ct.error();
-        const auto registration = inputs.get<Registration>("registration");
-        if (!registration) return registration.error();
-        const LabelFile& file = value.as<LabelFile>();
-        return write_segmentation_pictures(
-            {(*ct)->volume, *registration, file.volume, file.boundary}, folder);
+        SONOCASE_TRY(const auto ct, inputs.get(kCtLabels));
+        SONOCASE_TRY(const auto registration, inputs.get(kRegistration));
+        const LabelFile& file = value.as(kLabels);
+        return write_segmentation_pictures({ct->volume, registration, file.volume, file.boundary},
+                                           folder);
     };
     return verb;
 }
@@ -179,23 +227,31 @@ StageVerb verb() {
 
 StageDescriptor resample_stage() {
     StageDescriptor stage;
-    stage.name = "resample";
+    stage.name = stage_names::kResample;
     stage.version = kResampleVersion;
     stage.summary = "carry labels through the fit into cubic voxels";
     stage.about = "Carry a label map through the fitted map into cubic voxels, and smooth it";
-    stage.takes = {"ct_labels", "registration"};
-    stage.provides = "labels";
+    stage.takes = {kCtLabels, kRegistration};
+    stage.provides = kLabels;
     stage.options = options();
+    stage.read_sections = read_sections;
     stage.key_texts = key_texts;
     stage.can_do = can_do;
     stage.run = run;
-    stage.codec = label_codec();
-    stage.reports = label_reports;
+    stage.codec = label_codec(kLabels);
+    stage.reports = reports_of(kLabels);
     stage.share = 0.4;
-    stage.cost = {2, 250, 0, 65, 3, 420, 12, 8, 86};
-    stage.cost.per_region_voxel = 1.5;
+    stage.cost = {.threads = 2,
+                  .base_mb = 250,
+                  .per_label_voxel = 65,
+                  .per_cooked_voxel = 3,
+                  .large_mb = 420,
+                  .per_large_voxel = 12,
+                  .per_streamed_voxel = 8,
+                  .per_interpolated_node = 86,
+                  .per_region_voxel = 1.5};
     stage.verb = verb();
     return stage;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

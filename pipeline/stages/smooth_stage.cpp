@@ -2,13 +2,14 @@
 
 // smooth: takes the steps out of cooked labels. resample does so itself with its standard method;
 // a case has this stage after resample.method nearest, or where the recipe asks for it.
-#include "pipeline/export/labels/segmentation_pictures.h"
+#include "pipeline/export/segmentation_pictures.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/segmentation/smooth_labels.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/label_codec.h"
+#include "pipeline/stages/roles.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
 struct SmoothStageOptions {
@@ -68,9 +69,9 @@ OptionGroup options() {
 }
 
 bool active(const Recipe& recipe) {
-    const std::string& method = recipe.settings.of<SmoothStageOptions>("smooth").method;
+    const std::string& method = recipe.settings.of<SmoothStageOptions>().method;
     if (method != "auto") return method != "none";
-    return recipe.settings.of<ResampleOptions>("resample").method == "nearest";
+    return recipe.settings.of<ResampleOptions>().method == "nearest";
 }
 
 Error region_is_in_the_way() {
@@ -79,42 +80,38 @@ Error region_is_in_the_way() {
 }
 
 Status can_do(const Recipe& recipe) {
-    if (recipe.settings.of<ResampleOptions>("resample").region) return region_is_in_the_way();
+    if (recipe.settings.of<ResampleOptions>().region) return region_is_in_the_way();
     return Done{};
 }
 
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
-    const auto labels = inputs.get<LabelFile>("labels");
-    if (!labels) return labels.error();
-    const auto& options = inputs.options<SmoothStageOptions>("smooth");
+    SONOCASE_TRY(const auto labels, inputs.get(kLabels));
+    const auto& options = inputs.options<SmoothStageOptions>();
     if (options.method == "none")
         return Error{"method none smooths nothing", "", "choose auto, joint or level_set"};
-    if ((*labels)->region) return region_is_in_the_way();
+    if (labels->region) return region_is_in_the_way();
     SmoothOptions smooth = options.smooth;
     smooth.method = options.method == "level_set" ? "level_set" : "joint";
-    auto result = smooth_labels((*labels)->volume, smooth, progress);
-    if (!result) return result.error();
-    return label_value((*labels)->frame, std::move(*result));
+    SONOCASE_TRY(auto result, smooth_labels(labels->volume, smooth, progress));
+    return label_value(labels->frame, std::move(result));
 }
 
 StageVerb verb() {
     StageVerb verb;
-    verb.files = {label_input("labels", "Labels: .labels or any label map")};
+    verb.files = {label_input(kLabels, "Labels: .labels or any label map")};
     verb.output_type = "OUT";
     verb.output_meaning = kLabelOutput;
     verb.save = [](StageInputs& inputs, const StageValue& value,
                    const std::string& path) -> Status {
-        const auto before = inputs.get<LabelFile>("labels");
-        if (!before) return before.error();
-        return save_labels(value.as<LabelFile>(), (*before)->reports, path);
+        SONOCASE_TRY(const auto before, inputs.get(kLabels));
+        return save_labels(value.as(kLabels), before->reports, path);
     };
     verb.pictures_meaning = "Folder for pictures of before and after in three planes";
     verb.draw = [](StageInputs& inputs, const StageValue& value,
                    const std::string& folder) -> Status {
-        const auto before = inputs.get<LabelFile>("labels");
-        if (!before) return before.error();
-        const LabelFile& file = value.as<LabelFile>();
-        return write_segmentation_pictures({(*before)->volume, nullptr, file.volume, file.boundary},
+        SONOCASE_TRY(const auto before, inputs.get(kLabels));
+        const LabelFile& file = value.as(kLabels);
+        return write_segmentation_pictures({before->volume, nullptr, file.volume, file.boundary},
                                            folder);
     };
     return verb;
@@ -124,22 +121,22 @@ StageVerb verb() {
 
 StageDescriptor smooth_stage() {
     StageDescriptor stage;
-    stage.name = "smooth";
+    stage.name = stage_names::kSmooth;
     stage.version = kSmoothVersion;
     stage.summary = "take the steps out of labels";
     stage.about = "Smooth all labels of a volume, each at its own volume";
-    stage.takes = {"labels"};
-    stage.provides = "labels";
+    stage.takes = {kLabels};
+    stage.provides = kLabels;
     stage.options = options();
     stage.active = active;
     stage.can_do = can_do;
     stage.run = run;
-    stage.codec = label_codec();
-    stage.reports = label_reports;
+    stage.codec = label_codec(kLabels);
+    stage.reports = reports_of(kLabels);
     stage.share = 0.1;
-    stage.cost = {2, 340, 0, 0, 12};
+    stage.cost = {.threads = 2, .base_mb = 340, .per_cooked_voxel = 12};
     stage.verb = verb();
     return stage;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// structure: what lies inside the organs and no label shows, baked into echo offsets.
+// structure: bakes what lies inside the organs and no label shows into echo offsets.
 #include "pipeline/stages/structure_stage.h"
 
 #include <array>
 #include <string_view>
 
+#include "formats/bundle/codec/chunk_file.h"
 #include "formats/bundle/stage_files.h"
-#include "formats/container/chunk_file.h"
 #include "formats/text/stage_report_json.h"
-#include "pipeline/anatomy/structure_cells.h"
+#include "pipeline/anatomy/bake_structure.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
 #include "pipeline/stages/label_codec.h"
+#include "pipeline/stages/roles.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
 constexpr int kStructureVersion = 3;
@@ -43,18 +44,15 @@ OptionGroup options() {
 }
 
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
-    const auto labels = inputs.get<LabelFile>("labels");
-    if (!labels) return labels.error();
-    const auto used = inputs.get<CaseTissues>("tissues");
-    if (!used) return used.error();
-    BakeStructureOptions options = inputs.options<BakeStructureOptions>("structure");
-    options.seed = case_seed(inputs.recipe());
+    SONOCASE_TRY(const auto labels, inputs.get(kLabels));
+    SONOCASE_TRY(const auto used, inputs.get(kTissues));
+    BakeStructureOptions options = inputs.options<BakeStructureOptions>();
+    options.seed = case_seed(inputs.recipe().settings);
     // The same voxels with the tissues of the recipe; one byte per voxel is copied.
-    LabelVolume volume = (*labels)->volume;
-    volume.labels = (*used)->palette;
-    auto result = bake_structure_in_cells(volume, (*used)->tissues, options, progress);
-    if (!result) return result.error();
-    return StageValue::of(EchoOffsets{std::move(result->echo_offset), {result->report}});
+    LabelVolume volume = labels->volume;
+    volume.labels = used->palette;
+    SONOCASE_TRY(auto result, bake_structure_in_cells(volume, used->tissues, options, progress));
+    return StageValue::of(kStructure, EchoOffsets{std::move(result.echo_offset), {result.report}});
 }
 
 Bytes encode(const EchoOffsets& offsets) {
@@ -74,46 +72,40 @@ Bytes encode(const EchoOffsets& offsets) {
 }
 
 Result<EchoOffsets> decode(const Bytes& bytes, const std::string& where) {
-    auto reader = ChunkReader::open(bytes, kEchoKind, kEchoChunks, where);
-    if (!reader) return reader.error();
+    SONOCASE_TRY(auto reader, ChunkReader::open(bytes, kEchoKind, kEchoChunks, where));
     EchoOffsets result;
-    auto size = reader->read_array<std::int32_t>("size", 3);
-    if (!size) return size.error();
-    result.offset.size = {(*size)[0], (*size)[1], (*size)[2]};
-    auto table = reader->read_array<std::uint32_t, RawVector<std::uint32_t>>(
-        "table", reader->raw_bytes("table") / 4);
-    if (!table) return table.error();
-    auto uniform = reader->read_array<std::int8_t>("uniform", reader->raw_bytes("uniform"));
-    if (!uniform) return uniform.error();
-    auto pool =
-        reader->read_array<std::int8_t, RawVector<std::int8_t>>("pool", reader->raw_bytes("pool"));
-    if (!pool) return pool.error();
-    result.offset.table = std::move(*table);
-    result.offset.uniform = std::move(*uniform);
-    result.offset.pool = std::move(*pool);
-    auto text = reader->read("report", reader->raw_bytes("report"));
-    if (!text) return text.error();
-    auto report =
-        parse_stage_report({reinterpret_cast<const char*>(text->data()), text->size()}, where);
-    if (!report) return report.error();
-    result.reports = {std::move(*report)};
+    SONOCASE_TRY(auto size, reader.read_array<std::int32_t>("size", 3));
+    result.offset.size = {size[0], size[1], size[2]};
+    SONOCASE_TRY(auto table, reader.read_array<std::uint32_t, RawVector<std::uint32_t>>(
+                                 "table", reader.raw_bytes("table") / 4));
+    SONOCASE_TRY(auto uniform,
+                 reader.read_array<std::int8_t>("uniform", reader.raw_bytes("uniform")));
+    SONOCASE_TRY(auto pool, reader.read_array<std::int8_t, RawVector<std::int8_t>>(
+                                "pool", reader.raw_bytes("pool")));
+    result.offset.table = std::move(table);
+    result.offset.uniform = std::move(uniform);
+    result.offset.pool = std::move(pool);
+    SONOCASE_TRY(auto text, reader.read("report", reader.raw_bytes("report")));
+    SONOCASE_TRY(
+        auto report,
+        parse_stage_report({reinterpret_cast<const char*>(text.data()), text.size()}, where));
+    result.reports = {std::move(report)};
     return result;
 }
 
 StageVerb verb() {
     StageVerb verb;
-    verb.files = {label_input("labels", "Cooked labels, as resample or smooth writes them")};
+    verb.files = {label_input(kLabels, "Cooked labels, as resample or smooth writes them")};
     verb.output_type = "OUT.labels";
     verb.output_meaning = "Where to write the labels with their echo offsets";
     verb.save = [](StageInputs& inputs, const StageValue& value,
                    const std::string& path) -> Status {
-        const auto labels = inputs.get<LabelFile>("labels");
-        if (!labels) return labels.error();
-        const EchoOffsets& offsets = value.as<EchoOffsets>();
-        LabelFile file = **labels;
+        SONOCASE_TRY(const auto labels, inputs.get(kLabels));
+        const EchoOffsets& offsets = value.as(kStructure);
+        LabelFile file = *labels;
         file.echo_offset = offsets.offset;
         file.reports = offsets.reports;
-        return save_labels(file, (*labels)->reports, path);
+        return save_labels(file, labels->reports, path);
     };
     return verb;
 }
@@ -122,22 +114,21 @@ StageVerb verb() {
 
 StageDescriptor structure_stage() {
     StageDescriptor stage;
-    stage.name = "structure";
+    stage.name = stage_names::kStructure;
     stage.version = kStructureVersion;
     stage.summary = "bake structure inside organs into cooked labels";
     stage.about = "Bake structure inside organs into the echo offsets of cooked labels";
-    stage.takes = {"labels", "tissues"};
-    stage.provides = "structure";
+    stage.takes = {kLabels, kTissues};
+    stage.provides = kStructure;
     stage.options = options();
     stage.seeded = true;
     stage.run = run;
-    stage.codec = codec_of<EchoOffsets>(encode, decode);
-    stage.reports = [](const StageValue& value) { return value.as<EchoOffsets>().reports; };
+    stage.codec = codec_of(kStructure, encode, decode);
+    stage.reports = reports_of(kStructure);
     stage.share = 0.2;
-    stage.cost = {2, 240, 0, 0, 5};
-    stage.cost.per_region_voxel = 1.5;
+    stage.cost = {.threads = 2, .base_mb = 240, .per_cooked_voxel = 5, .per_region_voxel = 1.5};
     stage.verb = verb();
     return stage;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

@@ -9,7 +9,7 @@
 #include "formats/base/stage_report.h"
 #include "formats/volume/brick_volume.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 
 // Echo offsets alone, without the labels that they belong to.
 struct EchoOffsets {
@@ -17,4 +17,4 @@ struct EchoOffsets {
     std::vector<StageReport> reports;
 };
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// surface: the patient's skin from the labels, in the `ct` frame.
+// surface: extracts the patient's skin from the labels, in the `ct` frame.
 #include <array>
 #include <string_view>
 
+#include "formats/bundle/codec/chunk_file.h"
 #include "formats/bundle/stage_files.h"
-#include "formats/container/chunk_file.h"
-#include "formats/files/stage_file.h"
+#include "formats/files/load_save.h"
 #include "pipeline/registration/skin/skin_surface.h"
 #include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/roles.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
 constexpr int kSurfaceVersion = 1;
@@ -37,16 +38,14 @@ OptionGroup options() {
             "bridge_mm", [](auto& o) { return &o.bridge_mm; }, 0, 100, "mm",
             "thickness below which sheets and bridges are not body")
         .number(
-            "least_part", [](auto& o) { return &o.least_part; }, 0, 1, "",
+            "least_part", [](auto& o) { return &o.min_part; }, 0, 1, "",
             "share of a slice's largest part below which a part is an arm and not body");
 }
 
 Result<StageValue> run(StageInputs& inputs, const Progress&) {
-    const auto ct = inputs.get<LabelFile>("ct_labels");
-    if (!ct) return ct.error();
-    auto skin = extract_skin_surface((*ct)->volume, inputs.options<SkinSurfaceOptions>("surface"));
-    if (!skin) return skin.error();
-    return StageValue::of(std::move(*skin));
+    SONOCASE_TRY(const auto ct, inputs.get(kCtLabels));
+    SONOCASE_TRY(auto skin, extract_skin_surface(ct->volume, inputs.options<SkinSurfaceOptions>()));
+    return StageValue::of(kSkin, std::move(skin));
 }
 
 Bytes encode(const SkinSurfaceResult& skin) {
@@ -61,25 +60,20 @@ Bytes encode(const SkinSurfaceResult& skin) {
 }
 
 Result<SkinSurfaceResult> decode(const Bytes& bytes, const std::string& where) {
-    auto reader = ChunkReader::open(bytes, kSkinKind, kSkinChunks, where);
-    if (!reader) return reader.error();
-    auto inner = reader->read("surface", reader->raw_bytes("surface"));
-    if (!inner) return inner.error();
-    auto surface = read_surface_file(*inner, where);
-    if (!surface) return surface.error();
-    auto rim = reader->read_array<std::uint8_t>("rim", surface->surface.points.size());
-    if (!rim) return rim.error();
-    auto box = reader->read_array<double>("box", 6);
-    if (!box) return box.error();
-    if (surface->reports.size() != 1)
+    SONOCASE_TRY(auto reader, ChunkReader::open(bytes, kSkinKind, kSkinChunks, where));
+    SONOCASE_TRY(auto inner, reader.read("surface", reader.raw_bytes("surface")));
+    SONOCASE_TRY(auto surface, read_surface_file(inner, where));
+    SONOCASE_TRY(auto rim, reader.read_array<std::uint8_t>("rim", surface.surface.points.size()));
+    SONOCASE_TRY(auto box, reader.read_array<double>("box", 6));
+    if (surface.reports.size() != 1)
         return Error{"a skin without its report", where, "remove the file"};
     SkinSurfaceResult skin;
-    skin.skin = std::move(surface->surface);
-    skin.on_rim = std::move(*rim);
-    const std::vector<double>& b = *box;
+    skin.skin = std::move(surface.surface);
+    skin.on_rim = std::move(rim);
+    const std::vector<double>& b = box;
     skin.box.lower = {b[0], b[1], b[2]};
     skin.box.upper = {b[3], b[4], b[5]};
-    skin.report = std::move(surface->reports[0]);
+    skin.report = std::move(surface.reports[0]);
     return skin;
 }
 
@@ -93,7 +87,7 @@ StageVerb verb() {
     verb.output_type = "SKIN.surface";
     verb.output_meaning = "Where to write the skin";
     verb.save = [](StageInputs&, const StageValue& value, const std::string& path) {
-        const SkinSurfaceResult& skin = value.as<SkinSurfaceResult>();
+        const SkinSurfaceResult& skin = value.as(kSkin);
         return save_surface_file({"ct", skin.skin, without_seconds({skin.report})}, path);
     };
     return verb;
@@ -103,23 +97,21 @@ StageVerb verb() {
 
 StageDescriptor surface_stage() {
     StageDescriptor stage;
-    stage.name = "surface";
+    stage.name = stage_names::kSurface;
     stage.version = kSurfaceVersion;
     stage.summary = "extract the patient's skin from a label map";
     stage.about =
         "Extract the patient's skin: points, outward normals and triangles in the ct frame";
-    stage.takes = {"ct_labels"};
-    stage.provides = "skin";
+    stage.takes = {kCtLabels};
+    stage.provides = kSkin;
     stage.options = options();
     stage.run = run;
-    stage.codec = codec_of<SkinSurfaceResult>(encode, decode);
-    stage.reports = [](const StageValue& value) {
-        return std::vector<StageReport>{value.as<SkinSurfaceResult>().report};
-    };
+    stage.codec = codec_of(kSkin, encode, decode);
+    stage.reports = reports_of(kSkin);
     stage.share = 0.02;
-    stage.cost = {1, 240, 0, 4, 0};
+    stage.cost = {.threads = 1, .base_mb = 240, .per_label_voxel = 4};
     stage.verb = verb();
     return stage;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

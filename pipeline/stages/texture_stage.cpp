@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// texture: solid textures of the tissues that the labels are made of, and the speckle volume.
+// texture: makes solid textures of the tissues that the labels are made of, and the speckle volume.
 //
-// Its verb, pipeline/verbs/verb_texture.cpp, learns single textures from example images as well.
+// The descriptor has no verb: pipeline/verbs/verb_texture.cpp does more than this stage.
 #include "pipeline/stages/texture_stage.h"
 
 #include "formats/bundle/stage_files.h"
-#include "formats/threads/thread_jobs.h"
+#include "formats/files/thread_jobs.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
-#include "pipeline/texture/speckle.h"
+#include "pipeline/stages/roles.h"
+#include "pipeline/texture/speckle_volume.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
 constexpr int kTextureVersion = 1;
@@ -49,17 +50,15 @@ OptionGroup options() {
 }
 
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
-    const auto used = inputs.get<CaseTissues>("tissues");
-    if (!used) return used.error();
-    const auto& options = inputs.options<TextureStageOptions>("texture");
+    SONOCASE_TRY(const auto used, inputs.get(kTissues));
+    const auto& options = inputs.options<TextureStageOptions>();
     const Recipe& recipe = inputs.recipe();
-    TextureBankOptions bank = bank_options(options, case_seed(recipe));
+    TextureBankOptions bank = bank_options(options, case_seed(recipe.settings));
     bank.example_folder = recipe.resolve(recipe.inputs.examples);
-    auto result = build_texture_bank((*used)->tissues, bank, progress);
-    if (!result) return result.error();
-    TextureFile file{std::move(result->textures), {}, (*used)->tissues, {result->report}};
+    SONOCASE_TRY(auto result, build_texture_bank(used->tissues, bank, progress));
+    TextureFile file{std::move(result.textures), {}, used->tissues, {result.report}};
     if (options.speckle_edge > 0) file.speckle = make_speckle(options.speckle_edge, bank.seed);
-    return StageValue::of(std::move(file));
+    return StageValue::of(kTextures, std::move(file));
 }
 
 Bytes encode(const TextureFile& file) {
@@ -84,21 +83,21 @@ TextureBankOptions bank_options(const TextureStageOptions& options, std::uint64_
 
 StageDescriptor texture_stage() {
     StageDescriptor stage;
-    stage.name = "texture";
+    stage.name = stage_names::kTexture;
     stage.version = kTextureVersion;
-    stage.takes = {"tissues"};
-    stage.provides = "textures";
+    stage.takes = {kTissues};
+    stage.provides = kTextures;
     stage.options = options();
     stage.seeded = true;
     stage.key_texts = [](const Recipe&, const InputDigests& digests) {
         return std::vector<std::string>{digests.examples};
     };
     stage.run = run;
-    stage.codec = codec_of<TextureFile>(encode, decode);
-    stage.reports = [](const StageValue& value) { return value.as<TextureFile>().reports; };
+    stage.codec = codec_of(kTextures, encode, decode);
+    stage.reports = reports_of(kTextures);
     stage.share = 0.1;
-    stage.cost = {1, 240, 0, 0, 3.5};
+    stage.cost = {.threads = 1, .base_mb = 240, .per_cooked_voxel = 3.5};
     return stage;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

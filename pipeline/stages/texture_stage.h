@@ -7,7 +7,7 @@
 
 #include "pipeline/texture/texture_bank.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 
 struct TextureStageOptions {
     TextureBankOptions bank;  // its mode, seed and examples are set from the case
@@ -18,4 +18,4 @@ struct TextureStageOptions {
 // The bank's options with the mode and the seed.
 TextureBankOptions bank_options(const TextureStageOptions& options, std::uint64_t seed);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

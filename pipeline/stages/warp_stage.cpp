@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// warp: the map from the patient to the mannequin, rigid alignment and warps in one.
+// warp: fits the map from the patient to the mannequin, rigid alignment and warps in one.
 //
 // The analytic torso may take the map that its mannequin was made by, which is exact.
-#include "formats/registration/registration_json.h"
-#include "pipeline/base/plausible_size.h"
+#include "pipeline/base/source_checks.h"
 #include "pipeline/registration/landmark_file.h"
+#include "pipeline/registration/map/registration.h"
 #include "pipeline/registration/register_surfaces.h"
 #include "pipeline/stages/built_in_stages.h"
-#include "pipeline/stages/key_text.h"
 #include "pipeline/stages/label_codec.h"
-#include "pipeline/stages/mannequin_surface.h"
+#include "pipeline/stages/mannequin_step.h"
+#include "pipeline/stages/roles.h"
+#include "pipeline/stages/stage_table.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline stages {
 namespace {
 
 using Fit = RegisterOptions;
@@ -138,9 +139,8 @@ Status add_hints(const Recipe& recipe, RegisterOptions& options) {
     const RecipeInputs& in = recipe.inputs;
     options.up = in.up;
     if (!in.landmarks.empty()) {
-        auto landmarks = load_landmarks(recipe.resolve(in.landmarks));
-        if (!landmarks) return landmarks.error();
-        options.landmarks = std::move(*landmarks);
+        SONOCASE_TRY(auto landmarks, load_landmarks(recipe.resolve(in.landmarks)));
+        options.landmarks = std::move(landmarks);
     }
     if (in.analytic)
         for (const AnalyticLandmark& mark : analytic_torso_landmarks(
@@ -152,7 +152,7 @@ Status add_hints(const Recipe& recipe, RegisterOptions& options) {
 Registration known_map(const AnalyticInput& torso) {
     Registration registration = analytic_torso_truth(torso.mannequin.strength, torso.body);
     StageReport report;
-    report.stage = "warp";
+    report.stage = stage_names::kWarp;
     report.version = kRegisterVersion;
     report.warnings = {"the map is the analytic torso's own and was not fitted"};
     registration.reports = {report};
@@ -161,26 +161,22 @@ Registration known_map(const AnalyticInput& torso) {
 
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     const Recipe& recipe = inputs.recipe();
-    const auto mannequin = inputs.get<Mannequin>("mannequin");
-    if (!mannequin) return mannequin.error();
-    const auto skin = inputs.get<SkinSurfaceResult>("skin");
-    if (!skin) return skin.error();
-    const Surface& surface = (*mannequin)->surface;
+    SONOCASE_TRY(const auto mannequin, inputs.get(kMannequin));
+    SONOCASE_TRY(const auto skin, inputs.get(kSkin));
+    const Surface& surface = mannequin->surface;
     const std::string name =
         recipe.inputs.analytic ? "(analytic)" : recipe.resolve(recipe.inputs.surface);
-    if (const auto error = check_same_unit(extent_of((*skin)->skin), extent_of(surface), name))
+    if (const auto error = check_same_unit(extent_of(skin->skin), extent_of(surface), name))
         return *error;
     if (recipe.inputs.analytic && recipe.inputs.torso.known_map)
-        return StageValue::of(known_map(recipe.inputs.torso));
-    RegisterOptions options = inputs.options<RegisterOptions>("warp");
-    options.seed = case_seed(recipe);
-    if (auto status = add_hints(recipe, options); !status) return status.error();
+        return StageValue::of(kRegistration, known_map(recipe.inputs.torso));
+    RegisterOptions options = inputs.options<RegisterOptions>();
+    options.seed = case_seed(recipe.settings);
+    SONOCASE_TRY_DONE(add_hints(recipe, options));
     // The tissues decide how the inside follows; the known map above does without them.
-    const auto ct = inputs.get<LabelFile>("ct_labels");
-    if (!ct) return ct.error();
-    auto fitted = register_surfaces({**skin, surface, &(*ct)->volume}, options, progress);
-    if (!fitted) return fitted.error();
-    return StageValue::of(std::move(fitted->registration));
+    SONOCASE_TRY(const auto ct, inputs.get(kCtLabels));
+    SONOCASE_TRY(auto fitted, register_surfaces({*skin, surface, &ct->volume}, options, progress));
+    return StageValue::of(kRegistration, std::move(fitted.registration));
 }
 
 std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
@@ -206,20 +202,21 @@ Result<Registration> decode(const Bytes& bytes, const std::string& where) {
 
 }  // namespace
 
+// Without a verb: pipeline/verbs/verb_register.cpp does more than this stage.
 StageDescriptor warp_stage() {
     StageDescriptor stage;
-    stage.name = "warp";
+    stage.name = stage_names::kWarp;
     stage.version = kRegisterVersion;
-    stage.takes = {"ct_labels", "skin", "mannequin"};
-    stage.provides = "registration";
+    stage.takes = {kCtLabels, kSkin, kMannequin};
+    stage.provides = kRegistration;
     stage.options = options();
     stage.seeded = true;
     stage.key_texts = key_texts;
     stage.run = run;
-    stage.codec = codec_of<Registration>(encode, decode);
-    stage.reports = [](const StageValue& value) { return value.as<Registration>().reports; };
+    stage.codec = codec_of(kRegistration, encode, decode);
+    stage.reports = reports_of(kRegistration);
     stage.share = 0.18;
     return stage;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline stages

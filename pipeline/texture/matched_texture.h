@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Solid texture with the histogram and the autocorrelation of its example.
+// Makes a solid texture with the histogram and the autocorrelation of its example.
 //
 // The grey of the example is regarded as q(g), an ascending function of a Gaussian field g: q holds
 // the histogram, and the field's autocorrelation rho holds the grain. rho is chosen such that grey
-// has the example's autocorrelation after q (grey_to_gaussian.h). The power of each wave of the
+// has the example's autocorrelation after q. The power of each wave of the
 // picture is spread over waves out of the picture such that fibres are round and speckle is as wide
-// in elevation as laterally; planes parallel to the picture keep its autocorrelation exactly
-// (spectrum/depth_spectrum.h). The field is white noise with every Fourier amplitude set to the
-// wanted value: the autocorrelation of the cube itself is then exact, not just its expectation, and
-// the cube wraps at its faces. Direction is preserved: fibres remain fibres.
+// in elevation as laterally; planes parallel to the picture keep its autocorrelation exactly. The
+// field is white noise with every Fourier amplitude set to the wanted value: the autocorrelation of
+// the cube itself is then exact, not just its expectation, and the cube wraps at its faces.
+// Direction is preserved: fibres remain fibres.
 //
 // Correlation is followed up to half an edge. Where the grain of the example is too long for that,
 // a voxel stands for several pixels: the field is sampled more coarsely, not smoothed.
@@ -23,16 +23,16 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/texture/example/example_image.h"
-#include "pipeline/texture/spectrum/autocorrelation.h"
+#include "pipeline/texture/autocorrelation.h"
+#include "pipeline/texture/example_image.h"
 #include "pipeline/texture/texture_bank.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline texture {
 
 struct MatchedOptions {
     ThirdAxis third_axis = ThirdAxis::across;
-    int corrections =
-        3;  // rounds of measuring the cube's autocorrelation and correcting its spectrum
+    // Rounds of measuring the cube's autocorrelation and correcting its spectrum.
+    int corrections = 3;
 };
 
 struct MatchedTexture {
@@ -40,11 +40,11 @@ struct MatchedTexture {
     int pixels_per_voxel = 1;  // more than 1 only if the grain is longer than half an edge
 };
 
-// examples: prepared (prepare_example.h), >= 1. edge: power of two in 8..128.
+// examples: at least one, each prepared (example_image.h). edge: power of two in 8..128.
 // Same bytes for any number of threads. Cost: 64^3 0.1 s on one core.
 MatchedTexture synthesise_matched(std::span<const ExampleImage> examples,
                                   int edge,
                                   std::uint64_t seed,
                                   const MatchedOptions& options = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline texture

@@ -10,7 +10,7 @@
 #include "pipeline/base/parallel.h"
 #include "pipeline/base/periodic_volume.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline texture {
 namespace {
 
 constexpr int kBins = 256;
@@ -22,7 +22,7 @@ int bin_of(const PyramidBand& band, float value) {
     return std::clamp(static_cast<int>(t), 0, kBins - 1);
 }
 
-// Low-pass filter of an image with taps `gap` apart. Pixels outside the image or the mask are left
+// Filters an image (low-pass) with taps `gap` apart. Pixels outside the image or the mask are left
 // out and the weights rescaled: nothing from outside the example enters its statistics.
 std::vector<float> lowpass_image(const ExampleImage& shape, const std::vector<float>& in, int gap) {
     std::vector<float> weight(in.size()), sum(in.size());
@@ -54,8 +54,8 @@ std::vector<float> lowpass_image(const ExampleImage& shape, const std::vector<fl
     return sum;
 }
 
-// Levels that an example supports: the filter must fit into the image, and the coarsest band must
-// hold at least 16 independent values.
+// Returns the levels that an example supports: the filter must fit into the image, and the coarsest
+// band must hold at least 16 independent values.
 int supported_levels(const ExampleImage& example, int wanted) {
     std::size_t used = 0;
     for (std::size_t i = 0; i < example.count(); ++i) used += example.used(i) ? 1 : 0;
@@ -121,8 +121,8 @@ float draw_marginal(const PyramidBand& band, double u) {
 }
 
 float draw_conditional(const PyramidBand& band, int parent_bin, double u, double v) {
-    const std::uint32_t begin = band.row_begin[static_cast<std::size_t>(parent_bin)];
-    const std::uint32_t end = band.row_begin[static_cast<std::size_t>(parent_bin) + 1];
+    const std::uint32_t begin = band.row_begin[parent_bin];
+    const std::uint32_t end = band.row_begin[parent_bin + 1];
     if (begin == end) return draw_marginal(band, u);
     const auto pick = begin + static_cast<std::uint32_t>(u * (end - begin));
     const float width = (band.high - band.low) / kBins;
@@ -151,7 +151,7 @@ PyramidStatistics learn_pyramid(std::span<const ExampleImage> examples,
         }
     }
     out.options.levels = levels;
-    out.bands.resize(static_cast<std::size_t>(levels));
+    out.bands.resize(levels);
 
     std::vector<ExampleBands> values;
     for (const ExampleImage& example : examples) values.push_back(split_bands(example, levels));
@@ -179,7 +179,7 @@ std::vector<float> synthesise_pyramid(const PyramidStatistics& statistics,
     std::vector<float> sum;      // of the bands so far, at the resolution of the current level
     std::vector<float> parents;  // values of the coarser band at that resolution
     for (int l = levels - 1; l >= 0; --l) {
-        const PyramidBand& band = statistics.bands[static_cast<std::size_t>(l)];
+        const PyramidBand& band = statistics.bands[l];
         const bool coarsest = l == levels - 1;
         const int shrink = statistics.options.decimate ? std::min(l, 2 + (edge > 32)) : 0;
         const int n = edge >> shrink;
@@ -198,10 +198,7 @@ std::vector<float> synthesise_pyramid(const PyramidStatistics& statistics,
                 drawn[i] =
                     coarsest || choice < weight
                         ? draw_marginal(band, u)
-                        : draw_conditional(
-                              band,
-                              bin_of(statistics.bands[static_cast<std::size_t>(l) + 1], parents[i]),
-                              u, v);
+                        : draw_conditional(band, bin_of(statistics.bands[l + 1], parents[i]), u, v);
             }
         });
         if (!statistics.options.decimate && l > 0) {
@@ -225,4 +222,4 @@ std::vector<float> synthesise_pyramid(const PyramidStatistics& statistics,
     return sum;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline texture

@@ -32,9 +32,9 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/texture/example/example_image.h"
+#include "pipeline/texture/example_image.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline texture {
 
 struct PyramidOptions {
     int levels = 4;         // wanted, [1, 5]; fewer if an example has too few pixels
@@ -68,4 +68,4 @@ std::vector<float> synthesise_pyramid(const PyramidStatistics& statistics,
                                       int edge,
                                       std::uint64_t seed);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline texture

@@ -12,16 +12,16 @@
 
 #include "formats/files/atomic_file.h"
 #include "pipeline/base/counter_random.h"
-#include "pipeline/base/delimited_text.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/base/stopwatch.h"
-#include "pipeline/texture/example/prepare_example.h"
-#include "pipeline/texture/example/read_example.h"
-#include "pipeline/texture/example/synthetic_examples.h"
+#include "pipeline/base/text.h"
+#include "pipeline/texture/example_image.h"
 #include "pipeline/texture/matched_texture.h"
 #include "pipeline/texture/pyramid_texture.h"
+#include "pipeline/texture/read_example.h"
+#include "pipeline/texture/synthetic_examples.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline texture {
 namespace {
 
 // The class of patches.csv that is used for a built-in texture, and which patch of the class
@@ -70,10 +70,8 @@ Result<std::map<std::string, std::vector<std::string>>> read_patch_table(
     const std::vector<TextRow> rows = split_rows(*text);
     const std::vector<std::string> header =
         rows.empty() ? std::vector<std::string>() : rows[0].cells;
-    const auto file =
-        static_cast<std::size_t>(std::find(header.begin(), header.end(), "file") - header.begin());
-    const auto kind =
-        static_cast<std::size_t>(std::find(header.begin(), header.end(), "class") - header.begin());
+    const std::size_t file = std::find(header.begin(), header.end(), "file") - header.begin();
+    const std::size_t kind = std::find(header.begin(), header.end(), "class") - header.begin();
     if (file >= header.size() || kind >= header.size()) {
         return Error{"no column named file and class", path.string(),
                      "expected both in its first line"};
@@ -124,16 +122,15 @@ Result<SolidTextureResult> make_solid_texture(const TextureSpec& spec) {
     std::vector<ExampleImage> prepared;
     double count = 0, sum = 0, square = 0;
     for (const ExampleImage& example : spec.examples) {
-        auto p = prepare_example(example);
-        if (!p) return p.error();
-        out.warnings.insert(out.warnings.end(), p->warnings.begin(), p->warnings.end());
-        for (std::size_t i = 0; i < p->image.count(); ++i) {
-            if (!p->image.used(i)) continue;
+        SONOCASE_TRY(auto p, prepare_example(example));
+        out.warnings.insert(out.warnings.end(), p.warnings.begin(), p.warnings.end());
+        for (std::size_t i = 0; i < p.image.count(); ++i) {
+            if (!p.image.used(i)) continue;
             count += 1;
-            sum += p->image.grey[i];
-            square += static_cast<double>(p->image.grey[i]) * p->image.grey[i];
+            sum += p.image.grey[i];
+            square += static_cast<double>(p.image.grey[i]) * p.image.grey[i];
         }
-        prepared.push_back(std::move(p->image));
+        prepared.push_back(std::move(p.image));
     }
     out.grey_mean = sum / count;
     out.grey_sd = std::sqrt(std::max(square / count - out.grey_mean * out.grey_mean, 1e-12));
@@ -173,9 +170,8 @@ Result<std::vector<TextureSpec>> plan_texture_bank(std::span<const Tissue> tissu
     };
     std::map<std::string, std::vector<std::string>> patches;
     if (!options.example_folder.empty()) {
-        auto table = read_patch_table(options.example_folder);
-        if (!table) return table.error();
-        patches = std::move(*table);
+        SONOCASE_TRY(auto table, read_patch_table(options.example_folder));
+        patches = std::move(table);
     }
     std::vector<TextureSpec> specs;
     const auto planned = [&](const std::string& name) {
@@ -196,9 +192,8 @@ Result<std::vector<TextureSpec>> plan_texture_bank(std::span<const Tissue> tissu
         const std::vector<std::string> files =
             example_files(tissue.texture, stand_in, options.examples, patches);
         for (const std::string& file : files) {
-            auto example = read_example(file, {}, notes);
-            if (!example) return example.error();
-            spec.examples.push_back(std::move(*example));
+            SONOCASE_TRY(auto example, read_example(file, {}, notes));
+            spec.examples.push_back(std::move(example));
         }
         if (spec.examples.empty()) {
             spec.examples.push_back(synthetic_example(spec.name, 160, 128, options.seed));
@@ -221,13 +216,12 @@ Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
                                              const Progress& progress) {
     const Stopwatch watch;
     TextureBankResult out;
-    out.report.stage = "texture";
-    auto specs = plan_texture_bank(tissues, options, &out.report.warnings);
-    if (!specs) return specs.error();
-    std::vector<std::optional<Result<SolidTextureResult>>> made(specs->size());
+    out.report.stage = stage_names::kTexture;
+    SONOCASE_TRY(auto specs, plan_texture_bank(tissues, options, &out.report.warnings));
+    std::vector<std::optional<Result<SolidTextureResult>>> made(specs.size());
     report_progress(progress, 0.1, "learning textures");
     parallel_for(made.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) made[i].emplace(make_solid_texture((*specs)[i]));
+        for (std::size_t i = begin; i < end; ++i) made[i].emplace(make_solid_texture(specs[i]));
     });
     double synthetic = 0;
     for (std::size_t i = 0; i < made.size(); ++i) {
@@ -236,7 +230,7 @@ Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
         out.textures.push_back(std::move(result.texture));
         out.report.warnings.insert(out.report.warnings.end(), result.warnings.begin(),
                                    result.warnings.end());
-        synthetic += (*specs)[i].examples[0].name.rfind("synthetic ", 0) == 0;
+        synthetic += specs[i].examples[0].name.rfind("synthetic ", 0) == 0;
     }
     report_progress(progress, 1, "learning textures");
     out.report.measures = {{"textures", static_cast<double>(made.size())},
@@ -246,4 +240,4 @@ Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
     return out;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline texture

@@ -14,10 +14,10 @@
 #include "formats/volume/solid_texture.h"
 #include "formats/volume/tissue.h"
 #include "pipeline/base/progress.h"
-#include "pipeline/texture/example/example_image.h"
+#include "pipeline/texture/example_image.h"
 #include "pipeline/texture/pyramid_texture.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline texture {
 
 enum class TextureMode {
     pyramid,  // eq. (15) of the paper; pyramid_texture.h
@@ -91,4 +91,4 @@ Result<TextureBankResult> build_texture_bank(std::span<const Tissue> tissues,
                                              const TextureBankOptions& options = {},
                                              const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline texture

@@ -6,12 +6,16 @@
 #include <array>
 #include <cmath>
 
+#include "formats/base/geometry.h"
+#include "formats/text/number_text.h"
 #include "pipeline/base/periodic_volume.h"
 #include "pipeline/base/stopwatch.h"
-#include "pipeline/texture/example/prepare_example.h"
-#include "pipeline/texture/spectrum/local_trend.h"
+#include "pipeline/pictures/chart.h"
+#include "pipeline/texture/autocorrelation.h"
+#include "pipeline/texture/example_image.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline texture {
+
 namespace {
 
 // RMS difference over the lags within the wider of the two grains, at most the common reach.
@@ -30,7 +34,7 @@ double grain_distance(const Autocorrelation& a, const Autocorrelation& b) {
     return std::sqrt(sum / count);
 }
 
-constexpr TextureDistance kLargestDistance{1, 255, 1};
+constexpr TextureDistance kMaxDistance{1, 255, 1};
 constexpr int kReach = 32;       // px, of the grain distance
 constexpr int kWidthReach = 96;  // px, of the correlation widths
 
@@ -82,7 +86,7 @@ double earth_mover(std::span<const float> a, std::span<const float> b) {
 }
 
 std::array<double, 3> seam_scores(const SolidTexture& texture) {
-    const auto n = static_cast<std::size_t>(texture.edge);
+    const std::size_t n = texture.edge;
     std::array<double, 3> scores{};
     for (int axis = 0; axis < 3; ++axis) {
         const std::vector<double> step =
@@ -92,8 +96,7 @@ std::array<double, 3> seam_scores(const SolidTexture& texture) {
         for (std::size_t p = 0; p + 1 < n; ++p) mean += step[p] / inner;
         for (std::size_t p = 0; p + 1 < n; ++p)
             square += (step[p] - mean) * (step[p] - mean) / inner;
-        scores[static_cast<std::size_t>(axis)] =
-            square > 0 ? (step[n - 1] - mean) / std::sqrt(square) : 0;
+        scores[axis] = square > 0 ? (step[n - 1] - mean) / std::sqrt(square) : 0;
     }
     return scores;
 }
@@ -111,7 +114,7 @@ std::array<ExampleImage, 2> split_example(const ExampleImage& example) {
     const bool across_x = example.width >= example.height;
     std::array<ExampleImage, 2> halves;
     for (int h = 0; h < 2; ++h) {
-        ExampleImage& half = halves[static_cast<std::size_t>(h)];
+        ExampleImage& half = halves[h];
         half.name = example.name + (h == 0 ? ", first half" : ", second half");
         half.width = across_x ? example.width / 2 : example.width;
         half.height = across_x ? example.height : example.height / 2;
@@ -131,7 +134,7 @@ std::array<ExampleImage, 2> split_example(const ExampleImage& example) {
 
 TextureDistance distance_between(const ExampleImage& a, const ExampleImage& b) {
     const std::vector<float> x = used_grey(a), y = used_grey(b);
-    if (x.empty() || y.empty()) return kLargestDistance;
+    if (x.empty() || y.empty()) return kMaxDistance;
     return {kolmogorov_smirnov(x, y), earth_mover(x, y),
             grain_distance(grain_of(a, kReach), grain_of(b, kReach))};
 }
@@ -139,7 +142,7 @@ TextureDistance distance_between(const ExampleImage& a, const ExampleImage& b) {
 TextureDistance distance_between(const SolidTextureResult& made, const ExampleImage& example) {
     const std::vector<float> x = texture_grey(made.texture, made.grey_mean, made.grey_sd);
     const std::vector<float> y = used_grey(example);
-    if (y.empty()) return kLargestDistance;
+    if (y.empty()) return kMaxDistance;
     return {kolmogorov_smirnov(x, y), earth_mover(x, y),
             grain_distance(grain_of(x, made),
                            at_stride(grain_of(example, kReach), made.pixels_per_voxel))};
@@ -152,7 +155,8 @@ TextureQuality measure_texture(const SolidTextureResult& made, const ExampleImag
     q.floor = distance_between(halves[0], halves[1]);
     const std::vector<float> grey = texture_grey(made.texture, made.grey_mean, made.grey_sd);
     const Autocorrelation grain = grain_of(example, kWidthReach);
-    // On the lattice of the texture, such that interpolation between lags affects both alike.
+    // Both are measured on the lattice of the texture, such that interpolation between lags affects
+    // both alike.
     const Autocorrelation seen = at_stride(grain, made.pixels_per_voxel);
     q.example = correlation_widths(through_window(seen, seen));
     q.texture = correlation_widths(through_window(grain_of(grey, made), seen));
@@ -202,16 +206,14 @@ std::vector<Measure> TextureAssessment::measures() const {
 Result<TextureAssessment> assess_texture(const TextureSpec& spec) {
     TextureAssessment out;
     const Stopwatch watch;
-    auto made = make_solid_texture(spec);
-    if (!made) return made.error();
+    SONOCASE_TRY(auto made, make_solid_texture(spec));
     out.seconds = watch.seconds();
-    out.made = std::move(*made);
+    out.made = std::move(made);
     const auto largest = std::max_element(
         spec.examples.begin(), spec.examples.end(),
         [](const ExampleImage& a, const ExampleImage& b) { return a.count() < b.count(); });
-    auto prepared = prepare_example(*largest);
-    if (!prepared) return prepared.error();
-    out.example = std::move(prepared->image);
+    SONOCASE_TRY(auto prepared, prepare_example(*largest));
+    out.example = std::move(prepared.image);
     out.quality = measure_texture(out.made, out.example);
     const std::array<ExampleImage, 2> halves = split_example(out.example);
     TextureSpec half = spec;
@@ -223,4 +225,128 @@ Result<TextureAssessment> assess_texture(const TextureSpec& spec) {
     return out;
 }
 
-}  // namespace sonocase::pipeline
+namespace {
+
+constexpr int kShownPx = 160;  // width and height of each picture, example pixels
+
+std::uint8_t byte_of(double grey) {
+    return static_cast<std::uint8_t>(std::clamp(std::lround(grey), 0l, 255l));
+}
+
+Chart example_panel(const ExampleImage& example) {
+    Chart panel;
+    panel.title = "example: " + example.name;
+    panel.picture_width = panel.picture_height = kShownPx;
+    panel.picture.assign(kShownPx * kShownPx, 255);
+    for (int y = 0; y < std::min(example.height, kShownPx); ++y) {
+        for (int x = 0; x < std::min(example.width, kShownPx); ++x) {
+            const std::size_t i = example.index(x, y);
+            panel.picture[x + kShownPx * y] = example.used(i) ? byte_of(example.grey[i]) : 255;
+        }
+    }
+    return panel;
+}
+
+// Cuts the texture along two unit vectors, one step per pixel of the example, by the nearest voxel
+// as in the image model "paper".
+Chart cut_panel(const char* title, const SolidTextureResult& made, Vector3 right, Vector3 down) {
+    const int n = made.texture.edge;
+    Chart panel;
+    panel.title = title;
+    panel.picture_width = panel.picture_height = kShownPx;
+    panel.picture.resize(kShownPx * kShownPx);
+    const double step = 1.0 / made.pixels_per_voxel;
+    const auto wrap = [n](double v) {
+        const auto i = static_cast<int>(std::floor(v + 0.5));
+        return static_cast<std::size_t>(((i % n) + n) % n);
+    };
+    for (int y = 0; y < kShownPx; ++y) {
+        for (int x = 0; x < kShownPx; ++x) {
+            const Vector3 p = Vector3{0, 0, n / 3.0} + (x * step) * right + (y * step) * down;
+            const std::size_t e = n;
+            const std::uint8_t v = made.texture.voxels[wrap(p.x) + e * (wrap(p.y) + e * wrap(p.z))];
+            panel.picture[x + kShownPx * y] =
+                byte_of(made.grey_mean + (v - 128) / 32.0 * made.grey_sd);
+        }
+    }
+    return panel;
+}
+
+Series histogram(const std::string& name, const std::vector<float>& grey) {
+    Series series;
+    series.name = name;
+    std::vector<double> bins(64, 0);
+    for (const float g : grey) {
+        bins[std::clamp(static_cast<int>(g / 4), 0, 63)] += 25.0 / static_cast<double>(grey.size());
+    }
+    for (std::size_t b = 0; b < bins.size(); ++b) {
+        series.x.push_back(4 * static_cast<double>(b) + 2);
+        series.y.push_back(bins[b]);
+    }
+    return series;
+}
+
+Series profile(const std::string& name, const Autocorrelation& a, double angle, double scale) {
+    Series series;
+    series.name = name;
+    for (double r = 0; r <= a.reach && r * scale <= 48; r += 0.25) {
+        series.x.push_back(r * scale);
+        series.y.push_back(a.between(r * std::cos(angle), r * std::sin(angle)));
+    }
+    return series;
+}
+
+// Autocorrelation of example and texture along and across the main direction.
+void add_profiles(const TextureAssessment& assessment,
+                  const std::vector<float>& grey,
+                  ChartSheet* sheet) {
+    const SolidTextureResult& made = assessment.made;
+    const ExampleImage local = without_local_trend(assessment.example, kGrainTrendPx);
+    const Autocorrelation wanted = autocorrelation({&local, 1}, 48);
+    const Autocorrelation got = plane_autocorrelation(
+        without_local_trend(grey, made.texture.edge, kGrainTrendPx / made.pixels_per_voxel),
+        made.texture.edge, made.texture.edge / 2);
+    for (const bool along : {true, false}) {
+        const double angle =
+            assessment.quality.example.angle_rad + (along ? 0 : 1.5707963267948966);
+        Chart chart;
+        const CorrelationWidths& e = assessment.quality.example;
+        const CorrelationWidths& t = assessment.quality.texture;
+        chart.title = std::string(along ? "along: " : "across: ") +
+                      number_text(along ? t.along : t.across, 3) + " px, example " +
+                      number_text(along ? e.along : e.across, 3);
+        chart.x_label = "lag, example px";
+        chart.y_label = "autocorrelation";
+        chart.series = {profile("example", wanted, angle, 1),
+                        profile("texture", got, angle, made.pixels_per_voxel)};
+        sheet->charts.push_back(chart);
+    }
+}
+
+}  // namespace
+
+Status write_texture_page(const TextureAssessment& assessment, const std::string& path) {
+    const SolidTextureResult& made = assessment.made;
+    const ExampleImage& example = assessment.example;
+    const std::vector<float> grey = texture_grey(made.texture, made.grey_mean, made.grey_sd);
+    ChartSheet sheet;
+    sheet.columns = 4;
+    sheet.width_px = 360;
+    sheet.height_px = 390;
+    sheet.charts = {example_panel(example), cut_panel("cut x-y", made, {1, 0, 0}, {0, 1, 0}),
+                    cut_panel("cut x-z", made, {1, 0, 0}, {0, 0, 1}),
+                    cut_panel("cut z-y", made, {0, 0, 1}, {0, 1, 0}),
+                    cut_panel("oblique cut", made, {0.80, 0.36, 0.48}, {-0.60, 0.48, 0.64})};
+    Chart greys;
+    greys.title = "grey: KS " + number_text(assessment.quality.distance.ks, 2) +
+                  ", between halves " + number_text(assessment.quality.floor.ks, 2);
+    greys.x_label = "grey";
+    greys.y_label = "per cent per level";
+    greys.series = {histogram("example", used_grey(example)), histogram("texture", grey)};
+    sheet.charts.push_back(greys);
+
+    add_profiles(assessment, grey, &sheet);
+    return write_chart_png(sheet, path);
+}
+
+}  // namespace sonocase::pipeline::inline texture

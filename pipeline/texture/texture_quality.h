@@ -6,16 +6,17 @@
 
 #include <array>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
 #include "formats/volume/solid_texture.h"
-#include "pipeline/texture/example/example_image.h"
-#include "pipeline/texture/spectrum/autocorrelation.h"
+#include "pipeline/texture/autocorrelation.h"
+#include "pipeline/texture/example_image.h"
 #include "pipeline/texture/texture_bank.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline texture {
 
 // Distance between two samples of grey and their grain.
 struct TextureDistance {
@@ -50,7 +51,7 @@ std::array<ExampleImage, 2> split_example(const ExampleImage& example);
 TextureDistance distance_between(const ExampleImage& a, const ExampleImage& b);
 TextureDistance distance_between(const SolidTextureResult& made, const ExampleImage& example);
 
-// made: by make_solid_texture; example: prepared (prepare_example.h). Cost: about that of making
+// made: by make_solid_texture; example: prepared (example_image.h). Cost: about that of making
 // the texture.
 TextureQuality measure_texture(const SolidTextureResult& made, const ExampleImage& example);
 
@@ -71,4 +72,9 @@ struct TextureAssessment {
 // Errors are those of make_solid_texture. Cost: three times that of making the texture.
 Result<TextureAssessment> assess_texture(const TextureSpec& spec);
 
-}  // namespace sonocase::pipeline
+// Writes a page to compare a solid texture with its example by eye, a PNG: the example; cuts x-y,
+// x-z and z-y and an oblique cut at the scale of the example, larger than the texture's period;
+// histograms; autocorrelation along and across. Error: those of the chart writer.
+Status write_texture_page(const TextureAssessment& assessment, const std::string& path);
+
+}  // namespace sonocase::pipeline::inline texture

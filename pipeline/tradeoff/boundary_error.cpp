@@ -12,7 +12,7 @@
 #include "formats/volume/boundary_record.h"
 #include "pipeline/base/parallel.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 
 std::uint8_t label_at_point(const LabelVolume& volume,
                             const BrickVolume<std::uint32_t>& boundary,
@@ -36,7 +36,7 @@ BoundaryError measure_boundary_error(const LabelVolume& cooked,
                                      const AnalyticBody& body,
                                      int points,
                                      const Box3* within) {
-    // The cooked palette may hold fewer labels, or hold them in another order: compare by name.
+    // The cooked palette may have fewer labels or another order: labels are compared by name.
     const std::vector<Label> palette = analytic_torso_labels();
     std::map<std::string, int> analytic_index;
     for (std::size_t i = 0; i < palette.size(); ++i)
@@ -52,9 +52,9 @@ BoundaryError measure_boundary_error(const LabelVolume& cooked,
     struct Tally {
         std::size_t all = 0, inside = 0, wrong = 0, crossings = 0;
     };
-    // One tally a block of points, each with its own engine: the same for any number of threads.
+    // One tally and one random engine per block of points: the same for any number of threads.
     constexpr int kBlock = 2000;
-    std::vector<Tally> tallies(static_cast<std::size_t>((points + kBlock - 1) / kBlock));
+    std::vector<Tally> tallies((points + kBlock - 1) / kBlock);
     const Box3 box = truth.ct_box;
     parallel_for(tallies.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t b = begin; b < end; ++b) {
@@ -76,7 +76,7 @@ BoundaryError measure_boundary_error(const LabelVolume& cooked,
                 tally.crossings += analytic_torso_label(ct + step, body) != here;
                 const int seen = label_at_point(cooked, boundary, place);
                 tally.inside += here != 0;
-                tally.wrong += analytic_of[static_cast<std::size_t>(seen)] != here;
+                tally.wrong += analytic_of[seen] != here;
             }
         }
     });
@@ -106,4 +106,4 @@ BoundaryError measure_boundary_error(const CaseBundle& bundle, const AnalyticInp
                                   torso.body);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

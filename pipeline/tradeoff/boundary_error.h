@@ -12,13 +12,13 @@
 #include <cstdint>
 
 #include "formats/bundle/case_bundle.h"
-#include "formats/registration/registration.h"
 #include "formats/volume/brick_volume.h"
 #include "formats/volume/label_volume.h"
 #include "pipeline/anatomy/analytic_torso.h"
-#include "pipeline/stage/recipe.h"
+#include "pipeline/registration/map/registration.h"
+#include "pipeline/stages/recipe.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 
 struct BoundaryError {
     double displaced_mm = 0;  // mean displacement of the surfaces
@@ -26,10 +26,10 @@ struct BoundaryError {
     int lost_labels = 0;      // labels of the palette without a voxel
 };
 
-// cooked: volume and boundary records in `mannequin`, palette as analytic_torso_labels() names it;
-// truth: the map that made the mannequin. Points whose true preimage lies outside truth.ct_box do
-// not count. within: a box of `mannequin` to which points are confined; null: all. Deterministic.
-// Cost: about 1 us per point.
+// cooked: volume and boundary records in the mannequin frame, palette as analytic_torso_labels()
+// names it; truth: the map that made the mannequin. Points whose true preimage lies outside
+// truth.ct_box do not count. within: a box in the mannequin frame that confines the points; null:
+// all. Deterministic. Cost: about 1 us per point.
 BoundaryError measure_boundary_error(const LabelVolume& cooked,
                                      const BrickVolume<std::uint32_t>& boundary,
                                      const Registration& truth,
@@ -37,13 +37,13 @@ BoundaryError measure_boundary_error(const LabelVolume& cooked,
                                      int points = 200000,
                                      const Box3* within = nullptr);
 
-// Of a cooked analytic torso.
+// The same for a bundle cooked from an analytic torso.
 BoundaryError measure_boundary_error(const CaseBundle& bundle, const AnalyticInput& torso);
 
-// Palette index at a point of `mannequin`, surfaces placed by the boundary records; 0 outside the
-// grid.
+// The palette index at a point of the mannequin frame, with surfaces placed by the boundary
+// records; 0 outside the grid.
 std::uint8_t label_at_point(const LabelVolume& volume,
                             const BrickVolume<std::uint32_t>& boundary,
                             Point3 point);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

@@ -11,7 +11,7 @@
 #include "pipeline/base/stopwatch.h"
 #include "pipeline/segmentation/resample_labels.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 namespace {
 
 double voxel_mm_of(const Settings& settings) {
@@ -27,7 +27,7 @@ double voxels(double volume_mm3, const Settings& settings) {
     return volume_mm3 / (h * h * h);
 }
 
-// Seconds of a row for a case of another volume. The part that does not depend on voxels stays.
+// The seconds of a row for a case of another volume. The part that does not depend on voxels stays.
 double seconds_at(const FrontRow& row,
                   const FrontTable& table,
                   const CostModel& model,
@@ -51,7 +51,7 @@ const FrontTable& measured_front() {
 }
 
 CostModel fit_cost_model(const FrontTable& table) {
-    // Relative errors count alike, so each row is weighted by one over its seconds squared.
+    // Relative errors count, so each row is weighted by one over the square of its seconds.
     double sw = 0, sx = 0, sxx = 0, sy = 0, sxy = 0;
     for (const FrontRow& row : table.rows) {
         const double x = voxels(table.volume_mm3, row.settings),
@@ -102,7 +102,7 @@ std::string format_front(const std::vector<Trial>& trials,
 }
 
 double probe_seconds() {
-    // The stages that a build spends its time in, on a small torso.
+    // The stages that take most of a build, on a small torso.
     const Stopwatch watch;
     const LabelVolume ct = sample_analytic_torso(analytic_torso_grid({4, 4, 4}));
     ResampleOptions options;
@@ -160,7 +160,7 @@ NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3) 
     const auto seconds = [&](const FrontRow& row) {
         return seconds_at(row, table, model, volume_mm3);
     };
-    // The row that the case was cooked with: the cheapest of those with its voxel.
+    // The case was cooked with the cheapest of the rows with its voxel.
     const FrontRow* now = nullptr;
     for (const FrontRow& row : table.rows) {
         const double off = std::abs(voxel_mm_of(row.settings) - voxel_mm);
@@ -183,4 +183,4 @@ NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3) 
     return step;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

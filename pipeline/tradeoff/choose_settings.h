@@ -2,11 +2,11 @@
 
 // Chooses settings for a wanted accuracy, or for the time available.
 //
-// The table of measured settings (measured_front.inc, written by scripts/accuracy from a sweep of
-// the whole case on the synthetic bodies) gives the error, the worst of the bodies'. The seconds of
-// a case at hand are given by the caller; those of the next step in a bundle, which must not depend
-// on the machine, are those of the sweep, moved to the case's volume by a cost per voxel fitted to
-// it.
+// The error is taken from the table of measured settings (measured_front.inc, written by
+// scripts/accuracy from a sweep of the whole case on the synthetic bodies): the largest over these
+// bodies. The caller gives the seconds of the case at hand. The seconds of the next step in a
+// bundle must not depend on the machine: they are those of the sweep, scaled to the case's volume
+// by a cost per voxel that is fitted to the table.
 #pragma once
 
 #include <functional>
@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "pipeline/pack/error_budget.h"
-#include "pipeline/tradeoff/trial.h"
+#include "pipeline/export/error_budget.h"
+#include "pipeline/tradeoff/sweep.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 
 struct FrontRow {
     Settings settings;
@@ -39,8 +39,9 @@ struct CostModel {
 };
 CostModel fit_cost_model(const FrontTable& table);
 
-// measured_front.inc from sweeps of the suite "case": every setting that was tried on all bodies,
-// with the greatest of its errors and its seconds on `timed_body`, whose grid has volume_mm3.
+// The text of measured_front.inc from sweeps of the suite "case": every setting that was tried on
+// all bodies, with the largest of its errors and its seconds on `timed_body`, whose grid has
+// volume_mm3.
 std::string format_front(const std::vector<Trial>& trials,
                          const std::string& timed_body,
                          double volume_mm3,
@@ -59,17 +60,17 @@ struct Choice {
     Settings settings;
     double predicted_error_mm = 0;
     double predicted_seconds = 0;
-    std::string warning;  // what of the target cannot be achieved; empty: nothing
+    std::string warning;  // the part of the target that cannot be achieved; empty: none
 };
 
-// seconds: that the case at hand takes with settings, the whole command
-// (pipeline/cook/build_time.h). The table has at least one row.
+// seconds: the time of the whole command for the case at hand with given settings
+// (pipeline/cook/case_cost.h). The table has at least one row.
 Choice choose_settings(const FrontTable& table,
                        const AccuracyTarget& target,
                        const std::function<double(const Settings&)>& seconds);
 
-// What would lower the error next: the cheapest row that is better than the one a case was cooked
-// with (by its voxel).
+// The next step to a lower error: the cheapest row that is better than the one with which a case
+// was cooked, which is found by its voxel.
 NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

@@ -5,8 +5,25 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <random>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
+
+TemporaryFolder::~TemporaryFolder() {
+    std::error_code ignored;
+    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
+}
+
+Status TemporaryFolder::make(const std::string& name) {
+    std::error_code failed;
+    const auto folder = std::filesystem::temp_directory_path(failed) /
+                        (name + "-" + std::to_string(std::random_device{}()));
+    if (!failed) std::filesystem::create_directories(folder, failed);
+    if (failed)
+        return Error{failed.message(), folder.string(), "check the folder for temporary files"};
+    path_ = folder.string();
+    return Done{};
+}
 
 Result<std::string> output_of_program_beside(const std::string& program,
                                              const std::string& arguments,
@@ -28,4 +45,4 @@ Result<std::string> output_of_program_beside(const std::string& program,
     return text;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

@@ -1,19 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Programs beside this one: pipeline and runtime do not link each other, so that what the runtime
-// measures of itself is asked for by a command.
+// What suites need to run programs that lie beside this one: a temporary folder, and their output.
+// Pipeline and runtime do not link each other, so what the runtime measures of itself is measured
+// by a command.
 #pragma once
 
 #include <string>
 
 #include "formats/base/result.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 
-// What the program prints. arguments: as in a shell, quoted where needed. Error: it is not there
-// (then `suites` are to be left out), or it fails.
+// A folder that is removed with the object.
+class TemporaryFolder {
+  public:
+    TemporaryFolder() = default;
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+    ~TemporaryFolder();
+
+    // name: the beginning of its name, such as "sonocase-render". Error: it cannot be made.
+    Status make(const std::string& name);
+    const std::string& path() const { return path_; }  // empty: not made
+
+  private:
+    std::string path_;
+};
+
+// Returns what the program prints. arguments: as in a shell, quoted where needed. Error: the
+// program is not there (the message then advises to leave `suites` out), or it fails.
 Result<std::string> output_of_program_beside(const std::string& program,
                                              const std::string& arguments,
                                              const std::string& suites);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

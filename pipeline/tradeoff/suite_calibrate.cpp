@@ -4,14 +4,14 @@
 #include <cmath>
 #include <random>
 
+#include "formats/base/constants.h"
 #include "formats/calibration/point.h"
 #include "pipeline/base/stopwatch.h"
 #include "pipeline/tradeoff/suites.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 const Vector3 kTip{-17.8, 1.1, -156.9};
 constexpr int kDraws = 25;
 
@@ -112,4 +112,4 @@ Suite calibrate_suite() {
     return suite;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

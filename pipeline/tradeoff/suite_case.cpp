@@ -3,13 +3,13 @@
 #include <map>
 #include <memory>
 
-#include "formats/registration/registration_json.h"
 #include "pipeline/cook/cook_case.h"
-#include "pipeline/recipe/read_recipe.h"
+#include "pipeline/registration/map/registration.h"
+#include "pipeline/stages/read_recipe.h"
 #include "pipeline/tradeoff/boundary_error.h"
 #include "pipeline/tradeoff/suites.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 namespace {
 
 LabelVolume labels_of(const CaseBundle& bundle) {
@@ -47,14 +47,12 @@ Suite case_suite(const AnalyticBody& body, const std::string& body_name) {
     suite.knobs = knobs_of(built_in_stages(), suite.name);
     suite.named = preset_points(built_in_stages());
     suite.measure = [body](const Settings& settings) -> Result<Measured> {
-        auto recipe = embedded_recipe();
-        if (!recipe) return recipe.error();
-        recipe->inputs.torso.body = body;
-        if (const Status s = apply_settings(settings, recipe->settings); !s) return s.error();
-        const auto cooked = cook_case(*recipe);
-        if (!cooked) return cooked.error();
-        const BoundaryError error = measure_boundary_error(cooked->bundle, recipe->inputs.torso);
-        return Measured{error.displaced_mm, seconds_of(*cooked),
+        SONOCASE_TRY(auto recipe, embedded_recipe());
+        recipe.inputs.torso.body = body;
+        SONOCASE_TRY_DONE(apply_settings(settings, recipe.settings));
+        SONOCASE_TRY(const auto cooked, cook_case(recipe));
+        const BoundaryError error = measure_boundary_error(cooked.bundle, recipe.inputs.torso);
+        return Measured{error.displaced_mm, seconds_of(cooked),
                         std::to_string(error.lost_labels) + " labels lost"};
     };
     return suite;
@@ -83,18 +81,16 @@ Suite own_case_suite(const Recipe& recipe) {
     suite.measure = [state](const Settings& settings) -> Result<Measured> {
         const auto cook = [&](const Settings& with) -> Result<CookResult> {
             Recipe own = state->recipe;
-            if (const Status s = apply_settings(with, own.settings); !s) return s.error();
+            SONOCASE_TRY_DONE(apply_settings(with, own.settings));
             return cook_case(own);
         };
         if (state->finest.voxels.empty()) {
-            auto made = cook(settings_of(*built_in_stages().find_preset("accurate")));
-            if (!made) return made.error();
-            state->finest = labels_of(made->bundle);
-            state->finest_boundary = made->bundle.boundary;
+            SONOCASE_TRY(auto made, cook(settings_of(*built_in_stages().find_preset("accurate"))));
+            state->finest = labels_of(made.bundle);
+            state->finest_boundary = made.bundle.boundary;
         }
-        const auto made = cook(settings);
-        if (!made) return made.error();
-        const LabelVolume volume = labels_of(made->bundle);
+        SONOCASE_TRY(const auto made, cook(settings));
+        const LabelVolume volume = labels_of(made.bundle);
         std::map<std::string, int> finest_index;
         for (std::size_t i = 0; i < state->finest.labels.size(); ++i) {
             finest_index[state->finest.labels[i].name] = static_cast<int>(i);
@@ -117,7 +113,7 @@ Suite own_case_suite(const Recipe& recipe) {
                     crossings +=
                         label_at_point(state->finest, state->finest_boundary, p + along) != here;
                     const auto& name =
-                        volume.labels[label_at_point(volume, made->bundle.boundary, p)].name;
+                        volume.labels[label_at_point(volume, made.bundle.boundary, p)].name;
                     const auto found = finest_index.find(name);
                     wrong += found == finest_index.end() || found->second != here;
                     ++count;
@@ -128,9 +124,9 @@ Suite own_case_suite(const Recipe& recipe) {
             2 * static_cast<double>(crossings) / static_cast<double>(count) / kSegmentMm;
         const double displaced =
             static_cast<double>(wrong) / static_cast<double>(count) / area_per_mm3;
-        return Measured{displaced, seconds_of(*made), ""};
+        return Measured{displaced, seconds_of(made), ""};
     };
     return suite;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

@@ -5,12 +5,11 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/files/atomic_file.h"
-#include "pipeline/base/line_text.h"
+#include "pipeline/base/text.h"
 #include "pipeline/tradeoff/program_beside.h"
 #include "pipeline/tradeoff/suites.h"
-#include "pipeline/tradeoff/temporary_folder.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 namespace {
 
 std::string recipe_text(const Settings& settings) {
@@ -25,22 +24,19 @@ std::string recipe_text(const Settings& settings) {
            "\n[resample]\nvoxel_mm = " + cooked + "\n" + region;
 }
 
-// One command from its start to the bundle on the disk, with nothing in the cache.
+// The time of one command from its start to the bundle on the disk, with an empty cache.
 Result<Measured> build(TemporaryFolder& folder, const Settings& settings) {
-    if (folder.path().empty())
-        if (const Status s = folder.make("sonocase-cost"); !s) return s.error();
+    if (folder.path().empty()) SONOCASE_TRY_DONE(folder.make("sonocase-cost"));
     const std::string recipe = folder.path() + "/case.toml",
                       report = folder.path() + "/report.json";
-    if (const Status s = write_file(recipe, recipe_text(settings)); !s) return s.error();
-    const auto done =
+    SONOCASE_TRY_DONE(write_file(recipe, recipe_text(settings)));
+    SONOCASE_TRY_DONE(
         output_of_program_beside("sonocase",
                                  text("build '%s' -o '%s/cost.sonocase' --report '%s' --quiet 2>&1",
                                       recipe.c_str(), folder.path().c_str(), report.c_str()),
-                                 "cost");
-    if (!done) return done.error();
-    const auto written = read_text_file(report);
-    if (!written) return written.error();
-    const auto json = nlohmann::json::parse(*written, nullptr, false);
+                                 "cost"));
+    SONOCASE_TRY(const auto written, read_text_file(report));
+    const auto json = nlohmann::json::parse(written, nullptr, false);
     if (json.is_discarded() || !json.contains("expected"))
         return Error{"is not the report of a build", report, ""};
     const auto& said = json["expected"];
@@ -95,4 +91,4 @@ Suite cost_suite() {
     return suite;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

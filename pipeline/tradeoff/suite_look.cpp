@@ -7,10 +7,10 @@
 #include "pipeline/look/fit_machine.h"
 #include "pipeline/tradeoff/suites.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 namespace {
 
-// A machine unlike the base in everything that is fitted to the texture.
+// A machine that differs from the base in everything that is fitted to the texture.
 Machine known_machine() {
     Machine machine;
     machine.beam.axial_mm = 0.95;
@@ -42,10 +42,8 @@ Result<Measured> measure_look(const Settings& settings) {
     }
     const Stopwatch watch;
     LookGauge gauge(
-        grid,
-        std::vector<std::uint8_t>(
-            static_cast<std::size_t>(grid.samples) * static_cast<std::size_t>(grid.lines), 1),
-        {}, {});
+        grid, std::vector<std::uint8_t>(static_cast<std::size_t>(grid.samples) * grid.lines, 1), {},
+        {});
     for (const auto& frame : clip)
         gauge.add(gauge.measure(beam_from_picture(frame, kStandInWidth, kStandInHeight, place)));
     LookMeasures measures = gauge.result();
@@ -86,4 +84,4 @@ Suite look_suite() {
     return suite;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

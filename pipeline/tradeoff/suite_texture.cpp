@@ -4,13 +4,13 @@
 #include <string_view>
 
 #include "pipeline/base/stopwatch.h"
-#include "pipeline/texture/example/prepare_example.h"
-#include "pipeline/texture/example/synthetic_examples.h"
+#include "pipeline/texture/example_image.h"
+#include "pipeline/texture/synthetic_examples.h"
 #include "pipeline/texture/texture_bank.h"
 #include "pipeline/texture/texture_quality.h"
 #include "pipeline/tradeoff/suites.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 namespace {
 
 constexpr const char* kExamples[] = {"liver", "muscle", "fat"};
@@ -25,15 +25,14 @@ Result<Measured> measure_bank(const Settings& settings) {
     }
     Measured sum;
     for (const char* name : kExamples) {
-        const auto example = prepare_example(synthetic_example(name));
-        if (!example) return example.error();
+        SONOCASE_TRY(const auto example, prepare_example(synthetic_example(name)));
         spec.name = name;
         spec.examples = {synthetic_example(name)};
         const Stopwatch watch;
         const auto made = make_solid_texture(spec);
         sum.seconds += watch.seconds();
         if (!made) return made.error();
-        const TextureQuality quality = measure_texture(*made, example->image);
+        const TextureQuality quality = measure_texture(*made, example.image);
         sum.error += quality.distance.grain / std::size(kExamples);
     }
     return sum;
@@ -62,4 +61,4 @@ Suite texture_suite() {
     return suite;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

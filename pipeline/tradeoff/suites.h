@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The suites of the tradeoff, one function each: what is measured, against which truth, by which
-// knobs. The knobs of stages are in the descriptors of their options (pipeline/stage/option.h).
+// The suites of the tradeoff, one function each: what is measured, against which truth, with which
+// knobs. The knobs of stages are in the descriptors of their options (pipeline/stages/option.h).
 // Preparing a suite may take seconds (sampling a body); measuring one setting runs the stage alone.
 #pragma once
 
@@ -9,14 +9,14 @@
 #include <vector>
 
 #include "pipeline/stages/built_in_stages.h"
-#include "pipeline/tradeoff/trial.h"
+#include "pipeline/tradeoff/sweep.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 
 // Fit of the demo torso's skin to its mannequin: distance of inner points from where the known warp
 // puts them.
 Suite register_suite();
-// Fit of the demo torso to a mannequin of another build: what becomes of its organs.
+// Fit of the demo torso to a mannequin of another build: change of its organs.
 Suite elastic_suite();
 // Inverse map and resampling of the demo torso through its known warp: displacement of surfaces.
 Suite warp_suite();
@@ -28,7 +28,7 @@ Suite texture_suite();
 Suite calibrate_suite();
 // Point spread and grey of a known machine from frames of its own.
 Suite look_suite();
-// Frames of the player beside this program, against its finest sampling.
+// Frames of the player that lies beside this program, against its finest sampling.
 Suite render_suite();
 // The same with a linear probe, whose pictures have plates and grounds of their own.
 Suite linear_suite();
@@ -43,18 +43,18 @@ Suite pathology_suite();
 // doppler_trial beside this one.
 Suite colour_suite();
 Suite spectrum_suite();
-// What a build says of its cost before it begins against what it took, by commands of their own.
+// The cost that a build predicts against the time it takes, measured by commands.
 Suite cost_suite();
 // The whole chain on the demo torso, or another body of the same family.
 Suite case_suite(const AnalyticBody& body, const std::string& body_name);
 // The whole chain on a user's case, against its own finest setting.
 Suite own_case_suite(const Recipe& recipe);
 
-// Puts settings into the options of the stages, by the names that a recipe has for them. Error: an
+// Sets the options of the stages by the names that a recipe uses for them. Error: an
 // option or a value that the stages do not know.
 Status apply_settings(const Settings& settings, StageSettings& options);
 
 // The knobs of one suite: every option of the table that is swept in it, with its default.
 std::vector<Knob> knobs_of(const StageTable& table, const std::string& suite);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

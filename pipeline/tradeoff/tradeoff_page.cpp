@@ -11,8 +11,16 @@
 #include "pipeline/pictures/markup.h"
 #include "pipeline/stages/built_in_stages.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
+
+extern const std::string_view kTradeoffPageHtml;  // tradeoff_page.html, embedded by CMake
+
 namespace {
+
+const HtmlTemplate& html() {
+    static const HtmlTemplate page(kTradeoffPageHtml);
+    return page;
+}
 
 std::vector<Trial> trials_of(const PageInput& input, const Suite& suite) {
     std::vector<Trial> own;
@@ -35,7 +43,7 @@ Chart suite_chart(const Suite& suite, const std::vector<Trial>& trials) {
     chart.x_log = chart.y_log = true;
     const std::vector<bool> front = pareto_front(trials);
 
-    Series all{"settings tried", {}, {}, SeriesLook::points, {190, 190, 190}, 2.5};
+    Series all{"settings tried", {}, {}, SeriesStyle::points, {190, 190, 190}, 2.5};
     std::vector<std::pair<double, double>> line;
     for (std::size_t i = 0; i < trials.size(); ++i) {
         all.x.push_back(trials[i].seconds);
@@ -43,7 +51,7 @@ Chart suite_chart(const Suite& suite, const std::vector<Trial>& trials) {
         if (front[i] && trials[i].error > 0) line.emplace_back(trials[i].seconds, trials[i].error);
     }
     std::sort(line.begin(), line.end());
-    Series best{"Pareto front", {}, {}, SeriesLook::line_and_points, {0, 114, 178}, 2};
+    Series best{"Pareto front", {}, {}, SeriesStyle::line_and_points, {0, 114, 178}, 2};
     for (const auto& [s, e] : line) {
         best.x.push_back(s);
         best.y.push_back(e);
@@ -63,7 +71,7 @@ Chart suite_chart(const Suite& suite, const std::vector<Trial>& trials) {
         if (!shown || !std::isfinite(t.error)) continue;
         const auto own = t.role == TrialRole::paper ? std::array<std::uint8_t, 3>{213, 40, 0}
                                                     : marks[colour++ % marks.size()];
-        chart.series.push_back({t.name, {t.seconds}, {t.error}, SeriesLook::points, own, 4.5});
+        chart.series.push_back({t.name, {t.seconds}, {t.error}, SeriesStyle::points, own, 4.5});
     }
     return chart;
 }
@@ -91,32 +99,64 @@ const Trial* cheaper_than_standard(const std::vector<Trial>& trials, double nois
     return best;
 }
 
+std::string curve_text(const Knob& knob, const CurveVerdict& verdict) {
+    if (verdict.monotone) return "more time, less error (within noise)";
+    const std::string reason = knob.why_not_monotone.empty()
+                                   ? "No reason is known; look before trusting it."
+                                   : knob.why_not_monotone;
+    return escaped_html("not monotone (" + verdict.worst + "). " + reason);
+}
+
 std::string knob_rows(const Suite& suite, const std::vector<Trial>& trials, double noise) {
-    std::string html;
+    std::string rows;
     for (const Knob& knob : suite.knobs) {
         const std::vector<Trial> curve = trials_of_knob(trials, knob);
-        html += "<tr><td><code>" + escaped_html(knob.key) + "</code></td><td>" +
-                escaped_html(knob.meaning) + "</td><td>" +
-                escaped_html(knob.standard + (knob.unit.empty() ? "" : " " + knob.unit)) +
-                "</td><td>" + escaped_html(knob.trades) + "</td><td>";
-        for (const Trial& t : curve) {
-            html += escaped_html(t.settings.empty() ? "" : t.settings.front().value) + ": " +
-                    number(t.error) + " " + escaped_html(suite.error_unit) + " in " +
-                    number(t.seconds) + " s<br>";
-        }
-        html += "</td><td>";
-        const CurveVerdict verdict = judge_curve(curve, noise);
-        if (verdict.monotone) {
-            html += "more time, less error (within noise)";
-        } else {
-            html += "not monotone (" + escaped_html(verdict.worst) + "). " +
-                    escaped_html(knob.why_not_monotone.empty()
-                                     ? "No reason is known; look before trusting it."
-                                     : knob.why_not_monotone);
-        }
-        html += "</td></tr>\n";
+        std::string measured;
+        for (const Trial& t : curve)
+            measured += html().filled(
+                "measured",
+                {{"value", t.settings.empty() ? "" : escaped_html(t.settings.front().value)},
+                 {"error", number(t.error)},
+                 {"unit", escaped_html(suite.error_unit)},
+                 {"seconds", number(t.seconds)}});
+        rows += html().filled(
+            "knob",
+            {{"key", escaped_html(knob.key)},
+             {"meaning", escaped_html(knob.meaning)},
+             {"standard", escaped_html(knob.standard + (knob.unit.empty() ? "" : " " + knob.unit))},
+             {"trades", escaped_html(knob.trades)},
+             {"measured", measured},
+             {"curve", curve_text(knob, judge_curve(curve, noise))}});
     }
-    return html;
+    return rows;
+}
+
+// Trials that have a name or lie on the front.
+std::string trial_rows(const std::vector<Trial>& trials) {
+    std::string rows;
+    const std::vector<bool> front = pareto_front(trials);
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+        const Trial& t = trials[i];
+        const bool named = t.role != TrialRole::knob && t.role != TrialRole::pair;
+        if (!front[i] && !named) continue;
+        rows += html().filled("trial", {{"class", front[i] ? "front" : ""},
+                                        {"name", named ? escaped_html(t.name) : "on the front"},
+                                        {"settings", escaped_html(settings_text(t.settings))},
+                                        {"error", number(t.error)},
+                                        {"seconds", number(t.seconds)},
+                                        {"low", number(t.seconds_low)},
+                                        {"high", number(t.seconds_high)},
+                                        {"note", escaped_html(t.note)}});
+    }
+    return rows;
+}
+
+std::string cheaper_text(const Suite& suite, const Trial* cheaper) {
+    if (cheaper == nullptr) return html().filled("none_cheaper", {});
+    return html().filled("cheaper", {{"settings", escaped_html(settings_text(cheaper->settings))},
+                                     {"error", number(cheaper->error)},
+                                     {"unit", escaped_html(suite.error_unit)},
+                                     {"seconds", number(cheaper->seconds)}});
 }
 
 // Every option of every stage; an option that no suite above sweeps trades no accuracy for time.
@@ -126,77 +166,30 @@ std::string options_table() {
            options_markdown(built_in_stages());
 }
 
-constexpr const char* kStyle =
-    "body{font:15px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 "
-    "1rem;color:#1b1f24}"
-    "table{border-collapse:collapse;width:100%;font-size:13px}td,th{border:1px solid "
-    "#d0d7de;padding:.35rem .5rem;"
-    "vertical-align:top;text-align:left}th{background:#f6f8fa}img{max-width:100%}code{background:#"
-    "f6f8fa}"
-    "h2{margin-top:2.5rem;border-bottom:1px solid #d0d7de}.front{background:#eaf4fb}";
-
 }  // namespace
 
 Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
-    std::string html =
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>What accuracy costs"
-        "</title><style>" +
-        std::string(kStyle) +
-        "</style><body><h1>What accuracy costs in time</h1>"
-        "<p>Each point is one setting of one stage: how wrong its answer is against the truth "
-        "named "
-        "below, and how long it took (median of its repeats). Lower and further left is better. "
-        "The "
-        "blue line is the Pareto front: no other setting tried is both faster and better. Measured "
-        "on " +
-        escaped_html(input.machine) + "; another machine moves all points sideways alike.</p>\n";
+    std::string suites;
     for (const Suite& suite : input.suites) {
         const std::vector<Trial> trials = trials_of(input, suite);
         if (trials.empty()) continue;
         const std::string stem = suite.name + "-" + suite.body;
         const ChartSheet sheet{{suite_chart(suite, trials)}, 1, 900, 560};
-        if (const Status s = write_chart_png(sheet, folder + "/" + stem + ".png"); !s) return s;
-        if (const Status s = write_chart_svg(sheet, folder + "/" + stem + ".svg"); !s) return s;
-        html += "<h2>" + escaped_html(suite.title) + " <small>(" + escaped_html(suite.body) +
-                ")</small></h2><p>" + escaped_html(suite.truth) + "</p>\n<a href=\"" + stem +
-                ".svg\"><img src=\"" + stem + ".png\" alt=\"error against seconds\"></a>\n";
-        const Trial* cheaper = cheaper_than_standard(trials, input.noise);
-        html +=
-            cheaper == nullptr
-                ? std::string(
-                      "<p>No setting tried is cheaper than the standard one at equal error.</p>\n")
-                : "<p>Cheaper than the standard setting at equal error: <code>" +
-                      escaped_html(settings_text(cheaper->settings)) + "</code>, " +
-                      number(cheaper->error) + " " + escaped_html(suite.error_unit) + " in " +
-                      number(cheaper->seconds) + " s.</p>\n";
-        html +=
-            "<table><tr><th>knob</th><th>meaning</th><th>standard</th><th>error it "
-            "trades</th><th>measured"
-            "</th><th>curve</th></tr>\n" +
-            knob_rows(suite, trials, input.noise) + "</table>\n";
-
-        std::vector<bool> front = pareto_front(trials);
-        html +=
-            "<h3>The front, presets, the paper and "
-            "peers</h3><table><tr><th>what</th><th>settings</th><th>" +
-            escaped_html(suite.error_name + ", " + suite.error_unit) +
-            "</th><th>seconds (low to high)</th><th>note"
-            "</th></tr>\n";
-        for (std::size_t i = 0; i < trials.size(); ++i) {
-            const Trial& t = trials[i];
-            const bool named = t.role != TrialRole::knob && t.role != TrialRole::pair;
-            if (!front[i] && !named) continue;
-            html += std::string("<tr") + (front[i] ? " class=\"front\"" : "") + "><td>" +
-                    (named ? escaped_html(t.name) : std::string("on the front")) +
-                    "</td><td><code>" + escaped_html(settings_text(t.settings)) +
-                    "</code></td><td>" + number(t.error) + "</td><td>" + number(t.seconds) + " (" +
-                    number(t.seconds_low) + " to " + number(t.seconds_high) + ")</td><td>" +
-                    escaped_html(t.note) + "</td></tr>\n";
-        }
-        html += "</table>\n";
+        SONOCASE_TRY_DONE(write_chart_png(sheet, folder + "/" + stem + ".png"));
+        SONOCASE_TRY_DONE(write_chart_svg(sheet, folder + "/" + stem + ".svg"));
+        suites += html().filled(
+            "suite", {{"title", escaped_html(suite.title)},
+                      {"body", escaped_html(suite.body)},
+                      {"truth", escaped_html(suite.truth)},
+                      {"stem", escaped_html(stem)},
+                      {"cheaper", cheaper_text(suite, cheaper_than_standard(trials, input.noise))},
+                      {"knobs", knob_rows(suite, trials, input.noise)},
+                      {"error", escaped_html(suite.error_name + ", " + suite.error_unit)},
+                      {"trials", trial_rows(trials)}});
     }
-    html += "</body></html>\n";
-    return write_file(folder + "/index.html", html);
+    return write_file(
+        folder + "/index.html",
+        html().filled("page", {{"machine", escaped_html(input.machine)}, {"suites", suites}}));
 }
 
 std::string format_accuracy_markdown(const PageInput& input) {
@@ -231,4 +224,4 @@ std::string format_accuracy_markdown(const PageInput& input) {
     return text + options_table();
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What a sweep is shown as: one plot per suite and body, and a page that explains itself.
+// The plots of a sweep, one per suite and body, and its page.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "formats/base/result.h"
-#include "pipeline/tradeoff/trial.h"
+#include "pipeline/tradeoff/sweep.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline tradeoff {
 
 struct PageInput {
     std::vector<Suite> suites;  // measure is not called
     std::vector<Trial> trials;  // of all suites
     std::string machine;        // "2 cores, ..."; as the page shows it
-    double noise = 0.15;        // relative differences below this are not differences
+    double noise = 0.15;        // smaller relative differences count as noise
 };
 
 // Writes SUITE-BODY.png and .svg (error against seconds, log-log: all trials, the front as a line,
 // presets, the paper's settings and peers marked) and index.html into `folder`, which exists.
 Status write_tradeoff_page(const PageInput& input, const std::string& folder);
 
-// docs/accuracy.md: the table of knobs, from the suites alone, and the figures of the trials given.
+// The text of docs/accuracy.md: the table of knobs, from the suites, and the figures of the trials.
 std::string format_accuracy_markdown(const PageInput& input);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline tradeoff

@@ -9,14 +9,14 @@
 #include <vector>
 
 #include "formats/base/build_facts.h"
+#include "formats/base/stage_report.h"
 #include "formats/text/nearest_name.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
 #include "pipeline/stages/built_in_stages.h"
-#include "pipeline/verbs/stage/stage_verb.h"
-#include "pipeline/verbs/verb_check.h"
+#include "pipeline/verbs/stage_verb.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 namespace {
 
 constexpr const char* kCase = "Make and look at a case";
@@ -43,13 +43,17 @@ const std::vector<Verb>& hand_written_verbs() {
         {kCase, "publish", "write a site that plays cases in browsers", verb_publish, ""},
         {kCase, "look", "measure how a real machine draws", verb_look, ""},
         {kCase, "tradeoff", "sweep accuracy against time", verb_tradeoff, ""},
-        {kStage, "align", "lay the skin on the mannequin rigidly", verb_align, "surface"},
-        {kStage, "warp", "fit the quadratic and residual warps", verb_warp, "warp"},
-        {kStage, "register", "surface, align and warp in one call", verb_register, "warp"},
-        {kStage, "landmarks", "list places for a landmark file", verb_landmarks, "surface"},
-        {kStage, "map", "carry points through a fitted map", verb_map, "warp"},
-        {kStage, "texture", "learn solid textures from example images", verb_texture, "texture"},
-        {kStage, "pack", "put the stages' files into a bundle", verb_pack, "pack"},
+        {kStage, "align", "lay the skin on the mannequin rigidly", verb_align,
+         stage_names::kSurface},
+        {kStage, "warp", "fit the quadratic and residual warps", verb_warp, stage_names::kWarp},
+        {kStage, "register", "surface, align and warp in one call", verb_register,
+         stage_names::kWarp},
+        {kStage, "landmarks", "list places for a landmark file", verb_landmarks,
+         stage_names::kSurface},
+        {kStage, "map", "carry points through a fitted map", verb_map, stage_names::kWarp},
+        {kStage, "texture", "learn solid textures from example images", verb_texture,
+         stage_names::kTexture},
+        {kStage, "pack", "put the stages' files into a bundle", verb_pack, stage_names::kPack},
         {kFarm, "plan", "find what a build farm has to run", verb_plan, ""},
         {kFarm, "cache", "tidy a folder of stage results", verb_cache, ""},
         {kSession, "calibrate", "find tips, axes and frames of tracked tools", verb_calibrate, ""},
@@ -127,7 +131,7 @@ int run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs
 
 int main(int argc, char** argv) {
     // A file that may not grow further is an error of its write, as a full disk is.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase build: a recipe becomes a case bundle.
+// sonocase build: cooks a recipe into a case bundle.
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -15,22 +15,20 @@
 #include "formats/base/build_facts.h"
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
-#include "formats/threads/thread_jobs.h"
+#include "formats/files/thread_jobs.h"
 #include "pipeline/base/memory_limit.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
-#include "pipeline/cook/build_time.h"
-#include "pipeline/cook/case_size.h"
+#include "pipeline/cook/case_cost.h"
 #include "pipeline/cook/cook_case.h"
-#include "pipeline/cook/memory_need.h"
-#include "pipeline/recipe/read_recipe.h"
 #include "pipeline/segmentation/resample_labels.h"
+#include "pipeline/stages/read_recipe.h"
 #include "pipeline/tradeoff/boundary_error.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/tradeoff/suites.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 namespace {
 
 struct BuildOptions {
@@ -48,7 +46,7 @@ struct BuildOptions {
     CommonOptions common;
 };
 
-// "import, surface, ...": where --until may stop.
+// Returns where --until may stop: "import, surface, ...".
 std::string stage_names(const StageTable& table) {
     std::string names;
     for (const StageDescriptor& stage : table.stages)
@@ -63,7 +61,7 @@ std::string preset_names(const StageTable& table) {
     return names;
 }
 
-// The report as people see it: what happened in the cache is of interest for this run as well.
+// Returns the report as people see it, with what happened in the cache in this run.
 StageReport with_cache_notes(const StageRun& run) {
     StageReport report = run.report;
     report.warnings.insert(report.warnings.end(), run.cache_notes.begin(), run.cache_notes.end());
@@ -74,7 +72,7 @@ StageReport with_cache_notes(const StageRun& run) {
 Result<Choice> choose_for(const BuildOptions& options, Recipe& recipe, double speed) {
     if (auto size = cooked_volume_mm3(recipe); !size) return size.error();
     const CaseSize size = case_size(recipe);
-    const double voxel_mm = recipe.settings.of<ResampleOptions>("resample").voxel_mm;
+    const double voxel_mm = recipe.settings.of<ResampleOptions>().voxel_mm;
     Recipe tried = recipe;
     const auto seconds = [&](const Settings& settings) {
         tried.settings = recipe.settings;
@@ -93,14 +91,14 @@ double peak_memory_mb() {
     return static_cast<double>(usage.ru_maxrss) * 1024 / 1e6;
 }
 
-// What was said before the work began.
+// What a build is expected to take, before the work begins.
 struct Expected {
     double memory_mb = 0;
     BuildTime time;
     bool said = false;
 };
 
-// What a build reports: the stages as they ran, and which of them came from the cache.
+// Returns what a build reports: the stages as they ran, and which of them came from the cache.
 std::string build_report(const CookResult& cooked,
                          const std::string& out,
                          const std::string& digest,
@@ -178,8 +176,8 @@ Status write_stage_report(const BuildOptions& options,
         build_report(cooked, "", cooked.digest, 0, seconds, expected, choice, std::nullopt));
 }
 
-// The bundle, its picture, and the report beside it, which inspect reads: seconds are not part of
-// the bundle, whose bytes they would change from run to run.
+// Writes the bundle, its picture, and the report beside it, which inspect reads: seconds are not
+// part of the bundle, whose bytes they would change from run to run.
 Status write_case(const BuildOptions& options,
                   const std::string& out,
                   const CookResult& cooked,
@@ -209,8 +207,8 @@ int build_one(const BuildOptions& options) {
     if (const Status s = check_memory(need, options.memory_mb); !s) return fail("build", s.error());
     const Expected expected{
         need.mb,
-        build_time(*recipe, need.size, recipe->settings.of<ResampleOptions>("resample").voxel_mm,
-                   speed, options.common.threads),
+        build_time(*recipe, need.size, recipe->settings.of<ResampleOptions>().voxel_mm, speed,
+                   options.common.threads),
         say};
     if (!options.common.quiet && need.size.cooked_voxels > 0)  // 0: inputs that cannot be read
         std::printf(
@@ -247,15 +245,16 @@ int build_one(const BuildOptions& options) {
     return kDone;
 }
 
-// "OUT-STEM.sonocase": of several mannequins each has its own bundle.
+// Returns "OUT-STEM.sonocase": each of several mannequins has its own bundle.
 std::string with_stem(const std::string& path, const std::string& stem) {
     const std::filesystem::path whole(path);
     return (whole.parent_path() / (whole.stem().string() + "-" + stem)).string() +
            whole.extension().string();
 }
 
-// One bundle for each mannequin. What does not depend on the mannequin (import, skin, textures) is
-// made once: results pass from one to the next through the cache, or through a folder of this run.
+// Builds one bundle for each mannequin. What does not depend on the mannequin (import, skin,
+// textures) is made once: results pass from one to the next through the cache, or through a folder
+// of this run.
 int build_several(const BuildOptions& options) {
     namespace fs = std::filesystem;
     std::vector<std::string> stems;
@@ -366,4 +365,4 @@ int verb_build(int argc, char** argv) {
     return build(options);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase check: is a case fit to teach with? sonocase aim: where does a probe see a target?
-#include "pipeline/verbs/verb_check.h"
-
+// sonocase check: tells whether a case is fit to teach with. sonocase aim: finds windows on the
+// skin from which a probe sees a target.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 
 #include "formats/files/atomic_file.h"
-#include "formats/files/bundle_file.h"
-#include "pipeline/aim/aim.h"
-#include "pipeline/aim/scripted_expert.h"
+#include "formats/files/load_save.h"
+#include "pipeline/check/aim.h"
 #include "pipeline/check/check_case.h"
-#include "pipeline/command_line/command_line.h"
+#include "pipeline/check/scripted_expert.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 
 int verb_check(int argc, char** argv) {
     CLI::App app(
@@ -51,7 +51,8 @@ int verb_check(int argc, char** argv) {
 
 namespace {
 
-// One row per target of every exercise: its first window, and whether an expert passes through it.
+// Prints one row per target of every exercise: its first window, and whether an expert passes
+// through it.
 int aim_at_all(const CaseBundle& bundle, const CaseLabels& labels) {
     bool all = true;
     std::printf("%-42s %9s %9s %7s  %s\n", "exercise/target", "depth mm", "blocked", "seen",
@@ -113,11 +114,11 @@ int verb_aim(int argc, char** argv) {
     for (const EmbeddedExercise& embedded : bundle->exercises)
         if (embedded.name == target->exercise)
             if (const auto exercise = parse_exercise(embedded.toml, embedded.name)) {
-                AimOptions of = aim_options(*exercise);
-                of.windows = options.windows;
-                of.keep_clear.insert(of.keep_clear.end(), options.keep_clear.begin(),
-                                     options.keep_clear.end());
-                options = of;
+                AimOptions given = aim_options(*exercise);
+                given.windows = options.windows;
+                given.keep_clear.insert(given.keep_clear.end(), options.keep_clear.begin(),
+                                        options.keep_clear.end());
+                options = given;
             }
     const AimResult result = aim(labels, *target, options);
     if (result.windows.empty())
@@ -150,4 +151,4 @@ int verb_aim(int argc, char** argv) {
     return kDone;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs

@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase export: a bundle's parts as files that other tools open, or a session's pictures as
-// DICOM.
-#include <CLI/CLI.hpp>
+// sonocase export: writes a bundle's parts as files that other tools open, or a session's pictures
+// as DICOM. sonocase publish: writes cases as a site for browsers.
 #include <cstdio>
 
-#include "formats/files/bundle_file.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
-#include "pipeline/export/dicom/ultrasound_dicom.h"
+#include <CLI/CLI.hpp>
+
+#include "formats/files/load_save.h"
 #include "pipeline/export/export_files.h"
 #include "pipeline/export/export_level_sets.h"
+#include "pipeline/export/publish.h"
+#include "pipeline/export/ultrasound_dicom.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
+
 namespace {
 
 int export_dicom(const std::string& session, const std::string& file) {
@@ -67,4 +70,35 @@ int verb_export(int argc, char** argv) {
     return kDone;
 }
 
-}  // namespace sonocase::pipeline
+int verb_publish(int argc, char** argv) {
+    CLI::App app(
+        "Write a site for browsers: page, program and cases, for any static host, without a\n"
+        "request to others. See docs/browser.md");
+    std::vector<std::string> cases;
+    std::string site;
+    PublishOptions options;
+    app.add_option("CASE", cases, "Case bundles, in the order of the page")->required();
+    app.add_option("-o,--output", site, "Folder of the site, or the page of --single-file")
+        ->type_name("SITE")
+        ->required();
+    app.add_flag("--single-file", options.single_file,
+                 "One .html with one case inside, which opens from disk");
+    app.add_option("--xapi", options.xapi,
+                   "Learning record store that takes the results; the page says so")
+        ->type_name("ENDPOINT");
+    app.add_option("--poses", options.poses,
+                   "Pose server (sonoplay --serve-poses) that the page may connect to with ?poses=")
+        ->type_name("ws://HOST:PORT");
+    app.add_option("--program", options.program_folder,
+                   "Folder with the player for browsers, as scripts/web builds it")
+        ->type_name("DIR");
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    const auto published = publish(cases, site, options);
+    if (!published) return fail("publish", published.error());
+    for (const std::string& warning : published->warnings)
+        std::fprintf(stderr, "sonocase publish: warning: %s\n", warning.c_str());
+    for (const std::string& file : published->files) std::printf("%s\n", file.c_str());
+    return kDone;
+}
+
+}  // namespace sonocase::pipeline::inline verbs

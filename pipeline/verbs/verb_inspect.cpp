@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase inspect and sonocase validate: what a bundle holds, and whether it is valid.
+// sonocase inspect and validate: what a bundle holds, and whether it is valid.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
-#include "formats/files/bundle_file.h"
-#include "formats/threads/thread_jobs.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
+#include "formats/files/load_save.h"
+#include "formats/files/thread_jobs.h"
 #include "pipeline/export/inspect_case.h"
 #include "pipeline/tradeoff/choose_settings.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 
 int verb_inspect(int argc, char** argv) {
     CLI::App app(
@@ -87,4 +87,4 @@ int verb_validate(int argc, char** argv) {
     return all_valid ? kDone : kFailed;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs

@@ -6,14 +6,14 @@
 #include <filesystem>
 
 #include "formats/files/atomic_file.h"
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "formats/text/number_text.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
 #include "pipeline/look/look_page.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 namespace {
 
 struct LookArguments {
@@ -131,4 +131,4 @@ int verb_look(int argc, char** argv) {
     return look(a);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs

@@ -7,16 +7,15 @@
 #include <vector>
 
 #include "formats/files/atomic_file.h"
-#include "formats/files/registration_file.h"
-#include "formats/registration/registration_json.h"
 #include "formats/text/number_text.h"
-#include "pipeline/base/delimited_text.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
+#include "pipeline/base/text.h"
 #include "pipeline/registration/map/inverse_map.h"
+#include "pipeline/registration/map/registration.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -24,12 +23,11 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 // Columns x, y, z by the header, or the first three. Rows that are not numbers become NaN, so that
 // the output has the same rows as the input.
 Result<std::vector<Point3>> read_points(const std::string& path) {
-    const Result<std::string> text = read_text_file(path);
-    if (!text) return text.error();
+    SONOCASE_TRY(const std::string text, read_text_file(path));
     std::vector<Point3> points;
     std::size_t column[3] = {0, 1, 2};
     bool first = true;
-    for (const TextRow& row : split_rows(*text)) {
+    for (const TextRow& row : split_rows(text)) {
         if (first) {
             first = false;
             bool header = false;
@@ -132,4 +130,4 @@ int verb_map(int argc, char** argv) {
     return kDone;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs

@@ -1,25 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase pack: the files of the stages become one bundle.
+// sonocase pack: puts the files of the stages into one bundle.
+//
+// More than the verb that a descriptor would give the stage "pack": skin and registration may be
+// missing, structure is baked where the labels carry none, exercises are files of their own, and
+// the reports of the stages before come from the files that they wrote.
 #include <CLI/CLI.hpp>
 
 #include "formats/base/build_facts.h"
 #include "formats/bundle/stage_files.h"
 #include "formats/files/atomic_file.h"
-#include "formats/files/bundle_file.h"
-#include "formats/files/registration_file.h"
-#include "formats/files/stage_file.h"
-#include "formats/registration/registration_json.h"
-#include "pipeline/anatomy/structure_cells.h"
+#include "formats/files/load_save.h"
+#include "pipeline/anatomy/bake_structure.h"
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
-#include "pipeline/import/surface/surface_file.h"
-#include "pipeline/pack/pack_case.h"
-#include "pipeline/registration/unfitted_skin.h"
+#include "pipeline/import/mesh/surface_file.h"
+#include "pipeline/registration/fit/fit_measure.h"
+#include "pipeline/registration/map/registration.h"
+#include "pipeline/stages/pack_case.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 namespace {
 
 struct PackFiles {
@@ -29,73 +31,73 @@ struct PackFiles {
     std::uint64_t seed = 1;
 };
 
-// A .surface file of ours, or any surface file that import reads.
+// Reads a .surface file, or any surface file that import reads.
 Result<Surface> load_any_surface(const std::string& path) {
-    const auto bytes = sonocase::read_file(path);
-    if (!bytes) return bytes.error();
-    if (container_kind(*bytes) != "SURF") return import_surface(path);
-    auto file = load_surface_file(path);
-    if (!file) return file.error();
-    return std::move(file->surface);
+    SONOCASE_TRY(const auto bytes, sonocase::read_file(path));
+    if (container_kind(bytes) != "SURF") return import_surface(path);
+    SONOCASE_TRY(auto file, load_surface_file(path));
+    return std::move(file.surface);
 }
 
 Result<PackResult> pack(const PackFiles& files, const Progress& progress) {
-    auto labels = load_label_file(files.labels);
-    if (!labels) return labels.error();
-    if (labels->frame != "mannequin")
-        return Error{"labels are in the frame '" + labels->frame + "'", files.labels,
+    SONOCASE_TRY(auto labels, load_label_file(files.labels));
+    if (labels.frame != "mannequin")
+        return Error{"labels are in the frame '" + labels.frame + "'", files.labels,
                      "expected resampled labels, in the frame 'mannequin'"};
-    auto textures = load_texture_file(files.textures);
-    if (!textures) return textures.error();
-    auto mannequin = load_any_surface(files.mannequin);
-    if (!mannequin) return mannequin.error();
+    SONOCASE_TRY(auto textures, load_texture_file(files.textures));
+    SONOCASE_TRY(auto mannequin, load_any_surface(files.mannequin));
     std::vector<EmbeddedExercise> exercises;
     for (const std::string& path : files.exercises) {
-        auto text = sonocase::read_text_file(path);
-        if (!text) return text.error();
+        SONOCASE_TRY(auto text, sonocase::read_text_file(path));
         std::string name = path.substr(path.rfind('/') + 1);
         if (name.ends_with(".toml")) name.resize(name.size() - 5);
-        exercises.push_back({name, std::move(*text)});
+        exercises.push_back({name, std::move(text)});
     }
     Surface skin;
     Registration registration;
     const bool has_skin = !files.skin.empty(), has_fit = !files.registration.empty();
     if (has_skin) {
-        auto loaded = load_any_surface(files.skin);
-        if (!loaded) return loaded.error();
-        skin = std::move(*loaded);
+        SONOCASE_TRY(auto loaded, load_any_surface(files.skin));
+        skin = std::move(loaded);
     }
     if (has_fit) {
-        auto fit = load_registration(files.registration);
-        if (!fit) return fit.error();
-        registration = std::move(*fit);
+        SONOCASE_TRY(auto fit, load_registration(files.registration));
+        registration = std::move(fit);
     }
-    std::vector<Tissue> tissues = textures->tissues;
+    std::vector<Tissue> tissues = textures.tissues;
     if (tissues.empty()) {
         const auto built_in = built_in_tissues();
         tissues.assign(built_in.begin(), built_in.end());
     }
-    if (files.structure && labels->echo_offset.table.empty()) {
+    if (files.structure && labels.echo_offset.table.empty()) {
         BakeStructureOptions options;
         options.seed = files.seed;
-        auto baked = bake_structure_in_cells(labels->volume, tissues, options, progress);
-        if (!baked) return baked.error();
-        labels->echo_offset = std::move(baked->echo_offset);
-        labels->reports.push_back(baked->report);
+        SONOCASE_TRY(auto baked,
+                     bake_structure_in_cells(labels.volume, tissues, options, progress));
+        labels.echo_offset = std::move(baked.echo_offset);
+        labels.reports.push_back(baked.report);
     }
     std::vector<std::uint8_t> unfitted;
     if (has_skin && has_fit) {
-        auto found = unfitted_skin(skin, *mannequin, registration);
-        if (!found) return found.error();
-        unfitted = std::move(*found);
+        SONOCASE_TRY(auto found, unfitted_skin(skin, mannequin, registration));
+        unfitted = std::move(found);
     }
-    auto packed = pack_case({files.name, "", exercises, has_skin ? &skin : nullptr,
-                             has_fit ? &registration : nullptr, *mannequin, labels->volume,
-                             labels->volume.labels, labels->boundary, labels->echo_offset,
-                             *textures, tissues, std::move(unfitted)});
+    auto packed = pack_case({.case_name = files.name,
+                             .recipe_text = "",
+                             .exercises = exercises,
+                             .ct_skin = has_skin ? &skin : nullptr,
+                             .registration = has_fit ? &registration : nullptr,
+                             .mannequin = mannequin,
+                             .cooked = labels.volume,
+                             .palette = labels.volume.labels,
+                             .boundary = labels.boundary,
+                             .echo_offset = labels.echo_offset,
+                             .textures = textures,
+                             .tissues = tissues,
+                             .skin_unfitted = std::move(unfitted)});
     if (!packed) return packed;
     auto& stages = packed->bundle.manifest.stages;
-    for (const auto* reports : {&labels->reports, &textures->reports})
+    for (const auto* reports : {&labels.reports, &textures.reports})
         stages.insert(stages.end(), reports->begin(), reports->end());
     if (has_fit)
         stages.insert(stages.begin(), registration.reports.begin(), registration.reports.end());
@@ -154,4 +156,4 @@ int verb_pack(int argc, char** argv) {
     return kDone;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase plan, sonocase cache: what a build farm asks before and after its jobs.
+// sonocase plan and cache: what a build farm asks before and after its jobs.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 
 #include "formats/files/atomic_file.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
 #include "pipeline/cook/plan_cases.h"
-#include "pipeline/stage/stage_cache.h"
+#include "pipeline/stages/stage_cache.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 
 int verb_plan(int argc, char** argv) {
     CLI::App app(
@@ -78,4 +78,4 @@ int verb_cache(int argc, char** argv) {
     return kDone;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase review and sonocase score: what a session was worth.
+// sonocase review, score and progress: pages, scores and results of recorded sessions.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "formats/attempt/draw_attempt.h"
 #include "formats/files/atomic_file.h"
-#include "formats/files/bundle_file.h"
-#include "formats/files/recording_file.h"
-#include "formats/threads/thread_jobs.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
-#include "pipeline/import/surface/surface_file.h"
-#include "pipeline/review/review_page.h"
+#include "formats/files/load_save.h"
+#include "formats/files/thread_jobs.h"
+#include "formats/scoring/draw_attempt.h"
+#include "pipeline/import/mesh/surface_file.h"
+#include "pipeline/review/review.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 
 int verb_review(int argc, char** argv) {
     CLI::App app(
@@ -105,13 +104,12 @@ int verb_score(int argc, char** argv) {
     const auto axis = axis_of(a.axis);
     if (!axis) return wrong_usage("score", "--needle-axis is not a direction x,y,z");
     const auto session = [&]() -> Result<Session> {
-        const auto sequence = load_recording_file(a.session);
-        if (!sequence) return sequence.error();
-        SessionNames names = guess_names(*sequence);
+        SONOCASE_TRY(const auto sequence, load_recording_file(a.session));
+        SessionNames names = guess_names(sequence);
         names.needle_axis = *axis;
         if (!a.probe.empty()) names.probe = a.probe;
         if (!a.needle.empty()) names.needle = names.drawn = a.needle;
-        return session_from_sequence(*sequence, names, a.session);
+        return session_from_sequence(sequence, names, a.session);
     }();
     if (!session) return fail("score", session.error());
     if (const auto status = check_session(*session, a.session); !status)
@@ -203,4 +201,4 @@ int verb_progress(int argc, char** argv) {
     return kDone;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs

@@ -1,26 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // sonocase texture: learns solid textures from example images, or makes the whole bank.
+//
+// Not the verb that a descriptor would give the stage "texture": it takes images in place of a
+// case's tissues, may write pictures or a report alone, and measures the quality of every texture.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
 #include <optional>
 
 #include "formats/bundle/stage_files.h"
-#include "formats/files/stage_file.h"
+#include "formats/files/load_save.h"
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/texture_stage.h"
-#include "pipeline/texture/example/read_example.h"
-#include "pipeline/texture/speckle.h"
-#include "pipeline/texture/texture_pictures.h"
+#include "pipeline/texture/read_example.h"
+#include "pipeline/texture/speckle_volume.h"
 #include "pipeline/texture/texture_quality.h"
-#include "pipeline/verbs/stage/option_flags.h"
+#include "pipeline/verbs/stage_verb.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 namespace {
 
 struct TextureArguments {
@@ -31,12 +33,8 @@ struct TextureArguments {
     int frame = 0;
     CommonOptions common;
 
-    const TextureStageOptions& options() const {
-        return settings.of<TextureStageOptions>("texture");
-    }
-    std::uint64_t seed() const {
-        return static_cast<std::uint64_t>(settings.of<CaseOptions>("case").seed);
-    }
+    const TextureStageOptions& options() const { return settings.of<TextureStageOptions>(); }
+    std::uint64_t seed() const { return case_seed(settings); }
 };
 
 void add_files(CLI::App& app, TextureArguments& a) {
@@ -100,8 +98,7 @@ Result<std::vector<TextureSpec>> specs_of_images(const TextureArguments& a,
         const std::string path = named ? image.substr(equals + 1) : image;
         const std::string name =
             named ? image.substr(0, equals) : std::filesystem::path(path).stem().string();
-        auto example = read_example(path, read, notes);
-        if (!example) return example.error();
+        SONOCASE_TRY(auto example, read_example(path, read, notes));
         auto same = std::find_if(specs.begin(), specs.end(),
                                  [&](const TextureSpec& s) { return s.name == name; });
         if (same == specs.end()) {
@@ -115,7 +112,7 @@ Result<std::vector<TextureSpec>> specs_of_images(const TextureArguments& a,
             spec.third_axis = ThirdAxis::along;
             same = specs.insert(specs.end(), std::move(spec));
         }
-        same->examples.push_back(std::move(*example));
+        same->examples.push_back(std::move(example));
     }
     return specs;
 }
@@ -196,11 +193,11 @@ int verb_texture(int argc, char** argv) {
         "Learn solid textures from example images. Without examples: the bank of the built-in\n"
         "tissue table, from a folder of patches or from synthetic examples");
     TextureArguments a;
-    a.settings.of<TextureStageOptions>("texture").speckle_edge = 0;  // textures alone
+    a.settings.of<TextureStageOptions>().speckle_edge = 0;  // textures alone
     add_files(app, a);
-    const StageTable& table = built_in_stages();
-    add_option_flags(app, table.find("texture")->options, a.settings.options("texture"));
-    add_option_flags(app, table.common, a.settings.options(table.common.name));
+    const StageTable& table = a.settings.table();
+    add_option_flags(app, table.options_of<TextureStageOptions>(), a.settings);
+    add_option_flags(app, table.common, a.settings);
     add_image_options(app, a);
     add_common_options(app, a.common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
@@ -208,7 +205,7 @@ int verb_texture(int argc, char** argv) {
     const ThreadLimit limit(a.common.threads);
     const Stopwatch watch;
     StageReport report;
-    report.stage = "texture";
+    report.stage = stage_names::kTexture;
     const auto specs = specs_of(a, &report.warnings);
     if (!specs) return fail("texture", specs.error());
     const auto textures = assess(*specs, a.common);
@@ -221,4 +218,4 @@ int verb_texture(int argc, char** argv) {
     return kDone;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase tradeoff: what accuracy costs in time.
+// sonocase tradeoff: measures what accuracy costs in time.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
@@ -10,17 +10,16 @@
 
 #include "formats/files/atomic_file.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/command_line/command_line.h"
-#include "pipeline/command_line/verbs.h"
-#include "pipeline/cook/case_size.h"
-#include "pipeline/recipe/read_recipe.h"
+#include "pipeline/cook/case_cost.h"
+#include "pipeline/stages/read_recipe.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/tradeoff/suites.h"
 #include "pipeline/tradeoff/sweep.h"
 #include "pipeline/tradeoff/tradeoff_page.h"
-#include "pipeline/tradeoff/trial_file.h"
+#include "pipeline/verbs/verb_common.h"
+#include "pipeline/verbs/verbs.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline verbs {
 namespace {
 
 struct TradeoffOptions {
@@ -87,7 +86,7 @@ int tradeoff(const TradeoffOptions& options) {
                             (options.suite.empty() && options.recipe.empty());
         if (wanted) makers.push_back(named.make);
     }
-    // Need data or programs that packages lack: only by name.
+    // These need data or programs that packages lack, and run only where they are named.
     if (options.suite == "colour") makers.push_back(colour_suite);
     if (options.suite == "spectrum") makers.push_back(spectrum_suite);
     if (options.suite == "press")
@@ -210,4 +209,4 @@ int verb_tradeoff(int argc, char** argv) {
     return tradeoff(options);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline verbs

@@ -6,7 +6,7 @@
 
 #include <cassert>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 
 ImageTexture::~ImageTexture() {
     if (texture_) glDeleteTextures(1, &texture_);
@@ -54,4 +54,4 @@ void paint_opaque(const ImDrawList*, const ImDrawCmd*) {
     glDisable(GL_BLEND);
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

@@ -11,7 +11,7 @@
 struct ImDrawList;
 struct ImDrawCmd;
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 
 class ImageTexture {
   public:
@@ -31,11 +31,11 @@ class ImageTexture {
     void send(int width_px, int height_px);
     unsigned texture_ = 0;
     int width_px_ = 0, height_px_ = 0;
-    std::vector<std::uint32_t> rgba_;  // WebGL lacks the swizzle that would spare this
+    std::vector<std::uint32_t> rgba_;  // WebGL has no swizzle, which would make this unnecessary
 };
 
 // For ImDrawList::AddCallback: what is drawn afterwards replaces what is under it, without
 // blending.
 void paint_opaque(const ImDrawList*, const ImDrawCmd*);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

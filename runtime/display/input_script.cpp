@@ -8,12 +8,11 @@
 
 #include "formats/files/atomic_file.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 
 Result<InputScript> InputScript::load(const std::string& path) {
-    auto content = read_text_file(path);
-    if (!content) return content.error();
-    std::istringstream file(std::move(*content));
+    SONOCASE_TRY(auto content, read_text_file(path));
+    std::istringstream file(std::move(content));
     InputScript script;
     int number = 0;
     for (std::string text; std::getline(file, text);) {
@@ -107,4 +106,4 @@ InjectedInput InputScript::next(double now_s, std::string& shot, bool& quit) {
     return input_;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

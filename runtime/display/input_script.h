@@ -25,7 +25,7 @@
 #include "formats/base/result.h"
 #include "runtime/display/window.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 
 class InputScript {
   public:
@@ -37,9 +37,9 @@ class InputScript {
     // The input of the next picture. Sets `shot` to the file in which to save that picture, and
     // `quit` when the script ends. now_s: the clock of `loop`.
     InjectedInput next(double now_s, std::string& shot, bool& quit);
-    // Whether `shot` of the last next() is of the second window.
+    // Whether the last next() asked for a picture of the second window.
     bool of_instructor() const { return of_instructor_; }
-    // Where controls are: the middle of one in window pixels; false: there is none of that name.
+    // Finds a control by its name and gives its middle in window pixels; false: there is none.
     void set_finder(std::function<bool(const std::string& name, float& x, float& y)> find) {
         find_ = std::move(find);
     }
@@ -54,8 +54,8 @@ class InputScript {
     int waiting_ = 0;
     InjectedInput input_;
     bool release_ = false, of_instructor_ = false;
-    int press_ = 0;  // steps of a press that are to come
+    int press_ = 0;  // steps of a press that are still to come
     std::function<bool(const std::string&, float&, float&)> find_;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Taps of keys that are over before the next picture. Dear ImGui sees only what is held when a
-// picture begins, so that such a key is held down for one picture more.
+// Key presses that end before the next picture begins. Dear ImGui sees only keys that are held when
+// a picture begins, so such a key is held down for one more picture.
 #pragma once
 
 #include <array>
@@ -9,18 +9,17 @@
 #include <span>
 #include <vector>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 
 template <std::size_t kKeys>
 class KeyTaps {
   public:
-    // Whenever a key goes down; others than [0, kKeys) are left out.
+    // Call this whenever a key goes down; keys outside [0, kKeys) are ignored.
     void press(int key) {
-        if (key >= 0 && key < static_cast<int>(kKeys))
-            pressed_[static_cast<std::size_t>(key)] = true;
+        if (key >= 0 && key < static_cast<int>(kKeys)) pressed_[key] = true;
     }
-    // At the start of a picture. down: what is held, # kKeys at least. Holds the keys whose tap is
-    // over, until release() at its end.
+    // Call this at the start of a picture. down: the keys that are held, at least kKeys of them.
+    // Adds the keys whose tap is over; release() at the end of the picture takes them away again.
     void hold(std::span<bool> down) {
         for (std::size_t key = 0; key < kKeys; ++key) {
             if (pressed_[key] && !down[key]) {
@@ -40,4 +39,4 @@ class KeyTaps {
     std::vector<std::size_t> held_;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

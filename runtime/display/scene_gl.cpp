@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 namespace {
 
 Matrix4 multiply(const Matrix4& a, const Matrix4& b) {
@@ -15,10 +15,9 @@ Matrix4 multiply(const Matrix4& a, const Matrix4& b) {
         for (int row = 0; row < 4; ++row) {
             float sum = 0;
             for (int k = 0; k < 4; ++k) {
-                sum += a[static_cast<std::size_t>(row + 4 * k)] *
-                       b[static_cast<std::size_t>(k + 4 * col)];
+                sum += a[row + 4 * k] * b[k + 4 * col];
             }
-            c[static_cast<std::size_t>(row + 4 * col)] = sum;
+            c[row + 4 * col] = sum;
         }
     }
     return c;
@@ -28,9 +27,9 @@ Matrix4 from_rigid(const Rigid& t) {
     Matrix4 m{};
     for (int c = 0; c < 3; ++c) {
         for (int r = 0; r < 3; ++r) {
-            m[static_cast<std::size_t>(r + 4 * c)] = static_cast<float>(t.rotation(r, c));
+            m[r + 4 * c] = static_cast<float>(t.rotation(r, c));
         }
-        m[static_cast<std::size_t>(12 + c)] = static_cast<float>(t.translation[c]);
+        m[12 + c] = static_cast<float>(t.translation[c]);
     }
     m[15] = 1;
     return m;
@@ -242,4 +241,4 @@ void* OffscreenPicture::texture() const {
     return reinterpret_cast<void*>(static_cast<std::uintptr_t>(texture_));
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

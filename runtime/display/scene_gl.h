@@ -10,11 +10,11 @@
 #include "formats/base/geometry.h"
 #include "runtime/display/models/tool_models.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 
 // Column-major, as OpenGL takes it.
 using Matrix4 = std::array<float, 16>;
-// tan_half: of half the vertical field of view; near, far: distances in mm.
+// tan_half: tangent of half the vertical field of view; near, far: distances in mm.
 Matrix4 perspective(double tan_half, double aspect, double near, double far);
 
 class GlMesh {
@@ -46,7 +46,7 @@ class SceneProgram {
 
     // texture: OpenGL name of the picture for Paint::textured; 0: none.
     void use(const Matrix4& clip_from_view, const Rigid& view_from_mannequin, unsigned texture);
-    // rgb: 0xRRGGBB. scale: of the mesh about its origin.
+    // rgb: 0xRRGGBB. scale: enlarges the mesh about its origin.
     void draw(const GlMesh& mesh,
               const Rigid& mannequin_from_model,
               double scale,
@@ -72,8 +72,8 @@ class OffscreenPicture {
     void resize(int width_px, int height_px);
     int width_px() const { return width_px_; }
     int height_px() const { return height_px_; }
-    // Drawing between the two goes to the picture, which begin() clears; depth test on, blending
-    // off.
+    // What is drawn between the two goes to the picture. begin() clears it and turns the depth test
+    // on and blending off.
     void begin();
     void end();
     void* texture() const;  // for ImGui
@@ -83,4 +83,4 @@ class OffscreenPicture {
     int width_px_ = 0, height_px_ = 0;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

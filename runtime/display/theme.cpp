@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 namespace {
 
-Fonts g_fonts;  // of ImGui's current context, which is one per process too
+Fonts g_fonts;  // global, as ImGui's current context is
 
 std::string first_file(const std::vector<std::string>& files) {
     for (const std::string& file : files) {
@@ -77,8 +77,8 @@ void apply_theme(float scale) {
         return io.Fonts->AddFontFromFileTTF(file.c_str(), config.SizePixels, &config, ranges);
     };
     const std::string& strong = bold.empty() ? body : bold;
-    // In u. DejaVu Sans is an eighth wider than most, so a size smaller than theirs reads the same.
-    g_fonts.body = load(body, 16, kRanges);  // first: ImGui's own
+    // DejaVu Sans is an eighth wider than most fonts, so a smaller size reads as well.
+    g_fonts.body = load(body, 16, kRanges);  // the first one is ImGui's default
     g_fonts.small = load(body, 14, kRanges);
     g_fonts.bold = load(strong, 16, kRanges);
     g_fonts.heading = load(strong, 19, kRanges);
@@ -135,4 +135,4 @@ void apply_theme(float scale) {
     ImGui::GetStyle() = style;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

@@ -1,30 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Colours, spacing and fonts of the player: dark, so that the ultrasound picture is the brightest
-// part of the screen. Round the picture only greys, and one accent; words have a contrast of at
-// least 4.5 on every surface that they stand on (WCAG 2; a test computes it), and a colour never
-// says alone what it says: an icon or a word does too.
+// part of the screen. Around the picture there are only greys and one accent colour. Words have a
+// contrast of at least 4.5 on every surface that they stand on (WCAG 2; a test computes it). No
+// information is given by colour alone: an icon or a word repeats it.
 #pragma once
 
 struct ImFont;
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 
 struct Fonts {
     ImFont* small = nullptr;  // second lines, words on the picture
     ImFont* body = nullptr;
     ImFont* bold = nullptr;     // values, and what is chosen
-    ImFont* heading = nullptr;  // of cards
+    ImFont* heading = nullptr;  // headings of cards
     ImFont* large = nullptr;    // results
-    ImFont* title = nullptr;    // of pages
+    ImFont* title = nullptr;    // titles of pages
 };
 
-// Makes style and fonts for a scale; to be called between pictures. The fonts are the system's
-// (share/sonocase/fonts, DejaVu, Liberation, Noto), or ImGui's own, enlarged, if it has none of
-// them.
+// Makes style and fonts for a scale; call it between pictures. The fonts are those of the system
+// (share/sonocase/fonts, DejaVu, Liberation, Noto), or ImGui's own, enlarged, where it has none.
 void apply_theme(float scale);
 const Fonts& fonts();
-// Those of another ImGui context, which is current from now on.
+// Takes the fonts of another ImGui context, which is the current one from now on.
 void use_fonts(const Fonts& fonts);
 
 // sRGB with alpha, as ImGui packs it.
@@ -55,4 +54,4 @@ inline constexpr unsigned kImageText = rgba(0xC9, 0xCD, 0xD1);  // words on the 
 inline constexpr unsigned kMeasure = rgba(0xE6, 0xE8, 0xEA);    // marks on the picture
 }  // namespace colour
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

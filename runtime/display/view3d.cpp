@@ -14,10 +14,10 @@
 #include "runtime/display/models/tool_models.h"
 #include "runtime/display/scene_gl.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 namespace {
 
-constexpr double kTanHalf = 0.36;          // of half the vertical field of view
+constexpr double kTanHalf = 0.36;          // tangent of half the vertical field of view
 constexpr double kNear = 10, kFar = 5000;  // mm from the eye
 
 }  // namespace
@@ -27,13 +27,13 @@ struct View3d::Impl {
     OffscreenPicture picture, other;
     GlMesh skin, probe, mark, plane, needle, hub, ball;
     Exercise exercise;
-    Box3 box;         // of the skin
-    Point3 interest;  // that the view from outside turns about
+    Box3 box;         // around the skin
+    Point3 interest;  // the point that the view from outside turns about
     Matrix3 home;     // columns: right, up, towards the eye
     Renderer::Layout plane_layout;
     bool plane_flipped = false;
     Rigid view_from_mannequin;
-    double tan_half = kTanHalf;  // of this drawing: wider where the view is higher than wide
+    double tan_half = kTanHalf;  // in this drawing: wider where the view is higher than wide
     struct Organ {
         std::unique_ptr<GlMesh> mesh;
         unsigned rgb;
@@ -49,7 +49,7 @@ struct View3d::Impl {
     void draw_tools(const View3dInput& input, bool from_needle) const;
     void draw_targets(const View3dInput& input) const;
     void draw_skin(bool exam) const;
-    // Into `to`, as the camera sees it.
+    // Draws the scene into `to`, as the camera sees it.
     void render(OffscreenPicture& to, const View3dInput& input, bool from_needle, bool organs);
 };
 
@@ -160,7 +160,7 @@ void View3d::Impl::draw_targets(const View3dInput& input) const {
     }
 }
 
-// The tip's way in a replay, and the straight one beside it.
+// The tip's path in a replay, and the straight path to compare it with.
 void View3d::Impl::draw_lines(const View3dInput& input) const {
     const auto balls = [&](const std::vector<Point3>& points, std::size_t every, unsigned rgb) {
         for (std::size_t i = 0; i < points.size(); i += every) {
@@ -194,8 +194,8 @@ void View3d::Impl::draw_through(const View3dInput& input) const {
     glDepthFunc(GL_LESS);
 }
 
-// Its front only, blended over what is inside; drawn last. In an exam it hides what is inside and
-// is darker, so that the view does not outshine the picture beside it.
+// Draws the front of the skin, blended over what is inside; comes last. In an exam the skin hides
+// what is inside and is darker, so that the view does not outshine the picture beside it.
 void View3d::Impl::draw_skin(bool exam) const {
     const Rigid identity;
     glEnable(GL_CULL_FACE);
@@ -274,4 +274,4 @@ ViewRay View3d::ray(double x_px, double y_px) const {
             normalized(mannequin_from_view * direction_view)};
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

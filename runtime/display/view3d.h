@@ -13,24 +13,24 @@
 #include "runtime/display/models/camera.h"
 #include "runtime/imaging/renderer.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 
 struct View3dInput {
     bool has_probe = false, has_needle = false, in_contact = true;
     Rigid mannequin_from_probe;
     Rigid mannequin_from_needle;
     Renderer::Layout layout;
-    double depth_mm = 0;  // of the picture; may differ from the exercise's
+    double depth_mm = 0;  // depth of the picture; may differ from the exercise's
     bool flipped = false;
     int image_width_px = 0, image_height_px = 0;
     unsigned image_texture = 0;  // OpenGL name; 0: a plain plane
     bool show_targets = true;
     std::vector<bool> targets_reached;  // # targets
-    std::vector<Point3>
-        target_centres;        // # targets, `mannequin` frame; empty: as the exercise has them
+    // # targets, `mannequin` frame; empty: as the exercise has them.
+    std::vector<Point3> target_centres;
     bool exam = false;         // the skin hides what is inside
-    std::vector<Point3> path;  // of the tip so far, `mannequin` frame; drawn as a line
-    std::vector<Point3> best;  // the way to compare it with; drawn dotted
+    std::vector<Point3> path;  // the tip's path so far, `mannequin` frame; drawn as a line
+    std::vector<Point3> best;  // the path to compare it with; drawn dotted
 };
 
 struct ViewRay {  // `mannequin` frame
@@ -45,25 +45,25 @@ class View3d {
     View3d(const View3d&) = delete;
     View3d& operator=(const View3d&) = delete;
 
-    // A new skin; set_exercise() follows. Organs are made on a thread of their own, so that the
-    // first picture does not wait; the bundle must outlive that: until leave_case() or another
-    // case.
+    // Makes a new skin; call set_exercise() next. Organs are made on a thread of their own, so that
+    // the first picture does not wait. The bundle must live until leave_case() or the next case.
     void set_case(const CaseBundle& bundle);
     void leave_case();
     bool busy() const;  // organs are still being made
     bool& shows_organs() { return shows_organs_; }
-    // New tools, and a new home view: the probe points down, the long axis of the body runs across.
+    // Makes new tools and a new home view: the probe points down and the long axis of the body runs
+    // across.
     void set_exercise(const Exercise& exercise);
     Orbit& orbit() { return orbit_; }
     void home() { orbit_ = first_; }
-    // Where to look from; from outside if the tool is not there.
+    // The viewpoint; the view is from outside while the tool is missing.
     ViewFrom& from() { return from_; }
 
     // Draws at width x height pixels and returns the texture for ImGui::Image, whose v runs
     // upwards.
     void* draw(int width_px, int height_px, const View3dInput& input);
-    // The same from outside at the first view, for another display: into a texture of its own, and
-    // without any change to ray(), orbit() and from().
+    // Draws the same scene from the home view, for another display, into a texture of its own.
+    // ray(), orbit() and from() stay as they are.
     void* draw_for_other(int width_px, int height_px, const View3dInput& input);
     // The ray through the pixel (x, y), from the top left, of the last picture.
     ViewRay ray(double x_px, double y_px) const;
@@ -71,9 +71,9 @@ class View3d {
   private:
     struct Impl;
     std::unique_ptr<Impl> impl_;
-    Orbit orbit_, first_;  // first_: of the exercise
+    Orbit orbit_, first_;  // first_: home view of the exercise
     ViewFrom from_ = ViewFrom::outside;
     bool shows_organs_ = true;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cfloat>
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -20,10 +21,8 @@
 #include <vector>
 
 #include "runtime/display/key_taps.h"
-#include "runtime/display/theme.h"
-#include "runtime/display/window_native.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display {
 namespace {
 
 std::string g_glfw_error;  // GLFW reports to a function without context
@@ -40,6 +39,7 @@ void on_key(GLFWwindow* window, int key, int scancode, int action, int modifiers
 }
 
 std::string g_dropped;  // GLFW calls back without context
+
 void on_drop(GLFWwindow*, int count, const char** paths) {
     if (count > 0) g_dropped = paths[0];
 }
@@ -51,6 +51,59 @@ void leave_a_core_to_imaging() {
     const unsigned cores = std::thread::hardware_concurrency();
     const std::string painters = std::to_string(std::max(1u, cores - std::min(cores, 1u)));
     setenv("LP_NUM_THREADS", painters.c_str(), 0);
+}
+
+// Draws ImGui's picture into the current OpenGL context; capture: may be null.
+void paint_window(GLFWwindow* window, Window::Capture* capture) {
+    int width = 0, height = 0;
+    glfwGetFramebufferSize(window, &width, &height);
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glViewport(0, 0, width, height);
+    // The page's colour: clearing takes less time than a page-sized rectangle where the processor
+    // paints.
+    glClearColor(0x0B / 255.0f, 0x0C / 255.0f, 0x0D / 255.0f, 1);
+    glClear(GL_COLOR_BUFFER_BIT);
+    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+    if (capture) {
+        // Before the swap, after which the content of the buffers is undefined.
+        const std::ptrdiff_t row = std::ptrdiff_t{3} * width;
+        std::vector<std::uint8_t>& pixels = capture->pixels;
+        pixels.resize(row * height);
+        capture->width_px = width;
+        capture->height_px = height;
+        glPixelStorei(GL_PACK_ALIGNMENT, 1);
+        glReadPixels(0, 0, width, height, GL_RGB, GL_UNSIGNED_BYTE, pixels.data());
+        for (int y = 0; y < height / 2; ++y) {  // OpenGL counts rows from the bottom
+            const auto top = pixels.begin() + row * y;
+            const auto bottom = pixels.begin() + row * (height - 1 - y);
+            std::swap_ranges(top, top + row, bottom);
+        }
+    }
+    glfwSwapBuffers(window);
+}
+
+// Fills the monitor that the window is on, and goes back to `windowed`: x, y, width, height.
+void switch_full_screen(GLFWwindow* window, int windowed[4]) {
+    int* old = windowed;
+    if (glfwGetWindowMonitor(window)) {
+        glfwSetWindowMonitor(window, nullptr, old[0], old[1], old[2], old[3], 0);
+        return;
+    }
+    glfwGetWindowPos(window, &old[0], &old[1]);
+    glfwGetWindowSize(window, &old[2], &old[3]);
+    // The monitor that holds the window's middle.
+    GLFWmonitor* monitor = glfwGetPrimaryMonitor();
+    int count = 0;
+    GLFWmonitor** all = glfwGetMonitors(&count);
+    for (int i = 0; i < count; ++i) {
+        int x = 0, y = 0, w = 0, h = 0;
+        glfwGetMonitorWorkarea(all[i], &x, &y, &w, &h);
+        const int across = old[0] + old[2] / 2 - x, down = old[1] + old[3] / 2 - y;
+        if (across >= 0 && across < w && down >= 0 && down < h) monitor = all[i];
+    }
+    if (!monitor) return;
+    const GLFWvidmode* mode = glfwGetVideoMode(monitor);
+    glfwSetWindowMonitor(window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
 }
 
 }  // namespace
@@ -210,59 +263,8 @@ void* Window::native() const {
     return impl_->window;
 }
 
-void paint_window(GLFWwindow* window, Window::Capture* capture) {
-    int width = 0, height = 0;
-    glfwGetFramebufferSize(window, &width, &height);
-    glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    glViewport(0, 0, width, height);
-    // The page's colour: takes less time than a page-sized rectangle where the processor paints.
-    glClearColor(0x0B / 255.0f, 0x0C / 255.0f, 0x0D / 255.0f, 1);
-    glClear(GL_COLOR_BUFFER_BIT);
-    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
-    if (capture) {
-        // Before the swap, after which the content of the buffers is undefined.
-        const std::size_t row = static_cast<std::size_t>(width) * 3;
-        std::vector<std::uint8_t>& pixels = capture->pixels;
-        pixels.resize(row * static_cast<std::size_t>(height));
-        capture->width_px = width;
-        capture->height_px = height;
-        glPixelStorei(GL_PACK_ALIGNMENT, 1);
-        glReadPixels(0, 0, width, height, GL_RGB, GL_UNSIGNED_BYTE, pixels.data());
-        for (int y = 0; y < height / 2; ++y) {  // OpenGL counts rows from the bottom
-            const auto top = pixels.begin() + static_cast<std::ptrdiff_t>(row) * y;
-            const auto bottom =
-                pixels.begin() + static_cast<std::ptrdiff_t>(row) * (height - 1 - y);
-            std::swap_ranges(top, top + static_cast<std::ptrdiff_t>(row), bottom);
-        }
-    }
-    glfwSwapBuffers(window);
-}
-
 void Window::toggle_full_screen() {
-    runtime::toggle_full_screen(impl_->window, impl_->windowed);
-}
-
-void toggle_full_screen(GLFWwindow* window, int windowed[4]) {
-    int* old = windowed;
-    if (glfwGetWindowMonitor(window)) {
-        glfwSetWindowMonitor(window, nullptr, old[0], old[1], old[2], old[3], 0);
-        return;
-    }
-    glfwGetWindowPos(window, &old[0], &old[1]);
-    glfwGetWindowSize(window, &old[2], &old[3]);
-    // The monitor that holds its middle.
-    GLFWmonitor* monitor = glfwGetPrimaryMonitor();
-    int count = 0;
-    GLFWmonitor** all = glfwGetMonitors(&count);
-    for (int i = 0; i < count; ++i) {
-        int x = 0, y = 0, w = 0, h = 0;
-        glfwGetMonitorWorkarea(all[i], &x, &y, &w, &h);
-        const int across = old[0] + old[2] / 2 - x, down = old[1] + old[3] / 2 - y;
-        if (across >= 0 && across < w && down >= 0 && down < h) monitor = all[i];
-    }
-    if (!monitor) return;
-    const GLFWvidmode* mode = glfwGetVideoMode(monitor);
-    glfwSetWindowMonitor(window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
+    switch_full_screen(impl_->window, impl_->windowed);
 }
 
 int key_code(const std::string& name) {
@@ -281,4 +283,140 @@ int key_code(const std::string& name) {
     return found == kNamed.end() ? -1 : found->second;
 }
 
-}  // namespace sonocase::runtime
+struct SecondWindow::Impl {
+    GLFWwindow *window = nullptr, *first = nullptr;
+    ImGuiContext *imgui = nullptr, *first_imgui = nullptr;
+    bool imgui_gl = false;
+    Fonts fonts, first_fonts;
+    int windowed[4] = {0, 0, 1280, 720};
+    double last_s = 0;
+
+    void use_first() {
+        ImGui::SetCurrentContext(first_imgui);
+        use_fonts(first_fonts);
+    }
+};
+
+namespace {
+
+void on_second_key(GLFWwindow* window, int key, int, int action, int) {
+    if (key != GLFW_KEY_F11 || action != GLFW_PRESS) return;
+    auto* impl = static_cast<SecondWindow::Impl*>(glfwGetWindowUserPointer(window));
+    switch_full_screen(window, impl->windowed);
+}
+
+// The monitor beside the primary one; null: there is none.
+GLFWmonitor* other_monitor() {
+    int count = 0;
+    GLFWmonitor** all = glfwGetMonitors(&count);
+    return count > 1 ? all[1] : nullptr;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SecondWindow>> SecondWindow::open(const Window& first,
+                                                         const std::string& title,
+                                                         int width_px,
+                                                         int height_px) {
+    auto second = std::unique_ptr<SecondWindow>(new SecondWindow);
+    second->impl_ = std::make_unique<Impl>();
+    Impl& impl = *second->impl_;
+    impl.first = static_cast<GLFWwindow*>(first.native());
+    int x = 0, y = 0;
+    if (GLFWmonitor* monitor = other_monitor())
+        glfwGetMonitorWorkarea(monitor, &x, &y, &width_px, &height_px);
+    glfwWindowHint(GLFW_FOCUSED, GLFW_FALSE);  // the trainee's keys go on
+    glfwWindowHint(GLFW_FOCUS_ON_SHOW, GLFW_FALSE);
+    impl.window = glfwCreateWindow(width_px, height_px, title.c_str(), nullptr, impl.first);
+    glfwWindowHint(GLFW_FOCUSED, GLFW_TRUE);
+    glfwWindowHint(GLFW_FOCUS_ON_SHOW, GLFW_TRUE);
+    if (!impl.window)
+        return Error{"no second window can be made", "window", "go on with one display"};
+    if (other_monitor()) glfwSetWindowPos(impl.window, x, y);
+    glfwSetWindowSizeLimits(impl.window, 640, 360, GLFW_DONT_CARE, GLFW_DONT_CARE);
+    glfwSetWindowUserPointer(impl.window, &impl);
+    glfwSetKeyCallback(impl.window, on_second_key);
+    glfwMakeContextCurrent(impl.window);
+    glfwSwapInterval(0);  // the first window's display sets the pace
+    glfwMakeContextCurrent(impl.first);
+    impl.first_imgui = ImGui::GetCurrentContext();
+    impl.first_fonts = fonts();
+    impl.imgui = ImGui::CreateContext();
+    ImGui::SetCurrentContext(impl.imgui);
+    ImGui::GetIO().IniFilename = nullptr;
+    impl.imgui_gl = ImGui_ImplOpenGL3_Init("#version 330 core");
+    impl.use_first();
+    if (!impl.imgui_gl)
+        return Error{"the OpenGL functions of the second window cannot be loaded", "window",
+                     "go on with one display"};
+    return second;
+}
+
+SecondWindow::~SecondWindow() {
+    if (!impl_ || !impl_->window) return;
+    // What its context has bound is released in that context, before the context goes.
+    glfwMakeContextCurrent(impl_->window);
+    if (impl_->imgui) {
+        ImGui::SetCurrentContext(impl_->imgui);
+        if (impl_->imgui_gl) ImGui_ImplOpenGL3_Shutdown();
+        ImGui::DestroyContext(impl_->imgui);
+        ImGui::SetCurrentContext(impl_->first_imgui);
+    }
+    glBindTexture(GL_TEXTURE_2D, 0);
+    glFinish();
+    glfwMakeContextCurrent(impl_->first);
+    glfwDestroyWindow(impl_->window);
+}
+
+bool SecondWindow::should_close() const {
+    return glfwWindowShouldClose(impl_->window);
+}
+
+void SecondWindow::show(bool shown) {
+    if (shown == shown_) return;
+    shown_ = shown;
+    if (shown) {
+        glfwSetWindowShouldClose(impl_->window, GLFW_FALSE);
+        glfwShowWindow(impl_->window);
+    } else {
+        glfwHideWindow(impl_->window);
+    }
+}
+
+void SecondWindow::begin_frame(const std::function<float(int, int)>& fits) {
+    Impl& impl = *impl_;
+    impl.first_fonts = fonts();
+    ImGui::SetCurrentContext(impl.imgui);
+    ImGuiIO& io = ImGui::GetIO();
+    int width = 0, height = 0;
+    glfwGetFramebufferSize(impl.window, &width, &height);
+    const float wanted = fits(width, height);
+    if (std::abs(wanted - scale_) > 0.01f) {
+        const bool had_fonts = scale_ > 0;
+        scale_ = wanted;
+        if (had_fonts) ImGui_ImplOpenGL3_DestroyFontsTexture();
+        apply_theme(scale_);
+        impl.fonts = fonts();
+        if (had_fonts) ImGui_ImplOpenGL3_CreateFontsTexture();
+    }
+    use_fonts(impl.fonts);
+    const double now_s = glfwGetTime();
+    io.DeltaTime = static_cast<float>(impl.last_s > 0 ? std::max(now_s - impl.last_s, 1e-3) : 0.1);
+    impl.last_s = now_s;
+    io.DisplaySize = {static_cast<float>(width), static_cast<float>(height)};
+    io.MousePos = {-FLT_MAX, -FLT_MAX};
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui::NewFrame();
+}
+
+void SecondWindow::end_frame(bool capture) {
+    Impl& impl = *impl_;
+    ImGui::Render();
+    glFlush();  // what the first context drew into textures is there for the second
+    glfwMakeContextCurrent(impl.window);
+    paint_window(impl.window, capture ? &capture_ : nullptr);
+    glfwMakeContextCurrent(impl.first);
+    impl.use_first();
+}
+
+}  // namespace sonocase::runtime::inline display

@@ -8,12 +8,12 @@
 
 #include "formats/base/portable_math.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline engine {
 namespace {
 
 const SensorReading* sensor(const TrackerReading& reading, int index) {
     if (index < 0 || index >= reading.sensor_count || index >= kMaxSensors) return nullptr;
-    const SensorReading& s = reading.sensors[static_cast<std::size_t>(index)];
+    const SensorReading& s = reading.sensors[index];
     return s.state == SensorState::ok || s.state == SensorState::poor ? &s : nullptr;
 }
 
@@ -70,21 +70,19 @@ Result<ScanEngine> ScanEngine::create(CaseView bundle,
     Exercise adjusted = exercise;
     if (options.depth_mm > 0) adjusted.probe.depth_mm = options.depth_mm;
     if (options.focus_mm > 0) adjusted.probe.focus_mm = options.focus_mm;
-    Result<Renderer> renderer = Renderer::create(bundle, adjusted, options.render);
-    if (!renderer) return renderer.error();
-    return ScanEngine(bundle, std::move(adjusted), options, std::move(*renderer));
+    SONOCASE_TRY(Renderer renderer, Renderer::create(bundle, adjusted, options.render));
+    return ScanEngine(bundle, std::move(adjusted), options, std::move(renderer));
 }
 
 void ScanEngine::observe(const TrackerReading& reading, bool is_device) {
-    const auto watch = [&](SensorWatch& of, int index) {
-        const bool there = index >= 0 && index < reading.sensor_count && index < kMaxSensors;
+    const auto feed = [&](SensorWatch& watch, int index) {
+        const bool present = index >= 0 && index < reading.sensor_count && index < kMaxSensors;
         const SensorReading none;
-        of.observe(there ? reading.sensors[static_cast<std::size_t>(index)] : none, reading.time_s,
-                   is_device);
+        watch.observe(present ? reading.sensors[index] : none, reading.time_s, is_device);
     };
     const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment_;
-    watch(probe_watch_, places.probe);
-    watch(needle_watch_, places.needle);
+    feed(probe_watch_, places.probe);
+    feed(needle_watch_, places.needle);
     force_watch_.observe(reading.force_n, reading.time_s);
     reading_ = reading;
     ToolPoses tools = tool_poses(reading, calibrations_, assignment_);
@@ -142,7 +140,7 @@ FrameStatus ScanEngine::frame(double now_s,
         force_watch_.taken();
         input.settings.press_mm = sensed_press_mm_;
     }
-    renderer_.settle(input);
+    renderer_.press_probe(input);
     record.press = renderer_.press();
     if (tools_.has_needle) {
         record.puncture = puncture_.update(time_s, input.needle.tip, input.needle.direction,
@@ -202,4 +200,4 @@ FrameStatus ScanEngine::finish(const FrameInput& input,
     return FrameStatus::no_contact;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline engine

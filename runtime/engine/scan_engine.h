@@ -12,26 +12,24 @@
 #include <span>
 #include <vector>
 
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 #include "formats/calibration/calibration.h"
 #include "formats/exercise/exercise.h"
 #include "formats/scoring/anatomy.h"
 #include "formats/scoring/session_score.h"
-#include "runtime/engine/force_watch.h"
+#include "runtime/engine/needle_puncture.h"
 #include "runtime/engine/needle_state.h"
-#include "runtime/engine/puncture_state.h"
 #include "runtime/engine/sensor_watch.h"
 #include "runtime/engine/skin.h"
-#include "runtime/engine/skin_fit.h"
 #include "runtime/engine/tracker_reading.h"
-#include "runtime/imaging/frame/doppler_report.h"
+#include "runtime/imaging/core/frame_input.h"
 #include "runtime/imaging/renderer.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline engine {
 
 struct Calibrations {
     std::optional<Calibration> probe, needle, mannequin;
-    double needle_lag_s = 0;  // by which the needle's readings come later than the probe's
+    double needle_lag_s = 0;  // how much later the needle's readings come than the probe's
 };
 
 // Which sensor is on which tool; -1: none.
@@ -62,9 +60,9 @@ struct FrameRecord {
     NeedleView needle;  // as drawn, after the bend constraint
     PressReport press;  // what the probe does to the tissue
     PunctureReport puncture;
-    DopplerReport doppler;  // of the Doppler view beside the engine, where there is one
+    DopplerReport doppler;  // from the Doppler view beside the engine, where there is one
     double reading_time_s = 0;
-    bool skin_not_fitted = false;  // the probe touches skin that no reading lies near
+    bool skin_not_fitted = false;  // the probe touches skin that was not fitted; see SkinFit
 };
 
 struct EngineOptions {
@@ -132,11 +130,11 @@ class ScanEngine {
 
     Skin skin_;
     SkinFit skin_fit_;
-    std::shared_ptr<CaseAnatomy> anatomy_;  // stays in place when the engine moves
+    std::shared_ptr<CaseAnatomy> anatomy_;  // its address stays when the engine moves
     NeedleState needle_;
     PunctureState puncture_;
     ForceWatch force_watch_;
-    double sensed_press_mm_ = 0;  // that the force sensor's last reading asks for
+    double sensed_press_mm_ = 0;  // depth of pressing that the force sensor's last reading asks for
     Exercise exercise_;
     EngineOptions options_;
     Renderer renderer_;
@@ -147,7 +145,22 @@ class ScanEngine {
     FrameRecord last_;
     ToolPoses tools_;
     std::uint32_t frame_ = 0;
-    double origin_s_ = 0;  // of the session
+    double origin_s_ = 0;  // when the session began
 };
 
-}  // namespace sonocase::runtime
+// Fills the part of a session's sample that comes from a frame: all but the settings' text. Sample
+// is RecordedFrame on the desktop and SessionSample in a page. Does not allocate.
+template <class Sample>
+void fill_sample(const FrameRecord& record, Sample& sample) {
+    sample.time_s = record.input.time_s;
+    sample.frame = record.input.frame;
+    sample.probe_ok = record.tools.has_probe;
+    sample.needle_ok = record.tools.has_needle;
+    sample.mannequin_from_probe = record.tools.mannequin_from_probe;
+    sample.mannequin_from_needle = record.tools.mannequin_from_needle;
+    sample.mannequin_from_drawn = record.needle.mannequin_from_drawn;
+    sample.has_press = record.press.solved;
+    sample.press = {record.press.force_n, record.press.pressure_kpa, record.press.vein_open};
+}
+
+}  // namespace sonocase::runtime::inline engine

@@ -3,8 +3,41 @@
 #include "runtime/engine/sensor_watch.h"
 
 #include <algorithm>
+#include <cmath>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline engine {
+
+void ForceWatch::trust(double force_n) {
+    const bool lifted = force_n == 0 && force_n_ != 0;
+    if (!lifted && std::abs(force_n - force_n_) < options_.min_change_n) return;
+    force_n_ = force_n;
+    fresh_ = true;
+}
+
+void ForceWatch::observe(double force_n, double time_s) {
+    if (force_n < 0) return;
+    if (!(force_n <= options_.max_n)) return;  // this also rejects what is not a number
+    if (!present_) {
+        present_ = true;
+        trusted_s_ = changed_s_ = time_s;
+    }
+    const double before_n = last_n_, before_s = last_s_;
+    if (force_n != last_n_) changed_s_ = time_s;
+    last_n_ = force_n;
+    last_s_ = time_s;
+    frozen_ = force_n > options_.min_n && time_s - changed_s_ > options_.frozen_after_s;
+    if (frozen_) {
+        trust(0);
+        return;
+    }
+    // A jump is believed once a second reading confirms it.
+    const auto within = [&](double from_n, double from_s) {
+        return std::abs(force_n - from_n) <= 1 + options_.max_n_s * std::max(time_s - from_s, 0.0);
+    };
+    if (!within(force_n_, trusted_s_) && !(before_n >= 0 && within(before_n, before_s))) return;
+    trusted_s_ = time_s;
+    trust(force_n < options_.min_n ? 0 : force_n);
+}
 
 const char* verdict_sentence(SensorVerdict verdict) {
     switch (verdict) {
@@ -66,4 +99,4 @@ SensorVerdict SensorWatch::verdict(double now_s) const {
     return SensorVerdict::fine;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline engine

@@ -1,12 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Notices a sensor that cannot be trusted: frozen, jumping or silent. Devices report such readings
-// as good.
+// Notices sensors that cannot be trusted: a pose sensor that is frozen, jumping or silent, and a
+// force sensor whose values are impossible or frozen. Devices report such readings as good.
 #pragma once
 
 #include "runtime/engine/tracker_reading.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline engine {
+
+struct ForceWatchOptions {
+    double max_n = 100;          // more is a fault of the sensor
+    double max_n_s = 400;        // a hand's tap rises no faster
+    double frozen_after_s = 1;   // no bit of a force above min_n changes
+    double min_n = 0.2;          // less counts as 0
+    double min_change_n = 0.05;  // a smaller change is not worth solving again
+};
+
+// Filters the readings of a force sensor: a value that is not a number, one that jumps faster than
+// a hand presses, or one that never changes is not trusted and leaves the last force as it was. A
+// sensor that freezes while it is pressed counts as released after a second, so that the picture
+// does not stay pressed for ever.
+class ForceWatch {
+  public:
+    explicit ForceWatch(const ForceWatchOptions& options = {}) : options_(options) {}
+
+    // Call this with every reading; force_n negative: the tracker has no such sensor.
+    void observe(double force_n, double time_s);
+    bool present() const { return present_; }
+    bool frozen() const { return frozen_; }
+    double force_n() const { return force_n_; }  // trusted; 0 while frozen
+    // The trusted force has changed since taken().
+    bool fresh() const { return fresh_; }
+    void taken() { fresh_ = false; }
+
+  private:
+    void trust(double force_n);
+
+    ForceWatchOptions options_;
+    bool present_ = false, frozen_ = false, fresh_ = false;
+    double force_n_ = 0;
+    double trusted_s_ = 0;                // time of the last reading that was believed
+    double last_n_ = -1, changed_s_ = 0;  // the last reading, believed or not
+    double last_s_ = 0;
+};
 
 struct SensorWatchOptions {
     double stale_after_s = 0.25;   // no new reading
@@ -43,4 +79,4 @@ class SensorWatch {
     int jumps_ = 0;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline engine

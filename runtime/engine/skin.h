@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The skin as the player's tools touch it: where the cooked labels begin. Read from the label
-// volume itself and not from a mesh, so that what the mouse touches is exactly what the picture
-// shows, in every bundle, with or without a surface mesh. Points and directions are in the frame
-// `mannequin`.
+// The skin as the player's tools touch it: where the cooked labels begin. It is read from the label
+// volume itself and not from a mesh, so that the mouse touches exactly what the picture shows, in
+// every bundle, with or without a surface mesh. Points and directions are in the frame `mannequin`.
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "formats/bundle/case_bundle.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline engine {
 
 class Skin {
   public:
@@ -43,4 +44,22 @@ class Skin {
     const CaseBundle* bundle_;
 };
 
-}  // namespace sonocase::runtime
+// Where the patient's skin was not fitted: no reading of the mannequin lies near, so that the body
+// under it is a guess.
+class SkinFit {
+  public:
+    SkinFit() = default;  // everything is fitted
+    // Reads CaseBundle::skin_unfitted. Cost: one pass over the skin's points.
+    explicit SkinFit(const CaseBundle& bundle);
+
+    // True where most skin points within some 18 mm of a place, frame `mannequin`, were not fitted.
+    // Where there is no skin the answer is false. Constant time, no allocation.
+    bool not_fitted(Point3 p) const;
+
+  private:
+    Point3 lower_;
+    Int3 size_{0, 0, 0};              // cells
+    std::vector<std::int32_t> vote_;  // per cell: unfitted points less fitted ones
+};
+
+}  // namespace sonocase::runtime::inline engine

@@ -9,7 +9,7 @@
 
 #include "formats/base/geometry.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline engine {
 
 inline constexpr int kMaxSensors = 16;
 inline constexpr int kProbeSensor = 0;  // unless the sensors are assigned otherwise
@@ -36,10 +36,10 @@ struct TrackerReading {
     double device_time_s = -1;   // on the device's own clock; negative: it has none
     // The sensors are the tools themselves and `world` is the mannequin: no calibration applies.
     bool in_mannequin = false;
-    // On the probe's face, newtons, of a force or pressure sensor; negative: there is none.
+    // Force on the probe's face, newtons, from a force or pressure sensor; negative: there is none.
     double force_n = -1;
     int sensor_count = 0;
     std::array<SensorReading, kMaxSensors> sensors{};
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline engine

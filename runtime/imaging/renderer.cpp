@@ -7,9 +7,9 @@
 #include <cassert>
 #include <cmath>
 
-#include "runtime/imaging/accuracy/governor.h"
-#include "runtime/imaging/formation/image_formation.h"
-#include "runtime/imaging/host/pass_timer.h"
+#include "runtime/imaging/core/governor.h"
+#include "runtime/imaging/core/host.h"
+#include "runtime/imaging/core/image_formation.h"
 #include "runtime/imaging/paper/paper_formation.h"
 #include "runtime/imaging/physical/physical_formation.h"
 #include "runtime/imaging/press/probe_press.h"
@@ -92,7 +92,7 @@ void set_gain(const ImageSettings& s, std::span<float> row_gain_db) {
             s.tgc_db[i] * (1 - (at - static_cast<double>(i))) +
             s.tgc_db[std::min<std::size_t>(i + 1, 7)] * (at - static_cast<double>(i));
         const double db = s.gain_db + slider;
-        row_gain_db[static_cast<std::size_t>(k)] =
+        row_gain_db[k] =
             static_cast<float>(std::isfinite(db) ? std::clamp(db, -100.0, 100.0) : 0.0);
     }
 }
@@ -141,15 +141,15 @@ struct Renderer::Impl {
         }
     }
 
-    Level& now() { return levels[static_cast<std::size_t>(governor.level())]; }
+    Level& current() { return levels[governor.level()]; }
 
     Exercise exercise;
     RenderOptions options;
     NeedleModel needle;  // as the model draws it
     EffectChoice effects;
-    int deformation = -1;                      // row of the effect
+    int deformation = -1;                      // row of the effect in the table
     std::unique_ptr<press::ProbePress> probe;  // null: the effect is off
-    PressReport press;                         // of the last frame
+    PressReport press;                         // from the last frame
     Rigid shown_pose;
     std::vector<Level> levels;  // finest first; one without a frame budget
     Governor governor;
@@ -166,11 +166,9 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 Result<Renderer> Renderer::create(CaseView bundle,
                                   const Exercise& exercise,
                                   const RenderOptions& options) {
-    if (const Status fits = check_options(exercise, options); !fits) return fits.error();
-    const Result<SimdTarget> simd = simd_of(options);
-    if (!simd) return simd.error();
-    Result<EffectChoice> effects = choice_of(options);
-    if (!effects) return effects.error();
+    SONOCASE_TRY_DONE(check_options(exercise, options));
+    SONOCASE_TRY(const SimdTarget simd, simd_of(options));
+    SONOCASE_TRY(EffectChoice effects, choice_of(options));
     const ImageModelInfo& info = info_of(options.model);
     const bool reference = options.kind == RendererKind::reference;
     JobRunner& jobs = options.host.jobs ? *options.host.jobs : serial_jobs();
@@ -178,23 +176,22 @@ Result<Renderer> Renderer::create(CaseView bundle,
 
     auto impl = std::make_unique<Impl>(exercise, options);
     Impl& m = *impl;
-    m.effects = std::move(*effects);
+    m.effects = std::move(effects);
     if (!(m.needle.slab_mm > 0)) m.needle.slab_mm = info.needle_slab_mm(exercise);
     for (const char* name : info.effects) m.costs.push_back({name, 0, false, ""});
     m.deformation = row_of_effect(info, "deformation");
-    if (m.deformation >= 0 && m.effects.on[static_cast<std::size_t>(m.deformation)])
-        m.probe = std::make_unique<press::ProbePress>(bundle, exercise, *simd);
+    if (m.deformation >= 0 && m.effects.on[m.deformation])
+        m.probe = std::make_unique<press::ProbePress>(bundle, exercise, simd);
     const int lines = options.scanlines > 0 ? options.scanlines : info.scanlines(exercise, options);
     const int samples = options.samples > 0 ? options.samples : info.samples(exercise, options);
-    Result<std::unique_ptr<ImageFormation>> formation =
-        info.create({bundle,
-                     m.exercise,
-                     m.options,
-                     m.effects,
-                     lines,
-                     {*m.workers, jobs, *simd, options.host.clock}});
-    if (!formation) return formation.error();
-    m.formation = std::move(*formation);
+    SONOCASE_TRY(std::unique_ptr<ImageFormation> formation,
+                 info.create({bundle,
+                              m.exercise,
+                              m.options,
+                              m.effects,
+                              lines,
+                              {*m.workers, jobs, simd, options.host.clock}}));
+    m.formation = std::move(formation);
 
     const bool governed =
         options.frame_budget_ms > 0 && options.host.clock != nullptr && !reference;
@@ -205,7 +202,7 @@ Result<Renderer> Renderer::create(CaseView bundle,
         Impl::Level& level = m.levels.emplace_back();
         level.geometry =
             make_scan_geometry(exercise.probe, l, k, options.width_px, options.height_px);
-        level.row_gain_db.assign(static_cast<std::size_t>(k), 0.0f);
+        level.row_gain_db.assign(k, 0.0f);
         m.formation->add_level(level.geometry, accuracy.looks);
         if (!governed) break;
     }
@@ -214,14 +211,13 @@ Result<Renderer> Renderer::create(CaseView bundle,
 
 FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pixels) {
     Impl& m = *impl_;
-    assert(pixels.size() == static_cast<std::size_t>(m.options.width_px) *
-                                static_cast<std::size_t>(m.options.height_px));
+    assert(pixels.size() == static_cast<std::size_t>(m.options.width_px) * m.options.height_px);
     if (!valid_pose(input.mannequin_from_probe)) return FrameStatus::held_bad_pose;
-    Impl::Level& level = m.now();
+    Impl::Level& level = m.current();
     set_gain(input.settings, level.row_gain_db);
     PassTimer timer(m.options.host.clock);
     FrameInput held = input;
-    settle(input);
+    press_probe(input);
     held.mannequin_from_probe = m.shown_pose;
     const double press_ms = timer.lap_ms();
     NeedleShape needle;
@@ -236,18 +232,17 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
     const FrameRequest request{held, shown ? &needle : nullptr, pressed, level.row_gain_db};
     if (m.options.kind == RendererKind::reference) {
         m.formation->render_reference(request, pixels, m.costs);
-        if (input.settings.flip_left_right)
-            flip(pixels, static_cast<std::size_t>(m.options.width_px));
+        if (input.settings.flip_left_right) flip(pixels, m.options.width_px);
         return FrameStatus::rendered;
     }
     const FrameStatus status =
         m.formation->render_fast(m.governor.level(), request, pixels, m.costs);
-    if (pressed != nullptr) m.costs[static_cast<std::size_t>(m.deformation)].ms += press_ms;
+    if (pressed != nullptr) m.costs[m.deformation].ms += press_ms;
     m.governor.frame_took(press_ms + timer.lap_ms());
     return status;
 }
 
-void Renderer::settle(const FrameInput& input) {
+void Renderer::press_probe(const FrameInput& input) {
     Impl& m = *impl_;
     if (!valid_pose(input.mannequin_from_probe)) return;
     m.shown_pose = input.mannequin_from_probe;
@@ -273,12 +268,12 @@ Point3 Renderer::at_rest(Point3 now) const {
     return impl_->probe ? impl_->probe->at_rest(now) : now;
 }
 
-Point3 Renderer::now_at(Point3 rest) const {
-    return impl_->probe ? impl_->probe->now_at(rest) : rest;
+Point3 Renderer::current_position(Point3 rest) const {
+    return impl_->probe ? impl_->probe->current_position(rest) : rest;
 }
 
-bool Renderer::shut(Point3 rest) const {
-    return impl_->probe && impl_->probe->shut(rest);
+bool Renderer::closed(Point3 rest) const {
+    return impl_->probe && impl_->probe->closed(rest);
 }
 
 std::span<const EffectCost> Renderer::costs() const {
@@ -286,13 +281,13 @@ std::span<const EffectCost> Renderer::costs() const {
 }
 
 Renderer::Accuracy Renderer::accuracy() const {
-    const ScanGeometry &g = impl_->now().geometry, &full = impl_->levels.front().geometry;
-    return {impl_->governor.level(),
-            static_cast<int>(impl_->levels.size()),
-            g.scanlines,
-            g.samples,
-            full.scanlines,
-            full.samples};
+    const ScanGeometry &g = impl_->current().geometry, &full = impl_->levels.front().geometry;
+    return {.level = impl_->governor.level(),
+            .levels = static_cast<int>(impl_->levels.size()),
+            .scanlines = g.scanlines,
+            .samples = g.samples,
+            .full_scanlines = full.scanlines,
+            .full_samples = full.samples};
 }
 
 Renderer::Layout Renderer::layout() const {

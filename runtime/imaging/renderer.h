@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
-#include "runtime/imaging/frame/frame_input.h"
-#include "runtime/imaging/frame/render_options.h"
+#include "runtime/imaging/core/frame_input.h"
+#include "runtime/imaging/core/render_options.h"
 
 namespace sonocase::runtime {
 
@@ -39,28 +39,28 @@ class Renderer {
     // 512 x 512 pixels; the reference renderer takes seconds.
     FrameStatus render(const FrameInput& input, std::span<std::uint8_t> pixels);
 
-    // Presses the probe as render() of this input will, so that at_rest(), now_at(), shut() and
-    // press() already speak of that frame: a needle finds its layers before it is drawn. render()
-    // does not solve again. A pose that is not rigid changes nothing.
-    void settle(const FrameInput& input);
+    // Presses the probe as render() of this input will, so that at_rest(), current_position(),
+    // closed() and press() already describe that frame: a needle finds its layers before it is
+    // drawn. render() does not solve again. A pose that is not rigid changes nothing.
+    void press_probe(const FrameInput& input);
 
-    // Of the last frame: one per effect of the model, in order of execution.
+    // Costs of the last frame: one per effect of the model, in order of execution.
     std::span<const EffectCost> costs() const;
 
-    // Of the last frame.
+    // What the probe did to the tissue in the last frame.
     const PressReport& press() const;
-    // Of the last frame, in the frame `mannequin`: where the tissue that is at a place lies at
-    // rest, where tissue from a place at rest is now, and whether a place at rest lies in a vein
-    // that is pressed shut. Without pressing: the place itself, and false. Cost: 2 us, 80 us, 1 us.
+    // For the last frame, in the frame `mannequin`: where the tissue that is at a place lies at
+    // rest, where tissue from a place at rest is now, and whether a place at rest lies in a
+    // collapsed vein. Without pressing: the place itself, and false. Cost: 2 us, 80 us, 1 us.
     Point3 at_rest(Point3 now) const;
-    Point3 now_at(Point3 rest) const;
-    bool shut(Point3 rest) const;
+    Point3 current_position(Point3 rest) const;
+    bool closed(Point3 rest) const;
     // The depth of pressing, [0, 40] mm, at which the force on a face at this pose is `force_n`:
-    // force rises with depth. start_mm: a guess. Solves six times at most: 2 ms. 0 without the
-    // effect.
+    // force rises with depth. start_mm: a first guess. Solves at most six times: 2 ms. Returns 0
+    // without the effect.
     double press_mm_for(const Rigid& mannequin_from_probe, double force_n, double start_mm);
 
-    // Where the face stood: the input's pose, pressed, and held back by bone.
+    // Pose of the face in the last frame: the input's pose, pressed, and held back by bone.
     const Rigid& shown_pose() const;
 
     // What a frame budget gives up at present; level 0 is full accuracy.

@@ -3,11 +3,11 @@
 #include <pybind11/stl.h>
 
 #include "bindings.h"
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "formats/recording/session.h"
 #include "formats/scoring/session_score.h"
+#include "frame_renderer.h"
 #include "numpy_values.h"
-#include "opened_case.h"
 
 namespace sonocase::python {
 namespace {
@@ -93,7 +93,7 @@ py::dict read_session(const std::string& path) {
         std::copy_n(from.data(), 16, to.mutable_data(n));
     };
     for (py::ssize_t n = 0; n < count; ++n) {
-        const SessionSample& sample = session.samples[static_cast<std::size_t>(n)];
+        const SessionSample& sample = session.samples[n];
         time_s.mutable_at(n) = sample.time_s;
         frame.mutable_at(n) = sample.frame;
         probe_ok.mutable_at(n) = sample.probe_ok;

@@ -1,18 +1,134 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include <pybind11/stl.h>
+// What Python's arguments say of a frame, checked: each error names the argument and what it takes.
 
 #include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <limits>
 #include <optional>
+#include <vector>
 
+#include <pybind11/stl.h>
+
+#include "bind_truth.h"
 #include "bindings.h"
 #include "doppler_values.h"
-#include "formats/files/machine_file.h"
-#include "frame_arguments.h"
+#include "formats/files/load_save.h"
 #include "frame_renderer.h"
-#include "truth_values.h"
+#include "numpy_values.h"
 
 namespace sonocase::python {
+
+using Bytes = py::array_t<std::uint8_t, py::array::c_style>;
+
+void set_scalars(double time_s, std::int64_t frame, double gain_db, runtime::FrameInput& input);
+void set_press(double press_mm, runtime::FrameInput& input);
+
+// One task per pose. poses: (n, 4, 4); needles, times_s: None, or one per pose.
+std::vector<FrameTask> batch_tasks(py::handle poses,
+                                   py::handle needles,
+                                   py::handle times_s,
+                                   std::int64_t first_frame,
+                                   double gain_db);
+// press_mm: one number, or one per frame.
+void press_batch(const py::object& press_mm, std::vector<FrameTask>& tasks);
+// None, or a pair or None per frame.
+void dent_batch(py::handle dents, std::vector<FrameTask>& tasks);
+
+// out itself, if it is a writeable array of bytes of this shape.
+py::object checked_out(const py::object& out, const std::vector<py::ssize_t>& shape);
+
+namespace {
+
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+}  // namespace
+
+void set_scalars(double time_s, std::int64_t frame, double gain_db, runtime::FrameInput& input) {
+    if (!std::isfinite(time_s)) throw py::value_error("time_s: not finite");
+    if (!std::isfinite(gain_db)) throw py::value_error("gain_db: not finite");
+    if (frame < 0 || frame > std::numeric_limits<std::uint32_t>::max())
+        throw py::value_error("frame: give 0 to 2^32 - 1");
+    input.time_s = time_s;
+    input.frame = static_cast<std::uint32_t>(frame);
+    input.settings.gain_db = gain_db;
+}
+
+void set_press(double press_mm, runtime::FrameInput& input) {
+    if (!(press_mm >= 0 && press_mm <= 40)) throw py::value_error("press_mm: give 0 to 40");
+    input.settings.press_mm = press_mm;
+}
+
+void press_batch(const py::object& press_mm, std::vector<FrameTask>& tasks) {
+    const Doubles values(numbers_from(press_mm, "press_mm"));
+    const bool one = values.ndim() == 0;
+    if (!one && !(values.ndim() == 1 && values.shape(0) == static_cast<py::ssize_t>(tasks.size())))
+        throw py::value_error("press_mm: give one number, or one per pose");
+    for (std::size_t n = 0; n < tasks.size(); ++n)
+        set_press(values.data()[one ? 0 : n], tasks[n].input);
+}
+
+void dent_batch(py::handle dents, std::vector<FrameTask>& tasks) {
+    if (dents.is_none()) return;
+    if (!PySequence_Check(dents.ptr()) || py::len(dents) != tasks.size())
+        throw py::value_error("dents: give one per pose; None for no dent");
+    const auto dent_of = py::reinterpret_borrow<py::sequence>(dents);
+    for (std::size_t n = 0; n < tasks.size(); ++n) {
+        const std::string name = "dents[" + std::to_string(n) + "]";
+        set_dent(py::object(dent_of[n]), tasks[n].input, name.c_str());
+    }
+}
+
+py::object checked_out(const py::object& out, const std::vector<py::ssize_t>& shape) {
+    if (!py::isinstance<Bytes>(out))
+        throw py::type_error("out: give a C-contiguous array of dtype uint8");
+    const Bytes a = py::reinterpret_borrow<Bytes>(out);
+    bool fits = a.ndim() == static_cast<py::ssize_t>(shape.size());
+    std::string wanted;
+    for (std::size_t i = 0; i < shape.size(); ++i) {
+        fits = fits && a.shape(static_cast<py::ssize_t>(i)) == shape[i];
+        wanted += (i > 0 ? ", " : "") + std::to_string(shape[i]);
+    }
+    if (!fits) throw py::value_error("out: give an array of shape (" + wanted + ")");
+    if (!a.writeable()) throw py::value_error("out: the array is read-only");
+    return out;
+}
+
+std::vector<FrameTask> batch_tasks(py::handle poses,
+                                   py::handle needles,
+                                   py::handle times_s,
+                                   std::int64_t first_frame,
+                                   double gain_db) {
+    const py::array a = numbers_from(poses, "poses");
+    if (a.ndim() != 3 || a.shape(1) != 4 || a.shape(2) != 4)
+        throw py::value_error("poses: give an array of shape (n, 4, 4), rigid motions in mm");
+    const Doubles rows(a);
+    std::vector<FrameTask> tasks(rows.shape(0));
+    std::optional<Doubles> times;
+    if (!times_s.is_none()) {
+        times = Doubles(numbers_from(times_s, "times_s"));
+        if (times->ndim() != 1 || times->shape(0) != rows.shape(0))
+            throw py::value_error("times_s: give one number per pose");
+    }
+    py::sequence needle_of;
+    if (!needles.is_none()) {
+        needle_of = py::reinterpret_borrow<py::sequence>(needles);
+        if (!PySequence_Check(needles.ptr()) ||
+            py::len(needle_of) != static_cast<std::size_t>(rows.shape(0)))
+            throw py::value_error("needles: give one per pose; None for no needle");
+    }
+    for (std::size_t n = 0; n < tasks.size(); ++n) {
+        runtime::FrameInput& input = tasks[n].input;
+        input.mannequin_from_probe =
+            rigid_from(rows.data(static_cast<py::ssize_t>(n)), "poses[" + std::to_string(n) + "]");
+        if (!needles.is_none()) set_needle(py::object(needle_of[n]), input);
+        set_scalars(times ? times->at(static_cast<py::ssize_t>(n)) : 0,
+                    first_frame + static_cast<std::int64_t>(n), gain_db, input);
+    }
+    return tasks;
+}
+
 namespace {
 
 // One at a time: raises where another thread is inside.
@@ -96,7 +212,7 @@ class PyRenderer {
         FrameTask task;
         task.input = last();
         const TruthArrays arrays = TruthArrays::make(names, -1, height(), width());
-        task.planes = arrays.planes(0, static_cast<std::size_t>(width() * height()));
+        task.planes = arrays.planes(0, width() * height());
         const Turn turn(busy_);
         check(usable(renderer_->opened()));
         check(renderer_->prepare_truth());
@@ -127,7 +243,7 @@ class PyRenderer {
         py::object pictures = out.is_none() ? py::object(Bytes({count, height(), width()}))
                                             : checked_out(out, {count, height(), width()});
         std::uint8_t* to = static_cast<Bytes&>(pictures).mutable_data();
-        const auto area = static_cast<std::size_t>(width() * height());
+        const std::size_t area = width() * height();
         TruthArrays arrays;
         if (truth) arrays = TruthArrays::make(*truth, count, height(), width());
         for (std::size_t n = 0; n < tasks.size(); ++n) {
@@ -183,7 +299,7 @@ class PyRenderer {
         const py::ssize_t rows = runtime::doppler_rows(mode_, static_cast<int>(height()));
         py::object picture = out.is_none() ? py::object(Bytes({rows, width(), py::ssize_t{3}}))
                                            : checked_out(out, {rows, width(), 3});
-        std::vector<std::uint8_t> grey(static_cast<std::size_t>(width() * height()));
+        std::vector<std::uint8_t> grey(width() * height());
         task.pixels = grey;
         const std::span<std::uint8_t> rgb(static_cast<Bytes&>(picture).mutable_data(),
                                           static_cast<std::size_t>(3 * width() * rows));

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <string>
 
+#include "bind_truth.h"
 #include "bindings.h"
-#include "truth_values.h"
 
 namespace sonocase::python {
 namespace {

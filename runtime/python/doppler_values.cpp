@@ -67,9 +67,8 @@ bool set_one(const std::string& name, py::handle value, DopplerSettings& setting
 }
 
 std::string label_of(const std::vector<Label>& labels, int label) {
-    return label >= 0 && label < static_cast<int>(labels.size())
-               ? labels[static_cast<std::size_t>(label)].name
-               : std::string();
+    return label >= 0 && label < static_cast<int>(labels.size()) ? labels[label].name
+                                                                 : std::string();
 }
 
 }  // namespace

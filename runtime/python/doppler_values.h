@@ -6,7 +6,7 @@
 #include <string>
 
 #include "numpy_values.h"
-#include "runtime/imaging/doppler/view/doppler_view.h"
+#include "runtime/imaging/doppler/doppler_view.h"
 
 namespace sonocase::python {
 

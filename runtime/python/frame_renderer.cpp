@@ -1,14 +1,56 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "frame_renderer.h"
-
 #include <algorithm>
 #include <atomic>
 #include <system_error>
 #include <thread>
 #include <utility>
 
+#include "formats/files/load_save.h"
+#include "frame_renderer.h"
+
 namespace sonocase::python {
+
+Result<std::shared_ptr<OpenedCase>> open_case(const std::string& path) {
+    SONOCASE_TRY(StreamedBundle bundle, open_bundle(path));
+    auto opened = std::make_shared<OpenedCase>();
+    opened->path = path;
+    opened->bundle = std::move(bundle);
+    for (const EmbeddedExercise& embedded : opened->bundle->exercises) {
+        Result<Exercise> exercise = parse_exercise(embedded.toml, path + ":" + embedded.name);
+        if (!exercise) {
+            opened->warnings.push_back(exercise.error().message());
+            continue;
+        }
+        if (exercise->name.empty()) exercise->name = embedded.name;
+        opened->exercises.push_back(std::move(*exercise));
+    }
+    return opened;
+}
+
+Status usable(const OpenedCase& opened) {
+    if (opened.closed) return Error{"the case is closed", opened.path, "open it again"};
+    const VoxelBlocks* blocks = opened.bundle.blocks();
+    if (blocks != nullptr && blocks->damaged()) return blocks->status();
+    return Done{};
+}
+
+Result<Exercise> exercise_named(const OpenedCase& opened, const std::string& name) {
+    if (name.empty() && !opened.exercises.empty()) return opened.exercises.front();
+    std::string names;
+    for (const Exercise& exercise : opened.exercises) {
+        if (exercise.name == name) return exercise;
+        names += (names.empty() ? "" : ", ") + exercise.name;
+    }
+    if (name.empty()) {
+        Exercise exercise;
+        exercise.name = "free-scan";
+        exercise.kind = "scan";
+        return exercise;
+    }
+    return Error{"no exercise named " + name, opened.path,
+                 names.empty() ? "this bundle holds none" : "this bundle holds: " + names};
+}
 
 Result<std::unique_ptr<FrameRenderer>> FrameRenderer::create(
     std::shared_ptr<OpenedCase> opened,
@@ -21,24 +63,22 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::create(
         static const auto textures = runtime::make_physical_textures();
         renderer->options_.textures = textures;
     }
-    if (const Status added = renderer->add_worker(); !added) return added.error();
+    SONOCASE_TRY_DONE(renderer->add_worker());
     return renderer;
 }
 
 Status FrameRenderer::add_worker() {
     runtime::EngineOptions options;
     options.render = options_;
-    auto engine = runtime::ScanEngine::create(opened_->bundle, exercise_, options);
-    if (!engine) return engine.error();
-    workers_.push_back(std::make_unique<Worker>(std::move(*engine)));
+    SONOCASE_TRY(auto engine, runtime::ScanEngine::create(opened_->bundle, exercise_, options));
+    workers_.push_back(std::make_unique<Worker>(std::move(engine)));
     return Done{};
 }
 
 Status FrameRenderer::add_truth(Worker& worker) {
     if (worker.truth != nullptr) return Done{};
-    auto truth = runtime::TruthRenderer::create(opened_->bundle, exercise_, options_);
-    if (!truth) return truth.error();
-    worker.truth = std::make_unique<runtime::TruthRenderer>(std::move(*truth));
+    SONOCASE_TRY(auto truth, runtime::TruthRenderer::create(opened_->bundle, exercise_, options_));
+    worker.truth = std::make_unique<runtime::TruthRenderer>(std::move(truth));
     return Done{};
 }
 
@@ -48,9 +88,8 @@ Status FrameRenderer::prepare_truth() {
 
 Status FrameRenderer::prepare_doppler() {
     if (doppler_ != nullptr) return Done{};
-    auto view = runtime::DopplerView::create(opened_->bundle, exercise_, options_);
-    if (!view) return view.error();
-    doppler_ = std::make_unique<runtime::DopplerView>(std::move(*view));
+    SONOCASE_TRY(auto view, runtime::DopplerView::create(opened_->bundle, exercise_, options_));
+    doppler_ = std::make_unique<runtime::DopplerView>(std::move(view));
     return Done{};
 }
 
@@ -87,14 +126,14 @@ void FrameRenderer::describe(FrameTask& task) {
 Result<bool> FrameRenderer::render_all(std::span<FrameTask> tasks,
                                        int threads,
                                        const std::function<bool()>& interrupted) {
-    const std::size_t wanted = std::clamp<std::size_t>(static_cast<std::size_t>(threads), 1,
-                                                       std::max<std::size_t>(tasks.size(), 1));
+    const std::size_t wanted =
+        std::clamp<std::size_t>(threads, 1, std::max<std::size_t>(tasks.size(), 1));
     while (workers_.size() < wanted) {
-        if (const Status added = add_worker(); !added) return added.error();
+        SONOCASE_TRY_DONE(add_worker());
     }
     if (!tasks.empty() && tasks.front().wants_truth) {
         for (std::size_t part = 0; part < wanted; ++part) {
-            if (const Status added = add_truth(*workers_[part]); !added) return added.error();
+            SONOCASE_TRY_DONE(add_truth(*workers_[part]));
         }
     }
     std::atomic<std::size_t> next{0};

@@ -1,21 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Frames as `sonoplay --headless` renders them, one at a time or many on several threads. Nothing
-// here knows Python.
+// A case and its renderer as Python holds them. Nothing here knows Python.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "opened_case.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
 #include "runtime/engine/scan_engine.h"
-#include "runtime/imaging/doppler/view/doppler_picture.h"
+#include "runtime/engine/skin.h"
+#include "runtime/imaging/doppler/doppler_picture.h"
+#include "runtime/imaging/renderer.h"
 #include "runtime/imaging/truth/frame_truth.h"
 
 namespace sonocase::python {
+
+// Stays in place and is shared by its renderers, so that closing it frees nothing that a frame on
+// another thread still reads.
+struct OpenedCase {
+    std::string path;
+    StreamedBundle bundle;
+    std::vector<Exercise> exercises;    // those that could be read
+    std::vector<std::string> warnings;  // whole sentences, about those that could not
+    std::atomic<bool> closed{false};
+};
+
+// Errors: a file that cannot be read or is not a bundle.
+Result<std::shared_ptr<OpenedCase>> open_case(const std::string& path);
+
+// An Error once the case is closed, or once a part of it that was needed turned out to be damaged.
+Status usable(const OpenedCase& opened);
+
+// The exercise of that name; "" means the first, and where the bundle holds none, a free scan.
+Result<Exercise> exercise_named(const OpenedCase& opened, const std::string& name);
 
 // Where one frame of a batch goes.
 struct FrameTask {
@@ -29,6 +52,7 @@ struct FrameTask {
     runtime::FrameTruth truth;
 };
 
+// Renders frames as `sonoplay --headless` does, one at a time or many on several threads.
 class FrameRenderer {
   public:
     // Errors: those of ScanEngine::create.
@@ -39,7 +63,7 @@ class FrameRenderer {
     void render(FrameTask& task);
     // Before the first frame with truth. Errors: those of TruthRenderer::create.
     Status prepare_truth();
-    // Of a frame that was rendered before.
+    // The truth of a frame that was rendered before.
     void describe(FrameTask& task);
     // Renders all, with truth where tasks want it, on `threads` threads, the caller's included;
     // each has an engine of its own, which is kept for the next time. interrupted: asked by the

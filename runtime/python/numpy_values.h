@@ -12,7 +12,7 @@
 
 #include "formats/base/geometry.h"
 #include "formats/base/result.h"
-#include "runtime/imaging/frame/frame_input.h"
+#include "runtime/imaging/core/frame_input.h"
 
 namespace sonocase::python {
 

@@ -11,11 +11,11 @@
 #include <thread>
 
 #include "formats/files/growing_sequence.h"
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "formats/text/number_text.h"
-#include "runtime/recording/doppler_sample.h"
+#include "runtime/recording/session_words.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline recording {
 namespace {
 
 constexpr std::size_t kQueue = 8192;  // frames: more than a minute at 120 Hz
@@ -87,10 +87,10 @@ struct SessionRecorder::Impl {
         if (written) {
             state.frames_written += waiting.size();
             waiting.clear();
-            state.problem.clear();
+            state.problem = {};
         } else {
-            state.problem =
-                "The session goes on but is not being recorded: " + written.error().message() + ".";
+            state.problem = Message("The session goes on but is not being recorded: {}.",
+                                    {written.error().message()});
         }
         state.frames_dropped = dropped.load();
     }
@@ -128,22 +128,22 @@ struct SessionRecorder::Impl {
             frame.number = picture.frame;
             frame.timestamp_s = frame.unfiltered_timestamp_s = picture.time_s;
             frame.fields = {{"Event", picture.why}};
-            if (picture.layout.mm_per_px > 0) {  // what lets a viewer measure in it
+            if (picture.layout.mm_per_px > 0) {  // with these a viewer can measure in the picture
                 const Renderer::Layout& layout = picture.layout;
                 frame.fields.push_back({"MmPerPx", number_text(layout.mm_per_px)});
                 frame.fields.push_back({"OriginXPx", number_text(layout.origin_x_px)});
                 frame.fields.push_back({"OriginYPx", number_text(layout.origin_y_px)});
             }
             pictures.frames.push_back(std::move(frame));
-            const std::size_t bytes = static_cast<std::size_t>(picture.width_px) *
-                                      static_cast<std::size_t>(picture.height_px);
+            const std::size_t bytes =
+                static_cast<std::size_t>(picture.width_px) * picture.height_px;
             pictures.pixels.insert(pictures.pixels.end(), picture.pixels.begin(),
                                    picture.pixels.begin() + static_cast<std::ptrdiff_t>(bytes));
             const Status saved = save_sequence(pictures, pictures_path(path), true);
             if (!saved) {
                 const std::lock_guard lock(mutex);
-                state.problem =
-                    "A picture of this session was not kept: " + saved.error().message() + ".";
+                state.problem = Message("A picture of this session was not kept: {}.",
+                                        {saved.error().message()});
             }
         }
         picture.full.store(false, std::memory_order_release);
@@ -181,9 +181,8 @@ Result<std::unique_ptr<SessionRecorder>> SessionRecorder::start(const std::strin
     Sequence head;
     head.transforms = {kProbeTransform, kNeedleTransform, kDrawnTransform};
     head.fields = fields_from_header(header);
-    auto file = GrowingSequence::create(path, head);
-    if (!file) return file.error();
-    auto impl = std::make_unique<Impl>(std::move(*file), path, exercise, labels);
+    SONOCASE_TRY(auto file, GrowingSequence::create(path, head));
+    auto impl = std::make_unique<Impl>(std::move(file), path, exercise, labels);
     impl->pictures.fields = head.fields;
     impl->thread = std::thread([raw = impl.get()] { raw->run(); });
     return std::unique_ptr<SessionRecorder>(new SessionRecorder(std::move(impl)));
@@ -253,10 +252,10 @@ Status SessionRecorder::finish() {
     impl.write_batch();
     impl.write_picture();
     if (!impl.waiting.empty()) {
-        return Error{std::to_string(impl.waiting.size()) + " frames were not recorded", impl.path,
-                     impl.state.problem};
+        return Error{Message("{} frames were not recorded", {std::to_string(impl.waiting.size())}),
+                     impl.path, impl.state.problem};
     }
     return Done{};
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline recording

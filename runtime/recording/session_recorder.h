@@ -19,10 +19,10 @@
 #include "formats/recording/session.h"
 #include "formats/scoring/session_monitor.h"
 #include "formats/volume/label_volume.h"
-#include "runtime/imaging/frame/doppler_report.h"
+#include "runtime/imaging/core/frame_input.h"
 #include "runtime/imaging/renderer.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline recording {
 
 // One frame of the player. Fixed size, so that handing it over allocates nothing.
 struct RecordedFrame {
@@ -40,7 +40,7 @@ struct RecordedFrame {
 struct RecorderStatus {
     std::size_t frames_written = 0;
     std::size_t frames_dropped = 0;  // lost because the writer was more than a minute behind
-    std::string problem;             // a whole sentence for the trainee; empty: none
+    Message problem;                 // a whole sentence for the trainee; empty: none
 };
 
 class SessionRecorder {
@@ -67,8 +67,7 @@ class SessionRecorder {
                       std::span<const std::uint8_t> pixels,
                       const Renderer::Layout& layout = {});
 
-    // Returns when there is room for frames and a picture: for runs faster than real time, which
-    // may wait.
+    // Waits until there is room for frames and a picture; for runs faster than real time.
     void wait_for_room();
 
     RecorderStatus status() const;  // for the screen; takes a lock for the time of a copy
@@ -84,4 +83,4 @@ class SessionRecorder {
 // "x.igs.mha" -> "x.frames.igs.mha".
 std::string pictures_path(const std::string& session_path);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline recording

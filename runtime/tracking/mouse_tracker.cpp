@@ -7,7 +7,7 @@
 
 #include "runtime/tracking/scripted_sweep.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline tracking {
 namespace {
 
 constexpr double kMaxTilt = 1.2;      // rad; beyond it the edge of a real face leaves the skin
@@ -40,13 +40,13 @@ void MouseTracker::reset() {
     if (put_probe(start_probe_, start_beam_)) return;
     for (double reach : {2 * kReach, 5 * kReach}) {
         if (const auto touch = skin_.project(start_probe_, start_beam_, reach)) {
-            settle(*touch);
+            move_contact(*touch);
             break;
         }
     }
 }
 
-void MouseTracker::settle(Point3 near) {
+void MouseTracker::move_contact(Point3 near) {
     const Vector3 normal = skin_.normal(near);
     contact_ = near;
     if (norm(normal) > 0.5) {
@@ -64,7 +64,7 @@ bool MouseTracker::put_probe(Point3 near, Vector3 towards) {
     if (!touch) return false;
     const Vector3 normal = skin_.normal(*touch);
     if (norm(normal) > 0.5) normal_ = normal;
-    settle(*touch);
+    move_contact(*touch);
     return true;
 }
 
@@ -77,9 +77,9 @@ void MouseTracker::slide(double lateral_mm, double elevation_mm) {
         const Point3 next =
             contact_ + (1.0 / steps) * (lateral_mm * lateral_ + elevation_mm * elevation);
         const auto touch = skin_.project(next, -normal_, 12);
-        // At the edge of the body or of the volume it stays.
+        // The probe stops at the edge of the body or of the volume.
         if (!touch || (skin_.at_border(*touch) && !skin_.at_border(contact_))) return;
-        settle(*touch);
+        move_contact(*touch);
     }
 }
 
@@ -135,7 +135,7 @@ bool MouseTracker::place_needle_beside_probe(double offset_mm, bool in_plane) {
 }
 
 bool MouseTracker::take_needle(const Probe& probe, bool in_plane) {
-    // Far enough that hand and probe do not meet.
+    // So far from the probe that the hand does not touch it.
     const double half = probe.shape == ProbeShape::curvilinear
                             ? probe.radius_mm * std::sin(0.5 * probe.field_of_view_rad)
                             : 0.5 * probe.width_mm;
@@ -206,4 +206,4 @@ TrackerHealth MouseTracker::health() const {
     return health;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline tracking

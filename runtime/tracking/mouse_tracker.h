@@ -10,7 +10,7 @@
 #include "runtime/engine/skin.h"
 #include "runtime/tracking/tracker.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline tracking {
 
 class MouseTracker final : public Tracker {
   public:
@@ -36,7 +36,7 @@ class MouseTracker final : public Tracker {
     bool place_needle(Point3 near, Vector3 towards);
     // Beside the probe, `offset_mm` from the middle of the face along x (in plane) or along y.
     bool place_needle_beside_probe(double offset_mm, bool in_plane);
-    // As above, just beside the probe's face.
+    // The same, just beside the probe's face.
     bool take_needle(const Probe& probe, bool in_plane);
     void aim_needle(double in_plane_rad, double out_of_plane_rad);  // about the probe's y and x
     // Turns the needle about its entry, so that pushed on it meets p. False: no needle, or p lies
@@ -55,7 +55,7 @@ class MouseTracker final : public Tracker {
     Rigid mannequin_from_needle() const;
 
   private:
-    void settle(Point3 near);  // new contact point and normal from a place near the skin
+    void move_contact(Point3 near);  // sets contact point and normal from a place near the skin
 
     Skin skin_;
     Point3 start_probe_;
@@ -73,4 +73,4 @@ class MouseTracker final : public Tracker {
     std::uint64_t sequence_ = 0;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline tracking

@@ -3,12 +3,14 @@
 #include "runtime/tracking/replay_tracker.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <utility>
 
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "formats/recording/sequence.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline tracking {
 namespace {
 
 SensorReading reading_of(const Pose& pose) {
@@ -64,7 +66,7 @@ std::vector<Pose> poses_of(const Sequence& sequence, int transform) {
         Pose pose;
         pose.frame = frame.number;
         pose.timestamp_s = frame.timestamp_s;
-        const SequencePose& read = frame.poses[static_cast<std::size_t>(transform)];
+        const SequencePose& read = frame.poses[transform];
         const std::optional<Rigid> rigid = rigid_from_matrix(read.to_from);
         pose.ok = read.ok && rigid;
         if (rigid) pose.tracker_from_tool = *rigid;
@@ -74,21 +76,20 @@ std::vector<Pose> poses_of(const Sequence& sequence, int transform) {
 }
 
 Result<Recording> recording_of_sequence(const std::string& path) {
-    Result<Sequence> sequence = load_sequence(path);
-    if (!sequence) return sequence.error();
+    SONOCASE_TRY(Sequence sequence, load_sequence(path));
     Recording recording;
     bool probe_home = false, needle_home = false;
-    const int probe = transform_of(*sequence, {"Probe", "Transducer", "Image"}, probe_home);
-    const int needle = transform_of(*sequence, {"Needle", "Stylus"}, needle_home);
+    const int probe = transform_of(sequence, {"Probe", "Transducer", "Image"}, probe_home);
+    const int needle = transform_of(sequence, {"Needle", "Stylus"}, needle_home);
     if (probe < 0) {
         std::string names;
-        for (const std::string& name : sequence->transforms) names += " " + name;
+        for (const std::string& name : sequence.transforms) names += " " + name;
         return Error{"no transform of a probe; found" + (names.empty() ? " none" : ":" + names),
                      path, "expected ProbeToTracker or ProbeToMannequin"};
     }
-    recording.probe = poses_of(*sequence, probe);
+    recording.probe = poses_of(sequence, probe);
     recording.in_mannequin = probe_home;
-    if (needle >= 0 && needle_home == probe_home) recording.needle = poses_of(*sequence, needle);
+    if (needle >= 0 && needle_home == probe_home) recording.needle = poses_of(sequence, needle);
     return recording;
 }
 
@@ -112,8 +113,7 @@ double ReplayTracker::duration_s() const {
 }
 
 double ReplayTracker::recorded_time_s(int i) const {
-    return recording_.probe[static_cast<std::size_t>(i)].timestamp_s -
-           recording_.probe.front().timestamp_s;
+    return recording_.probe[i].timestamp_s - recording_.probe.front().timestamp_s;
 }
 
 bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
@@ -177,25 +177,59 @@ Result<Recording> load_recording(const std::string& files) {
     const std::size_t comma = files.find(',');
     const std::string probe_file = files.substr(0, comma);
     if (ends_with(probe_file, ".mha") || ends_with(probe_file, ".nrrd")) {
-        Result<Recording> whole = recording_of_sequence(probe_file);
-        if (!whole) return whole.error();
-        if (Status ok = check_times(whole->probe, probe_file); !ok) return ok.error();
-        whole->name = probe_file.substr(probe_file.find_last_of('/') + 1);
+        SONOCASE_TRY(Recording whole, recording_of_sequence(probe_file));
+        SONOCASE_TRY_DONE(check_times(whole.probe, probe_file));
+        whole.name = probe_file.substr(probe_file.find_last_of('/') + 1);
         return whole;
     }
     recording.name = probe_file.substr(probe_file.find_last_of('/') + 1);
-    Result<std::vector<Pose>> probe = load_poses(probe_file);
-    if (!probe) return probe.error();
-    recording.probe = std::move(*probe);
-    if (Status ok = check_times(recording.probe, probe_file); !ok) return ok.error();
+    SONOCASE_TRY(std::vector<Pose> probe, load_poses(probe_file));
+    recording.probe = std::move(probe);
+    SONOCASE_TRY_DONE(check_times(recording.probe, probe_file));
     if (comma != std::string::npos) {
         const std::string needle_file = files.substr(comma + 1);
-        Result<std::vector<Pose>> needle = load_poses(needle_file);
-        if (!needle) return needle.error();
-        recording.needle = std::move(*needle);
-        if (Status ok = check_times(recording.needle, needle_file); !ok) return ok.error();
+        SONOCASE_TRY(std::vector<Pose> needle, load_poses(needle_file));
+        recording.needle = std::move(needle);
+        SONOCASE_TRY_DONE(check_times(recording.needle, needle_file));
     }
     return recording;
 }
 
-}  // namespace sonocase::runtime
+PacedTracker::PacedTracker(std::unique_ptr<Tracker> inner) : inner_(std::move(inner)) {
+    assert(inner_ && inner_->duration_s() >= 0);
+}
+
+void PacedTracker::set_speed(double speed) {
+    speed_ = std::isfinite(speed) ? std::clamp(speed, 0.0, 16.0) : 1;
+}
+
+bool PacedTracker::poll(double now_s, TrackerReading& reading) {
+    if (!started_) {
+        last_s_ = now_s;
+        TrackerReading first;  // the inner tracker's time starts here
+        started_ = inner_->poll(0, first);
+        if (started_) {
+            reading = first;
+            reading.time_s = now_s;
+        }
+        return started_;
+    }
+    inner_s_ += (now_s - last_s_) * speed_ + jump_s_.exchange(0);
+    last_s_ = now_s;
+    const double duration = inner_->duration_s();
+    // A jump back beyond the start goes on from the end, as in a loop.
+    if (inner_s_ < 0) inner_s_ = duration > 0 ? duration + std::fmod(inner_s_, duration) : 0;
+    at_s_ = duration > 0 ? std::fmod(inner_s_, duration) : 0;
+    if (!inner_->poll(inner_s_, reading)) return false;
+    const double late_s = speed_ > 0 ? (inner_s_ - reading.time_s) / speed_ : 0;
+    reading.time_s = now_s - std::max(0.0, late_s);
+    return true;
+}
+
+double PacedTracker::next_s() const {
+    const double inner = inner_->next_s(), speed = speed_;
+    if (inner < 0 || speed == 0) return -1;
+    return last_s_ + std::max(0.0, inner - inner_s_) / speed;
+}
+
+}  // namespace sonocase::runtime::inline tracking

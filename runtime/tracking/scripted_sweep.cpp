@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline tracking {
 namespace {
 
 Vector3 as_vector(Point3 p) {
@@ -114,4 +114,4 @@ TrackerHealth ScriptedSweep::health() const {
     return health;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline tracking

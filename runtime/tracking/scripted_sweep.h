@@ -7,7 +7,7 @@
 #include "runtime/engine/skin.h"
 #include "runtime/tracking/tracker.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline tracking {
 
 struct SweepPose {
     Rigid mannequin_from_probe;
@@ -45,4 +45,4 @@ class ScriptedSweep final : public Tracker {
     std::uint64_t sequence_ = 0;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline tracking

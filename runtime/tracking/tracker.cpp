@@ -2,7 +2,7 @@
 
 #include "runtime/tracking/tracker.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline tracking {
 
 const char* phase_name(TrackerPhase phase) {
     switch (phase) {
@@ -15,4 +15,4 @@ const char* phase_name(TrackerPhase phase) {
     return "";
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline tracking

@@ -7,10 +7,13 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 
+#include "formats/base/mailbox.h"
+#include "formats/base/message.h"
 #include "runtime/engine/tracker_reading.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline tracking {
 
 enum class TrackerPhase : std::uint8_t {
     searching,  // no device yet
@@ -22,9 +25,9 @@ enum class TrackerPhase : std::uint8_t {
 
 struct TrackerHealth {
     TrackerPhase phase = TrackerPhase::searching;
-    std::string device;   // "Polhemus Viper", with its serial where it has one
-    std::string message;  // a whole sentence for the user; empty when all is well
-    double rate_hz = 0;   // measured
+    std::string device;  // "Polhemus Viper", with its serial where it has one
+    Message message;     // a whole sentence for the user; empty when all is well
+    double rate_hz = 0;  // measured
     std::uint64_t readings = 0;
     std::uint64_t bad_frames = 0;  // discarded: wrong checksum or length, not a number
     std::uint64_t connects = 0;
@@ -59,4 +62,35 @@ using SessionClock = std::function<double()>;
 
 const char* phase_name(TrackerPhase phase);
 
-}  // namespace sonocase::runtime
+// A tracker whose readings come from its owner: the window's mouse, a browser, a test. One thread
+// pushes and one polls.
+class PushTracker final : public Tracker {
+  public:
+    explicit PushTracker(std::string device, bool is_device = false)
+        : device_(std::move(device)), is_device_(is_device) {}
+    void push(const TrackerReading& reading) {
+        box_.publish(reading);
+        if (wake_) wake_();
+    }
+    bool poll(double, TrackerReading& reading) override {
+        if (!box_.refresh()) return false;
+        reading = box_.value();
+        return true;
+    }
+    TrackerHealth health() const override {
+        TrackerHealth health;
+        health.phase = TrackerPhase::streaming;
+        health.device = device_;
+        return health;
+    }
+    void set_wake(std::function<void()> wake) override { wake_ = std::move(wake); }
+    bool is_device() const override { return is_device_; }
+
+  private:
+    std::string device_;
+    bool is_device_;
+    Mailbox<TrackerReading> box_;
+    std::function<void()> wake_;
+};
+
+}  // namespace sonocase::runtime::inline tracking

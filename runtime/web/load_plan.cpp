@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline web {
 namespace {
 
 // Segments between two runs that are fetched rather than asked for apart: a request costs as much.
@@ -61,7 +61,7 @@ class Chosen {
 
 std::vector<SegmentRun> LoadPlan::next(const StreamedBundle& bundle,
                                        Point3 centre,
-                                       std::size_t most) {
+                                       std::size_t max_segments) {
     const Arrivals& arrivals = *bundle.arrivals();
     Chosen chosen(arrivals, asked_);
     const VoxelBlocks* blocks = bundle.blocks();
@@ -85,11 +85,12 @@ std::vector<SegmentRun> LoadPlan::next(const StreamedBundle& bundle,
         }
         std::sort(nearest.begin(), nearest.end());
         for (const auto& [unused, block] : nearest) {
-            if (chosen.size() >= most) break;
+            if (chosen.size() >= max_segments) break;
             add_block(block);
         }
     }
-    for (std::size_t n = 0; n < arrivals.segments() && chosen.size() < most; ++n) chosen.add(n);
+    for (std::size_t n = 0; n < arrivals.segments() && chosen.size() < max_segments; ++n)
+        chosen.add(n);
     return chosen.runs();
 }
 
@@ -97,4 +98,4 @@ void LoadPlan::ask_again(SegmentRun run) {
     for (std::uint32_t n = run.first; n < run.first + run.count; ++n) asked_[n] = 0;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline web

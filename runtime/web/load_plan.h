@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What of a case that arrives in segments is fetched next: what the last picture lacked, then the
+// What is fetched next of a case that arrives in segments: what the last picture lacked, then the
 // blocks round the probe, then the rest.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline web {
 
 // Segments that follow each other, fetched by one request.
 struct SegmentRun {
@@ -22,11 +22,13 @@ class LoadPlan {
     LoadPlan() = default;
     explicit LoadPlan(std::size_t segments) : asked_(segments, 0) {}
 
-    // Of a bundle of stream_bundle_in_parts(): runs in the order of the file, and none of a segment
-    // that a run before had. What the last picture lacked comes at once; of the rest at most `most`
-    // segments. centre: a place of the picture, frame `mannequin`. Empty: everything is there or
-    // asked for.
-    std::vector<SegmentRun> next(const StreamedBundle& bundle, Point3 centre, std::size_t most);
+    // bundle: of stream_bundle_in_parts(). Returns runs in the order of the file, without the
+    // segments that a run before had. What the last picture lacked comes at once; of the rest at
+    // most `max_segments` segments. centre: a place of the picture, frame `mannequin`. Empty:
+    // everything is there or asked for.
+    std::vector<SegmentRun> next(const StreamedBundle& bundle,
+                                 Point3 centre,
+                                 std::size_t max_segments);
     // The run's segments did not all come: those that are missing will be given again.
     void ask_again(SegmentRun run);
 
@@ -34,4 +36,4 @@ class LoadPlan {
     std::vector<std::uint8_t> asked_;  // of each segment
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline web

@@ -5,7 +5,7 @@
 #include "formats/exercise/metric_table.h"
 #include "formats/text/json_reader.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline web {
 namespace {
 
 using detail::Json;
@@ -68,4 +68,4 @@ std::string metric_words_json() {
     return detail::json_text(out, false);
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline web

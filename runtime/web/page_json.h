@@ -7,7 +7,7 @@
 
 #include "runtime/web/page_player.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline web {
 
 // {"case_name", "exercises": [{"name", "title", "description", "kind", "difficulty", "mode":
 // "practice" or "exam", "hints": [texts], "targets":
@@ -18,4 +18,4 @@ std::string case_json(const PagePlayer& player);
 // [{"name", "group", "title", "unit"}] of every score, in the order of metric_table().
 std::string metric_words_json();
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline web

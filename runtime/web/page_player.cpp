@@ -4,13 +4,142 @@
 
 #include <algorithm>
 #include <cassert>
+#include <optional>
+#include <span>
 #include <utility>
 
-#include "formats/attempt/draw_attempt.h"
 #include "formats/exercise/case_exercises.h"
 #include "formats/scoring/anatomy.h"
+#include "formats/scoring/draw_attempt.h"
+#include "runtime/engine/scan_engine.h"
+#include "runtime/imaging/doppler/doppler_picture.h"
+#include "runtime/recording/session_words.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline web {
+
+namespace {
+
+constexpr std::size_t kWords = 6;
+
+bool same(const ImageSettings& a, const ImageSettings& b) {
+    return a.gain_db == b.gain_db && a.dynamic_range_db == b.dynamic_range_db &&
+           a.tgc_db == b.tgc_db && a.press_mm == b.press_mm &&
+           a.flip_left_right == b.flip_left_right && a.doppler == b.doppler;
+}
+
+}  // namespace
+
+PageSession::PageSession(const CaseBundle& bundle,
+                         const ScanEngine& engine,
+                         const std::string& trainee,
+                         const std::string& started,
+                         std::uint64_t seed)
+    : bundle_(bundle),
+      exercise_(engine.exercise()),
+      first_anatomy_(engine.anatomy()),
+      anatomy_(first_anatomy_),
+      monitor_(exercise_, first_anatomy_.get(), bundle.labels) {
+    session_.header = session_header(bundle, exercise_, engine.render_options(), trainee, started);
+    if (seed != 0) session_.header.attempt = "seed=" + std::to_string(seed);
+}
+
+void PageSession::observe(const FrameRecord& record) {
+    const FrameInput& input = record.input;
+    SessionSample sample;
+    fill_sample(record, sample);
+    sample.has_doppler = record.doppler.on;
+    sample.doppler = doppler_sample(record.doppler, bundle_.labels);
+    if (session_.samples.empty() || !same(settings_, input.settings))
+        sample.settings = settings_text(input.settings);
+    settings_ = input.settings;
+    monitor_.update(sample.time_s, sample.frame, sample.probe_ok, sample.mannequin_from_probe,
+                    sample.needle_ok, sample.mannequin_from_drawn);
+    report_punctures(record.puncture, monitor_);
+    const std::span<const LiveEvent> events = monitor_.events();
+    for (const LiveEvent& event : events) {
+        session_.events.push_back(session_event(event, exercise_, bundle_.labels));
+        std::string words = event_words(event, exercise_, bundle_.labels);
+        if (words.empty()) continue;
+        words_.push_back(std::move(words));
+        if (words_.size() > kWords) words_.erase(words_.begin());
+    }
+    session_.samples.push_back(std::move(sample));
+}
+
+double PageSession::seconds() const {
+    return session_.samples.empty() ? 0 : session_.samples.back().time_s;
+}
+
+Result<FinishedSession> PageSession::finish() const {
+    FinishedSession out;
+    out.recording = write_sequence(sequence_from_session(session_), SequenceForm::mha);
+    SONOCASE_TRY(const auto sequence, read_sequence(out.recording, "recording"));
+    SONOCASE_TRY(const auto session,
+                 session_from_sequence(sequence, guess_names(sequence), "recording"));
+    out.score = score_session(session, exercise_, anatomy_.get(), bundle_.labels);
+    out.score_json = score_json(out.score, exercise_);
+    return out;
+}
+
+Status PageDoppler::begin(const StreamedBundle& bundle, const ScanEngine& engine) {
+    if (!bundle.has_flow())
+        return Error{"the flow of blood in this case is still loading", "", "wait for the case"};
+    SONOCASE_TRY(auto view,
+                 DopplerView::create(bundle, engine.exercise(), engine.render_options()));
+    view_ = std::make_unique<DopplerView>(std::move(view));
+    return Done{};
+}
+
+void PageDoppler::frame(const ScanEngine& engine,
+                        const FrameRecord& record,
+                        std::span<const std::uint8_t> pixels,
+                        bool live) {
+    live_ = live;
+    mode_ = view_ ? record.input.settings.doppler.mode : DopplerMode::off;
+    if (!view_) return;
+    const bool strip = mode_ == DopplerMode::spectral || mode_ == DopplerMode::m_mode;
+    // A strip runs on with the time of live frames; going back would begin it anew.
+    if (live || !strip) view_->frame(record.input, engine.renderer(), pixels);
+}
+
+std::span<const std::uint8_t> PageDoppler::overlay() const {
+    if (mode_ != DopplerMode::colour && mode_ != DopplerMode::power) return {};
+    return view_->overlay();
+}
+
+std::span<const std::uint8_t> PageDoppler::strip(int width, int height) {
+    if (mode_ != DopplerMode::spectral && mode_ != DopplerMode::m_mode) return {};
+    strip_.resize(static_cast<std::size_t>(width) * height);
+    if (mode_ == DopplerMode::spectral)
+        doppler::draw_spectrum(view_->spectrum(), kStripSeconds, width, height, strip_);
+    else
+        doppler::draw_m_mode(view_->m_mode(), width, height, strip_);
+    return strip_;
+}
+
+std::span<const float> PageDoppler::sound() const {
+    if (mode_ != DopplerMode::spectral || !live_) return {};
+    return view_->spectrum().sound();
+}
+
+doppler::SpectralMeasures PageDoppler::measures() const {
+    return mode_ == DopplerMode::spectral ? view_->spectrum().measures()
+                                          : doppler::SpectralMeasures{};
+}
+
+DopplerSettings PageDoppler::aimed(const ScanEngine& engine,
+                                   const DopplerSettings& settings) const {
+    FrameInput input;
+    input.mannequin_from_probe = engine.last().tools.mannequin_from_probe;
+    return view_ ? view_->aimed(input, settings) : settings;
+}
+
+ScanGeometry doppler_geometry(const ScanEngine& engine) {
+    const RenderOptions& options = engine.render_options();
+    return make_scan_geometry(engine.exercise().probe, doppler::kColourLines, doppler::kColourRows,
+                              options.width_px, options.height_px);
+}
+
 namespace {
 
 constexpr double kKeptSeconds = 20;
@@ -29,7 +158,7 @@ EngineOptions engine_options(const PageImage& image,
     return options;
 }
 
-// The same for every case; a page opens many.
+// The tables are the same for every case, and a page opens many.
 const std::shared_ptr<const PhysicalTextures>& physical_textures() {
     static const std::shared_ptr<const PhysicalTextures> textures = make_physical_textures();
     return textures;
@@ -46,9 +175,8 @@ PagePlayer::PagePlayer(StreamedBundle bundle, const std::string& where)
 
 Result<std::unique_ptr<PagePlayer>> PagePlayer::open(RawVector<std::uint8_t> bytes,
                                                      const std::string& where) {
-    Result<StreamedBundle> bundle = stream_bundle(std::move(bytes), where);
-    if (!bundle) return bundle.error();
-    return of(std::move(*bundle), where);
+    SONOCASE_TRY(StreamedBundle bundle, stream_bundle(std::move(bytes), where));
+    return of(std::move(bundle), where);
 }
 
 std::unique_ptr<PagePlayer> PagePlayer::of(StreamedBundle bundle, const std::string& where) {
@@ -59,9 +187,8 @@ Result<std::unique_ptr<PagePlayer>> PagePlayer::open_in_parts(RawVector<std::uin
                                                               Arrivals arrivals,
                                                               const std::string& where) {
     const std::size_t segments = arrivals.segments();
-    auto bundle = stream_bundle_in_parts(std::move(bytes), std::move(arrivals), where);
-    if (!bundle) return bundle.error();
-    std::unique_ptr<PagePlayer> player(new PagePlayer(std::move(*bundle), where));
+    SONOCASE_TRY(auto bundle, stream_bundle_in_parts(std::move(bytes), std::move(arrivals), where));
+    std::unique_ptr<PagePlayer> player(new PagePlayer(std::move(bundle), where));
     player->plan_ = LoadPlan(segments);
     return player;
 }
@@ -70,16 +197,17 @@ void PagePlayer::prepare() {
     (void)physical_textures();
 }
 
-std::vector<SegmentRun> PagePlayer::next_runs(std::size_t most) {
+std::vector<SegmentRun> PagePlayer::next_runs(std::size_t max_segments) {
     if (is_whole()) return {};
     const Point3 middle{0, 0, 0.5 * image_.depth_mm};
-    return plan_.next(bundle_, hands_ ? hands_->mannequin_from_probe() * middle : middle, most);
+    return plan_.next(bundle_, hands_ ? hands_->mannequin_from_probe() * middle : middle,
+                      max_segments);
 }
 
 Status PagePlayer::choose_exercise(int index, int side_px) {
     const int count = static_cast<int>(exercises_.size());
     const int wanted = (index % count + count) % count;
-    const Exercise& exercise = exercises_[static_cast<std::size_t>(wanted)];
+    const Exercise& exercise = exercises_[wanted];
     PageImage image;
     image.model = exercise.model == "paper" ? ImageModel::paper : ImageModel::physical;
     image.side_px = side_px;
@@ -103,21 +231,20 @@ Status PagePlayer::set_image(const PageImage& image) {
     const Exercise& exercise = exercise_in_use();
     if (image.model == ImageModel::paper && !bundle_.has_textures())
         return Error{"the textures of this picture are still loading", "", "wait for the case"};
-    Result<ScanEngine> engine = ScanEngine::create(
-        bundle_, exercise,
-        engine_options(image, exercise,
-                       image.model == ImageModel::physical ? physical_textures() : nullptr));
-    if (!engine) return engine.error();
-    auto next = std::make_unique<ScanEngine>(std::move(*engine));
+    SONOCASE_TRY(
+        ScanEngine engine,
+        ScanEngine::create(
+            bundle_, exercise,
+            engine_options(image, exercise,
+                           image.model == ImageModel::physical ? physical_textures() : nullptr)));
+    auto next = std::make_unique<ScanEngine>(std::move(engine));
     if (engine_) next->take_over(*engine_);
     if (doppler_.begun())
         if (Status made = doppler_.begin(bundle_, *next); !made) return made;
     engine_ = std::move(next);
     truth_.reset();
     image_ = image;
-    pixels_.assign(
-        static_cast<std::size_t>(image.side_px) * static_cast<std::size_t>(image.side_px),
-        std::uint8_t{0});
+    pixels_.assign(static_cast<std::size_t>(image.side_px) * image.side_px, std::uint8_t{0});
     kept_count_ = 0;
     kept_last_s_ = -1;
     if (session_) session_->use(*engine_);
@@ -126,7 +253,7 @@ Status PagePlayer::set_image(const PageImage& image) {
 
 void PagePlayer::put_tools(double now_s, const TrackerReading& reading) {
     TrackerReading moved;
-    (void)hands_->poll(now_s, moved);  // what the hands did before is settled
+    (void)hands_->poll(now_s, moved);  // what the hands did before is applied
     engine_->observe(reading, true);
 }
 
@@ -152,7 +279,7 @@ FrameStatus PagePlayer::frame(double now_s, const ImageSettings& settings) {
 const FrameRecord& PagePlayer::kept_record(int back) const {
     assert(kept_count_ > 0);
     const std::size_t size = kept_.size();
-    const std::size_t n = std::min(static_cast<std::size_t>(std::max(back, 0)), kept_count_ - 1);
+    const std::size_t n = std::min<std::size_t>(std::max(back, 0), kept_count_ - 1);
     return kept_[(kept_next_ + 2 * size - 1 - n) % size];
 }
 
@@ -183,7 +310,7 @@ Status PagePlayer::start_attempt(const std::string& trainee,
         return Error{"the case is still loading", "", "a new place of the target needs all of it"};
     const std::optional<Exercise> before = drawn_;
     if (seed != 0) {
-        const Exercise& written = exercises_[static_cast<std::size_t>(exercise_index_)];
+        const Exercise& written = exercises_[exercise_index_];
         const CaseAnatomy at_rest(bundle_);
         drawn_ = draw_attempt(written, at_rest, bundle_->labels, seed).exercise;
         if (Status made = set_image(image_); !made) {
@@ -217,7 +344,7 @@ std::string PagePlayer::name_at(int column, int row) {
     }
     const PixelTruth there = truth_->at(engine_->last().input, column, row);
     if (!there.scanned || there.label <= 0) return {};
-    return bundle_->labels[static_cast<std::size_t>(there.label)].name;
+    return bundle_->labels[there.label].name;
 }
 
 Result<FinishedSession> PagePlayer::finish_attempt() {
@@ -227,4 +354,4 @@ Result<FinishedSession> PagePlayer::finish_attempt() {
     return session->finish();
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline web

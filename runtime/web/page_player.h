@@ -12,16 +12,102 @@
 #include <string>
 #include <vector>
 
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/base/result.h"
+#include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
+#include "formats/recording/session.h"
+#include "formats/scoring/session_monitor.h"
+#include "formats/scoring/session_score.h"
 #include "runtime/engine/scan_engine.h"
+#include "runtime/imaging/doppler/box_hands.h"
+#include "runtime/imaging/doppler/doppler_view.h"
 #include "runtime/imaging/truth/frame_truth.h"
 #include "runtime/tracking/mouse_tracker.h"
 #include "runtime/web/load_plan.h"
-#include "runtime/web/page_doppler.h"
-#include "runtime/web/page_session.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline web {
+
+// The recording is what sonoplay writes (docs/format.md, part 7), complete even without a score.
+struct FinishedSession {
+    std::vector<std::uint8_t> recording;  // bytes of an .igs.mha
+    SessionScore score;
+    std::string score_json;  // as `sonoplay --stats` and `sonocase review` give it
+};
+
+// An attempt on a page: what SessionRun is to the window, kept in memory instead of a file.
+class PageSession {
+  public:
+    // The bundle must outlive the session. seed: of the attempt; 0: as written.
+    PageSession(const CaseBundle& bundle,
+                const ScanEngine& engine,
+                const std::string& trainee,
+                const std::string& started,
+                std::uint64_t seed = 0);
+
+    // Another engine of the same exercise goes on.
+    void use(const ScanEngine& engine) { anatomy_ = engine.anatomy(); }
+    // Takes the frame that the engine just rendered.
+    void observe(const FrameRecord& record);
+
+    double seconds() const;
+    const SessionMonitor& monitor() const { return monitor_; }
+    const std::vector<std::string>& words() const { return words_; }  // the last six, newest last
+
+    // The scores are those of the recording's bytes, read again as a replay would read them.
+    Result<FinishedSession> finish() const;
+
+  private:
+    const CaseBundle& bundle_;
+    Exercise exercise_;
+    std::shared_ptr<const Anatomy> first_anatomy_, anatomy_;  // the monitor keeps the first
+    SessionMonitor monitor_;
+    Session session_;
+    ImageSettings settings_;
+    std::vector<std::string> words_;
+};
+
+// The Doppler modes of a page: what DopplerFrames and DopplerRun are to the desktop, with an
+// overlay and a strip that the page colours itself.
+class PageDoppler {
+  public:
+    // Before the first frame of a mode, and again for each engine. The bundle must outlive what is
+    // made. Error: blood flow has not arrived yet.
+    Status begin(const StreamedBundle& bundle, const ScanEngine& engine);
+    void end() { view_.reset(); }
+    bool begun() const { return view_ != nullptr; }
+    bool has_flow() const { return view_ && view_->has_flow(); }
+
+    // Draws the frame that the engine rendered last, from `record`. live: false for a kept one,
+    // whose strip stays as it was frozen.
+    void frame(const ScanEngine& engine,
+               const FrameRecord& record,
+               std::span<const std::uint8_t> pixels,
+               bool live);
+    DopplerMode mode() const { return mode_; }  // of the last frame
+    DopplerReport report() const { return view_ ? view_->report() : DopplerReport{}; }
+
+    // # pixels of the picture: index into doppler::palette(), 0: grey. Empty: no colour.
+    std::span<const std::uint8_t> overlay() const;
+    // Grey, # width * height; empty: the mode has none.
+    std::span<const std::uint8_t> strip(int width, int height);
+    // Pairs of samples of the last live frame (towards, away), and their rate.
+    std::span<const float> sound() const;
+    double sound_hz() const { return view_ ? view_->spectrum().sound_hz() : 0; }
+    doppler::SpectralMeasures measures() const;
+    double machine_hz() const { return view_ ? view_->colour().frame_hz : 0; }
+
+    // Settings with box, gate and cursor in the widest vessel of the last picture's plane.
+    DopplerSettings aimed(const ScanEngine& engine, const DopplerSettings& settings) const;
+
+  private:
+    std::unique_ptr<DopplerView> view_;
+    DopplerMode mode_ = DopplerMode::off;
+    bool live_ = false;
+    std::vector<std::uint8_t> strip_;
+};
+
+// Where the lines of the engine's picture run, for what a pointer takes hold of (box_hands.h).
+ScanGeometry doppler_geometry(const ScanEngine& engine);
 
 // What the engine draws; the console of the page changes it.
 struct PageImage {
@@ -48,22 +134,22 @@ class PagePlayer {
     static void prepare();
 
     const StreamedBundle& bundle() const { return bundle_; }
-    // For a case that arrives in segments: see streamed_bundle.h. A segment's bytes are checked
-    // before it has arrived.
+    // These are for a case that arrives in segments (formats/bundle/case_bundle.h). A segment's
+    // bytes are checked before it has arrived.
     std::span<std::uint8_t> bytes() { return bundle_.bytes(); }
     void arrived(std::size_t segment) { bundle_.arrived(segment); }
-    Status look_again() { return bundle_.look_again(); }
+    Status look_again() { return bundle_.read_arrived(); }
     bool is_whole() const { return !bundle_.arrivals() || bundle_.arrivals()->whole(); }
     // Blocks that the last picture lacked: surfaces are smoother there and tissue has less
     // structure.
     int missing_blocks() const {
         return bundle_.blocks() ? static_cast<int>(bundle_.blocks()->awaited()) : 0;
     }
-    // What to fetch next (load_plan.h); most: segments ahead of what the picture lacks.
-    std::vector<SegmentRun> next_runs(std::size_t most);
+    // What to fetch next (load_plan.h); max_segments: ahead of what the picture lacks.
+    std::vector<SegmentRun> next_runs(std::size_t max_segments);
     void ask_again(SegmentRun run) { plan_.ask_again(run); }
     const std::vector<Exercise>& exercises() const { return exercises_; }
-    const std::vector<std::string>& warnings() const { return warnings_; }
+    const std::vector<Message>& warnings() const { return warnings_; }
 
     // Begins an exercise in its own image: the probe goes to its start, an attempt is dropped.
     // index: taken modulo the number of exercises.
@@ -93,13 +179,13 @@ class PagePlayer {
     // Before frames whose settings ask for a Doppler mode; until then they show none. Error: blood
     // flow has not arrived yet.
     Status begin_doppler();
-    // Of the last frame.
+    // What the last frame showed.
     PageDoppler& doppler() { return doppler_; }
     const PageDoppler& doppler() const { return doppler_; }
 
-    // started: ISO 8601, UTC. seed: that targets and start are drawn with (formats/attempt); 0: as
+    // started: ISO 8601, UTC. seed: that targets and start are drawn with (draw_attempt.h); 0: as
     // written. Else the probe goes to the start without a needle, and the case has to be whole: a
-    // draw looks at all of it. Errors: it is not; the image cannot be made.
+    // draw reads all of it. Errors: it is not whole; the image cannot be made.
     Status start_attempt(const std::string& trainee,
                          const std::string& started,
                          double now_s,
@@ -121,13 +207,13 @@ class PagePlayer {
     PagePlayer(StreamedBundle bundle, const std::string& where);
     const FrameRecord& kept_record(int back) const;
     const Exercise& exercise_in_use() const {
-        return drawn_ ? *drawn_ : exercises_[static_cast<std::size_t>(exercise_index_)];
+        return drawn_ ? *drawn_ : exercises_[exercise_index_];
     }
 
     StreamedBundle bundle_;
     LoadPlan plan_;
     std::vector<Exercise> exercises_;
-    std::vector<std::string> warnings_;
+    std::vector<Message> warnings_;
     int exercise_index_ = 0;
     std::optional<Exercise> drawn_;  // of the attempt that runs or ran last; nothing: as written
     std::optional<TruthRenderer> truth_;  // of the image; made when it is first asked
@@ -142,4 +228,4 @@ class PagePlayer {
     double kept_last_s_ = -1;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline web

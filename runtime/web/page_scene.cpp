@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <atomic>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline web {
 namespace {
 
 constexpr double kSkinStepMm = 10, kOrganStepMm = 5;
-constexpr double kLeastNeedleMm = 20;
+constexpr double kMinNeedleMm = 20;
 
 }  // namespace
 
@@ -27,7 +27,7 @@ void PageScene::add_organs(const CaseBundle& bundle) {
 
 Model PageScene::part(int part, const ScanEngine& engine, const PlanePicture& picture) const {
     const Exercise& exercise = engine.exercise();
-    const double needle_mm = std::max(exercise.needle.length_mm, kLeastNeedleMm);
+    const double needle_mm = std::max(exercise.needle.length_mm, kMinNeedleMm);
     switch (static_cast<ScenePart>(part)) {
         case ScenePart::skin: return model_of(skin_);
         case ScenePart::probe: return probe_model(exercise.probe);
@@ -42,12 +42,12 @@ Model PageScene::part(int part, const ScanEngine& engine, const PlanePicture& pi
         }
         case ScenePart::count: break;
     }
-    const auto organ = static_cast<std::size_t>(part - static_cast<int>(ScenePart::count));
+    const std::size_t organ = part - static_cast<int>(ScenePart::count);
     return organ < organs_.size() ? model_of(organs_[organ].surface) : Model{};
 }
 
 unsigned PageScene::rgb(int part) const {
-    const auto organ = static_cast<std::size_t>(part - static_cast<int>(ScenePart::count));
+    const std::size_t organ = part - static_cast<int>(ScenePart::count);
     return organ < organs_.size() ? organs_[organ].rgb : 0;
 }
 
@@ -65,4 +65,4 @@ Orbit PageScene::first(const ScanEngine& engine) const {
     return home_view(body_, engine.exercise()).orbit;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline web

@@ -13,7 +13,7 @@
 #include "runtime/display/models/tool_models.h"
 #include "runtime/engine/scan_engine.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline web {
 
 // Meshes that every case has; the organs follow, as many as there are.
 enum class ScenePart : int { skin, probe, mark, plane, needle, hub, ball, count };
@@ -36,7 +36,7 @@ class PageScene {
 
     // mannequin_from_camera: from outside where the tool is not there.
     Rigid camera(ViewFrom from, const Orbit& orbit, const ScanEngine& engine) const;
-    // Of the first view from outside.
+    // The first view from outside.
     Orbit first(const ScanEngine& engine) const;
 
   private:
@@ -46,4 +46,4 @@ class PageScene {
     std::vector<OrganMesh> organs_;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline web

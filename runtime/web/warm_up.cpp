@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline web {
 namespace {
 
 constexpr int kVoxels = 48;
@@ -64,4 +64,4 @@ std::unique_ptr<PagePlayer> warm_up_player(int side_px) {
     return player;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline web

@@ -8,9 +8,9 @@
 
 #include "runtime/web/page_player.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline web {
 
 // A round body with a vessel, the physical model. Null: it cannot be made.
 std::unique_ptr<PagePlayer> warm_up_player(int side_px);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline web

@@ -4,7 +4,9 @@
 
 find_program(CCACHE_PROGRAM ccache)
 if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_CXX_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
+  # Precompiled headers: the cache may use them although they bear times and macros.
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${CMAKE_COMMAND}" -E env CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_PCH_EXTSUM=1
+      "${CCACHE_PROGRAM}")
   set(CMAKE_C_COMPILER_LAUNCHER "${CCACHE_PROGRAM}")
 endif()
 find_program(MOLD_PROGRAM mold)
@@ -14,11 +16,18 @@ endif()
 add_link_options(-Wl,--as-needed)
 set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
 set(CMAKE_CXX_FLAGS_DEBUG "-O1 -g1")
+# Tests are compiled once and run once: what they call is optimised, they need not be.
+set(SONOCASE_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
 
 # Interface target for our own code only, never for third-party code.
 add_library(sonocase_options INTERFACE)
 target_compile_options(sonocase_options INTERFACE
   -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
+  # GCC 12 is wrong about moved strings and variants (its bugs 105651 and 105329); the sanitizers see what it means to see.
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds> $<$<CXX_COMPILER_ID:GNU>:-Wno-free-nonheap-object>
+  -pthread
+  # What ccache needs in order to know a precompiled header again.
+  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<COMPILE_LANGUAGE:CXX>>:-fpch-preprocess>
   # One rounding per operation on every machine: the same inputs give the same bytes.
   -ffp-contract=off)
 if(SONOCASE_SANITIZE)
@@ -72,7 +81,12 @@ function(sonocase_room folder)
     endforeach()
   endforeach()
   if(arg_SOURCES)
+    if(NOT TARGET sonocase_room_headers)
+      add_library(sonocase_room_headers STATIC)
+      sonocase_precompiled(sonocase_room_headers ${sonocase_std_headers})
+    endif()
     add_library(${name} STATIC ${arg_SOURCES})
+    target_precompile_headers(${name} REUSE_FROM sonocase_room_headers)
     target_include_directories(${name} PUBLIC "$<BUILD_INTERFACE:${doors}>")
     target_link_libraries(${name} PUBLIC ${PUBLIC_targets} PRIVATE sonocase_options ${PRIVATE_targets})
   else()
@@ -85,18 +99,81 @@ function(sonocase_room folder)
   target_link_libraries(sonocase_${library} INTERFACE ${name})
 endfunction()
 
-# sonocase_test(NAME SOURCES ... LIBRARIES ...): one GoogleTest program, one ctest entry.
+# What nearly every source of ours includes of the standard library, parsed once. A source still includes all that it uses: the
+# page's program, the fuzzers and clang-tidy compile without this.
+set(sonocase_std_headers <algorithm> <array> <atomic> <charconv> <chrono> <cmath> <complex> <cstddef> <cstdint> <cstring>
+  <functional> <limits> <map> <memory> <mutex> <numbers> <numeric> <optional> <set> <span> <string> <string_view> <thread>
+  <tuple> <unordered_map> <utility> <variant> <vector>)
+# sonocase_precompiled(TARGET HEADER...): a target that only holds precompiled headers, for others to reuse.
+function(sonocase_precompiled target)
+  file(WRITE "${CMAKE_BINARY_DIR}/facts/${target}.cpp.new" "int main() { return 0; }\n")
+  file(COPY_FILE "${CMAKE_BINARY_DIR}/facts/${target}.cpp.new" "${CMAKE_BINARY_DIR}/facts/${target}.cpp" ONLY_IF_DIFFERENT)
+  target_sources(${target} PRIVATE "${CMAKE_BINARY_DIR}/facts/${target}.cpp")
+  target_link_libraries(${target} PRIVATE sonocase_options)
+  target_precompile_headers(${target} PRIVATE ${ARGN})
+  # What ccache knows it by, since its bytes differ from one folder to the next: compiler, options and content.
+  file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${target}.dir/cmake_pch.hxx.gch.sum"
+       "${CMAKE_CXX_COMPILER_VERSION} ${CMAKE_BUILD_TYPE} ${SONOCASE_SANITIZE} ${target} ${ARGN}\n")
+endfunction()
+
+# sonocase_test(NAME SOURCES ... LIBRARIES ...): one ctest entry of GoogleTest. Where the folder (or one above it) has set
+# SONOCASE_TEST_PROGRAM, entries share that program, which links fewer times and starts each with the suites of its own
+# sources; elsewhere NAME is a program of its own. SONOCASE_TEST_TARGET is set to the program.
 function(sonocase_test name)
   cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
-  add_executable(${name} ${arg_SOURCES})
-  target_link_libraries(${name} PRIVATE sonocase_options sonocase_test_support ${arg_LIBRARIES}
-                        GTest::gtest_main)
-  add_test(NAME ${name} COMMAND ${name})
+  if(SONOCASE_TEST_PROGRAM)
+    set(program ${SONOCASE_TEST_PROGRAM})
+  else()
+    set(program ${name})
+  endif()
+  if(NOT TARGET sonocase_test_headers)  # an executable, as the programs are: position-independent in the same way
+    add_executable(sonocase_test_headers)
+    target_link_libraries(sonocase_test_headers PRIVATE GTest::gtest)
+    target_compile_options(sonocase_test_headers PRIVATE ${SONOCASE_TEST_OPTIONS})
+    sonocase_precompiled(sonocase_test_headers <gtest/gtest.h> ${sonocase_std_headers})
+  endif()
+  if(NOT TARGET ${program})
+    add_executable(${program})
+    target_link_libraries(${program} PRIVATE sonocase_options sonocase_test_support GTest::gtest_main)
+    target_compile_options(${program} PRIVATE ${SONOCASE_TEST_OPTIONS})
+    target_precompile_headers(${program} REUSE_FROM sonocase_test_headers)
+    if(SONOCASE_SANITIZE MATCHES "address")
+      sonocase_keep_modules(${program})
+    endif()
+  endif()
+  list(TRANSFORM arg_SOURCES PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/" REGEX "^[^/]" OUTPUT_VARIABLE sources)
+  get_target_property(present ${program} SOURCES)
+  foreach(source IN LISTS sources)
+    if(NOT source IN_LIST present)
+      target_sources(${program} PRIVATE "${source}")
+    endif()
+  endforeach()
+  target_link_libraries(${program} PRIVATE ${arg_LIBRARIES})
+  set(filter "")
+  if(SONOCASE_TEST_PROGRAM)
+    set(suites "")
+    foreach(source IN LISTS sources)
+      set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${source}")
+      file(STRINGS "${source}" lines REGEX "^(TEST|TEST_F|TEST_P|TYPED_TEST|RC_GTEST_PROP)\\(")
+      list(TRANSFORM lines REPLACE "^[A-Z_]+\\( *([A-Za-z0-9_]+).*$" "\\1")
+      list(APPEND suites ${lines})
+    endforeach()
+    list(REMOVE_DUPLICATES suites)
+    foreach(suite IN LISTS suites)
+      list(APPEND filter "${suite}.*" "${suite}/*" "*/${suite}.*")
+    endforeach()
+    list(JOIN filter ":" filter)
+    set(filter "--gtest_filter=${filter}")
+  endif()
+  add_test(NAME ${name} COMMAND ${program} ${filter})
+  if(NOT TARGET ${name})
+    add_custom_target(${name} DEPENDS ${program})
+  endif()
   if(SONOCASE_SANITIZE MATCHES "address")
-    sonocase_keep_modules(${name})
     set_tests_properties(${name} PROPERTIES ENVIRONMENT
       "LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/leaks-of-libraries.txt:print_suppressions=0")
   endif()
+  set(SONOCASE_TEST_TARGET ${program} PARENT_SCOPE)
 endfunction()
 
 # sonocase_uses(LIBRARY "NAME VERSION"...): what LIBRARY is built with, for --version.

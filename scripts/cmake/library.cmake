@@ -15,14 +15,13 @@ find_package(ZLIB REQUIRED)
 find_package(Threads REQUIRED)
 include(CMakePackageConfigHelpers)
 
-string(CONCAT core_rooms "^(formats/(base|text|volume|flow|container|bundle|bundle/codec|registration|attempt|pathology|exercise|machine|recording|"
-  "calibration|calibration/solve|scoring)|runtime/(imaging|imaging/.*|needle|engine))$")
-set(formats_rooms "^formats/(threads|files|progress_book)$")
+string(CONCAT core_rooms "^(formats/(base|text|volume|flow|bundle|bundle/codec|pathology|exercise|machine|recording|calibration|scoring)|"
+  "runtime/(imaging|imaging/.*|engine))$")
+set(formats_rooms "^formats/(files|progress_book)$")
 # Rooms whose headers a program may include, and headers of theirs that are for the room's neighbours alone.
-string(CONCAT public_rooms "^(formats/(base|volume|flow|bundle|registration|attempt|exercise|machine|recording|calibration|"
-  "calibration/solve|scoring|threads|files|progress_book)|runtime/(imaging|imaging/frame|imaging/host|imaging/truth|"
-  "imaging/doppler|imaging/doppler/view|imaging/scan|needle|engine))$")
-set(inner_headers "/(build_facts|event|whole_file|pass_timer|parallel_halves|plane_look_up|scan_convert|truth_planes|truth_state|truth_rows|truth_voxels)\\.h$")
+string(CONCAT public_rooms "^(formats/(base|volume|flow|bundle|exercise|machine|recording|calibration|scoring|files|progress_book)|"
+  "runtime/(imaging|imaging/core|imaging/truth|imaging/doppler|engine))$")
+set(inner_headers "/(build_facts|event|whole_file|governor|image_formation|effect_table|noise|needle_chord|simd_target|plane_look_up|scan_convert|truth_inputs|truth_rows|[a-z_]*-inl)\\.h$")
 
 set(version_headers "${CMAKE_BINARY_DIR}/include/version")
 configure_file(scripts/cmake/version.h.in "${version_headers}/sonocase/version.h" @ONLY)

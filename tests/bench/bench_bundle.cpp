@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "pipeline/cook/cook_case.h"
-#include "pipeline/recipe/read_recipe.h"
+#include "pipeline/stages/read_recipe.h"
 #include "support/paths.h"
 #include "support/random.h"
 

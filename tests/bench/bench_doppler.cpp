@@ -13,7 +13,8 @@
 #include <cmath>
 #include <vector>
 
-#include "formats/flow/flow_profile.h"
+#include "formats/base/constants.h"
+#include "formats/flow/flow_velocity.h"
 #include "runtime/imaging/doppler/colour_image.h"
 #include "runtime/imaging/doppler/spectral_strip.h"
 
@@ -23,13 +24,11 @@ namespace {
 using namespace runtime;
 using namespace runtime::doppler;
 
-constexpr double kPi = 3.14159265358979323846;
-
 class StillTissue final : public TissuePlace {
   public:
     Point3 rest(PlanePoint shown) const override { return {shown.x, 0, shown.z}; }
     Vector3 velocity_mm_s(PlanePoint) const override { return moving; }
-    bool shut(Point3) const override { return false; }
+    bool closed(Point3) const override { return false; }
     bool presses() const override { return false; }
     bool blocks(PlanePoint shown) const override { return shown.z > 1e6; }
     Rigid mannequin_from_probe() const override { return {}; }

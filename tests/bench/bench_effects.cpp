@@ -22,10 +22,10 @@
 #include <memory>
 
 #include "bench_scene.h"
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "runtime/imaging/paper/paper_fast.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
-#include "runtime/imaging/press/press_plane.h"
+#include "runtime/imaging/press/press_field.h"
 
 namespace sonocase::bench {
 namespace {

@@ -12,7 +12,7 @@
 #include <chrono>
 
 #include "bench_scene.h"
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "peer_vtk.h"
 
 namespace sonocase::bench {

@@ -26,7 +26,7 @@
 #include <string>
 
 #include "bench_scene.h"
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "runtime/imaging/press/press_bundle.h"
 #include "runtime/imaging/press/press_support.h"
 

@@ -10,8 +10,8 @@
 
 #include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/registration/map/fold_proof.h"
 #include "pipeline/registration/map/inverse_map.h"
+#include "pipeline/registration/map/map_proofs.h"
 #include "pipeline/registration/register_surfaces.h"
 #include "support/torso_builds.h"
 
@@ -251,8 +251,8 @@ void BM_Proof(benchmark::State& state) {
     const Registration r = some_map();
     FoldProof proof;
     for (auto _ : state) proof = prove_no_fold(r);
-    state.counters["bound"] = proof.least_bound;
-    state.counters["sample"] = proof.least_sample;
+    state.counters["bound"] = proof.min_bound;
+    state.counters["sample"] = proof.min_sample;
 }
 BENCHMARK(BM_Proof)->Name("Registration/proof")->Unit(benchmark::kMillisecond)->UseRealTime();
 

@@ -22,7 +22,7 @@
 #include "peer_eq10.h"
 #include "peer_itk.h"
 #include "pipeline/anatomy/analytic_torso.h"
-#include "pipeline/import/label_map.h"
+#include "pipeline/import/volume/label_map.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "segmentation_row.h"
 #include "support/label_score.h"

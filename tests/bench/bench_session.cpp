@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "bench_bundle.h"
+#include "formats/base/constants.h"
 #include "formats/scoring/session_score.h"
 
 namespace sonocase::bench {
@@ -24,7 +25,7 @@ Session one_hour() {
         const Rigid& probe = poses[static_cast<std::size_t>(i / 1200) % poses.size()];
         const Point3 face{probe.translation.x, probe.translation.y, probe.translation.z};
         const Vector3 z = normalized(middle - face), x = any_perpendicular(z);
-        const double depth = 90 * std::pow(std::sin(3.14159265358979 * t / 20), 2) - 10;
+        const double depth = 90 * std::pow(std::sin(kPi * t / 20), 2) - 10;
         SessionSample sample;
         sample.time_s = t;
         sample.frame = i;

@@ -77,9 +77,8 @@ LabelVolume eq10_over_whole_grid(const LabelVolume& volume,
                                  const pipeline::LevelSetOptions& options) {
     const Int3 n = volume.grid.size;
     const double h_mm = volume.grid.spacing_mm.x;
-    const double step = options.time_step > 0
-                            ? options.time_step
-                            : 0.8 * pipeline::greatest_stable_step(options.k0, h_mm);
+    const double step = options.time_step > 0 ? options.time_step
+                                              : 0.8 * pipeline::max_stable_step(options.k0, h_mm);
     // In voxels: phi / h, K0 and time as they are, C / h^2.
     const float pull = static_cast<float>(step * options.k0),
                 bend = static_cast<float>(step / (h_mm * h_mm));

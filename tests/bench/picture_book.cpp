@@ -11,9 +11,9 @@
 #include <map>
 
 #include "formats/bundle/case_bundle.h"
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "runtime/imaging/renderer.h"
-#include "runtime/player/session/pictures/png_file.h"
+#include "runtime/player/session/png_file.h"
 
 namespace sonocase {
 namespace {

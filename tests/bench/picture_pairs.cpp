@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "pipeline/look/look_frames.h"
-#include "runtime/player/session/pictures/png_file.h"
+#include "runtime/player/session/png_file.h"
 
 namespace sonocase {
 namespace {

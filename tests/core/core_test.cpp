@@ -11,11 +11,10 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 #include "formats/calibration/calibration.h"
 #include "formats/exercise/exercise.h"
 #include "formats/recording/sequence.h"
-#include "formats/registration/registration_json.h"
 #include "formats/scoring/session_score.h"
 #include "runtime/imaging/renderer.h"
 #include "sonocase/version.h"
@@ -105,11 +104,10 @@ TEST(Core, RefusesBadBytesWithoutAnException) {
 
 TEST(Core, RefusesBadTextWithoutAnException) {
     for (const char* json : {"", "{", "[1]", "{\"version\": 1e999}", "{\"a\": \"\xff\"}", "nul"}) {
-        EXPECT_FALSE(parse_registration(json, "text")) << json;
         EXPECT_FALSE(parse_calibration(json, "text")) << json;
     }
     const std::string deep(100000, '[');
-    EXPECT_FALSE(parse_registration("{\"a\": " + deep, "text"));
+    EXPECT_FALSE(parse_calibration("{\"a\": " + deep, "text"));
     for (const char* toml : {"name = ", "[[[", "name = 1", "probe = 3", "x = 1e999"})
         EXPECT_FALSE(parse_exercise(toml, "text")) << toml;
     const std::string_view recording = "ObjectType = Image\nNDims = 3\nDimSize = 1 1 -4\n";

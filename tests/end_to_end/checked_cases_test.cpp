@@ -13,12 +13,11 @@
 #include <regex>
 
 #include "formats/exercise/exercise.h"
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "formats/volume/brick_volume.h"
 #include "pipeline/aim/plain_case.h"
 #include "pipeline/check/check_case.h"
-#include "pipeline/pathology/pathology.h"
-#include "pipeline/pathology/requested_parts.h"
+#include "pipeline/pathology/place_pathology.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 

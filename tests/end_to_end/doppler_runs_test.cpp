@@ -7,8 +7,9 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "formats/base/constants.h"
 #include "formats/bundle/case_bundle.h"
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "formats/flow/flow_summary.h"
 #include "runtime/imaging/doppler/colour_image.h"
 #include "runtime/imaging/doppler_cases.h"
@@ -25,8 +26,6 @@ using runtime::doppler::ColourImage;
 using runtime::doppler::FlowScene;
 using testing::run_command;
 using testing::TemporaryFolder;
-
-constexpr double kPi = 3.14159265358979323846;
 
 std::string player(const std::string& arguments) {
     const auto run = run_command(std::string(SONOCASE_BIN) + "/sonoplay " + arguments);

@@ -7,8 +7,8 @@
 #include <filesystem>
 
 #include "end_to_end/scripted_trainees.h"
-#include "formats/attempt/difficulty.h"
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
+#include "formats/scoring/draw_attempt.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 

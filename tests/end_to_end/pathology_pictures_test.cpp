@@ -8,10 +8,9 @@
 #include <cstdio>
 #include <memory>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "pipeline/anatomy/tissue_table.h"
-#include "pipeline/pathology/pathology.h"
-#include "pipeline/pathology/requested_parts.h"
+#include "pipeline/pathology/place_pathology.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
 #include "support/phantom_bundle.h"
 

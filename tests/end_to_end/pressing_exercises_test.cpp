@@ -10,7 +10,7 @@
 
 #include "end_to_end/pressing_hand.h"
 #include "end_to_end/scripted_trainees.h"
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 
@@ -80,10 +80,10 @@ void push(PressingHand& hand, sonocase::testing::ExpertPlan plan, double press_m
     const Rigid probe = plan.hands.mannequin_from_probe();
     for (int n = 0; n < 4; ++n) hand.hold(probe, {}, press_mm);
     const Point3 rest = hand.exercise().targets.front().centre;
-    plan.hands.aim_needle_at(hand.engine().renderer().now_at(rest));
-    constexpr double kStep_mm = 0.5;
+    plan.hands.aim_needle_at(hand.engine().renderer().current_position(rest));
+    constexpr double kStepMm = 0.5;
     while (plan.hands.needle_depth_mm() < plan.depth_mm - 1e-6) {
-        plan.hands.advance_needle(std::min(kStep_mm, plan.depth_mm - plan.hands.needle_depth_mm()));
+        plan.hands.advance_needle(std::min(kStepMm, plan.depth_mm - plan.hands.needle_depth_mm()));
         hand.hold(probe, plan.hands.mannequin_from_needle(), press_mm);
     }
     for (int n = 0; n < 10; ++n) hand.hold(probe, plan.hands.mannequin_from_needle(), press_mm);

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/player/session/case_set_up.h"
+#include "runtime/player/session/open_case.h"
 #include "runtime/player/session/session_run.h"
 #include "runtime/tracking/mouse_tracker.h"
 #include "runtime/tracking/scripted_sweep.h"
@@ -76,13 +76,13 @@ class PressingHand {
     // Some ways to hold the probe, those first at which the tissue yields most: presses each a
     // little. Those over bone are left out.
     std::vector<Rigid> by_softness(const std::vector<runtime::MouseTracker>& ways) {
-        constexpr double kHard_n = 15;
+        constexpr double kHardN = 15;
         std::vector<std::pair<double, Rigid>> found;
         for (const runtime::MouseTracker& way : ways) {
             const Rigid probe = way.mannequin_from_probe();
             for (const double mm : {4.0, 7.0, 10.0}) {
                 hold(probe, {}, mm);
-                if (force_n() > kHard_n) break;
+                if (force_n() > kHardN) break;
                 if (mm == 10) found.emplace_back(force_n(), probe);
             }
         }

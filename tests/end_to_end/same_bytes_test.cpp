@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "formats/base/digest.h"
-#include "formats/files/file_digest.h"
+#include "formats/files/atomic_file.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 #include "support/temporary_folder.h"

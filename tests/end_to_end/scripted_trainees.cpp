@@ -6,9 +6,9 @@
 #include <cmath>
 #include <vector>
 
-#include "formats/scoring/image_region.h"
+#include "formats/base/constants.h"
 #include "formats/scoring/sight.h"
-#include "formats/volume/tissue_mechanics.h"
+#include "formats/volume/tissue.h"
 
 namespace sonocase::testing {
 
@@ -94,7 +94,7 @@ class Expert {
                 for (int turn = 0; start && turn < 6; ++turn) {
                     MouseTracker hands = *start;
                     hands.slide(x, y);
-                    hands.rotate(turn * 3.14159265358979 / 6);
+                    hands.rotate(turn * kPi / 6);
                     centre(hands, 0);
                     if (sees(hands) && std::abs(target(hands).y) < 0.5) found.push_back(hands);
                 }
@@ -201,7 +201,7 @@ class Expert {
             for (int turn = 0; turn < 12; ++turn) {
                 for (const double x_mm : {0.0, -20.0, 20.0}) {
                     MouseTracker turned = hands;
-                    turned.rotate(turn * 3.14159265358979 / 12);
+                    turned.rotate(turn * kPi / 12);
                     centre(turned, x_mm);
                     if (!sees(turned) || std::abs(target(turned).y) > 0.5) continue;
                     plan_needle(turned);

@@ -10,9 +10,9 @@
 #include <optional>
 #include <vector>
 
-#include "formats/attempt/draw_attempt.h"
 #include "formats/bundle/case_bundle.h"
 #include "formats/recording/session.h"
+#include "formats/scoring/draw_attempt.h"
 #include "formats/scoring/session_score.h"
 #include "runtime/engine/needle_state.h"
 #include "runtime/engine/skin.h"

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "numerics/property.h"
-#include "runtime/engine/needle_constraint.h"
-#include "runtime/imaging/scan/scan_geometry.h"
+#include "runtime/engine/needle_state.h"
+#include "runtime/imaging/core/scan_geometry.h"
 
 namespace sonocase::numerics {
 namespace {

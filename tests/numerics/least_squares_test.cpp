@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Givens QR and one-sided Jacobi against long double and against exact rationals.
-#include "formats/calibration/solve/least_squares.h"
+#include "formats/calibration/least_squares.h"
 
 #include <gtest/gtest.h>
 
@@ -58,12 +58,12 @@ std::array<long double, kMaxUnknowns> reference(const System& s) {
     return x;
 }
 
-// Columns scaled so that the condition is about 10^decades.
+// Columns scaled so that the condition number is about 10^decades.
 System random_system(testing::Random& random, int unknowns, double decades, double residual) {
     System s;
     s.unknowns = unknowns;
     Row truth{};
-    for (int k = 0; k < unknowns; ++k) truth[static_cast<std::size_t>(k)] = random.gaussian();
+    for (int k = 0; k < unknowns; ++k) truth[k] = random.gaussian();
     const int rows = unknowns + static_cast<int>(random.uniform(1, 60));
     for (int i = 0; i < rows; ++i) {
         Row row{};

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Point, direction and needle calibration: limits, bounds from the condition, invariances.
+// Point, direction and needle calibration: limits, bounds from the condition number, invariances.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "formats/calibration/direction.h"
 #include "formats/calibration/needle.h"
 #include "formats/calibration/point.h"
@@ -16,8 +17,6 @@ namespace {
 
 using testing::pivot_recording;
 using testing::PivotMotion;
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Exact data: the remaining error is the rounding of the stored poses, eps times the largest
 // coordinate, times the amplification of the centred system, 1 / swing.
@@ -59,7 +58,7 @@ RC_GTEST_PROP(PivotNumerics,
         turned[i].tracker_from_tool.rotation = poses[i].tracker_from_tool.rotation * turn;
         other[i].tracker_from_tool.translation = 3.0 * poses[i].tracker_from_tool.translation;
     }
-    const double bound = 1e-8;  // 1e4 mm of coordinates and a condition of about 10
+    const double bound = 1e-8;  // 1e4 mm of coordinates and a condition number of about 10
     RC_ASSERT(norm(fit_point(moved).tip_mm - fit.tip_mm) < bound);
     RC_ASSERT(norm(turn * fit_point(turned).tip_mm - fit.tip_mm) < bound);
     RC_ASSERT(norm(fit_point(other).tip_mm - 3.0 * fit.tip_mm) < 3 * bound);
@@ -126,7 +125,7 @@ TEST(PivotNumerics, GuardForTooLittleTurnFiresBetweenStillAndSlight) {
     bool was = false;
     for (double degrees : {0.01, 0.1, 0.5, 1.0, 3.0}) {
         PivotMotion motion;
-        motion.tilt_rad = motion.twist_rad = degrees * kPi / 180;
+        motion.tilt_rad = motion.twist_rad = degrees * kRadPerDeg;
         const PointFit fit = fit_point(pivot_recording(motion, random));
         EXPECT_GE(fit.determined, was) << degrees;
         if (!fit.determined) {
@@ -178,7 +177,7 @@ RC_GTEST_PROP(PrincipalAxisNumerics, NeedleOfExactPointsIsExactWhateverItsPlace,
     RC_ASSERT(fit.determined);
     RC_ASSERT(norm(fit.direction - way) < 1e-9);
     RC_ASSERT(norm(fit.tip_mm - tip) < 1e-7);
-    // The paper's point is the foot from the sensor on the axis.
+    // The paper's point is the point of the axis nearest to the sensor.
     RC_ASSERT(norm(cross(fit.paper_point_mm - tip, way)) < 1e-7);
     RC_ASSERT(std::abs(dot(fit.paper_point_mm, way)) < 1e-7);
 }

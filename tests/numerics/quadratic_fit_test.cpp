@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "numerics/property.h"
-#include "pipeline/registration/warp/quadratic_warp.h"
+#include "pipeline/registration/fit/quadratic_warp.h"
 
 namespace sonocase::numerics {
 namespace {
@@ -55,7 +55,7 @@ RC_GTEST_PROP(QuadraticFitNumerics, ExactPairsComeBack, ()) {
     const RigidQuadratic fitted = fit_correspondences(pairs, truth.rigid, 0);
     for (int n = 0; n < 20; ++n) {
         const Point3 p = random.point(180);
-        // Condition of 60 random points in centred and scaled coordinates: some 1e2.
+        // The condition number of 60 random points in centred and scaled coordinates is about 1e2.
         RC_ASSERT(distance(map_point(fitted, p), map_point(truth, p)) < 1e5 * kEpsilon * 500);
     }
 }
@@ -71,7 +71,7 @@ RC_GTEST_PROP(QuadraticFitNumerics, ASampleOfOneRepeatedPairMovesThatPointAndBen
         RC_ASSERT(finite(fitted));
         RC_ASSERT(distance(map_point(fitted, p), place) < 1e-6);
     }
-    // Held at that point alone the slopes are those of the rotation there.
+    // If only that point is held, the slopes there are those of the rotation.
     const RigidQuadratic held = fit_correspondences(pairs, pose, 15);
     RC_ASSERT(strain2(held, pairs) < 1e-12);
 }
@@ -93,7 +93,7 @@ RC_GTEST_PROP(QuadraticFitNumerics, PointsInAPlaneOrOnALineLeaveAFiniteMap, ()) 
         double worst = 0;
         for (const Correspondence& c : pairs)
             worst = std::max(worst, distance(map_point(fitted, c.skin), c.place));
-        RC_ASSERT(worst < 6);  // the noise is at most some 4 mm
+        RC_ASSERT(worst < 6);  // the noise is at most about 4 mm
     }
 }
 

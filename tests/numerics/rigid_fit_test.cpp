@@ -5,13 +5,12 @@
 
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "formats/calibration/landmarks.h"
 #include "numerics/property.h"
 
 namespace sonocase::numerics {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 struct Shape {
     std::vector<Point3> points;
@@ -50,7 +49,7 @@ RC_GTEST_PROP(RigidFitNumerics, ExactPairsComeBackAtEveryAngleShapeAndScale, ())
         to.push_back(truth * from.back());
     }
     const RigidFit fit = fit_rigid(from, to);
-    RC_PRE(fit.determined);  // a draw that is a line by chance says so
+    RC_PRE(fit.determined);  // a shape that is a line by chance is not
     // Rounding of stored coordinates over the narrower side of the shape.
     const double angle_bound = 300 * kEpsilon * (size + away) / (size * s.width);
     RC_ASSERT(rotation_angle(transpose(fit.to_from.rotation) * truth.rotation) <=

@@ -25,8 +25,8 @@ LabelVolume blank(Int3 size, Vector3 spacing_mm) {
     return v;
 }
 
-// Exact distance between voxel centres, less half a voxel, as the header promises; x along i alone
-// where a plane separates the two.
+// Exact distance between voxel centres, less half a voxel, as the header says; along i alone where
+// a plane separates the two.
 double brute_force(const LabelVolume& v, std::uint8_t label, Int3 at, double limit) {
     const bool own = v.voxels[v.grid.index(at.x, at.y, at.z)] == label;
     double best = INFINITY;
@@ -85,7 +85,7 @@ TEST(DistanceNumerics, NoneAllAndOneVoxel) {
 TEST(LevelSetNumerics, StepAboveTheLimitIsRefused) {
     LabelVolume v = blank({12, 12, 12}, {1, 1, 1});
     v.voxels[v.grid.index(6, 6, 6)] = 1;
-    const double limit = pipeline::greatest_stable_step(0.3, 1);
+    const double limit = pipeline::max_stable_step(0.3, 1);
     EXPECT_NEAR(limit, 2 / (0.3 + 8), 1e-12);
     pipeline::LevelSetOptions options;
     options.time_step = 1.01 * limit;

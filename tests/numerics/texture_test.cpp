@@ -9,13 +9,13 @@
 
 #include "numerics/property.h"
 #include "pipeline/base/periodic_volume.h"
-#include "pipeline/texture/speckle.h"
-#include "pipeline/texture/spectrum/fourier.h"
+#include "pipeline/texture/fourier.h"
+#include "pipeline/texture/speckle_volume.h"
 
 namespace sonocase::numerics {
 namespace {
 
-constexpr long double kPi = 3.14159265358979323846264338327950288L;
+constexpr long double kLongPi = 3.14159265358979323846264338327950288L;
 
 RC_GTEST_PROP(FourierNumerics, PlaneIsTheDefiningSum, ()) {
     testing::Random random = random_case();
@@ -37,9 +37,9 @@ RC_GTEST_PROP(FourierNumerics, PlaneIsTheDefiningSum, ()) {
             for (int y = 0; y < h; ++y) {
                 for (int x = 0; x < w; ++x) {
                     const long double turn =
-                        -2 * kPi *
+                        -2 * kLongPi *
                         (static_cast<long double>(u * x) / w + static_cast<long double>(v * y) / h);
-                    sum += std::complex<long double>(plane[static_cast<std::size_t>(y * w + x)]) *
+                    sum += std::complex<long double>(plane[y * w + x]) *
                            std::complex<long double>(std::cos(turn), std::sin(turn));
                 }
             }

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
+#include "formats/calibration/calibration.h"
 #include "formats/calibration/lag.h"
 #include "formats/calibration/pose_screen.h"
-#include "formats/calibration/quality.h"
 #include "numerics/property.h"
 
 namespace sonocase::numerics {

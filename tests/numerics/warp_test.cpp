@@ -5,10 +5,10 @@
 
 #include <cmath>
 
-#include "formats/registration/registration.h"
 #include "numerics/property.h"
-#include "pipeline/registration/map/fold_proof.h"
 #include "pipeline/registration/map/inverse_map.h"
+#include "pipeline/registration/map/map_proofs.h"
+#include "pipeline/registration/map/registration.h"
 
 namespace sonocase::numerics {
 namespace {
@@ -75,7 +75,7 @@ RC_GTEST_PROP(WarpNumerics, InverseReturnsToTheStartOrSaysThatThereIsNone, ()) {
     testing::Random random = random_case();
     const double away = random.uniform(0, 1) < 0.3 ? 1e4 : 0;
     const Registration map = random_map(random, 12, random.uniform(0, 1) < 0.5, away);
-    RC_PRE(pipeline::prove_no_fold(map).least_bound > pipeline::kLeastDetJacobian);
+    RC_PRE(pipeline::prove_no_fold(map).min_bound > pipeline::kMinDetJacobian);
     const InverseMap inverse_map(map);
     for (int k = 0; k < 20; ++k) {
         const Point3 ct = inside(random, map.ct_box);
@@ -93,9 +93,9 @@ RC_GTEST_PROP(WarpNumerics, FoldProofIsNeverAboveASample, ()) {
     testing::Random random = random_case();
     const Registration map = random_map(random, random.uniform(1, 120), random.uniform(0, 1) < 0.3);
     const pipeline::FoldProof proof = pipeline::prove_no_fold(map);
-    RC_ASSERT(proof.least_bound <= proof.least_sample);
+    RC_ASSERT(proof.min_bound <= proof.min_sample);
     for (int k = 0; k < 200; ++k) {
-        RC_ASSERT(determinant(jacobian(map, inside(random, map.ct_box))) >= proof.least_bound);
+        RC_ASSERT(determinant(jacobian(map, inside(random, map.ct_box))) >= proof.min_bound);
     }
 }
 
@@ -103,7 +103,7 @@ TEST(WarpNumerics, GuardFiresOnAFold) {
     testing::Random random(1);
     Registration map = random_map(random, 0, false);
     map.quadratic.coefficients[0][4] += 400;  // x -> x + 400 (x / 200)^2 turns back within the box
-    EXPECT_LT(pipeline::prove_no_fold(map).least_bound, 0);
+    EXPECT_LT(pipeline::prove_no_fold(map).min_bound, 0);
 }
 
 TEST(WarpNumerics, IdentityIsExact) {
@@ -113,8 +113,8 @@ TEST(WarpNumerics, IdentityIsExact) {
     map.ct_box.include({100, 100, 100});
     EXPECT_EQ(mannequin_from_ct(map, {12.25, -3.5, 99}), (Point3{12.25, -3.5, 99}));
     // Minus the margin that the proof subtracts for rounding.
-    EXPECT_NEAR(pipeline::prove_no_fold(map).least_bound, 1, 1e-11);
-    EXPECT_LE(pipeline::prove_no_fold(map).least_bound, 1);
+    EXPECT_NEAR(pipeline::prove_no_fold(map).min_bound, 1, 1e-11);
+    EXPECT_LE(pipeline::prove_no_fold(map).min_bound, 1);
 }
 
 RC_GTEST_PROP(ResidualWarpNumerics, SplineIsAPartitionOfUnityAndReproducesLinearFields, ()) {

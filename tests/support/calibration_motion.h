@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "formats/base/constants.h"
 #include "formats/recording/poses.h"
 #include "support/random.h"
 
@@ -12,10 +13,10 @@ namespace sonocase::testing {
 
 struct PivotMotion {
     int poses = 100;
-    double tilt_rad = 60 * 3.14159265358979323846 / 180 / 2;  // half of the full cone
-    double twist_rad = 3.14159265358979323846;                // about the tool's own axis, each way
-    double noise_mm = 0;                                      // uniform, half-width, on positions
-    double gaussian_mm = 0;                                   // standard deviation a component
+    double tilt_rad = 60 * kRadPerDeg / 2;  // half of the full cone
+    double twist_rad = kPi;                 // about the tool's own axis, each way
+    double noise_mm = 0;                    // uniform, half-width, on positions
+    double gaussian_mm = 0;                 // standard deviation a component
     Vector3 tip_mm{-17.78, 1.11, -156.87};
     Point3 pivot_mm{146.9, -62.97, -1042.14};
 };
@@ -27,7 +28,7 @@ inline std::vector<Pose> pivot_recording(const PivotMotion& motion, Random& rand
     const Vector3 axis = normalized(rest * motion.tip_mm);
     const Vector3 side = any_perpendicular(axis);
     for (int i = 0; i < motion.poses; ++i) {
-        const double around = random.uniform(-3.14159265358979323846, 3.14159265358979323846);
+        const double around = random.uniform(-kPi, kPi);
         const Vector3 hinge = rotation_about(axis, around) * side;
         const double tilt = motion.tilt_rad * std::sqrt(random.uniform(0, 1));
         const double twist = random.uniform(-motion.twist_rad, motion.twist_rad);

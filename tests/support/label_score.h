@@ -8,11 +8,11 @@
 #include <functional>
 #include <vector>
 
-#include "formats/registration/registration.h"
 #include "formats/volume/label_volume.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/registration/map/inverse_map.h"
-#include "pipeline/segmentation/field/cooked_grid.h"
+#include "pipeline/registration/map/registration.h"
+#include "pipeline/segmentation/cooked_grid.h"
 
 namespace sonocase::pipeline::testing {
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <random>
 
+#include "formats/base/constants.h"
 #include "formats/base/geometry.h"
 
 namespace sonocase::testing {
@@ -19,7 +20,7 @@ class Random {
     }
     double gaussian() {
         const double u = 1 - uniform(0, 1), v = uniform(0, 1);
-        return std::sqrt(-2 * std::log(u)) * std::cos(2 * 3.14159265358979323846 * v);
+        return std::sqrt(-2 * std::log(u)) * std::cos(2 * kPi * v);
     }
     Vector3 direction() { return normalized({gaussian(), gaussian(), gaussian()}); }
     Matrix3 rotation() {

@@ -15,7 +15,7 @@
 #include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/registration/map/inverse_map.h"
-#include "pipeline/segmentation/field/cooked_grid.h"
+#include "pipeline/segmentation/cooked_grid.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "support/random.h"
 

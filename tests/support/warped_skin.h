@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "formats/registration/registration.h"
 #include "formats/volume/surface.h"
+#include "pipeline/registration/map/registration.h"
 #include "support/area_sampler.h"
 #include "support/random.h"
 

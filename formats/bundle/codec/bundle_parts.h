@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Pieces that case bundles and the files between stages have in common. For the .cpp files of
-// formats/ only.
+// What case bundles and the files between stages have in common: grids, labels and tissues as JSON,
+// and chunks of bricks, textures and surfaces. For the .cpp files of formats/ only.
 #pragma once
 
 #include <algorithm>
@@ -10,13 +10,22 @@
 #include <string>
 #include <vector>
 
-#include "formats/container/chunk_file.h"
+#include "formats/bundle/codec/chunk_file.h"
 #include "formats/text/json_reader.h"
 #include "formats/volume/brick_volume.h"
+#include "formats/volume/label_volume.h"
 #include "formats/volume/solid_texture.h"
 #include "formats/volume/surface.h"
+#include "formats/volume/tissue.h"
 
 namespace sonocase::detail {
+
+Json json_of(const Grid& grid);
+Grid grid_from(JsonObject object);
+Json json_of(const std::vector<Label>& labels);
+std::vector<Label> labels_from(JsonObject& object, const char* key);
+Json json_of(const std::vector<Tissue>& tissues);
+std::vector<Tissue> tissues_from(JsonObject& object, const char* key);
 
 inline constexpr std::size_t kMaxManifestBytes = std::size_t{64} << 20;
 inline constexpr std::size_t kMaxSurfaceItems = std::size_t{1} << 27;
@@ -36,9 +45,8 @@ Result<BrickVolume<T>> read_bricks(const ChunkReader& reader,
     const Int3 n = brick_count(size);
     const std::size_t count = static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) *
                               static_cast<std::size_t>(n.z);
-    auto table =
-        reader.read_array<std::uint32_t, RawVector<std::uint32_t>>(name + ".t", count, jobs);
-    if (!table) return table.error();
+    SONOCASE_TRY(auto table, reader.read_array<std::uint32_t, RawVector<std::uint32_t>>(
+                                 name + ".t", count, jobs));
     const std::size_t uniform_count = reader.raw_bytes(name + ".u") / sizeof(T);
     const std::size_t pool_count = reader.raw_bytes(name + ".p") / sizeof(T);
     if (uniform_count > count || pool_count > count * kBrickVoxels ||
@@ -47,13 +55,11 @@ Result<BrickVolume<T>> read_bricks(const ChunkReader& reader,
             "brick volume '" + name + "' holds " + std::to_string(pool_count) + " values",
             "whole bricks, and no more than its grid has");
     }
-    auto uniform = reader.read_array<T>(name + ".u", uniform_count, jobs);
-    if (!uniform) return uniform.error();
-    auto pool = reader.read_array<T, RawVector<T>>(name + ".p", pool_count, jobs);
-    if (!pool) return pool.error();
+    SONOCASE_TRY(auto uniform, reader.read_array<T>(name + ".u", uniform_count, jobs));
+    SONOCASE_TRY(auto pool, reader.read_array<T, RawVector<T>>(name + ".p", pool_count, jobs));
     const std::size_t stored = pool_count / kBrickVoxels;
     bool inside = true;
-    for (const std::uint32_t entry : *table) {
+    for (const std::uint32_t entry : table) {
         const bool is_uniform = (entry & kUniformBrick) != 0;
         inside &= (entry & ~kUniformBrick) < (is_uniform ? uniform_count : stored);
     }
@@ -61,9 +67,9 @@ Result<BrickVolume<T>> read_bricks(const ChunkReader& reader,
         return reader.fault("brick volume '" + name + "' names a brick that it does not hold",
                             "make the file again");
     }
-    bricks.table = std::move(*table);
-    bricks.uniform = std::move(*uniform);
-    bricks.pool = std::move(*pool);
+    bricks.table = std::move(table);
+    bricks.uniform = std::move(uniform);
+    bricks.pool = std::move(pool);
     return bricks;
 }
 

@@ -13,11 +13,11 @@ namespace {
 constexpr std::uint32_t kVersion = 1;
 constexpr std::size_t kMaxVessels = 65536, kMaxNodes = 1 << 18, kMaxName = 128;
 constexpr double kPerMm = 1024, kRadiusPerMm = 256, kPerUnit = 32767;
-constexpr double kFarthestMm = 1e5, kMostFlow_ml_s = 1e4, kMostShare = 1e3;
+constexpr double kMaxCoordinateMm = 1e5, kMaxFlowMlPerS = 1e4, kMaxShare = 1e3;
 
-// What a vessel takes at least: name, kind, junctions, node count, mean, exponent, breathing, wave.
-constexpr std::size_t kVesselBytes = 2 + 2 + 8 + 4 + 8 + 8 + 8 * kFlowHarmonics;
-constexpr std::size_t kNodeBytes = 12 + 6 + 2;
+// The smallest vessel: name, kind, junctions, node count, mean, exponent, breathing, wave.
+constexpr std::size_t kMinVesselBytes = 2 + 2 + 8 + 4 + 8 + 8 + 8 * kFlowHarmonics;
+constexpr std::size_t kMinNodeBytes = 12 + 6 + 2;
 
 template <class T>
 void put(std::vector<std::uint8_t>& bytes, T value) {
@@ -31,15 +31,15 @@ std::int32_t steps(double value, double per_unit) {
     return static_cast<std::int32_t>(std::lround(value * per_unit));
 }
 
-// Takes values off the front of bytes; once they run out, it stays `short_`.
-class Taker {
+// Takes values off the front of bytes, and zeros once they have run out.
+class Consumer {
   public:
-    explicit Taker(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+    explicit Consumer(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
     template <class T>
     T take() {
         T value{};
         if (bytes_.size() < sizeof value) {
-            short_ = true;
+            ran_out_ = true;
             return value;
         }
         std::memcpy(&value, bytes_.data(), sizeof value);
@@ -48,7 +48,7 @@ class Taker {
     }
     std::string text(std::size_t count) {
         if (bytes_.size() < count) {
-            short_ = true;
+            ran_out_ = true;
             return {};
         }
         std::string out(reinterpret_cast<const char*>(bytes_.data()), count);
@@ -56,15 +56,15 @@ class Taker {
         return out;
     }
     std::size_t left() const { return bytes_.size(); }
-    bool ran_out() const { return short_; }
+    bool ran_out() const { return ran_out_; }
 
   private:
     std::span<const std::uint8_t> bytes_;
-    bool short_ = false;
+    bool ran_out_ = false;
 };
 
-bool sane(double value, double most) {
-    return std::isfinite(value) && std::abs(value) <= most;
+bool sane(double value, double max) {
+    return std::isfinite(value) && std::abs(value) <= max;
 }
 
 bool printable(const std::string& name) {
@@ -73,23 +73,24 @@ bool printable(const std::string& name) {
     });
 }
 
-// Why a vessel makes no sense; empty: it does.
+// What is wrong with a vessel; empty if nothing is.
 std::string fault_of(const FlowVessel& v, const FlowField& field) {
     if (!printable(v.name)) return "has no printable name";
     const auto known = [&](int junction) { return junction >= -1 && junction < field.junctions; };
     if (!known(v.from) || !known(v.to)) return "meets a junction that does not exist";
     if (v.nodes == 1) return "has a single node";
-    if (!(v.mean_ml_s >= 0) || !sane(v.mean_ml_s, kMostFlow_ml_s))
+    if (!(v.mean_ml_s >= 0) || !sane(v.mean_ml_s, kMaxFlowMlPerS))
         return "carries a flow that is negative or not finite";
-    if (!(v.exponent >= 1 && v.exponent <= 100)) return "has a profile that is none";
-    bool finite = sane(static_cast<double>(v.breathing), kMostShare);
+    if (!(v.exponent >= 1 && v.exponent <= 100))
+        return "has a profile whose exponent is not in 1 to 100";
+    bool finite = sane(static_cast<double>(v.breathing), kMaxShare);
     for (const FlowHarmonic& h : v.wave)
-        finite = finite && sane(static_cast<double>(h.re), kMostShare) &&
-                 sane(static_cast<double>(h.im), kMostShare);
+        finite = finite && sane(static_cast<double>(h.re), kMaxShare) &&
+                 sane(static_cast<double>(h.im), kMaxShare);
     return finite ? "" : "has a waveform that is not finite";
 }
 
-FlowVessel take_vessel(Taker& from) {
+FlowVessel take_vessel(Consumer& from) {
     FlowVessel v;
     const auto length = from.take<std::uint16_t>();
     v.name = length <= kMaxName ? from.text(length) : std::string();
@@ -112,13 +113,14 @@ FlowVessel take_vessel(Taker& from) {
     return v;
 }
 
-// False where the direction is none or a radius is 0.
-bool take_node(Taker& from, bool round, FlowNode& node) {
+// False where the direction is not a unit vector, a radius is 0 or the centre is out of range.
+bool take_node(Consumer& from, bool round, FlowNode& node) {
     for (int axis = 0; axis < 3; ++axis) node.centre[axis] = from.take<std::int32_t>() / kPerMm;
     for (int axis = 0; axis < 3; ++axis)
         node.direction[axis] = from.take<std::int16_t>() / kPerUnit;
     bool good = std::abs(norm(node.direction) - 1) < 1e-3;
-    for (int axis = 0; axis < 3; ++axis) good = good && std::abs(node.centre[axis]) <= kFarthestMm;
+    for (int axis = 0; axis < 3; ++axis)
+        good = good && std::abs(node.centre[axis]) <= kMaxCoordinateMm;
     const auto radius = [&] {
         const auto r = from.take<std::uint16_t>();
         good = good && r > 0;
@@ -159,12 +161,12 @@ std::vector<std::uint8_t> flow_bytes(const FlowField& field) {
     }
     for (const FlowVessel& v : field.vessels) {
         for (int i = 0; i < v.nodes; ++i) {
-            const FlowNode& node = field.nodes[static_cast<std::size_t>(v.first_node + i)];
+            const FlowNode& node = field.nodes[v.first_node + i];
             for (int axis = 0; axis < 3; ++axis) put(bytes, steps(node.centre[axis], kPerMm));
             for (int axis = 0; axis < 3; ++axis)
                 put(bytes, static_cast<std::int16_t>(steps(node.direction[axis], kPerUnit)));
             for (int ray = 0; ray < (v.round ? 1 : kFlowRays); ++ray) {
-                const auto r = static_cast<double>(node.radius_mm[static_cast<std::size_t>(ray)]);
+                const auto r = static_cast<double>(node.radius_mm[ray]);
                 put(bytes, static_cast<std::uint16_t>(std::clamp(
                                steps(r, kRadiusPerMm), std::int32_t{1}, std::int32_t{65535})));
             }
@@ -177,7 +179,7 @@ Result<FlowField> flow_from_bytes(std::span<const std::uint8_t> bytes, const std
     const auto fault = [&](const std::string& what) {
         return Error{"the flow field " + what, where, "cook the case again"};
     };
-    Taker from(bytes);
+    Consumer from(bytes);
     const auto version = from.take<std::uint32_t>();
     if (from.ran_out()) return fault("is cut short");
     if (version != kVersion)
@@ -188,7 +190,7 @@ Result<FlowField> flow_from_bytes(std::span<const std::uint8_t> bytes, const std
                nodes = from.take<std::uint32_t>();
     if (from.ran_out()) return fault("is cut short");
     if (junctions > kMaxVessels || vessels > kMaxVessels || nodes > kMaxNodes ||
-        vessels * kVesselBytes + nodes * kNodeBytes > from.left())
+        vessels * kMinVesselBytes + nodes * kMinNodeBytes > from.left())
         return fault("does not have the size that its counts call for");
     field.junctions = static_cast<int>(junctions);
     field.vessels.reserve(vessels);
@@ -207,8 +209,7 @@ Result<FlowField> flow_from_bytes(std::span<const std::uint8_t> bytes, const std
     field.nodes.resize(nodes);
     for (const FlowVessel& v : field.vessels) {
         for (int i = 0; i < v.nodes; ++i) {
-            const bool good =
-                take_node(from, v.round, field.nodes[static_cast<std::size_t>(v.first_node + i)]);
+            const bool good = take_node(from, v.round, field.nodes[v.first_node + i]);
             if (from.ran_out()) return fault("is cut short");
             if (!good)
                 return fault("has a node of " + v.name + " without place, direction or radius");

@@ -16,13 +16,13 @@ namespace sonocase::detail {
 
 inline constexpr std::size_t kMaxFlowBytes = std::size_t{16} << 20;
 
-// Centres are rounded to 1/1024 mm, directions to 1/32767, radii to 1/256 mm; of round vessels one
-// radius is written. flow_from_bytes(flow_bytes(f)) written again gives the same bytes.
+// Centres are rounded to 1/1024 mm, directions to 1/32767, radii to 1/256 mm; a round vessel
+// has one radius per node. flow_from_bytes(flow_bytes(f)) written again gives the same bytes.
 std::vector<std::uint8_t> flow_bytes(const FlowField& field);
 
 // Trusts nothing: every count is checked against the bytes before anything is allocated. Errors: a
-// version of the future, bytes that are missing or left over, a name, junction or number that makes
-// no sense; `where` names the file.
+// newer version, bytes that are missing or left over, a name, junction or number that makes no
+// sense. where: names the file.
 Result<FlowField> flow_from_bytes(std::span<const std::uint8_t> bytes, const std::string& where);
 
 }  // namespace sonocase::detail

@@ -6,38 +6,72 @@
 #include <span>
 
 #include "formats/bundle/codec/bundle_parts.h"
-#include "formats/bundle/codec/first_layout.h"
-#include "formats/bundle/codec/pack_offsets.h"
-#include "formats/bundle/codec/pack_surfaces.h"
-#include "formats/bundle/codec/unpack_offsets.h"
-#include "formats/bundle/codec/unpack_surfaces.h"
+#include "formats/bundle/codec/offset_codec.h"
+#include "formats/bundle/codec/surface_codec.h"
+#include "formats/volume/boundary_record.h"
 
 namespace sonocase::detail {
 namespace {
 
-constexpr int kLeastBlock = 8;  // bricks per edge
-constexpr std::size_t kMostBlocks = 4096;
-constexpr int kMostPatchStep = 16;
+template <class T, class Good>
+bool all_values(const BrickVolume<T>& bricks, Good good) {
+    return std::all_of(bricks.uniform.begin(), bricks.uniform.end(), good) &&
+           std::all_of(bricks.pool.begin(), bricks.pool.end(), good);
+}
 
-// Blocks small enough that a frame needs few, large enough that each compresses well.
+// Files of the first layout hold brick volumes as chunks lab.*, bnd.* and echo.* with tables,
+// uniform values and pools as they are in memory. Such files are read but no longer written.
+Result<VoxelVolumes> read_first_layout(const ChunkReader& reader,
+                                       bool with_records,
+                                       bool with_offsets,
+                                       Int3 size,
+                                       std::size_t palette,
+                                       JobRunner& jobs) {
+    VoxelVolumes out;
+    SONOCASE_TRY(auto labels, read_bricks<std::uint8_t>(reader, "lab", size, jobs));
+    out.labels = std::move(labels);
+    if (!all_values(out.labels, [&](std::uint8_t v) { return v < palette; }))
+        return reader.fault("a voxel has a label beyond the palette", "make the file again");
+    if (with_offsets) {
+        SONOCASE_TRY(auto echo, read_bricks<std::int8_t>(reader, "echo", size, jobs));
+        out.echo_offset = std::move(echo);
+    }
+    if (with_records) {
+        SONOCASE_TRY(auto boundary, read_bricks<std::uint32_t>(reader, "bnd", size, jobs));
+        out.boundary = std::move(boundary);
+        if (!all_values(out.boundary, [&](std::uint32_t v) {
+                return (v & 0xFFu) < palette || v == kNoBoundary;
+            })) {
+            return reader.fault("a boundary record has a label beyond the palette",
+                                "make the file again");
+        }
+    }
+    return out;
+}
+
+constexpr int kMinBlock = 8;  // bricks per edge
+constexpr std::size_t kMaxBlocks = 4096;
+constexpr int kMaxPatchStep = 16;
+
+// Blocks small enough that a frame of the player needs few, large enough that each compresses well.
 BlockGrid block_grid(Int3 size) {
-    BlockGrid grid{brick_count(size), kLeastBlock};
-    while (grid.count() > kMostBlocks && grid.edge < kLargestBlock) grid.edge *= 2;
+    BlockGrid grid{brick_count(size), kMinBlock};
+    while (grid.count() > kMaxBlocks && grid.edge < kMaxBlock) grid.edge *= 2;
     return grid;
 }
 
 // The largest distance of any record, in 1/48 voxel.
 int reach_of(const BrickVolume<std::uint32_t>& boundary) {
-    std::uint32_t most = 0;
+    std::uint32_t max_steps = 0;
     const auto search = [&](std::span<const std::uint32_t> values) {
         for (const std::uint32_t v : values) {
             const std::uint32_t steps = v >> 8 & 0xFFu;
-            if (steps < 128) most = std::max(most, steps);
+            if (steps < 128) max_steps = std::max(max_steps, steps);
         }
     };
     search(boundary.uniform);
     search(boundary.pool);
-    return static_cast<int>(most);
+    return static_cast<int>(max_steps);
 }
 
 }  // namespace
@@ -75,8 +109,8 @@ Result<VoxelVolumes> read_volumes(const ChunkReader& reader,
     auto parts = std::make_unique<BlockParts>();
     parts->reach_steps = static_cast<int>(manifest.integer("record_reach", 0, 127));
     parts->grid.bricks = brick_count(size);
-    parts->grid.edge = static_cast<int>(manifest.integer("block_bricks", 1, kLargestBlock));
-    const auto step = static_cast<int>(manifest.integer_or("patch_step", 1, 1, kMostPatchStep));
+    parts->grid.edge = static_cast<int>(manifest.integer("block_bricks", 1, kMaxBlock));
+    const auto step = static_cast<int>(manifest.integer_or("patch_step", 1, 1, kMaxPatchStep));
     if (!manifest.ok()) return VoxelVolumes{};
     parts->palette = palette;
     parts->where = reader.where();
@@ -84,12 +118,10 @@ Result<VoxelVolumes> read_volumes(const ChunkReader& reader,
     out.boundary.patches.step = step;
     out.labels.size = size;
     if (with_records) out.boundary.size = size;
-    if (Status s = read_surfaces(reader, with_records, jobs, parts.get(), &out); !s)
-        return s.error();
+    SONOCASE_TRY_DONE(read_surfaces(reader, with_records, jobs, parts.get(), &out));
     if (with_offsets) {
         out.echo_offset.size = size;
-        if (Status s = read_offsets(reader, jobs, parts.get(), &out.echo_offset); !s)
-            return s.error();
+        SONOCASE_TRY_DONE(read_offsets(reader, jobs, parts.get(), &out.echo_offset));
     }
     out.packed = std::move(parts);
     return out;

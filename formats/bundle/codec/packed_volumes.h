@@ -6,8 +6,8 @@
 
 #include <memory>
 
-#include "formats/bundle/codec/block_parts.h"
-#include "formats/container/chunk_file.h"
+#include "formats/bundle/codec/chunk_file.h"
+#include "formats/bundle/codec/packed_blocks.h"
 #include "formats/text/json_reader.h"
 #include "formats/volume/surface_patch.h"
 
@@ -17,11 +17,11 @@ struct VoxelVolumes {
     BrickVolume<std::uint8_t> labels;
     BoundaryBricks boundary;               // empty: none
     BrickVolume<std::int8_t> echo_offset;  // empty: none
-    // What VoxelBlocks unpacks the pools of the latter two from; null: everything is loaded.
+    // VoxelBlocks unpacks the pools of the latter two from it; null: everything is loaded.
     std::unique_ptr<BlockParts> packed;
 };
 
-// Adds the chunks, and to the manifest what is needed to read them. The order of bricks in the
+// Adds the chunks and, to the manifest, what is needed to read them. The order of bricks in the
 // pools is not preserved; the values of the voxels are.
 void add_volumes(ChunkWriter& writer,
                  Json& manifest,

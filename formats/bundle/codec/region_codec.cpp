@@ -4,14 +4,13 @@
 
 #include "formats/bundle/codec/bundle_parts.h"
 #include "formats/bundle/codec/packed_volumes.h"
-#include "formats/bundle/codec/volume_json.h"
 
 namespace sonocase::detail {
 namespace {
 
 constexpr std::string_view kChunks[] = {"manifest", SONOCASE_VOLUME_CHUNKS};
 
-// Every block at once: a region is small.
+// Unpacks every block at once: a region is small.
 Status unpack_all(BlockParts& parts) {
     BlockUnpacker unpacker(parts);
     for (std::size_t block = 0; block < parts.grid.count(); ++block) {
@@ -42,25 +41,23 @@ Result<FineRegion> region_from_bytes(std::span<const std::uint8_t> bytes,
                                      const std::string& where,
                                      JobRunner& jobs) {
     const std::string place = where + ": fine region";
-    auto reader = ChunkReader::open(bytes, "FINE", kChunks, place);
-    if (!reader) return reader.error();
-    auto json = read_manifest(*reader);
-    if (!json) return json.error();
+    SONOCASE_TRY(auto reader, ChunkReader::open(bytes, "FINE", kChunks, place));
+    SONOCASE_TRY(auto json, read_manifest(reader));
     JsonFault fault{place + ": manifest", {}};
-    JsonObject manifest(*json, "", fault);
+    JsonObject manifest(json, "", fault);
     FineRegion region;
     region.name = manifest.text_or("name", "");
     region.box.lower = manifest.point("lower_mm");
     region.box.upper = manifest.point("upper_mm");
     region.grid = grid_from(manifest.object("grid"));
     if (fault.error) return *fault.error;
-    if (Status good = check_region(region, case_voxel_mm, place); !good) return good.error();
-    if (!reader->has("vox.kind"))
-        return reader->fault("holds no labels of the fine region", "make the file again");
-    auto volumes = read_volumes(*reader, manifest, region.grid.size, palette, jobs);
+    SONOCASE_TRY_DONE(check_region(region, case_voxel_mm, place));
+    if (!reader.has("vox.kind"))
+        return reader.fault("holds no labels of the fine region", "make the file again");
+    auto volumes = read_volumes(reader, manifest, region.grid.size, palette, jobs);
     if (fault.error) return *fault.error;
     if (!volumes) return volumes.error();
-    if (Status whole = unpack_all(*volumes->packed); !whole) return whole.error();
+    SONOCASE_TRY_DONE(unpack_all(*volumes->packed));
     region.label_bricks = std::move(volumes->labels);
     region.boundary = std::move(volumes->boundary);
     return region;

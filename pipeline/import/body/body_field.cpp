@@ -9,7 +9,7 @@
 #include "pipeline/base/parallel.h"
 #include "pipeline/segmentation/distance/marked_distance.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_body {
 namespace {
 
 // To the surface half a voxel before the nearest marked centre, mm; 0 at marked voxels.
@@ -39,21 +39,21 @@ std::uint8_t BodyField::make(const char* name, const char* tissue) {
     return static_cast<std::uint8_t>(labels_.labels.size() - 1);
 }
 
-LabelBits BodyField::with(std::initializer_list<std::string_view> words) const {
-    LabelBits bits;
+LabelSet BodyField::with(std::initializer_list<std::string_view> words) const {
+    LabelSet bits;
     for (std::size_t l = 1; l < labels_.labels.size(); ++l)
         for (const std::string_view word : words)
             if (labels_.labels[l].name.find(word) != std::string::npos) bits.set(l);
     return bits;
 }
 
-LabelBits BodyField::all() const {
-    LabelBits bits;
+LabelSet BodyField::all() const {
+    LabelSet bits;
     for (std::size_t l = 1; l < labels_.labels.size(); ++l) bits.set(l, l != body_);
     return bits;
 }
 
-std::vector<float> BodyField::distance_to(const LabelBits& labels) const {
+std::vector<float> BodyField::distance_to(const LabelSet& labels) const {
     std::vector<std::uint8_t> marked(labels_.voxels.size());
     for (std::size_t n = 0; n < marked.size(); ++n) marked[n] = labels[labels_.voxels[n]];
     return distances(marked, grid());
@@ -64,16 +64,15 @@ std::vector<float> BodyField::distance_to(const std::vector<std::uint8_t>& marke
 }
 
 void BodyField::for_slices(const std::function<void(int)>& slice) const {
-    parallel_for(static_cast<std::size_t>(grid().size.z), 1,
-                 [&](std::size_t begin, std::size_t end) {
-                     for (std::size_t k = begin; k < end; ++k) slice(static_cast<int>(k));
-                 });
+    parallel_for(grid().size.z, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) slice(static_cast<int>(k));
+    });
 }
 
 void BodyField::paint_tube(std::uint8_t label,
                            const std::vector<Point3>& path,
                            double radius_mm,
-                           const LabelBits& give_way) {
+                           const LabelSet& give_way) {
     Box3 box;
     for (const Point3 p : path) {
         box.include(p + Vector3{radius_mm, radius_mm, radius_mm});
@@ -92,7 +91,7 @@ void BodyField::paint_tube(std::uint8_t label,
     paint(label, within, give_way);
 }
 
-Box3 BodyField::box_of(const LabelBits& bits) const {
+Box3 BodyField::box_of(const LabelSet& bits) const {
     Box3 box;
     for (int k = 0; k < grid().size.z; ++k)
         for (int j = 0; j < grid().size.y; ++j)
@@ -101,7 +100,7 @@ Box3 BodyField::box_of(const LabelBits& bits) const {
     return box;
 }
 
-Point3 BodyField::middle_of(const LabelBits& bits) const {
+Point3 BodyField::middle_of(const LabelSet& bits) const {
     Vector3 sum;
     double count = 0;
     for (int k = 0; k < grid().size.z; ++k)
@@ -116,7 +115,7 @@ Point3 BodyField::middle_of(const LabelBits& bits) const {
 
 const std::vector<BodyField::Outline>& BodyField::outlines() {
     if (!outlines_.empty()) return outlines_;
-    outlines_.assign(static_cast<std::size_t>(grid().size.z), {NAN, NAN, NAN, NAN, NAN});
+    outlines_.assign(grid().size.z, {NAN, NAN, NAN, NAN, NAN});
     for_slices([&](int k) {
         double left = 1e9, right = -1e9;
         for (int j = 0; j < grid().size.y; ++j)
@@ -126,7 +125,7 @@ const std::vector<BodyField::Outline>& BodyField::outlines() {
                     right = std::max(right, point(i, j, k).x);
                 }
         if (right < left) return;
-        Outline& out = outlines_[static_cast<std::size_t>(k)];
+        Outline& out = outlines_[k];
         out = {0.5 * (left + right), NAN, NAN, right, left};
         const int i = std::clamp(
             static_cast<int>(std::lround((out.middle_x - grid().origin_mm.x) / voxel_mm())), 0,
@@ -140,4 +139,4 @@ const std::vector<BodyField::Outline>& BodyField::outlines() {
     return outlines_;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_body

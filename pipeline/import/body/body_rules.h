@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A body of organs and a skin becomes a whole body: rules for what an atlas of organs lacks.
+// Turns organs and a skin into a whole body: rules for what an atlas of organs lacks.
 //
 // Every voxel that only the skin encloses (label "body") is given a label here, in the order below;
 // a structure that the meshes have is never painted over. Frame: RAS+ mm, x to the right, y to the
@@ -15,7 +15,7 @@
 #include "formats/volume/label_volume.h"
 #include "pipeline/base/progress.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_body {
 
 struct BodyOptions {
     bool enabled = true;       // false: the rest stays "body", soft tissue
@@ -42,12 +42,13 @@ struct BodyOptions {
     double bladder_ml = 150;  // the bladder is filled to this; 0: as it is
 };
 
-inline constexpr std::size_t kMostBodyLabels = 28;
+inline constexpr std::size_t kMaxBodyLabels = 28;  // that the rules may add
 
-// Cost: some 12 distance fields and passes over the voxels: 20 s for 25 M voxels.
+// Fills the body in place and adds its measures and warnings to `report`. Cost: some 12 distance
+// fields and passes over the voxels, 20 s for 25 M voxels.
 void fill_body(LabelVolume& labels,
                const BodyOptions& options,
                StageReport& report,
                const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_body

@@ -10,7 +10,7 @@
 #endif
 #include <nlohmann/json.hpp>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_mesh {
 namespace {
 
 using Json = nlohmann::json;
@@ -24,7 +24,7 @@ std::uint32_t word_at(std::span<const std::uint8_t> bytes, std::size_t at) {
     return word;
 }
 
-// Affine: column-major 4 x 4 as glTF has it.
+// An affine map, 4 x 4 and column by column as in glTF.
 struct Affine {
     std::array<double, 16> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     Point3 operator*(Point3 p) const {
@@ -69,16 +69,15 @@ class Reader {
             if (!nodes[n].contains("mesh")) continue;
             Affine to_scene;
             int up = static_cast<int>(n);
-            for (std::size_t steps = 0; up >= 0; up = parent[static_cast<std::size_t>(up)]) {
+            for (std::size_t steps = 0; up >= 0; up = parent[up]) {
                 if (++steps > nodes.size()) return fault("its nodes go round in a circle");
-                to_scene = transform(nodes[static_cast<std::size_t>(up)]) * to_scene;
+                to_scene = transform(nodes[up]) * to_scene;
             }
             MeshNode node;
             node.name = "node_" + std::to_string(n);
             if (const Json& name = member(nodes[n], "name"); name.is_string())
                 node.name = name.get<std::string>();
-            if (auto status = read_mesh(index(nodes[n]["mesh"]), node.surface); !status)
-                return status.error();
+            SONOCASE_TRY_DONE(read_mesh(index(nodes[n]["mesh"]), node.surface));
             for (Point3& p : node.surface.points) p = to_scene * p;
             nodes_.push_back(std::move(node));
         }
@@ -122,9 +121,7 @@ class Reader {
         if (s.empty()) s = {1, 1, 1};
         if (t.empty()) t = {0, 0, 0};
         for (int c = 0; c < 3; ++c)
-            for (int row = 0; row < 3; ++row)
-                out.m[static_cast<std::size_t>(4 * c + row)] =
-                    r(row, c) * s[static_cast<std::size_t>(c)];
+            for (int row = 0; row < 3; ++row) out.m[4 * c + row] = r(row, c) * s[c];
         for (std::size_t a = 0; a < 3; ++a) out.m[12 + a] = t[a];
         return out;
     }
@@ -174,19 +171,19 @@ class Reader {
         for (const Json& primitive : member(meshes[mesh], "primitives")) {
             if (index_or(primitive, "mode", 4) != 4)
                 return fault("a mesh is not made of single triangles");
-            auto points =
-                view(index_or(member(primitive, "attributes"), "POSITION", SIZE_MAX), 3, "VEC3");
-            if (!points) return points.error();
-            if (points->component != 5126) return fault("positions are not 32-bit floats");
+            SONOCASE_TRY(
+                auto points,
+                view(index_or(member(primitive, "attributes"), "POSITION", SIZE_MAX), 3, "VEC3"));
+            if (points.component != 5126) return fault("positions are not 32-bit floats");
             const std::size_t first = surface.points.size();
-            for (std::size_t n = 0; n < points->count; ++n) {
+            for (std::size_t n = 0; n < points.count; ++n) {
                 float p[3];
-                std::memcpy(p, points->bytes.data() + n * points->stride, sizeof p);
+                std::memcpy(p, points.bytes.data() + n * points.stride, sizeof p);
                 if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
                     return fault("a position is not a number");
                 surface.points.push_back({p[0], p[1], p[2]});
             }
-            if (auto status = read_triangles(primitive, first, points->count, surface); !status)
+            if (auto status = read_triangles(primitive, first, points.count, surface); !status)
                 return status;
         }
         return Done{};
@@ -198,14 +195,13 @@ class Reader {
                           Surface& surface) const {
         std::vector<std::uint32_t> corners;
         if (primitive.contains("indices")) {
-            auto list = view(index(primitive["indices"]), 1, "SCALAR");
-            if (!list) return list.error();
-            for (std::size_t n = 0; n < list->count; ++n) {
+            SONOCASE_TRY(auto list, view(index(primitive["indices"]), 1, "SCALAR"));
+            for (std::size_t n = 0; n < list.count; ++n) {
                 std::uint32_t corner = 0;
-                const std::size_t size = list->component == 5125   ? 4
-                                         : list->component == 5123 ? 2
-                                                                   : 1;
-                std::memcpy(&corner, list->bytes.data() + n * list->stride, size);
+                const std::size_t size = list.component == 5125   ? 4
+                                         : list.component == 5123 ? 2
+                                                                  : 1;
+                std::memcpy(&corner, list.bytes.data() + n * list.stride, size);
                 if (corner >= points) return fault("a triangle has a corner that is not there");
                 corners.push_back(corner);
             }
@@ -254,4 +250,4 @@ Result<std::vector<MeshNode>> read_glb(std::span<const std::uint8_t> bytes,
     return Reader(json, bin, where).read();
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_mesh

@@ -11,7 +11,7 @@
 #include "formats/base/result.h"
 #include "formats/volume/surface.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_mesh {
 
 struct MeshNode {
     std::string file;  // its name without folder
@@ -20,9 +20,9 @@ struct MeshNode {
 };
 
 // Triangles of every node that has a mesh, in the file's own axes and units (metres, y up). Errors,
-// one line each: no GLB; cut off; compressed (an extension is required); buffers in other files;
-// primitives that are no triangles; indices or accessors beyond their buffer.
+// one line each: not GLB; cut off; compressed (an extension is required); buffers in other files;
+// primitives that are not triangles; indices or accessors beyond their buffer.
 Result<std::vector<MeshNode>> read_glb(std::span<const std::uint8_t> bytes,
                                        const std::string& where);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_mesh

@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_mesh {
 namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
@@ -26,7 +26,7 @@ struct CellHash {
     }
 };
 
-// For each point the first one within weld_mm of it.
+// For each point, the first point within weld_mm of it.
 std::vector<std::uint32_t> welded(const std::vector<Point3>& points, double weld_mm) {
     std::unordered_map<std::array<std::int64_t, 3>, std::vector<std::uint32_t>, CellHash> cells;
     std::vector<std::uint32_t> first(points.size());
@@ -34,8 +34,7 @@ std::vector<std::uint32_t> welded(const std::vector<Point3>& points, double weld
     for (std::uint32_t n = 0; n < points.size(); ++n) {
         std::array<std::int64_t, 3> at;
         for (int axis = 0; axis < 3; ++axis)
-            at[static_cast<std::size_t>(axis)] =
-                static_cast<std::int64_t>(std::floor(points[n][axis] / cell_mm));
+            at[axis] = static_cast<std::int64_t>(std::floor(points[n][axis] / cell_mm));
         first[n] = n;
         for (int c = 0; c < 27 && first[n] == n; ++c) {
             const auto found =
@@ -67,7 +66,7 @@ std::vector<Triangle> welded_triangles(const Surface& patches, double weld_mm) {
     return triangles;
 }
 
-// Turns triangles to agree with their neighbours; the component of each.
+// Turns triangles to agree with their neighbours. Returns the component of each.
 std::vector<int> orient(std::vector<Triangle>& triangles, int* components) {
     std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> of_edge;
     for (std::uint32_t t = 0; t < triangles.size(); ++t)
@@ -104,7 +103,7 @@ std::vector<int> orient(std::vector<Triangle>& triangles, int* components) {
     return component;
 }
 
-// Directed edges that no triangle runs against, as chains from end to start.
+// Directed edges without an opposite one, joined to chains.
 std::vector<std::vector<std::uint32_t>> border_chains(const std::vector<Triangle>& triangles) {
     std::unordered_map<std::uint64_t, int> balance;
     for (const Triangle& t : triangles)
@@ -151,8 +150,8 @@ std::vector<std::vector<std::uint32_t>> border_chains(const std::vector<Triangle
     return chains;
 }
 
-// Components whose own triangles leave no edge without its opposite. Cost: n log n, however many
-// components there are.
+// Whether the triangles of each component leave no edge without its opposite. Cost: n log n,
+// however many components there are.
 std::vector<bool> closed_components(const std::vector<Triangle>& triangles,
                                     const std::vector<int>& component,
                                     int count) {
@@ -171,7 +170,7 @@ std::vector<bool> closed_components(const std::vector<Triangle>& triangles,
     std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
         return a.component != b.component ? a.component < b.component : a.edge < b.edge;
     });
-    std::vector<bool> closed(static_cast<std::size_t>(count), true);
+    std::vector<bool> closed(count, true);
     for (std::size_t n = 0; n < sides.size();) {
         const Side& first = sides[n];
         int sum = 0;
@@ -179,7 +178,7 @@ std::vector<bool> closed_components(const std::vector<Triangle>& triangles,
                sides[n].edge == first.edge;
              ++n)
             sum += sides[n].sense;
-        if (sum != 0) closed[static_cast<std::size_t>(first.component)] = false;
+        if (sum != 0) closed[first.component] = false;
     }
     return closed;
 }
@@ -190,7 +189,7 @@ double signed_volume(const std::vector<Point3>& points, const Triangle& t) {
     return dot(a, cross(b, c)) / 6;
 }
 
-void cap_borders(Surface& surface, std::vector<int>& component, MendReport& report) {
+void cap_borders(Surface& surface, MendReport& report) {
     for (const auto& chain : border_chains(surface.triangles)) {
         if (chain.front() != chain.back() || chain.size() < 4) {
             ++report.open_loops;
@@ -210,7 +209,6 @@ void cap_borders(Surface& surface, std::vector<int>& component, MendReport& repo
         ++report.caps;
         report.longest_cap_mm = std::max(report.longest_cap_mm, length_mm);
     }
-    component.clear();
 }
 
 }  // namespace
@@ -220,15 +218,14 @@ Surface mend_mesh(const Surface& patches, const MendOptions& options, MendReport
     solid.points = patches.points;
     solid.triangles = welded_triangles(patches, options.weld_mm);
     MendReport out;
-    std::vector<int> component = orient(solid.triangles, &out.components);
-    cap_borders(solid, component, out);
-    component = orient(solid.triangles, &out.components);
+    orient(solid.triangles, &out.components);
+    cap_borders(solid, out);
+    const std::vector<int> component = orient(solid.triangles, &out.components);
     // A part that only borders on others has no inside of its own, and stays as it is.
     const std::vector<bool> closed = closed_components(solid.triangles, component, out.components);
-    std::vector<double> volume(static_cast<std::size_t>(out.components), 0.0);
+    std::vector<double> volume(out.components, 0.0);
     for (std::size_t t = 0; t < solid.triangles.size(); ++t)
-        volume[static_cast<std::size_t>(component[t])] +=
-            signed_volume(solid.points, solid.triangles[t]);
+        volume[component[t]] += signed_volume(solid.points, solid.triangles[t]);
     for (std::size_t t = 0; t < solid.triangles.size(); ++t)
         if (const auto c = static_cast<std::size_t>(component[t]); closed[c] && volume[c] < 0)
             std::swap(solid.triangles[t][0], solid.triangles[t][1]);
@@ -240,4 +237,4 @@ Surface mend_mesh(const Surface& patches, const MendOptions& options, MendReport
     return solid;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_mesh

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Patches of one organ made into a solid: welded, turned alike, capped.
+// Makes patches of one organ into a solid: welds them, turns them alike and caps their borders.
 #pragma once
 
 #include "formats/volume/surface.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_mesh {
 
 struct MendOptions {
     double weld_mm = 0.01;  // corners nearer than this become one
@@ -25,4 +25,4 @@ struct MendReport {
 // Same result for the same input. Cost: 1 us per triangle.
 Surface mend_mesh(const Surface& patches, const MendOptions& options, MendReport* report);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_mesh

@@ -4,20 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <set>
 
 #include "formats/files/atomic_file.h"
-#include "pipeline/base/delimited_text.h"
-#include "pipeline/import/mesh/fill_lumen.h"
+#include "formats/text/number_text.h"
+#include "pipeline/base/source_checks.h"
+#include "pipeline/base/text.h"
 #include "pipeline/import/mesh/glb_file.h"
 #include "pipeline/import/mesh/node_table.h"
-#include "pipeline/import/source/source_path.h"
-#include "pipeline/import/surface/surface_file.h"
+#include "pipeline/import/mesh/solid_voxels.h"
+#include "pipeline/import/mesh/surface_file.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_mesh {
 namespace {
 
 namespace fs = std::filesystem;
@@ -36,12 +36,6 @@ std::vector<std::string> mesh_files(const std::string& path) {
         if (is_mesh_file(entry.path())) files.push_back(entry.path().string());
     std::sort(files.begin(), files.end());
     return files;
-}
-
-std::string text_of(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4g", value);
-    return text;
 }
 
 // Nodes of one label.
@@ -63,15 +57,12 @@ class Collector {
         const bool glb = lower_case(fs::path(path).extension().string()) == ".glb";
         std::vector<MeshNode> nodes;
         if (glb) {
-            auto bytes = read_file(path);
-            if (!bytes) return bytes.error();
-            auto read = read_glb(*bytes, path);
-            if (!read) return read.error();
-            nodes = std::move(*read);
+            SONOCASE_TRY(auto bytes, read_file(path));
+            SONOCASE_TRY(auto read, read_glb(bytes, path));
+            nodes = std::move(read);
         } else {
-            auto surface = import_surface(path, {1, false});
-            if (!surface) return surface.error();
-            nodes.push_back({name, fs::path(path).stem().string(), std::move(*surface)});
+            SONOCASE_TRY(auto surface, import_surface(path, {1, false}));
+            nodes.push_back({name, fs::path(path).stem().string(), std::move(surface)});
         }
         for (MeshNode& node : nodes) {
             ++nodes_;
@@ -132,7 +123,7 @@ Result<Grid> grid_of(const std::vector<Organ>& organs,
     const Vector3 extent = box.extent();
     const double longest = std::max({extent.x, extent.y, extent.z});
     if (longest < 20 || longest > 3000)
-        return Error{"the meshes are " + text_of(longest) + " mm long", where,
+        return Error{"the meshes are " + number_text(longest, 4) + " mm long", where,
                      longest < 20 ? "are they in metres? give the scale: --scale 1000"
                                   : "are they in micrometres? give the scale: --scale 0.001"};
     box.lower.z = std::max(box.lower.z, options.low_mm);
@@ -152,7 +143,7 @@ Result<Grid> grid_of(const std::vector<Organ>& organs,
         grid.size[axis] = static_cast<int>(std::ceil((high - grid.origin_mm[axis]) / v)) + 1;
     }
     if (static_cast<double>(grid.size.x) * grid.size.y * grid.size.z > 4e8)
-        return Error{"a grid of " + text_of(1e-6 * grid.size.x * grid.size.y * grid.size.z) +
+        return Error{"a grid of " + number_text(1e-6 * grid.size.x * grid.size.y * grid.size.z, 4) +
                          " million voxels",
                      where, "take larger voxels, or crop with low_mm and high_mm"};
     return grid;
@@ -178,8 +169,10 @@ Result<MeshSolid> solid_of(const Organ& organ,
     totals.longest_cap_mm = std::max(totals.longest_cap_mm, mended.longest_cap_mm);
     if (mended.longest_cap_mm > options.cap_mm && !options.allow_long_caps)
         return Error{
-            "'" + out.label + "' has an opening of " + text_of(mended.longest_cap_mm) + " mm round",
-            where, "a sheet is no organ: give its nodes the role skip, or raise cap_mm above it"};
+            "'" + out.label + "' has an opening of " + number_text(mended.longest_cap_mm, 4) +
+                " mm round",
+            where,
+            "a sheet is not an organ: give its nodes the role skip, or raise cap_mm above it"};
     if (mended.open_loops > 0)
         report.warnings.push_back("the border of '" + out.label + "' does not close at " +
                                   std::to_string(mended.open_loops) +
@@ -214,13 +207,10 @@ Result<MeshBody> read_meshes(const std::string& path,
     if (table_path.empty())
         return Error{"meshes without a table of their nodes", path,
                      "give --table NODES.csv: rows of node,label,role"};
-    auto text = read_text_file(table_path);
-    if (!text) return text.error();
-    auto table = parse_node_table(*text, table_path);
-    if (!table) return table.error();
-    Collector collector(*table, options);
-    for (const std::string& file : mesh_files(path))
-        if (auto status = collector.add_file(file); !status) return status.error();
+    SONOCASE_TRY(auto csv, read_text_file(table_path));
+    SONOCASE_TRY(auto table, parse_node_table(csv, table_path));
+    Collector collector(table, options);
+    for (const std::string& file : mesh_files(path)) SONOCASE_TRY_DONE(collector.add_file(file));
     if (!collector.unmapped().empty()) {
         std::string names;
         for (std::size_t n = 0; n < std::min<std::size_t>(collector.unmapped().size(), 8); ++n)
@@ -232,11 +222,10 @@ Result<MeshBody> read_meshes(const std::string& path,
                      table_path, "add rows for them, with the role skip if they are not wanted"};
     }
     MeshBody body;
-    body.attribution = table->attribution;
+    body.attribution = table.attribution;
     StageReport& report = body.report;
-    auto grid = grid_of(collector.organs(), options, path);
-    if (!grid) return grid.error();
-    body.grid = *grid;
+    SONOCASE_TRY(auto grid, grid_of(collector.organs(), options, path));
+    body.grid = grid;
     Totals totals;
     double done = 0;
     for (const Organ& organ : collector.organs()) {
@@ -246,9 +235,8 @@ Result<MeshBody> read_meshes(const std::string& path,
             report.warnings.push_back(
                 "'" + organ.row.label + "' comes from " + std::to_string(organ.files.size()) +
                 " files; give them labels of their own if it is not one organ");
-        auto solid = solid_of(organ, body.grid, options, table_path, totals, report);
-        if (!solid) return solid.error();
-        body.solids.push_back(std::move(*solid));
+        SONOCASE_TRY(auto solid, solid_of(organ, body.grid, options, table_path, totals, report));
+        body.solids.push_back(std::move(solid));
         done += 1;
     }
     if (totals.turned > 0)
@@ -262,4 +250,4 @@ Result<MeshBody> read_meshes(const std::string& path,
     return body;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_mesh

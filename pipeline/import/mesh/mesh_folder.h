@@ -9,17 +9,17 @@
 
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
-#include "formats/volume/grid.h"
+#include "formats/volume/label_volume.h"
 #include "pipeline/base/progress.h"
 #include "pipeline/import/mesh/mend_mesh.h"
-#include "pipeline/import/mesh/winding_voxels.h"
+#include "pipeline/import/mesh/solid_voxels.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_mesh {
 
 struct MeshOptions {
     double voxel_mm = 1.5;                // of the grid, [0.3, 10]
     double scale = 1;                     // mm per unit of the file; GLB: metres per unit
-    double low_mm = -1e9, high_mm = 1e9;  // kept along the head's direction (z)
+    double low_mm = -1e9, high_mm = 1e9;  // heights (z) between which the body is kept
     double weld_mm = 0.01;
     double cap_mm = 400;  // a longer cap is an error, unless
     bool allow_long_caps = false;
@@ -52,4 +52,4 @@ Result<MeshBody> read_meshes(const std::string& path,
                              const MeshOptions& options,
                              const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_mesh

@@ -6,9 +6,9 @@
 #include <sstream>
 
 #include "formats/text/nearest_name.h"
-#include "pipeline/base/delimited_text.h"
+#include "pipeline/base/text.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_mesh {
 namespace {
 
 const std::vector<std::string>& role_names() {
@@ -43,7 +43,7 @@ Status add_row(const TextRow& row, const std::string& where, NodeTable& table) {
         FrameRow frame;
         frame.pattern = cell(row, 0);
         if (!read_frame(cell(row, 1), frame))
-            return Error{"'" + cell(row, 1) + "' is no change of frame", place,
+            return Error{"'" + cell(row, 1) + "' is not a change of frame", place,
                          "expected AXIS HEIGHT: and scale and shift of x, y and z, as in y 50: "
                          "0.97 -8 1.07 -4 0.97 -49"};
         table.frames.push_back(frame);
@@ -131,11 +131,11 @@ Result<NodeTable> parse_node_table(std::string_view csv, const std::string& wher
     for (const TextRow& row : split_rows(rows)) {
         if (row.cells.empty() || (row.cells.size() == 1 && row.cells[0].empty())) continue;
         if (lower_case(row.cells[0]) == "node") continue;
-        if (auto status = add_row(row, where, table); !status) return status.error();
+        SONOCASE_TRY_DONE(add_row(row, where, table));
     }
     if (table.rows.empty())
         return Error{"the table has no rows", where, "expected node,label,role"};
     return table;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_mesh

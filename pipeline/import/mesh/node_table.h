@@ -11,10 +11,9 @@
 //     VHF_*_vein,veins,lumen,blood a pipe with a wall: filled
 //     VH_F_*ligament*,,skip,
 //     VH_F_Vasculature.glb,y 50: 0.972 -8.2 1.071 -3.8 0.972 -48.6,frame,
-//
 // `*` stands for any letters. The first row that matches counts. A row of role `frame` is for a
-// file: at that height of the file's axis, in mm, each axis is scaled and shifted; between several
-// heights the changes are blended, beyond them the nearest holds.
+// file: at that height along the axis of the file, in mm, each axis is scaled and shifted; between
+// several heights the changes are blended, and beyond them the nearest one applies.
 #pragma once
 
 #include <array>
@@ -25,7 +24,7 @@
 #include "formats/base/geometry.h"
 #include "formats/base/result.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_mesh {
 
 enum class NodeRole { body, organ, part, lumen, skip };
 
@@ -58,4 +57,4 @@ bool matches_pattern(std::string_view pattern, std::string_view name);
 // Errors name the line: a role that does not exist, an organ without a label, numbers missing.
 Result<NodeTable> parse_node_table(std::string_view csv, const std::string& where);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_mesh

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// ITK's types of voxels. For the .cpp files of this folder that include ITK, and for no other.
+// The type of voxels by ITK's name. Only for .cpp files of this folder that include ITK.
 #pragma once
 
 #include <itkImageIOBase.h>
@@ -9,9 +9,9 @@
 
 #include "pipeline/import/volume/native_volume.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_volume {
 
-// Nothing for types that hold no plain numbers.
+// Empty for types that are not plain numbers.
 inline std::optional<Component> component_of(itk::IOComponentEnum type) {
     using E = itk::IOComponentEnum;
     constexpr bool long_is_64 = sizeof(long) == 8;
@@ -32,4 +32,4 @@ inline std::optional<Component> component_of(itk::IOComponentEnum type) {
     }
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_volume

@@ -11,16 +11,16 @@
 #include <cmath>
 #include <filesystem>
 
-#include "pipeline/base/line_text.h"
 #include "pipeline/base/memory_limit.h"
 #include "pipeline/base/quiet_library.h"
-#include "pipeline/import/source/source_path.h"
-#include "pipeline/import/volume/data_file.h"
+#include "pipeline/base/source_checks.h"
+#include "pipeline/base/text.h"
 #include "pipeline/import/volume/itk_component.h"
 #include "pipeline/import/volume/native_volume.h"
 #include "pipeline/import/volume/volume_file.h"
+#include "pipeline/import/volume/volume_header.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_volume {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = 16ull << 30;  // no patient's volume is larger
@@ -39,7 +39,7 @@ std::string sizes_text(const itk::ImageIOBase& io) {
     return text;
 }
 
-// ITK's NIfTI reader calls axes in metres so as well: their matrix is nearly 0.
+// ITK's NIfTI reader reports axes in metres as not orthogonal too: their matrix is nearly 0.
 Error not_orthogonal(const std::string& path) {
     return {"voxel axes are not at right angles, or are not in millimetres", path,
             "write the geometry in millimetres, or resample the volume to an orthogonal grid "
@@ -59,8 +59,7 @@ Result<Grid> grid_of(const itk::ImageIOBase& io, const std::string& path) {
         grid.spacing_mm[axis] = io.GetSpacing(unsigned_axis);
         grid.origin_mm[axis] = io.GetOrigin(unsigned_axis);
         const std::vector<double> column = io.GetDirection(unsigned_axis);
-        for (int row = 0; row < 3; ++row)
-            direction(row, axis) = column[static_cast<std::size_t>(row)];
+        for (int row = 0; row < 3; ++row) direction(row, axis) = column[row];
         if (!(grid.spacing_mm[axis] > 0) || !std::isfinite(grid.spacing_mm[axis]) ||
             !std::isfinite(grid.origin_mm[axis]))
             return Error{"voxel size or origin is not a positive, finite number", path,
@@ -130,7 +129,7 @@ VolumeSize size_in_file_header(const std::string& path) {
 
 Result<NativeVolume> read_itk_volume(const std::string& path) {
     const char* todo = "check that the file is complete; export it again";
-    if (auto status = check_data_files(path); !status) return status.error();
+    SONOCASE_TRY_DONE(check_data_files(path));
     const QuietLibrary quiet;  // the C libraries below ITK print as well as throw
     itk::Object::GlobalWarningDisplayOff();
     try {
@@ -150,11 +149,10 @@ Result<NativeVolume> read_itk_volume(const std::string& path) {
         if (!component)
             return Error{"voxels of type " + io->GetComponentTypeAsString(io->GetComponentType()),
                          path, "expected whole numbers"};
-        auto grid = grid_of(*io, path);
-        if (!grid) return grid.error();
+        SONOCASE_TRY(auto grid, grid_of(*io, path));
 
         NativeVolume volume;
-        volume.grid = *grid;
+        volume.grid = grid;
         volume.component = *component;
         volume.layers = static_cast<int>(io->GetNumberOfComponents());
         const auto bytes = static_cast<std::uint64_t>(io->GetImageSizeInBytes());
@@ -162,10 +160,10 @@ Result<NativeVolume> read_itk_volume(const std::string& path) {
             return Error{"header asks for " + std::to_string(bytes >> 30) + " GB of voxels", path,
                          todo};
         // A file that is cut off is refused before room is made for what its header promises.
-        if (auto status = check_nifti_length(path, bytes); !status) return status.error();
-        if (auto status = check_meta_length(path, bytes); !status) return status.error();
-        if (auto status = check_nrrd_length(path, bytes); !status) return status.error();
-        if (auto status = check_room(volume, bytes, path); !status) return status.error();
+        SONOCASE_TRY_DONE(check_nifti_length(path, bytes));
+        SONOCASE_TRY_DONE(check_meta_length(path, bytes));
+        SONOCASE_TRY_DONE(check_nrrd_length(path, bytes));
+        SONOCASE_TRY_DONE(check_room(volume, bytes, path));
         volume.bytes.resize(bytes);
         itk::ImageIORegion region(dimensions);
         for (unsigned d = 0; d < dimensions; ++d) region.SetSize(d, io->GetDimensions(d));
@@ -191,4 +189,4 @@ Result<NativeVolume> read_itk_volume(const std::string& path) {
     }
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_volume

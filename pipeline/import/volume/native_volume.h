@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A volume as its file holds it, before its values are interpreted as labels. Internal to import.
+// A volume as its file holds it, before its values are interpreted as labels. Internal to this
+// room.
 #pragma once
 
 #include <cstddef>
@@ -10,10 +11,10 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "formats/volume/grid.h"
+#include "formats/volume/label_volume.h"
 #include "pipeline/import/volume/volume_file.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_volume {
 
 enum class Component { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 };
 
@@ -30,17 +31,6 @@ VolumeSize size_in_file_header(const std::string& path);            // one file
 Result<NativeVolume> read_itk_volume(const std::string& path);      // one file
 Result<NativeVolume> read_dicom_series(const std::string& folder);  // the folder's largest series
 
-// An Error if a NIfTI file holds fewer than `voxel_bytes` after its header, or is damaged gzip: the
-// library below ITK silently fills with zeros what is missing. Done for any other file.
-Status check_nifti_length(const std::string& path, std::uint64_t voxel_bytes);
-// A warning where a NIfTI file says nothing about its orientation (qform_code and sform_code are
-// 0), so that right and left are a guess; empty for any other file.
-std::string nifti_orientation_warning(const std::string& path);
-// The same as check_nifti_length for MetaImage.
-Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes);
-// The same for compressed NRRD, whose reader does not notice that the end of the stream is missing.
-Status check_nrrd_length(const std::string& path, std::uint64_t voxel_bytes);
-
 // How to permute and flip the axes of a grid so that they lie nearest to those of its frame.
 struct AxisOrder {
     int source[3] = {0, 1, 2};                // axis i of the result is this axis of the source
@@ -56,4 +46,4 @@ struct AxisWalk {
 };
 AxisWalk axis_walk(const Grid& source, const AxisOrder& order);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_volume

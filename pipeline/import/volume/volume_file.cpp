@@ -8,11 +8,63 @@
 #include <filesystem>
 #include <unordered_map>
 
-#include "pipeline/import/source/source_path.h"
-#include "pipeline/import/volume/dicom_stack.h"
+#include "pipeline/base/source_checks.h"
+#include "pipeline/import/volume/dicom_series.h"
 #include "pipeline/import/volume/native_volume.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_volume {
+
+AxisOrder canonical_axes(const Matrix3& direction) {
+    // Takes the one of the six assignments whose axes agree best with those of the frame. The
+    // largest component of each axis alone can name one axis twice in a scan tilted by 45 degrees.
+    AxisOrder best;
+    double best_score = -1;
+    int order[3] = {0, 1, 2};
+    do {
+        double score = 0;
+        for (int axis = 0; axis < 3; ++axis) score += std::abs(direction(axis, order[axis]));
+        if (score > best_score + 1e-9) {
+            best_score = score;
+            for (int axis = 0; axis < 3; ++axis) {
+                best.source[axis] = order[axis];
+                best.flipped[axis] = direction(axis, order[axis]) < 0;
+            }
+        }
+    } while (std::next_permutation(order, order + 3));
+    return best;
+}
+
+Grid reoriented(const Grid& grid, const AxisOrder& order) {
+    Grid result = grid;
+    Point3 first;  // source voxel that becomes voxel (0, 0, 0)
+    for (int axis = 0; axis < 3; ++axis) {
+        const int source = order.source[axis];
+        const double sign = order.flipped[axis] ? -1 : 1;
+        result.size[axis] = grid.size[source];
+        result.spacing_mm[axis] = grid.spacing_mm[source];
+        for (int row = 0; row < 3; ++row)
+            result.direction(row, axis) = sign * grid.direction(row, source);
+        first[source] = order.flipped[axis] ? grid.size[source] - 1 : 0;
+    }
+    result.origin_mm = grid.point_from_voxel(first);
+    return result;
+}
+
+AxisWalk axis_walk(const Grid& source, const AxisOrder& order) {
+    const std::ptrdiff_t stride[3] = {
+        1,
+        source.size.x,
+        static_cast<std::ptrdiff_t>(source.size.x) * source.size.y,
+    };
+    AxisWalk walk;
+    for (int axis = 0; axis < 3; ++axis) {
+        const int from = order.source[axis];
+        walk.step[axis] = order.flipped[axis] ? -stride[from] : stride[from];
+        if (order.flipped[axis]) walk.start += stride[from] * (source.size[from] - 1);
+    }
+    return walk;
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -20,8 +72,7 @@ namespace fs = std::filesystem;
 Result<NativeVolume> read_native(const std::string& path) {
     std::error_code code;
     if (fs::is_directory(path, code)) {
-        if (auto status = check_source_folder(path, "expected DICOM slices"); !status)
-            return status.error();
+        SONOCASE_TRY_DONE(check_source_folder(path, "expected DICOM slices"));
         return read_dicom_series(path);
     }
     if (fs::exists(path, code) && !is_volume_file_name(path))
@@ -29,8 +80,7 @@ Result<NativeVolume> read_native(const std::string& path) {
             "not a known volume file name", path,
             "expected .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a folder of masks or of DICOM "
             "slices"};
-    if (auto status = check_source_file(path, "expected a volume file"); !status)
-        return status.error();
+    SONOCASE_TRY_DONE(check_source_file(path, "expected a volume file"));
     return read_itk_volume(path);
 }
 
@@ -66,7 +116,7 @@ void walk(const Grid& target, const AxisWalk& walk, Visit visit) {
     }
 }
 
-// The whole number in a voxel; false if it holds none, or one that does not fit.
+// The whole number in a voxel; false if the value is not whole, or does not fit.
 template <class T>
 bool whole_number(T value, std::int32_t* whole) {
     if constexpr (std::is_floating_point_v<T>) {
@@ -127,26 +177,25 @@ VolumeSize size_in_headers(const std::string& path) {
         size.voxels += static_cast<std::uint64_t>(slice.rows) *
                        static_cast<std::uint64_t>(slice.columns) *
                        static_cast<std::uint64_t>(slice.frames);
-    size.bytes = 2 * size.voxels;  // of CT and of most others
+    size.bytes = 2 * size.voxels;  // CT and most others have two bytes per voxel
     return size;
 }
 
 Result<LabelLayers> read_label_layers(const std::string& path) {
-    auto native = read_native(path);
-    if (!native) return native.error();
-    const AxisOrder order = canonical_axes(native->grid.direction);
-    const AxisWalk steps = axis_walk(native->grid, order);
+    SONOCASE_TRY(auto native, read_native(path));
+    const AxisOrder order = canonical_axes(native.grid.direction);
+    const AxisWalk steps = axis_walk(native.grid, order);
 
     LabelLayers result;
-    result.grid = reoriented(native->grid, order);
-    result.fields = std::move(native->fields);
-    result.warnings = std::move(native->warnings);
-    const auto layer_count = static_cast<std::size_t>(native->layers);
+    result.grid = reoriented(native.grid, order);
+    result.fields = std::move(native.fields);
+    result.warnings = std::move(native.warnings);
+    const auto layer_count = static_cast<std::size_t>(native.layers);
     result.layers.assign(layer_count, std::vector<std::uint8_t>(result.grid.voxel_count()));
 
     ValueTable table;
     enum { kFine, kTooMany, kNotWhole } verdict = kFine;
-    with_voxels(*native, [&](const auto* voxels) {
+    with_voxels(native, [&](const auto* voxels) {
         for (std::size_t layer = 0; layer < layer_count && verdict == kFine; ++layer) {
             std::uint8_t* target = result.layers[layer].data();
             walk(result.grid, steps, [&](std::size_t to, std::size_t from) {
@@ -185,4 +234,4 @@ Result<LabelLayers> read_label_layers(const std::string& path) {
     return result;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_volume

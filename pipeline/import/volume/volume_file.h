@@ -17,7 +17,7 @@
 #include "formats/base/result.h"
 #include "formats/volume/label_volume.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline import_volume {
 
 // A volume of few distinct whole numbers in one or more layers (a .seg.nrrd may have several).
 struct LabelLayers {
@@ -33,8 +33,8 @@ struct LabelLayers {
 // and one byte each.
 Result<LabelLayers> read_label_layers(const std::string& path);
 
-// Voxels of a file or of a folder's DICOM series, and the bytes that they take in their own type,
-// according to headers, which are all that is read; of a folder of masks those of one. 0: they
+// The number of voxels of a file or of a folder with a DICOM series, and the bytes that they take
+// in their own type. Only headers are read. For a folder of masks, those of one mask. 0: they
 // cannot be read.
 struct VolumeSize {
     std::uint64_t voxels = 0, bytes = 0;
@@ -47,4 +47,4 @@ bool is_volume_file_name(const std::string& path);
 // File name without folder and without its volume ending: "a/liver.nii.gz" -> "liver".
 std::string volume_stem(const std::string& path);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline import_volume

@@ -5,15 +5,87 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/base/parallel.h"
-#include "pipeline/registration/elastic/natural_log.h"
-#include "pipeline/registration/matching/map_skin.h"
+#include <Eigen/Dense>
 
-namespace sonocase::pipeline {
+#include "pipeline/base/parallel.h"
+#include "pipeline/registration/elastic/elastic_strain.h"
+#include "pipeline/registration/fit/matching.h"
+
+namespace sonocase::pipeline::inline registration_elastic {
+
 namespace {
 
-constexpr double kEdge_mm = 8;
-constexpr double kLeastCosine = 0.3, kTableLoss_mm = 10;
+constexpr int kNeighbours = 36;
+constexpr double kSharpestCurvature = 1 / 40.0;  // per mm; a sharper patch is noise
+
+}  // namespace
+
+RimPatches::RimPatches(const TargetSurface& target, std::span<const std::uint32_t> readings)
+    : target_(target), patch_of_(target.points.size(), -1) {
+    std::vector<std::uint32_t> rim;
+    for (const std::uint32_t j : readings) {
+        if (!target.on_rim[j] || target.lifted[j]) continue;
+        patch_of_[j] = static_cast<std::int32_t>(rim.size());
+        rim.push_back(j);
+    }
+    patches_.resize(rim.size());
+    parallel_for(rim.size(), 16, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n) {
+            const std::uint32_t j = rim[n];
+            Patch& patch = patches_[n];
+            patch.u = any_perpendicular(target.normals[j]);
+            patch.v = cross(target.normals[j], patch.u);
+            const auto near = target.index.nearest(target.points[j], kNeighbours);
+            Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+            Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+            int used = 0;
+            for (const std::uint32_t i : near) {
+                if (target.lifted[i] || dot(target.normals[i], target.normals[j]) < 0.3) continue;
+                const Vector3 d = target.points[i] - target.points[j];
+                // Scaled by 30 mm, so that the columns are of one size.
+                const double a = dot(d, patch.u) / kReachMm, b = dot(d, patch.v) / kReachMm;
+                Eigen::Matrix<double, 6, 1> row;
+                row << 1, a, b, a * a, a * b, b * b;
+                const double w = 1 / (1 + a * a + b * b);
+                normal += w * row * row.transpose();
+                right += w * dot(d, target.normals[j]) * row;
+                ++used;
+            }
+            if (used < 12) continue;
+            // A little weight on small curvature keeps one-sided neighbourhoods determined.
+            for (int m = 3; m < 6; ++m) normal(m, m) += 0.02;
+            const Eigen::Matrix<double, 6, 1> c = normal.ldlt().solve(right);
+            for (int m = 0; m < 6; ++m) {
+                patch.c[m] = c[m] / (m == 0 ? 1 : m < 3 ? kReachMm : kReachMm * kReachMm);
+            }
+            patch.good = std::isfinite(c.sum()) &&
+                         std::abs(patch.c[3]) + std::abs(patch.c[4]) + std::abs(patch.c[5]) <
+                             kSharpestCurvature;
+        }
+    });
+}
+
+RimPatches::NearestPoint RimPatches::nearest_point(std::uint32_t reading, Point3 p) const {
+    NearestPoint nearest;
+    const std::int32_t n = patch_of_[reading];
+    if (n < 0 || !patches_[n].good) return nearest;
+    const Patch& patch = patches_[n];
+    const Vector3 normal = target_.normals[reading], d = p - target_.points[reading];
+    const double a = dot(d, patch.u), b = dot(d, patch.v);
+    if (a * a + b * b > kReachMm * kReachMm) return nearest;
+    const double* c = patch.c;
+    const double height = c[0] + c[1] * a + c[2] * b + c[3] * a * a + c[4] * a * b + c[5] * b * b;
+    const double slope_a = c[1] + 2 * c[3] * a + c[4] * b, slope_b = c[2] + c[4] * a + 2 * c[5] * b;
+    nearest.normal = normalized(normal - (slope_a * patch.u + slope_b * patch.v));
+    nearest.gap_mm = (dot(d, normal) - height) * dot(nearest.normal, normal);
+    nearest.found = true;
+    return nearest;
+}
+
+namespace {
+
+constexpr double kEdgeMm = 8;
+constexpr double kMinCosine = 0.3, kTableLossMm = 10;
 constexpr std::size_t kBlocks = 4;  // of rows, each summed by itself: fixed, whatever the threads
 constexpr Lanes kZero = {0, 0, 0, 0};
 
@@ -36,7 +108,7 @@ std::vector<std::uint8_t> points_near_edge(const SkinModel& skin) {
     for (std::size_t i = 0; i < skin.points.size(); ++i) {
         double d2 = 0;
         index.nearest(skin.points[i], &d2);
-        if (d2 < kEdge_mm * kEdge_mm) near[i] = 1;
+        if (d2 < kEdgeMm * kEdgeMm) near[i] = 1;
     }
     return near;
 }
@@ -68,7 +140,7 @@ ElasticRows::ElasticRows(const SkinModel& skin,
     grid_.size = grid.size;
     grid_.origin_mm = grid.origin_mm;
     grid_.spacing_mm = grid.spacing_mm;
-    for (int n = 0; n < 64; ++n) offset_[static_cast<std::size_t>(n)] = footprint_offset(grid_, n);
+    for (int n = 0; n < 64; ++n) offset_[n] = footprint_offset(grid_, n);
 }
 
 void ElasticRows::add_row(
@@ -95,7 +167,7 @@ void ElasticRows::match(const Registration& map, const GapOptions& options) {
             double d2 = 0;
             const std::uint32_t i = mapped.index.nearest(target_.points[j], &d2);
             if (d2 > farthest2 || near_edge_[i]) continue;
-            if (dot(mapped.normals[i], target_.normals[j]) < kLeastCosine) continue;
+            if (dot(mapped.normals[i], target_.normals[j]) < kMinCosine) continue;
             const double gap = dot(mapped.normals[i], mapped.points[i] - target_.points[j]);
             const double aside = std::sqrt(std::max(0.0, d2 - gap * gap));
             if (aside > std::max(8.0, 0.7 * std::abs(gap) + 4)) continue;
@@ -121,17 +193,17 @@ void ElasticRows::match(const Registration& map, const GapOptions& options) {
             double d2 = 0;
             const std::uint32_t j = target_.index.nearest(mapped.points[i], &d2);
             if (d2 > farthest2 || target_.lifted[j]) continue;
-            if (dot(mapped.normals[i], target_.normals[j]) < kLeastCosine) continue;
+            if (dot(mapped.normals[i], target_.normals[j]) < kMinCosine) continue;
             const double gap = dot(target_.normals[j], mapped.points[i] - target_.points[j]);
             const double aside = std::sqrt(std::max(0.0, d2 - gap * gap));
             if (aside <= (target_.on_rim[j] ? 0.35 : 1.0) * 1.2 * target_.spacing_mm) {
                 pairs[n] = {i, j, gap, target_.normals[j], 1, true};
                 continue;
             }
-            const RimPatches::Foot foot = rim_.foot(j, mapped.points[i]);
-            if (!foot.found) continue;
-            const double faded = 1 - aside / RimPatches::kReach_mm;
-            pairs[n] = {i, j, foot.gap_mm, foot.normal, options.rim_weight * faded, true};
+            const RimPatches::NearestPoint nearest = rim_.nearest_point(j, mapped.points[i]);
+            if (!nearest.found) continue;
+            const double faded = 1 - aside / RimPatches::kReachMm;
+            pairs[n] = {i, j, nearest.gap_mm, nearest.normal, options.rim_weight * faded, true};
         }
     });
     weight = options.skin_weight / count();
@@ -151,8 +223,8 @@ void ElasticRows::match(const Registration& map, const GapOptions& options) {
     }
 }
 
-// One-sided: nothing pulls the skin down to the table. The weight is that of a mean over all skin
-// that faces it, so that the last few points behind it do not pull like a whole back.
+// These rows are one-sided: nothing pulls the skin down to the table. The weight is that of a mean
+// over all skin that faces it, so that the last few points behind it do not pull like a whole back.
 void ElasticRows::add_table_rows(const MappedSkin& mapped,
                                  const GapOptions& options,
                                  const std::vector<std::uint8_t>& matched) {
@@ -160,14 +232,14 @@ void ElasticRows::add_table_rows(const MappedSkin& mapped,
     std::vector<std::uint32_t> behind;
     std::size_t facing = 0;
     for (std::size_t i = 0; i < mapped.points.size(); i += options.skin_stride) {
-        if (near_edge_[i] || dot(mapped.normals[i], table.normal) > -kLeastCosine) continue;
+        if (near_edge_[i] || dot(mapped.normals[i], table.normal) > -kMinCosine) continue;
         ++facing;
         if (!matched[i] && dot(table.normal, mapped.points[i] - table.place) < 0)
             behind.push_back(static_cast<std::uint32_t>(i));
     }
     for (const std::uint32_t i : behind) {
         add_row(i, table.normal, dot(table.normal, mapped.points[i] - table.place),
-                options.table_weight / static_cast<double>(facing), kTableLoss_mm);
+                options.table_weight / static_cast<double>(facing), kTableLossMm);
     }
 }
 
@@ -248,4 +320,4 @@ void ElasticRows::add_curvature(std::span<const Lanes> in, std::span<Lanes> out)
     }
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

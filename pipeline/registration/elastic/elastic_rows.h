@@ -1,19 +1,52 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The gaps between the mapped skin and the mannequin, and the landmarks, as rows on a displacement.
+// The gaps between the mapped skin and the mannequin, as rows of the elastic fit.
+//
+// Beyond the last readings the mannequin is continued by a quadratic height over the plane of each
+// reading at the rim of a sweep, fitted to its neighbours. Without it the skin beside the rim would
+// follow its own shape and not that of the mannequin.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
-#include "formats/registration/registration.h"
-#include "pipeline/registration/elastic/rim_patch.h"
 #include "pipeline/registration/elastic/spline_lattice.h"
-#include "pipeline/registration/matching/map_skin.h"
-#include "pipeline/registration/matching/matching.h"
-#include "pipeline/registration/warp/quadratic_warp.h"
+#include "pipeline/registration/fit/matching.h"
+#include "pipeline/registration/fit/quadratic_warp.h"
+#include "pipeline/registration/fit/target_surface.h"
+#include "pipeline/registration/map/registration.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_elastic {
+
+class RimPatches {
+  public:
+    static constexpr double kReachMm = 30;  // beside the reading
+
+    // One patch for each of `readings` that is at the rim and not a lift-off. Cost: 5 us each.
+    RimPatches(const TargetSurface& target, std::span<const std::uint32_t> readings);
+
+    struct NearestPoint {
+        bool found = false;
+        double gap_mm = 0;  // signed distance of the point from the patch, first order
+        Vector3 normal;     // of the patch there
+    };
+    // The point on the patch of `reading` below or above p; mannequin frame, relative to the
+    // target's origin.
+    NearestPoint nearest_point(std::uint32_t reading, Point3 p) const;
+
+  private:
+    struct Patch {
+        Vector3 u, v;      // in the plane; its normal is that of the reading
+        double c[6] = {};  // height = c0 + c1 a + c2 b + c3 aa + c4 ab + c5 bb
+        bool good = false;
+    };
+    const TargetSurface& target_;
+    std::vector<std::int32_t> patch_of_;  // # target points; -1: none
+    std::vector<Patch> patches_;
+};
+
+// The gaps between the mapped skin and the mannequin, and the landmarks, as rows on a displacement.
 
 struct GapOptions {
     double farthest_mm = 30;   // points farther apart are not matched
@@ -39,12 +72,9 @@ class ElasticRows {
                 const DisplacementGrid& grid);
 
     // Matches anew. Reading to skin: the nearest mapped skin point, along its mapped normal; skin
-    // to reading: the nearest reading, along its normal, or its patch beyond the rim (rim_patch.h).
+    // to reading: the nearest reading, along its normal, or its patch beyond the rim.
     void match(const Registration& map, const GapOptions& options);
 
-    struct Value {
-        double energy_mm2 = 0;
-    };
     double energy(double step) const;  // after `step` times the displacement given to project()
     void project(std::span<const Lanes> along);
     // Half of the gradient, and the diagonal of the half Hessian, added to.
@@ -88,4 +118,4 @@ class ElasticRows {
     mutable std::vector<std::vector<Lanes>> sums_;  // of each block of rows
 };
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

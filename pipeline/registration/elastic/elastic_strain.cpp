@@ -7,9 +7,23 @@
 #include <limits>
 
 #include "pipeline/base/parallel.h"
-#include "pipeline/registration/elastic/natural_log.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_elastic {
+
+double natural_log(double x) {
+    int exponent = 0;
+    double m = std::frexp(x, &exponent);  // exact
+    if (m < 0.70710678118654752) {
+        m *= 2;
+        --exponent;
+    }
+    // log m = 2 artanh s with |s| <= 0.172: the next term is below 1e-17.
+    const double s = (m - 1) / (m + 1), t = s * s;
+    double sum = 1.0 / 21;
+    for (int n = 19; n >= 3; n -= 2) sum = sum * t + 1.0 / n;
+    return exponent * 0.69314718055994531 + 2 * s * (1 + t * sum);
+}
+
 namespace {
 
 constexpr std::size_t kBlock = 512;  // samples whose energies are summed together
@@ -131,7 +145,7 @@ ElasticStrain::Value ElasticStrain::value(const LatticeSlopes& at,
                                 step * static_cast<double>(along.z[i][r]);
                 }
                 const Sample s = sample_of(f, options.barrier_det);
-                v.least_det = std::min(v.least_det, s.det);
+                v.min_det = std::min(v.min_det, s.det);
                 if (!(s.det > 0)) continue;
                 v.energy_mm2 +=
                     share * energy_of(s, options.stiffness * static_cast<double>(tissue_.shape[i]),
@@ -144,7 +158,7 @@ ElasticStrain::Value ElasticStrain::value(const LatticeSlopes& at,
     Value whole{0, std::numeric_limits<double>::infinity()};
     for (const Value& v : parts) {
         whole.energy_mm2 += v.energy_mm2;
-        whole.least_det = std::min(whole.least_det, v.least_det);
+        whole.min_det = std::min(whole.min_det, v.min_det);
     }
     return whole;
 }
@@ -207,4 +221,4 @@ void ElasticStrain::diagonal(LatticeSlopes* out) const {
     }
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

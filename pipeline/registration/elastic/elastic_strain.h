@@ -15,11 +15,16 @@
 
 #include <vector>
 
-#include "formats/registration/registration.h"
 #include "pipeline/registration/elastic/spline_lattice.h"
 #include "pipeline/registration/elastic/tissue_lattice.h"
+#include "pipeline/registration/map/registration.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_elastic {
+
+// The natural logarithm with the same bits on every platform; those of libm differ.
+// x > 0, finite, not subnormal. Relative error below 4e-16 away from 1, absolute below 1e-16 near
+// it.
+double natural_log(double x);
 
 struct StrainOptions {
     double stiffness = 1;  // of all tissues
@@ -36,7 +41,7 @@ class ElasticStrain {
 
     struct Value {
         double energy_mm2 = 0;
-        double least_det = 0;
+        double min_det = 0;
     };
     // At slopes `at` plus `step` times `along`.
     Value value(const LatticeSlopes& at,
@@ -62,4 +67,4 @@ class ElasticStrain {
     std::vector<float> shape_;       // curvature of the shape term
 };
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

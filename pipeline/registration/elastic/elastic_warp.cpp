@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_elastic {
 namespace {
 
 constexpr Lanes kZero = {0, 0, 0, 0};
@@ -20,8 +20,8 @@ struct Annealing {
 };
 constexpr Annealing kNear{20, 70, 0.66704, 0.78071, 0.90405, 8.4};
 constexpr Annealing kFar{40, 130, 0.81673, 0.84785, 0.91642, 16.8};
-constexpr double kStiffer = 30, kLastLoss_mm = 2.5, kLastGate_mm = 30;
-constexpr double kLeastSampledDet = 0.02;
+constexpr double kStiffer = 30, kLastLossMm = 2.5, kLastGateMm = 30;
+constexpr double kMinSampledDet = 0.02;
 
 struct Stage {
     double stiffness = kStiffer;
@@ -38,8 +38,8 @@ Stage stage_of(const Annealing& annealing, int round) {
         s.gaps.farthest_mm *= annealing.gate_factor;
     }
     s.stiffness = std::max(1.0, s.stiffness);
-    s.gaps.loss_mm = std::max(kLastLoss_mm, s.gaps.loss_mm);
-    s.gaps.farthest_mm = std::max(kLastGate_mm, s.gaps.farthest_mm);
+    s.gaps.loss_mm = std::max(kLastLossMm, s.gaps.loss_mm);
+    s.gaps.farthest_mm = std::max(kLastGateMm, s.gaps.farthest_mm);
     s.gaps.skin_weight = 0.5 * (1 - std::min(1.0, round / annealing.rounds)) + 0.1;
     return s;
 }
@@ -77,7 +77,7 @@ class Descent {
         lattice_.slopes(d_, at_);
     }
 
-    // Matches and goes one Gauss-Newton step. False: no step lowers the sum.
+    // Matches and takes one Gauss-Newton step. False: no step lowers the sum.
     bool step(const Stage& stage, ElasticFit* fit) {
         GapOptions gaps = stage.gaps;
         gaps.rim_weight = options_.rim;
@@ -100,13 +100,13 @@ class Descent {
             const ElasticStrain::Value v = strain_.value(at_, along, t, strain);
             fit->strain_mm2 = v.energy_mm2;
             fit->gaps_mm2 = rows_.energy(t);
-            fit->least_det = v.least_det;
+            fit->min_det = v.min_det;
             return v.energy_mm2 + fit->gaps_mm2 + b0 + t * (2 * b1 + t * b2);
         };
         const double before = energy(0);
         double t = 1;
         for (int halvings = 0; halvings < 12; ++halvings, t *= 0.5) {
-            if (energy(t) < before && fit->least_det > kLeastSampledDet) {
+            if (energy(t) < before && fit->min_det > kMinSampledDet) {
                 move(p, t);
                 return true;
             }
@@ -116,9 +116,10 @@ class Descent {
     }
 
   private:
-    static std::vector<std::uint32_t> some_readings(std::span<const std::uint32_t> all, int most) {
-        const std::size_t stride =
-            (all.size() + static_cast<std::size_t>(most) - 1) / static_cast<std::size_t>(most);
+    static std::vector<std::uint32_t> some_readings(std::span<const std::uint32_t> all,
+                                                    int max_count) {
+        const std::size_t stride = (all.size() + static_cast<std::size_t>(max_count) - 1) /
+                                   static_cast<std::size_t>(max_count);
         std::vector<std::uint32_t> some;
         for (std::size_t n = 0; n < all.size(); n += std::max<std::size_t>(1, stride))
             some.push_back(all[n]);
@@ -200,9 +201,7 @@ ElasticFit fit_elastic(const ElasticInput& input,
                        Registration* registration,
                        const Progress& progress) {
     DisplacementGrid grid = grid_over(registration->ct_box, options.spacing_mm);
-    grid.control_mm.assign(static_cast<std::size_t>(grid.size.x) *
-                               static_cast<std::size_t>(grid.size.y) *
-                               static_cast<std::size_t>(grid.size.z),
+    grid.control_mm.assign(static_cast<std::size_t>(grid.size.x) * grid.size.y * grid.size.z,
                            Vector3{});
     const bool warm = registration->residual.control_mm.size() == grid.control_mm.size();
     if (!warm) registration->residual = std::move(grid);
@@ -219,4 +218,4 @@ ElasticFit fit_elastic(const ElasticInput& input,
     return fit;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

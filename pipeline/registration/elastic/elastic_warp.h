@@ -14,13 +14,13 @@
 
 #include <span>
 
-#include "formats/registration/registration.h"
 #include "formats/volume/label_volume.h"
 #include "pipeline/base/progress.h"
 #include "pipeline/registration/elastic/elastic_rows.h"
 #include "pipeline/registration/elastic/elastic_strain.h"
+#include "pipeline/registration/map/registration.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_elastic {
 
 struct ElasticOptions {
     double spacing_mm = 30;  // of control points, >= 10
@@ -41,7 +41,7 @@ struct ElasticFit {
     int iterations = 0;            // of conjugate gradients
     double strain_mm2 = 0;         // of the last round
     double gaps_mm2 = 0;           // likewise, robust
-    double least_det = 0;          // sampled
+    double min_det = 0;            // sampled
     std::size_t counterparts = 0;  // readings matched in the last round
 };
 
@@ -62,4 +62,4 @@ ElasticFit fit_elastic(const ElasticInput& input,
                        Registration* registration,
                        const Progress& progress = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

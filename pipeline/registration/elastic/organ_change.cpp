@@ -9,7 +9,7 @@
 #include "pipeline/base/parallel.h"
 #include "pipeline/registration/map/map_evaluator.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_elastic {
 namespace {
 
 constexpr std::size_t kSamples = 1500;  // of a label, about
@@ -107,4 +107,4 @@ OrganChange joint_change(const std::vector<OrganChange>& changes,
     return joint;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

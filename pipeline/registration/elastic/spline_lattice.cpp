@@ -4,7 +4,7 @@
 
 #include "pipeline/base/parallel.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_elastic {
 namespace {
 
 constexpr Lanes kZero = {0, 0, 0, 0};
@@ -82,7 +82,7 @@ void SplineLattice::slopes(std::span<const Lanes> control, LatticeSlopes& out) c
     const std::size_t sx = as_size(s.x), sy = as_size(s.y), nx = as_size(n.x), ny = as_size(n.y);
     const std::size_t slab = sx * sy;
     out.resize(count());
-    // Of each layer of control points: slope along x, slope along y, value.
+    // For each layer of control points: slope along x, slope along y, value.
     std::vector<Lanes> by_x(slab * as_size(n.z)), by_y(slab * as_size(n.z)),
         plain(slab * as_size(n.z));
     parallel_for(as_size(n.z), 1, [&](std::size_t begin, std::size_t end) {
@@ -183,4 +183,4 @@ void SplineLattice::transposed(const LatticeSlopes& values,
     });
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

@@ -12,10 +12,10 @@
 #include <span>
 #include <vector>
 
-#include "formats/registration/registration.h"
-#include "pipeline/registration/warp/spline_penalty.h"
+#include "pipeline/registration/fit/spline_penalty.h"
+#include "pipeline/registration/map/registration.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_elastic {
 
 using Lanes = SplinePenalty::Lanes;  // x, y, z and one of padding
 
@@ -40,9 +40,7 @@ class SplineLattice {
         bool on_face = false;
         double fraction = 0;  // of the cell
     };
-    const Position& position(int axis, int n) const {
-        return axis_[static_cast<std::size_t>(axis)].at[static_cast<std::size_t>(n)];
-    }
+    const Position& position(int axis, int n) const { return axis_[axis].at[n]; }
 
     // control  # control_count(). Same bytes for any number of threads, like all of this class.
     void slopes(std::span<const Lanes> control, LatticeSlopes& out) const;
@@ -67,4 +65,4 @@ class SplineLattice {
     std::array<Axis, 3> axis_;
 };
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_elastic {
 namespace {
 
 struct Row {
@@ -44,7 +44,7 @@ constexpr Row kRows[] = {
     {"lung", {6, 4}},
 };
 
-constexpr double kCoarsest_mm = 3;  // voxels closer together than this are skipped
+constexpr double kCoarsestMm = 3;  // voxels closer together than this are skipped
 
 struct Block {
     double shape = 0, volume = 0;
@@ -76,17 +76,15 @@ TissueLattice make_tissue_lattice(const SplineLattice& lattice,
     const DisplacementGrid& grid = lattice.grid();
     const Int3 halves{size.x - 2, size.y - 2, size.z - 2};  // blocks, two for each cell
     const auto block_index = [&](int i, int j, int k) {
-        return static_cast<std::size_t>(i) +
-               static_cast<std::size_t>(halves.x) *
-                   (static_cast<std::size_t>(j) +
-                    static_cast<std::size_t>(halves.y) * static_cast<std::size_t>(k));
+        return i +
+               static_cast<std::size_t>(halves.x) * (j + static_cast<std::size_t>(halves.y) * k);
     };
     std::vector<Block> blocks(block_index(0, 0, halves.z));
     TissueLattice tissue;
     const bool known = labels != nullptr && labels->labels.size() > 1;
     if (known) {
         std::vector<Stiffness> stiffness;
-        bool one_tissue = labels->labels.size() == 2;
+        const bool one_tissue = labels->labels.size() == 2;
         for (const Label& label : labels->labels)
             stiffness.push_back(tissue_stiffness(label.tissue));
         if (one_tissue) stiffness[1] = kOneTissue;
@@ -94,7 +92,7 @@ TissueLattice make_tissue_lattice(const SplineLattice& lattice,
         int step[3];
         for (int a = 0; a < 3; ++a) {
             step[a] =
-                std::max(1, static_cast<int>(std::lround(kCoarsest_mm / voxels.spacing_mm[a])));
+                std::max(1, static_cast<int>(std::lround(kCoarsestMm / voxels.spacing_mm[a])));
         }
         const double per_mm = 2 / grid.spacing_mm;
         for (int k = 0; k < voxels.size.z; k += step[2]) {
@@ -145,4 +143,4 @@ TissueLattice make_tissue_lattice(const SplineLattice& lattice,
     return tissue;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

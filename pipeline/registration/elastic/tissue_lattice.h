@@ -10,15 +10,15 @@
 #include "formats/volume/label_volume.h"
 #include "pipeline/registration/elastic/spline_lattice.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_elastic {
 
 // mm^2, against the mean squared gap at the skin. shape: of |F - R|^2; volume: of (log det F)^2.
 struct Stiffness {
     double shape = 1, volume = 0;
 };
 
-// Of a tissue of the built-in table (Label::tissue). Bone hardly bends, organs keep volume and
-// shape, and fat, skin and what is not known take up the difference.
+// The stiffness of a tissue of the built-in table (Label::tissue). Bone hardly bends, organs keep
+// volume and shape, and fat, skin and what is not known take up the difference.
 Stiffness tissue_stiffness(std::string_view tissue);
 
 // Whether a tissue is bone, or a solid organ whose volume a fit should keep.
@@ -38,4 +38,4 @@ TissueLattice make_tissue_lattice(const SplineLattice& lattice,
                                   const LabelVolume* labels,
                                   double body_share = 0.6);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_elastic

@@ -11,9 +11,9 @@
 #include <cstdint>
 #include <memory>
 
-#include "formats/registration/registration.h"
+#include "pipeline/registration/map/registration.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_map {
 
 // ok           the preimage lies in the CT box and maps back onto the point
 // outside      the point has a preimage, but not in the CT box
@@ -53,4 +53,4 @@ class InverseMap {
     std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_map

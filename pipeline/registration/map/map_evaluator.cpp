@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_map {
 
 MapEvaluator::MapEvaluator(const Registration& registration) {
     const QuadraticMap& q = registration.quadratic;
@@ -95,4 +95,4 @@ void MapEvaluator::add_residual(Vector3 ct, MapSample* sample) const {
     }
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_map

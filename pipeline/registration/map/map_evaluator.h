@@ -8,9 +8,9 @@
 
 #include <vector>
 
-#include "formats/registration/registration.h"
+#include "pipeline/registration/map/registration.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_map {
 
 struct MapSample {
     Vector3 value;     // mannequin, relative to the mannequin centre, mm
@@ -40,4 +40,4 @@ class MapEvaluator {
     std::vector<Lanes> control_;
 };
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_map

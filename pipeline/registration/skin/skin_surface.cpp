@@ -11,13 +11,13 @@
 #include <vtkPolyData.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 
-#include "pipeline/registration/skin/body_field.h"
+#include "pipeline/base/stopwatch.h"
+#include "pipeline/registration/skin/skin_field.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_skin {
 namespace {
 
 struct Contour {
@@ -25,7 +25,7 @@ struct Contour {
     std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-Contour contour(const BodyField& body) {
+Contour contour(const SkinField& body) {
     vtkNew<vtkImageData> image;
     const Int3 size = body.grid.size;
     image->SetDimensions(size.x, size.y, size.z);
@@ -41,7 +41,7 @@ Contour contour(const BodyField& body) {
     vtkPolyData* mesh = edges->GetOutput();
     Contour out;
     const vtkIdType points = mesh->GetNumberOfPoints();
-    out.points.reserve(static_cast<std::size_t>(points));
+    out.points.reserve(points);
     for (vtkIdType i = 0; i < points; ++i) {
         const double* p = mesh->GetPoint(i);
         out.points.push_back({p[0], p[1], p[2]});
@@ -57,7 +57,7 @@ Contour contour(const BodyField& body) {
 }
 
 // Unit direction of steepest descent of the field at a point given in voxels, in the grid's frame.
-Vector3 outward(const BodyField& body, Point3 voxel) {
+Vector3 outward(const SkinField& body, Point3 voxel) {
     const Int3 size = body.grid.size;
     int first[3];
     double t[3];
@@ -125,17 +125,17 @@ std::vector<std::uint8_t> largest_part(const Surface& surface) {
     };
     for (const auto& t : surface.triangles) {
         for (int e = 1; e < 3; ++e) {
-            const std::uint32_t a = root(t[0]), b = root(t[static_cast<std::size_t>(e)]);
+            const std::uint32_t a = root(t[0]), b = root(t[e]);
             parent[std::max(a, b)] = std::min(a, b);
         }
     }
     std::vector<std::uint32_t> size(parent.size(), 0);
     for (std::size_t i = 0; i < parent.size(); ++i) ++size[root(static_cast<std::uint32_t>(i))];
-    const std::uint32_t most = size.empty() ? 0 : *std::max_element(size.begin(), size.end());
+    const std::uint32_t largest = size.empty() ? 0 : *std::max_element(size.begin(), size.end());
     std::vector<std::uint8_t> keep(parent.size(), 0);
     // A cut can divide the skin into several large pieces: keep every piece above a tenth.
     for (std::size_t i = 0; i < parent.size(); ++i) {
-        keep[i] = size[root(static_cast<std::uint32_t>(i))] * 10 >= most;
+        keep[i] = size[root(static_cast<std::uint32_t>(i))] * 10 >= largest;
     }
     return keep;
 }
@@ -161,10 +161,9 @@ std::vector<std::uint8_t> open_edge_points(const Surface& surface) {
 
 Result<SkinSurfaceResult> extract_skin_surface(const LabelVolume& labels,
                                                const SkinSurfaceOptions& options) {
-    const auto start = std::chrono::steady_clock::now();
-    Result<BodyField> field = make_body_field(labels, options);
-    if (!field) return field.error();
-    const BodyField& body = *field;
+    const Stopwatch watch;
+    SONOCASE_TRY(SkinField field, make_skin_field(labels, options));
+    const SkinField& body = field;
     const Contour mesh = contour(body);
 
     SkinSurfaceResult result;
@@ -213,7 +212,7 @@ Result<SkinSurfaceResult> extract_skin_surface(const LabelVolume& labels,
     }
 
     StageReport& report = result.report;
-    report.stage = "surface";
+    report.stage = stage_names::kSurface;
     if (skin.points.size() < 100) {
         return Error{"skin surface of " + std::to_string(skin.points.size()) + " points", "",
                      "at least 100 are needed; is label 0 the outside of the body?"};
@@ -236,12 +235,11 @@ Result<SkinSurfaceResult> extract_skin_surface(const LabelVolume& labels,
     if (body.hollow > 0.3) {
         report.warnings.push_back(
             "a third or more of the body carries no label, so that the surface may be that of "
-            "organs "
-            "and not the skin: give a label map that fills the body");
+            "organs and "
+            "not the skin: give a label map that fills the body");
     }
-    report.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    report.seconds = watch.seconds();
     return result;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_skin

@@ -18,13 +18,13 @@
 #include "formats/volume/label_volume.h"
 #include "formats/volume/surface.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline registration_skin {
 
 struct SkinSurfaceOptions {
     double working_mm = 3.0;    // voxels are averaged up to about this, > 0
     double smoothing_mm = 2.5;  // standard deviation of the Gaussian, >= 0
     double bridge_mm = 12.0;    // thinner sheets and bridges are not body
-    double least_part = 0.35;   // of a slice's largest part: smaller parts are arms or remnants
+    double min_part = 0.35;     // of a slice's largest part: smaller parts are arms or remnants
 };
 
 struct SkinSurfaceResult {
@@ -38,4 +38,4 @@ struct SkinSurfaceResult {
 Result<SkinSurfaceResult> extract_skin_surface(const LabelVolume& labels,
                                                const SkinSurfaceOptions& options = {});
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline registration_skin

@@ -8,7 +8,7 @@
 
 #include "pipeline/segmentation/distance/widest.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation_distance {
 namespace {
 
 // out[i] = sum_m kernel[m] from[m][i] for `count` values, in the order of the taps. The sums of
@@ -63,7 +63,7 @@ SONOCASE_WIDEST void smooth_lines(const float* in,
                                   float* out) {
     const int half = static_cast<int>(kernel.size() / 2);
     std::vector<const float*> from(kernel.size());
-    std::vector<float> before(static_cast<std::size_t>(lines));
+    std::vector<float> before(lines);
     for (std::size_t l = 0; l < before.size(); ++l) before[l] = constant[l * constant_pitch];
     for (int l = 0; l < lines; ++l) {
         float sum = 0;  // NaN where one of the lines holds several values
@@ -91,7 +91,7 @@ SONOCASE_WIDEST void smooth_rows(const float* in,
                                  float* constant,
                                  float* out) {
     const int reach = static_cast<int>(kernel.size() / 2) * stride;
-    std::vector<float> padded(static_cast<std::size_t>(count + 2 * reach));
+    std::vector<float> padded(count + 2 * reach);
     std::vector<const float*> from(kernel.size());
     for (std::size_t m = 0; m < from.size(); ++m)
         from[m] = padded.data() + m * static_cast<std::size_t>(stride);
@@ -134,15 +134,15 @@ std::vector<float> smoothing_kernel(double sigma, double moment) {
     if (sigma <= 0) return {};
     const double a = 2 + moment / (sigma * sigma);
     const int reach = std::max(2, static_cast<int>(std::ceil(3.2 * sigma)));
-    std::vector<double> gauss(static_cast<std::size_t>(2 * reach + 1));
+    std::vector<double> gauss(2 * reach + 1);
     double sum = 0;
     for (int i = -reach; i <= reach; ++i) {
         const double g = std::exp(-0.5 * i * i / (sigma * sigma));
-        gauss[static_cast<std::size_t>(i + reach)] = g;
+        gauss[i + reach] = g;
         sum += g;
     }
     for (double& g : gauss) g /= sum;
-    std::vector<double> kernel(static_cast<std::size_t>(4 * reach + 1));
+    std::vector<double> kernel(4 * reach + 1);
     for (std::size_t i = 0; i < gauss.size(); ++i) {
         kernel[i + static_cast<std::size_t>(reach)] += a * gauss[i];
         for (std::size_t j = 0; j < gauss.size(); ++j)
@@ -230,4 +230,4 @@ void shrink(const VoxelBox& box, const VoxelBox& part, std::vector<float>* value
     values->resize(part.count());
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation_distance

@@ -8,7 +8,7 @@
 
 #include "pipeline/segmentation/distance/signed_distance.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation_distance {
 
 // One kernel per axis; along an axis with an empty kernel nothing is done.
 struct BoxKernels {
@@ -42,4 +42,4 @@ void crop(const VoxelBox& box,
 // The same in place. part: within `box`.
 void shrink(const VoxelBox& box, const VoxelBox& part, std::vector<float>* values);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation_distance

@@ -3,7 +3,7 @@
 // Signed distance to unions of labels of a map on any grid, smoothed, on nodes fine enough for
 // shape interpolation.
 //
-// Thick slices are interpolated by shape (slice_shapes.cpp): each slice has its own distance field;
+// Thick slices are interpolated by shape: each slice has its own distance field;
 // the obliquity of the surfaces turns it into a distance in space, balls close outlines that end,
 // and the slices are blended along their axis by Catmull-Rom cubics. Outlines that move sideways
 // are blended along their shift (slice_groups.h). Nearly cubic voxels are measured in 3-D.
@@ -25,7 +25,7 @@
 #include "pipeline/segmentation/distance/slice_groups.h"
 #include "pipeline/segmentation/distance/sparse_box.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation_distance {
 
 struct LabelDistanceOptions {
     double sigma_vx = 1.7;   // smoothing, in-plane voxels of the map; 0: none
@@ -60,7 +60,7 @@ class LabelDistance {
     struct Scratch {
         SparseBox raw, smooth, wide, phi, other, marked, weight;
         std::array<SparseBox, 3> part_raw, fine;  // per level
-        // Of slices that are interpolated.
+        // For slices that are interpolated.
         std::vector<float> plain, flat, within, first, second;
         std::vector<std::uint8_t> capped;
         void slices_done() {
@@ -74,11 +74,11 @@ class LabelDistance {
     // Smooth phi (negative inside, mm) of a union of labels on reach(labels), which is returned;
     // phi: # box.count(). Thread-safe, with one Scratch per thread.
     VoxelBox distance(const LabelSet& labels, std::vector<float>* phi, Scratch* scratch) const;
-    // The same on a part of it alone, in memory that goes with the part and not with the map, and
-    // on the needed blocks alone, null: everywhere. Along
-    // the axis of slices that are interpolated the part must be as long as reach(labels). Equal to
-    // distance() but where structures too fine for the second width end beside the part's margin:
-    // which of them count as strays there depends on where smoothing stops.
+    // The same on a part of that box alone, in memory that goes with the part and not with the map,
+    // and on the needed blocks alone (null: everywhere). Along the axis of slices that are
+    // interpolated the part must be as long as reach(labels). Equal to distance() except where
+    // structures too fine for the second width end beside the margin of the part: which of them
+    // count as strays there depends on where smoothing stops.
     void distance_on(const LabelSet& labels,
                      const VoxelBox& part,
                      const NodeBlocks* needed,
@@ -90,7 +90,8 @@ class LabelDistance {
                             const VoxelBox& box,
                             std::vector<float>* phi,
                             Scratch* scratch) const;
-    // slice_shapes.cpp. own: the group is of a label of the union; otherwise it is cut out of it.
+    // Slices interpolated by shape. own: the group is of a label of the union; otherwise it is cut
+    // out of it.
     void correct_obliquity(const VoxelBox& slices, Scratch* scratch) const;
     void close_end(const SliceGroup& group,
                    bool own,
@@ -155,4 +156,4 @@ class LabelDistance {
 // The same voxels with the axis of the largest spacing last.
 LabelVolume slices_last(const LabelVolume& labels);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation_distance

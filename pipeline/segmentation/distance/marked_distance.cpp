@@ -7,7 +7,7 @@
 
 #include "pipeline/base/parallel.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation_distance {
 namespace {
 
 constexpr float kFarSquared = kNoMark * kNoMark;
@@ -17,21 +17,20 @@ struct Envelope {
     std::vector<int> roots;
 };
 
-// Replaces squared distances along one line by the least of (l - m)^2 + f(m).
+// Replaces squared distances along one line by the minimum of (l - m)^2 + f(m).
 void lower_envelope(float* line, std::size_t stride, int count, Envelope& e) {
-    e.squares.resize(static_cast<std::size_t>(count));
+    e.squares.resize(count);
     e.starts.resize(static_cast<std::size_t>(count) + 1);
-    e.roots.resize(static_cast<std::size_t>(count));
+    e.roots.resize(count);
     std::size_t used = 0;
     for (int q = 0; q < count; ++q) {
         const double f = static_cast<double>(line[static_cast<std::size_t>(q) * stride]);
-        e.squares[static_cast<std::size_t>(q)] = f;
+        e.squares[q] = f;
         if (!(f < static_cast<double>(kFarSquared))) continue;
         double start = -1e30;
         while (used > 0) {
             const int r = e.roots[used - 1];
-            start = (f + static_cast<double>(q) * q - e.squares[static_cast<std::size_t>(r)] -
-                     static_cast<double>(r) * r) /
+            start = (f + static_cast<double>(q) * q - e.squares[r] - static_cast<double>(r) * r) /
                     (2.0 * (q - r));
             if (start > e.starts[used - 1]) break;
             --used;
@@ -46,7 +45,7 @@ void lower_envelope(float* line, std::size_t stride, int count, Envelope& e) {
         while (at + 1 < used && e.starts[at + 1] < l) ++at;
         const double d = l - e.roots[at];
         line[static_cast<std::size_t>(l) * stride] =
-            static_cast<float>(d * d + e.squares[static_cast<std::size_t>(e.roots[at])]);
+            static_cast<float>(d * d + e.squares[e.roots[at]]);
     }
 }
 
@@ -78,4 +77,4 @@ std::vector<float> distance_to_marked(const std::vector<std::uint8_t>& marked, I
     return out;
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation_distance

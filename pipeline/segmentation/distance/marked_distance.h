@@ -13,7 +13,7 @@
 
 #include "formats/base/geometry.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation_distance {
 
 inline constexpr float kNoMark = 1e9f;  // distance where nothing is marked
 
@@ -21,4 +21,4 @@ inline constexpr float kNoMark = 1e9f;  // distance where nothing is marked
 // values for any number of threads.
 std::vector<float> distance_to_marked(const std::vector<std::uint8_t>& marked, Int3 size);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation_distance

@@ -9,7 +9,7 @@
 
 #include "pipeline/segmentation/distance/widest.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation_distance {
 namespace {
 
 // Squared distance along x to the nearest marked voxel of the row, at most limit_sq.
@@ -47,7 +47,7 @@ SONOCASE_WIDEST void line_distances(const float* in,
     typedef float Eight __attribute__((vector_size(32)));
     constexpr std::size_t kBatch = 32;  // values that stay in registers over all lines
     const int reach = static_cast<int>(std::sqrt(limit_sq) / spacing);
-    std::vector<RowKind> before(static_cast<std::size_t>(lines));
+    std::vector<RowKind> before(lines);
     for (std::size_t l = 0; l < before.size(); ++l) before[l] = kinds[l * kinds_pitch];
     std::vector<int> near;  // lines that can lower a distance
     for (int l = 0; l < lines; ++l) {
@@ -55,7 +55,7 @@ SONOCASE_WIDEST void line_distances(const float* in,
         const float* own = in + static_cast<std::size_t>(l) * stride;
         near.clear();
         for (int m = std::max(0, l - reach); m <= std::min(lines - 1, l + reach); ++m) {
-            if (before[static_cast<std::size_t>(m)] != RowKind::limits) near.push_back(m);
+            if (before[m] != RowKind::limits) near.push_back(m);
         }
         RowKind& kind = kinds[static_cast<std::size_t>(l) * kinds_pitch];
         if (kind == RowKind::zeros || near.empty()) {
@@ -93,13 +93,13 @@ SONOCASE_WIDEST void line_distances(const float* in,
             __builtin_memcpy(to + i + 24, &d, sizeof d);
         }
         for (; i < width; ++i) {
-            float least = own[i];
+            float lowest = own[i];
             for (const int m : near) {
                 const float along = static_cast<float>(l - m) * spacing;
                 const float d = in[static_cast<std::size_t>(m) * stride + i] + along * along;
-                least = d < least ? d : least;
+                lowest = d < lowest ? d : lowest;
             }
-            to[i] = least;
+            to[i] = lowest;
         }
     }
 }
@@ -188,7 +188,7 @@ void distances_on(const LabelVolume& volume,
     // Half a voxel from the last centre inside to the surface: the mean over the axes measured.
     double sum = 0, measured = 0;
     for (int a = 0; a < 3; ++a) {
-        if (axes[static_cast<std::size_t>(a)]) {
+        if (axes[a]) {
             sum += h[a];
             measured += 1;
         }
@@ -197,7 +197,7 @@ void distances_on(const LabelVolume& volume,
     const float limit = static_cast<float>(limit_mm) + half;
     const float limit_sq = limit * limit;
     auto& [first, second, mark, kinds] = *scratch;
-    kinds.resize(static_cast<std::size_t>(box.size.y) * static_cast<std::size_t>(box.size.z));
+    kinds.resize(static_cast<std::size_t>(box.size.y) * box.size.z);
     first.resize(count);
     second.resize(count);
     mark.resize(nx);
@@ -209,9 +209,7 @@ void distances_on(const LabelVolume& volume,
                     volume.grid.index(box.first.x, box.first.y + j, box.first.z + k);
                 for (std::size_t i = 0; i < nx; ++i) mark[i] = member[row[i]] != outside;
                 float* to = first.data() + box.index(0, j, k);
-                RowKind& kind =
-                    kinds[static_cast<std::size_t>(j) +
-                          static_cast<std::size_t>(k) * static_cast<std::size_t>(box.size.y)];
+                RowKind& kind = kinds[j + static_cast<std::size_t>(k) * box.size.y];
                 const bool same = std::memchr(mark.data(), !mark[0], nx) == nullptr;
                 kind = !same ? RowKind::mixed : mark[0] ? RowKind::zeros : RowKind::limits;
                 if (same) {
@@ -227,10 +225,8 @@ void distances_on(const LabelVolume& volume,
             for (int k = 0; k < box.size.z; ++k) {
                 const std::size_t at = static_cast<std::size_t>(k) * plane;
                 line_distances(first.data() + at, nx, box.size.y, nx, static_cast<float>(h.y),
-                               limit_sq,
-                               kinds.data() + static_cast<std::size_t>(k) *
-                                                  static_cast<std::size_t>(box.size.y),
-                               1, second.data() + at);
+                               limit_sq, kinds.data() + static_cast<std::size_t>(k) * box.size.y, 1,
+                               second.data() + at);
             }
             first.swap(second);
         }
@@ -295,4 +291,4 @@ void signed_distance(const LabelVolume& volume,
     signed_distance(volume, one_label(label), box, limit_mm, axes, phi);
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation_distance

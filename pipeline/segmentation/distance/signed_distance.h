@@ -12,12 +12,13 @@
 #pragma once
 
 #include <array>
-#include <bitset>
+#include <cstdint>
 #include <vector>
 
 #include "formats/volume/label_volume.h"
+#include "pipeline/base/label_set.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation_distance {
 
 // A box of voxels of a grid: first, first + 1, ... first + size - 1 along each axis.
 struct VoxelBox {
@@ -25,15 +26,10 @@ struct VoxelBox {
     Int3 size{0, 0, 0};
     bool empty() const { return size.x <= 0 || size.y <= 0 || size.z <= 0; }
     std::size_t count() const {
-        return empty() ? 0
-                       : static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
-                             static_cast<std::size_t>(size.z);
+        return empty() ? 0 : static_cast<std::size_t>(size.x) * size.y * size.z;
     }
     std::size_t index(int i, int j, int k) const {  // of a voxel relative to first
-        return static_cast<std::size_t>(i) +
-               static_cast<std::size_t>(size.x) *
-                   (static_cast<std::size_t>(j) +
-                    static_cast<std::size_t>(size.y) * static_cast<std::size_t>(k));
+        return i + static_cast<std::size_t>(size.x) * (j + static_cast<std::size_t>(size.y) * k);
     }
 };
 
@@ -42,14 +38,6 @@ std::vector<VoxelBox> label_boxes(const LabelVolume& volume);
 
 // `box` grown by `voxels` on each side and cut to the volume.
 VoxelBox grow(const VoxelBox& box, Int3 voxels, Int3 size);
-
-using LabelSet = std::bitset<256>;
-
-inline LabelSet one_label(std::uint8_t label) {
-    LabelSet set;
-    set.set(label);
-    return set;
-}
 
 // Scratch space, for callers that measure again and again: newly allocated memory is slow.
 struct DistanceSpace {
@@ -70,7 +58,7 @@ void signed_distance(const LabelVolume& volume,
                      double limit_mm,
                      std::array<bool, 3> axes,
                      std::vector<float>* phi);
-// Of one label.
+// The same for one label.
 void signed_distance(const LabelVolume& volume,
                      std::uint8_t label,
                      const VoxelBox& box,
@@ -78,4 +66,4 @@ void signed_distance(const LabelVolume& volume,
                      std::array<bool, 3> axes,
                      std::vector<float>* phi);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation_distance

@@ -5,10 +5,95 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <utility>
 
-namespace sonocase::pipeline {
+#include "formats/base/constants.h"
+
+namespace sonocase::pipeline::inline segmentation_distance {
+
+namespace {
+
+// 8-connected components of equal label in slice k, by union-find. Appends them with sums instead
+// of moments.
+void add_outlines(const LabelVolume& volume, int k, OutlineMap* out) {
+    const int nx = volume.grid.size.x, ny = volume.grid.size.y;
+    const std::size_t base = volume.grid.index(0, 0, k);
+    const std::uint8_t* label = volume.voxels.data() + base;
+    const auto at = [nx](int i, int j) { return i + static_cast<std::size_t>(nx) * j; };
+    std::vector<std::int32_t> parent(static_cast<std::size_t>(nx) * ny);
+    std::iota(parent.begin(), parent.end(), 0);
+    const auto root = [&](std::size_t v) {
+        while (static_cast<std::size_t>(parent[v]) != v) {
+            parent[v] = parent[parent[v]];
+            v = static_cast<std::size_t>(parent[v]);
+        }
+        return v;
+    };
+    for (int j = 0; j < ny; ++j) {
+        for (int i = 0; i < nx; ++i) {
+            const std::size_t v = at(i, j);
+            const auto join = [&](int a, int b) {
+                if (a < 0 || a >= nx || b < 0 || label[at(a, b)] != label[v]) return;
+                const std::size_t p = root(v), q = root(at(a, b));
+                parent[std::max(p, q)] = static_cast<std::int32_t>(std::min(p, q));
+            };
+            join(i - 1, j);
+            join(i - 1, j - 1);
+            join(i, j - 1);
+            join(i + 1, j - 1);
+        }
+    }
+    std::vector<std::int32_t> outline_of_root(parent.size(), -1);
+    for (int j = 0; j < ny; ++j) {
+        for (int i = 0; i < nx; ++i) {
+            const std::size_t v = at(i, j), r = root(v);
+            if (outline_of_root[r] < 0) {  // roots come first in scan order
+                outline_of_root[r] = static_cast<std::int32_t>(out->outlines.size());
+                out->outlines.push_back({k, label[v], {{i, j, k}, {1, 1, 1}}, 0, 0, 0});
+            }
+            Outline& o = out->outlines[outline_of_root[r]];
+            out->of_voxel[base + v] = outline_of_root[r];
+            const int x1 = std::max(o.box.first.x + o.box.size.x, i + 1);
+            o.box.first.x = std::min(o.box.first.x, i);
+            o.box.size.x = x1 - o.box.first.x;
+            o.box.size.y = j + 1 - o.box.first.y;
+            ++o.area;
+            o.x += i;
+            o.y += j;
+            o.xx += static_cast<double>(i) * i;
+            o.xy += static_cast<double>(i) * j;
+            o.yy += static_cast<double>(j) * j;
+        }
+    }
+}
+
+}  // namespace
+
+bool Outline::elongated() const {
+    const double mean = 0.5 * (xx + yy), spread = std::hypot(0.5 * (xx - yy), xy);
+    return mean + spread > 6.25 * (mean - spread + 1.0 / 12);  // 2.5 times as long as wide
+}
+
+double Outline::direction_rad() const {
+    return 0.5 * std::atan2(2 * xy, xx - yy);
+}
+
+OutlineMap find_outlines(const LabelVolume& volume) {
+    OutlineMap out;
+    out.of_voxel.assign(volume.grid.voxel_count(), -1);
+    for (int k = 0; k < volume.grid.size.z; ++k) add_outlines(volume, k, &out);
+    for (Outline& o : out.outlines) {
+        o.x /= o.area;
+        o.y /= o.area;
+        o.xx = o.xx / o.area - o.x * o.x;
+        o.xy = o.xy / o.area - o.x * o.y;
+        o.yy = o.yy / o.area - o.y * o.y;
+    }
+    return out;
+}
+
 namespace {
 
 class GroupFinder {
@@ -18,10 +103,9 @@ class GroupFinder {
         of_label_.resize(volume.labels.size());
         area_below_.assign(map_.outlines.size(), 0);
         area_above_.assign(map_.outlines.size(), 0);
-        in_slice_.resize(static_cast<std::size_t>(grid_.size.z));
+        in_slice_.resize(grid_.size.z);
         for (std::size_t o = 0; o < map_.outlines.size(); ++o) {
-            in_slice_[static_cast<std::size_t>(map_.outlines[o].slice)].push_back(
-                static_cast<std::int32_t>(o));
+            in_slice_[map_.outlines[o].slice].push_back(static_cast<std::int32_t>(o));
         }
     }
 
@@ -42,12 +126,11 @@ class GroupFinder {
         std::map<std::int32_t, int> ups, downs;                 // partners of a lower, an upper one
     };
 
-    const Outline& outline(int o) const { return map_.outlines[static_cast<std::size_t>(o)]; }
+    const Outline& outline(int o) const { return map_.outlines[o]; }
 
     double turn(int a, int b) const {
         if (!outline(a).elongated() || !outline(b).elongated()) return 0.0;
         double d = outline(b).direction_rad() - outline(a).direction_rad();
-        constexpr double kPi = 3.14159265358979323846;
         if (d > kPi / 2) d -= kPi;
         if (d < -kPi / 2) d += kPi;
         // A tube does not rotate further between two slices; such outlines have another cause.
@@ -79,7 +162,7 @@ class GroupFinder {
     }
 
     // The outlines of a tube of radius r in slices dz apart are apart by dz cos(a) / (2 r) of their
-    // length.
+    // length, with the angle a between the tube and the slices.
     bool may_pair(int a, int b) const {
         const double ratio = static_cast<double>(outline(a).area) / outline(b).area;
         return outline(a).label == outline(b).label && ratio < 4 && ratio > 0.25 &&
@@ -98,8 +181,7 @@ class GroupFinder {
     }
 
     Overlaps find_overlaps(int k) {
-        const std::size_t plane =
-            static_cast<std::size_t>(grid_.size.x) * static_cast<std::size_t>(grid_.size.y);
+        const std::size_t plane = static_cast<std::size_t>(grid_.size.x) * grid_.size.y;
         const std::size_t low = static_cast<std::size_t>(k) * plane;
         Overlaps out;
         std::int32_t last_a = -1, last_b = -1;
@@ -112,8 +194,8 @@ class GroupFinder {
             if (out.pairs.insert({a, b}).second) {
                 ++out.ups[a];
                 ++out.downs[b];
-                area_above_[static_cast<std::size_t>(a)] += outline(b).area;
-                area_below_[static_cast<std::size_t>(b)] += outline(a).area;
+                area_above_[a] += outline(b).area;
+                area_below_[b] += outline(a).area;
             }
         }
         return out;
@@ -135,7 +217,7 @@ class GroupFinder {
     // Outlines without overlap: pairs that are nearest to each other; the others end here.
     void pair_separate(int k, const Overlaps& overlaps) {
         std::vector<std::int32_t> lower, upper;
-        for (const std::int32_t a : in_slice_[static_cast<std::size_t>(k)]) {
+        for (const std::int32_t a : in_slice_[k]) {
             if (!overlaps.ups.count(a)) lower.push_back(a);
         }
         for (const std::int32_t b : in_slice_[static_cast<std::size_t>(k) + 1]) {
@@ -153,8 +235,7 @@ class GroupFinder {
             const std::int32_t b = nearest(a, upper);
             if (b >= 0 && nearest(b, lower) == a) {
                 add(k, a, b);
-                taken[static_cast<std::size_t>(std::find(upper.begin(), upper.end(), b) -
-                                               upper.begin())] = true;
+                taken[std::find(upper.begin(), upper.end(), b) - upper.begin()] = true;
             } else {
                 add(k, a, -1);
             }
@@ -166,8 +247,7 @@ class GroupFinder {
 
     // On a ball of radius R, an outline at height z above the centre has the area pi (R^2 - z^2).
     void place_poles() {
-        const double h = grid_.spacing_mm.z,
-                     disc = grid_.spacing_mm.x * grid_.spacing_mm.y / 3.14159265358979;
+        const double h = grid_.spacing_mm.z, disc = grid_.spacing_mm.x * grid_.spacing_mm.y / kPi;
         for (auto& groups : of_label_) {
             for (SliceGroup& group : groups) {
                 if (group.lower >= 0 && group.upper >= 0) continue;
@@ -197,4 +277,4 @@ SliceGroups find_slice_groups(const LabelVolume& volume) {
     return GroupFinder(volume).find();
 }
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation_distance

@@ -10,13 +10,36 @@
 // pole, which is half-way to the next slice if they do not shrink.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "formats/volume/label_volume.h"
-#include "pipeline/segmentation/distance/outlines.h"
+#include "pipeline/segmentation/distance/signed_distance.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation_distance {
 
+// An 8-connected component of one label in one slice.
+struct Outline {
+    int slice = 0;
+    std::uint8_t label = 0;
+    VoxelBox box;                   // one slice thick
+    int area = 0;                   // pixels
+    double x = 0, y = 0;            // centroid, pixels
+    double xx = 0, xy = 0, yy = 0;  // second moments about it, pixels^2
+
+    bool elongated() const;        // whether its direction is well defined
+    double direction_rad() const;  // of the long axis, in (-pi/2, pi/2]
+};
+
+struct OutlineMap {
+    std::vector<Outline> outlines;       // slice by slice
+    std::vector<std::int32_t> of_voxel;  // # voxels: index into outlines
+};
+
+// Slices are along k. Cost: one pass over the voxels.
+OutlineMap find_outlines(const LabelVolume& volume);
+
+// A pair of outlines in successive slices, or one that begins or ends.
 struct SliceGroup {
     int lower = -1;                   // outline in slice k; -1: `upper` begins above slice k
     int upper = -1;                   // outline in slice k + 1; -1: `lower` ends above slice k
@@ -35,4 +58,4 @@ struct SliceGroups {
 // Slices are along k. Cost: one pass over the voxels.
 SliceGroups find_slice_groups(const LabelVolume& volume);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation_distance

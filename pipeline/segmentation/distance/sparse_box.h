@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Values on a box of nodes, of which most are one of two numbers: distances up to a limit, and what
+// Values on a box of nodes, most of which are one of two numbers: distances up to a limit, and what
 // smoothing makes of them. Rows along x are cut into runs of 16 nodes; a run of one of the two
 // numbers takes four bytes, others their values as well. The functions give the values of their
 // namesakes on plain vectors (signed_distance.h, box_smoothing.h), bit by bit, in time and memory
@@ -16,7 +16,7 @@
 #include "pipeline/segmentation/distance/box_smoothing.h"
 #include "pipeline/segmentation/distance/signed_distance.h"
 
-namespace sonocase::pipeline {
+namespace sonocase::pipeline::inline segmentation_distance {
 
 class SparseBox {
   public:
@@ -32,10 +32,8 @@ class SparseBox {
     float low() const { return values(kLow)[0]; }
     int runs() const { return runs_; }  // per row
     std::size_t run_index(int run, int j, int k) const {
-        return static_cast<std::size_t>(run) +
-               static_cast<std::size_t>(runs_) *
-                   (static_cast<std::size_t>(j) +
-                    static_cast<std::size_t>(box_.size.y) * static_cast<std::size_t>(k));
+        return run +
+               static_cast<std::size_t>(runs_) * (j + static_cast<std::size_t>(box_.size.y) * k);
     }
     // One per run, x fastest, then y; all high after begin().
     std::vector<std::uint32_t>& states() { return states_; }
@@ -54,7 +52,7 @@ class SparseBox {
     float* at(std::uint32_t place) { return pool_.get() + std::size_t{kRun} * place; }
     // The values of a run, to be changed.
     float* open(std::size_t run);
-    // Of a node, relative to the first.
+    // The value of a node; i, j, k: relative to the first one.
     float value(int i, int j, int k) const {
         return values(states_[run_index(i / kRun, j, k)])[i % kRun];
     }
@@ -108,8 +106,8 @@ class WantedRuns {
     std::vector<std::uint8_t> wanted_;  // per run and row of blocks
 };
 
-// As smooth_box: from `in`, which stays, to `out`. All three are different. blocks, margin: where
-// the result is needed, null: everywhere.
+// smooth_box from `in`, which stays, to `out`; `in`, `out` and `scratch` must differ. blocks,
+// margin: where the result is needed; null: everywhere.
 void smooth_sparse(const SparseBox& in,
                    const BoxKernels& kernels,
                    SparseBox* out,
@@ -117,7 +115,7 @@ void smooth_sparse(const SparseBox& in,
                    const NodeBlocks* blocks = nullptr,
                    Int3 margin = {});
 
-// As signed_distance along all axes. scratch: two boxes, neither of them `out`.
+// signed_distance along all axes. scratch: three boxes other than `out`.
 void sparse_distance(const LabelVolume& volume,
                      const LabelSet& labels,
                      const VoxelBox& box,
@@ -125,4 +123,4 @@ void sparse_distance(const LabelVolume& volume,
                      SparseBox* out,
                      std::array<SparseBox*, 3> scratch);
 
-}  // namespace sonocase::pipeline
+}  // namespace sonocase::pipeline::inline segmentation_distance

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display_models {
 namespace {
 
 Rigid looking(Point3 eye, Point3 at, Vector3 up_hint) {
@@ -53,4 +53,4 @@ Rigid mannequin_from_needle_camera(const Rigid& mannequin_from_needle) {
                    mannequin_from_needle.rotation * Vector3{0, -1, 0});
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display_models

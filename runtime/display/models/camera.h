@@ -7,7 +7,7 @@
 #include "formats/base/geometry.h"
 #include "formats/exercise/exercise.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display_models {
 
 // A place on a sphere about the point of interest.
 struct Orbit {
@@ -20,18 +20,18 @@ enum class ViewFrom { outside, probe, needle };
 // Where the view from outside stands at first.
 struct HomeView {
     Matrix3 home;     // columns: right, up, towards the eye
-    Point3 interest;  // that it turns about
+    Point3 interest;  // the point that it turns about
     Orbit orbit;
 };
-// body: of the skin. The probe points down, the long axis of the body runs across.
+// body: box around the skin. The probe points down, the long axis of the body runs across.
 HomeView home_view(const Box3& body, const Exercise& exercise);
 
 // home: columns right, up and towards the eye, where yaw and pitch are 0.
 Rigid mannequin_from_outside_camera(const Matrix3& home, Point3 interest, const Orbit& orbit);
-// Behind the face and beside it, so that the picture is seen at an angle, with what it cuts in
-// front of it.
+// Stands behind the face and beside it: the picture is seen at an angle, with what it cuts in front
+// of it.
 Rigid mannequin_from_probe_camera(const Rigid& mannequin_from_probe);
 // Just above the shaft, behind the tip, looking in its direction.
 Rigid mannequin_from_needle_camera(const Rigid& mannequin_from_needle);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display_models

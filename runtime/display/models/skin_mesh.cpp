@@ -6,18 +6,15 @@
 #include <cmath>
 #include <vector>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display_models {
 namespace {
 
 struct Samples {
     Int3 n;
     double step = 1;          // in voxels
-    std::vector<float> body;  // share of what is looked for around each sample, [0, 1]
+    std::vector<float> body;  // share of the wanted labels around each sample, [0, 1]
     std::size_t index(int i, int j, int k) const {
-        return static_cast<std::size_t>(i) +
-               static_cast<std::size_t>(n.x) *
-                   (static_cast<std::size_t>(j) +
-                    static_cast<std::size_t>(n.y) * static_cast<std::size_t>(k));
+        return i + n.x * (j + n.y * static_cast<std::size_t>(k));
     }
 };
 
@@ -31,8 +28,8 @@ void smooth(Surface& mesh, int passes) {
         std::fill(count.begin(), count.end(), 0);
         for (const auto& t : mesh.triangles) {
             for (int a = 0; a < 3; ++a) {
-                const std::uint32_t p = t[static_cast<std::size_t>(a)];
-                const std::uint32_t q = t[static_cast<std::size_t>((a + 1) % 3)];
+                const std::uint32_t p = t[a];
+                const std::uint32_t q = t[(a + 1) % 3];
                 sum[p] = sum[p] + (mesh.points[q] - mesh.points[p]);
                 sum[q] = sum[q] + (mesh.points[p] - mesh.points[q]);
                 ++count[p];
@@ -55,10 +52,10 @@ Samples make_samples(const CaseBundle& bundle, double step_mm) {
     return s;
 }
 
-// The labels of eight places about a sample, each a quarter step off, so that slanted surfaces have
-// no steps.
+// Calls use() with the labels of eight places around a sample, each a quarter step off, so that
+// slanted surfaces have no steps.
 template <class Use>
-void look_round(const CaseBundle& bundle, const Samples& s, Int3 p, const Use& use) {
+void for_labels_around(const CaseBundle& bundle, const Samples& s, Int3 p, const Use& use) {
     const Int3 size = bundle.label_bricks.size;
     for (int c = 0; c < 8; ++c) {
         const auto at = [&](int n, int axis, int side) {
@@ -155,7 +152,7 @@ struct OrganColour {
     const char* part;  // of a label's name
     unsigned rgb;
 };
-// The first that fits.
+// The first entry that fits counts.
 constexpr OrganColour kOrgans[] = {
     {"gallbladder", 0x7FA650}, {"portal", 0x7C6BB5},   {"liver", 0x9C4A3C},
     {"kidney", 0xB8705A},      {"spleen", 0x84506A},   {"stomach", 0xCB8E9A},
@@ -185,7 +182,8 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
         for (int j = 0; j < s.n.y; ++j) {
             for (int i = 0; i < s.n.x; ++i) {
                 float& share = s.body[s.index(i, j, k)];
-                look_round(bundle, s, {i, j, k}, [&](int label) { share += label ? 0.125f : 0; });
+                for_labels_around(bundle, s, {i, j, k},
+                                  [&](int label) { share += label ? 0.125f : 0; });
             }
         }
     }
@@ -195,7 +193,7 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm) {
 std::vector<OrganMesh> organ_meshes(const CaseBundle& bundle,
                                     double step_mm,
                                     const std::atomic<bool>& stop) {
-    std::vector<unsigned> colours;  // of the groups
+    std::vector<unsigned> colours;  // one per group
     std::vector<int> group(256, -1);
     for (std::size_t label = 1; label < std::min<std::size_t>(bundle.labels.size(), 256); ++label) {
         const unsigned rgb = organ_colour(bundle.labels[label].name);
@@ -211,9 +209,9 @@ std::vector<OrganMesh> organ_meshes(const CaseBundle& bundle,
         for (int j = 0; j < s.n.y; ++j) {
             for (int i = 0; i < s.n.x; ++i) {
                 const std::size_t at = s.index(i, j, k);
-                look_round(bundle, s, {i, j, k}, [&](int label) {
-                    const int g = group[static_cast<std::size_t>(label)];
-                    if (g >= 0) ++eighths[static_cast<std::size_t>(g)][at];
+                for_labels_around(bundle, s, {i, j, k}, [&](int label) {
+                    const int g = group[label];
+                    if (g >= 0) ++eighths[g][at];
                 });
             }
         }
@@ -227,4 +225,4 @@ std::vector<OrganMesh> organ_meshes(const CaseBundle& bundle,
     return meshes;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display_models

@@ -10,7 +10,7 @@
 #include "formats/bundle/case_bundle.h"
 #include "formats/volume/surface.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline display_models {
 
 // Surface nets on samples `step_mm` apart, slightly smoothed; `mannequin` frame, mm, with outward
 // normals, counter-clockwise from outside. Open where the volume ends inside the body. Cost: eight
@@ -19,7 +19,7 @@ Surface skin_mesh(const CaseBundle& bundle, double step_mm);
 
 // What is drawn inside the skin, in the colours of an atlas of anatomy.
 struct OrganMesh {
-    Surface surface;   // as skin_mesh()
+    Surface surface;   // as skin_mesh() gives it
     unsigned rgb = 0;  // 0xRRGGBB
 };
 // One mesh per kind of organ that the palette names; muscle and fat are left out. Cost: one pass
@@ -30,4 +30,4 @@ std::vector<OrganMesh> organ_meshes(const CaseBundle& bundle,
 // Colour of an organ by its label's name; 0: it is not drawn.
 unsigned organ_colour(const std::string& label);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline display_models

@@ -50,8 +50,8 @@ Held hold_at(const ScanGeometry& geometry,
              double reach_mm) {
     if (d.mode == DopplerMode::off) return Held::none;
     const ColourBox box = colour_box(geometry, d);
-    const auto near = [&](FacePoint there, double reach) {
-        const PlanePoint p = plane_point(box, there);
+    const auto near = [&](FacePoint mark, double reach) {
+        const PlanePoint p = plane_point(box, mark);
         return std::hypot(p.x - at.x, p.z - at.z) <= reach;
     };
     const FacePoint pointer = face_point(geometry, box.steer_tan, at);
@@ -70,7 +70,7 @@ void drag_held(const ScanGeometry& geometry,
                PlanePoint from_place,
                PlanePoint to_place,
                DopplerSettings& d) {
-    constexpr double kLeastLine = 0.08, kLeastMm = 5;
+    constexpr double kMinLine = 0.08, kMinMm = 5;
     const double steer_tan = colour_box(geometry, d).steer_tan;
     const FacePoint from = face_point(geometry, steer_tan, from_place),
                     to = face_point(geometry, steer_tan, to_place);
@@ -83,9 +83,9 @@ void drag_held(const ScanGeometry& geometry,
                 d.gate_depth_mm = std::clamp(to.depth_mm, 1.0, depth);
             return;
         case Held::corner:
-            d.box_right = std::clamp(to.line, std::min(d.box_left + kLeastLine, 1.0), 1.0);
+            d.box_right = std::clamp(to.line, std::min(d.box_left + kMinLine, 1.0), 1.0);
             d.box_bottom_mm =
-                std::clamp(to.depth_mm, std::min(d.box_top_mm + kLeastMm, depth), depth);
+                std::clamp(to.depth_mm, std::min(d.box_top_mm + kMinMm, depth), depth);
             return;
         case Held::box: break;
     }

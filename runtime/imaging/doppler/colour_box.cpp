@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/base/constants.h"
+
 namespace sonocase::runtime::doppler {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846, kMostSteerDeg = 30;
+constexpr double kMaxSteerDeg = 30;
 
 double within(double value, double low, double high, double otherwise) {
     return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
@@ -44,7 +46,7 @@ ColourBox colour_box(const ScanGeometry& geometry, const DopplerSettings& s) {
     box.line_step = 2 * geometry.half_extent / kColourLines;
     box.row_mm = geometry.depth_mm / kColourRows;
     if (!geometry.fan)
-        box.steer_tan = std::tan(within(s.steer_deg, -kMostSteerDeg, kMostSteerDeg, 0) * kPi / 180);
+        box.steer_tan = std::tan(within(s.steer_deg, -kMaxSteerDeg, kMaxSteerDeg, 0) * kPi / 180);
     const double left = within(s.box_left, 0, 1, 0), right = within(s.box_right, 0, 1, 1);
     const double top = within(s.box_top_mm, 0, geometry.depth_mm, 0),
                  bottom = within(s.box_bottom_mm, 0, geometry.depth_mm, geometry.depth_mm);
@@ -56,8 +58,7 @@ ColourBox colour_box(const ScanGeometry& geometry, const DopplerSettings& s) {
 }
 
 ColourPixels::ColourPixels(const ScanGeometry& geometry) : geometry_(geometry) {
-    cell_.resize(static_cast<std::size_t>(geometry.width_px) *
-                 static_cast<std::size_t>(geometry.height_px));
+    cell_.resize(static_cast<std::size_t>(geometry.width_px) * geometry.height_px);
     pixels_.resize(cell_.size());
     first_.resize(kColourLines * kColourRows + 1);
     steer(0);
@@ -90,7 +91,7 @@ void ColourPixels::steer(double steer_tan) {
             std::clamp(static_cast<std::int32_t>(std::lround(256 * k)), 0, 256 * kColourRows - 1);
         return true;
     };
-    // Counted first, then put in order: all pixels of a cell one after another.
+    // Pixels are counted first and then put in order: all pixels of a cell one after another.
     std::fill(first_.begin(), first_.end(), 0u);
     std::int32_t line = 0, row = 0;
     for (std::size_t i = 0; i < cell_.size(); ++i) {

@@ -12,8 +12,8 @@
 #include <span>
 #include <vector>
 
-#include "runtime/imaging/frame/doppler_settings.h"
-#include "runtime/imaging/scan/scan_geometry.h"
+#include "runtime/imaging/core/frame_input.h"
+#include "runtime/imaging/core/scan_geometry.h"
 
 namespace sonocase::runtime::doppler {
 
@@ -39,11 +39,11 @@ struct ColourBox {
         return {beam.across + r * steer_tan, r};
     }
     PlanePoint direction(double line) const;  // unit, into the body
-    double line_of(PlanePoint p) const;       // that runs through a point
+    double line_of(PlanePoint p) const;       // the line through a point
     bool empty() const { return lines <= 0 || rows <= 0; }
 };
 
-// Settings out of range are taken to the nearest that make sense.
+// Settings out of range are replaced by the nearest ones that make sense.
 ColourBox colour_box(const ScanGeometry& geometry, const DopplerSettings& settings);
 
 // Which pixels show a cell: those between its middle and the middles of the next line and the next
@@ -57,7 +57,7 @@ class ColourPixels {
     void steer(double steer_tan);
 
     struct Pixel {
-        std::uint32_t index;               // of the picture
+        std::uint32_t index;               // in the picture
         std::uint8_t line_part, row_part;  // beyond the cell's middle, 1/256 of a cell
     };
     // A cell of the whole grid. What lies before the middle of the first line or row is shown as
@@ -68,15 +68,13 @@ class ColourPixels {
     }
 
   private:
-    static std::size_t cell_of(int line, int row) {
-        return static_cast<std::size_t>(row * kColourLines + line);
-    }
+    static std::size_t cell_of(int line, int row) { return row * kColourLines + line; }
     ScanGeometry geometry_;
     double steer_tan_ = 0;
     bool made_ = false;
     std::vector<Pixel> pixels_;
-    std::vector<std::uint32_t> first_;  // of each cell's pixels, and the end
-    std::vector<std::int32_t> cell_;    // of each pixel of the picture; -1: not scanned
+    std::vector<std::uint32_t> first_;  // per cell: index of its first pixel; and the end
+    std::vector<std::int32_t> cell_;    // per pixel of the picture; -1: not scanned
 };
 
 }  // namespace sonocase::runtime::doppler

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "formats/flow/flow_profile.h"
+#include "formats/flow/flow_velocity.h"
 
 namespace sonocase::runtime::doppler {
 
@@ -14,7 +14,7 @@ WallFilter::WallFilter(double cut_off) {
     per_sine_ = static_cast<float>(part > 0 ? 1 / unit_circle(part / 4).sine : 1e6);
 }
 
-Ensemble::Ensemble(int count) : pulses(std::clamp(count, 4, kMostPulses)) {
+Ensemble::Ensemble(int count) : pulses(std::clamp(count, 4, kMaxPulses)) {
     // Projection on 1 and on the line through the pulses: P_ij = 1/N + t_i t_j / sum t^2.
     const double n = pulses, middle = (n - 1) / 2;
     double square = 0, beside = 0;

@@ -29,11 +29,11 @@
 
 namespace sonocase::runtime::doppler {
 
-inline constexpr int kMostPulses = 16;
-inline constexpr float kLooks = 3;  // averaged by the processor along the beam
+inline constexpr int kMaxPulses = 16;
+inline constexpr float kLooks = 3;  // the processor averages them along the beam
 
-// Power gain of the wall filter on a velocity of `turns` = v / (2 v_N), wrapped or not; its half
-// lies at cut_off, a part of v_N in (0, 1). Near to a regression filter of first order.
+// Power gain of the wall filter on a velocity of `turns` = v / (2 v_N), wrapped or not; it is one
+// half at cut_off, a part of v_N in (0, 1). Close to a regression filter of first order.
 struct WallFilter {
     explicit WallFilter(double cut_off);
     float gain(float sine_of_half_turn) const {  // |sin(pi v / (2 v_N))|
@@ -48,7 +48,7 @@ struct WallFilter {
 struct Ensemble {
     explicit Ensemble(int pulses);
     int pulses;
-    float r0, r1;  // of white noise after regression of first order
+    float r0, r1;  // what a regression of first order leaves of white noise at lags 0 and 1
 };
 
 struct ColourEstimate {

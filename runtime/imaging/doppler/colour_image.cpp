@@ -7,10 +7,11 @@
 #include <cassert>
 #include <cmath>
 
+#include "formats/base/constants.h"
+
 namespace sonocase::runtime::doppler {
 namespace {
 
-constexpr double kSpeed_mm_s = 1.54e6;
 constexpr float kShadowMm = 2;
 // Point spread over cells, standard deviations 0.8 and 1.2, normalised.
 constexpr std::array<float, 3> kAcross{0.4917f, 0.2251f, 0.0290f};
@@ -32,9 +33,9 @@ double colour_frame_hz(const ColourBox& box,
                        double depth_mm,
                        int grey_lines) {
     const double nyquist = 10 * clean(settings.scale_cm_s, 1, 500, 30);
-    const double prf = 4 * frequency_mhz * 1e6 * nyquist / kSpeed_mm_s;
-    const double grey_s = grey_lines * 2 * depth_mm / kSpeed_mm_s;
-    const double colour_s = box.lines * std::clamp(settings.ensemble, 4, kMostPulses) / prf;
+    const double prf = 4 * frequency_mhz * 1e6 * nyquist / kSpeedOfSoundMmPerS;
+    const double grey_s = grey_lines * 2 * depth_mm / kSpeedOfSoundMmPerS;
+    const double colour_s = box.lines * std::clamp(settings.ensemble, 4, kMaxPulses) / prf;
     return 1 / (grey_s + colour_s);
 }
 
@@ -47,20 +48,20 @@ ColourImage::ColourImage(const FlowScene& scene,
       frequency_mhz_(frequency_mhz),
       pixels_(geometry),
       blood_(scene) {
-    const std::size_t cells = static_cast<std::size_t>(kStride) * (kColourRows + 2 * kMargin);
+    const std::size_t cells = kStride * (kColourRows + 2 * kMargin);
     for (auto* plane : {&power_, &re_, &im_, &work_, &truth_, &turns_, &shown_power_})
         plane->assign(cells, 0.0f);
     zeros_.assign(kStride, 0.0f);
     is_blood_.assign(cells, 0);
     vessel_.assign(cells, -1);
-    cells_of_.assign(static_cast<std::size_t>(scene.vessels()), 0);
+    cells_of_.assign(scene.vessels(), 0);
     shown_of_ = cells_of_;
     index_.assign(cells, 0);
     no_colour_.assign(kStride, 0);
-    // Of no frame: a slot whose frame it cannot hold.
-    draws_.resize(static_cast<std::size_t>(kColourLines) * kColourRows);
+    // No slot holds a frame yet: each is marked with a frame that it can never hold.
+    draws_.resize(kColourLines * kColourRows);
     for (CellDraws& cell : draws_)
-        for (std::uint64_t slot = 0; slot < kMostPersisted; ++slot) cell.whose[slot] = slot + 1;
+        for (std::uint64_t slot = 0; slot < kMaxPersisted; ++slot) cell.whose[slot] = slot + 1;
     for (int row = 0; row < kColourRows; ++row) {
         const double beyond = (row + 0.5) * geometry.depth_mm / kColourRows - focus_mm;
         const double loss = kSignalLoss * frequency_mhz * 2 * beyond / 10;
@@ -87,7 +88,7 @@ void ColourImage::find_rest(const TissuePlace& place) {
         for (int l = 0; l <= across; ++l) {
             const double line = box_.first_line + std::min(l * kBlockLines, box_.lines) - 0.5,
                          row = box_.first_row + std::min(k * kBlockRows, box_.rows) - 0.5;
-            const auto n = static_cast<std::size_t>(k * (across + 1) + l);
+            const int n = k * (across + 1) + l;
             nodes_[n] = scene_.local(place.rest(box_.point(line, row)));
             const PlanePoint d = box_.direction(line);
             const Vector3 world = pose.rotation * Vector3{d.x, 0, d.z};
@@ -101,8 +102,8 @@ void ColourImage::find_rest(const TissuePlace& place) {
                                std::min(kBlockRows, box_.rows - k * kBlockRows), false, false});
 }
 
-// Per line: the depth at which bone or gas stops the beam, looked for every kShadowMm on every
-// second line.
+// Finds for each line the depth at which bone or gas stops the beam; every second line is searched,
+// in steps of kShadowMm.
 void ColourImage::find_shadow(const TissuePlace& place) {
     const double step = kShadowMm / box_.row_mm;
     const int last = box_.first_row + box_.rows;
@@ -114,8 +115,8 @@ void ColourImage::find_shadow(const TissuePlace& place) {
             row = static_cast<float>(k);
             break;
         }
-        shadow_row_[static_cast<std::size_t>(l)] = row;
-        if (l + 1 < box_.lines) shadow_row_[static_cast<std::size_t>(l + 1)] = row;
+        shadow_row_[l] = row;
+        if (l + 1 < box_.lines) shadow_row_[l + 1] = row;
     }
 }
 
@@ -126,13 +127,13 @@ bool ColourImage::find_flash(const DopplerSettings& settings, const TissuePlace&
               down = (box_.rows + kBlockRows - 1) / kBlockRows;
     const double nyquist = 10 * clean(settings.scale_cm_s, 1, 500, 30);
     const WallFilter filter(settings.wall_filter);
-    const float tissue = power_of(kTissueDb), least = 0.01f * power_of(kNoiseDb + kShownDb);
+    const float tissue = power_of(kTissueDb), min_power = 0.01f * power_of(kNoiseDb + kShownDb);
     bool flash = false;
     for (int k = 0; k <= down; ++k)
         for (int l = 0; l <= across; ++l) {
             const double line = box_.first_line + std::min(l * kBlockLines, box_.lines) - 0.5,
                          row = box_.first_row + std::min(k * kBlockRows, box_.rows) - 0.5;
-            const auto n = static_cast<std::size_t>(k * (across + 1) + l);
+            const int n = k * (across + 1) + l;
             const Vector3 v = place.velocity_mm_s(box_.point(line, row));
             const Float3 d = node_direction_[n];
             const double towards =
@@ -141,13 +142,13 @@ bool ColourImage::find_flash(const DopplerSettings& settings, const TissuePlace&
             node_tissue_[n] = static_cast<float>(towards / (2 * nyquist));
             const auto sine = static_cast<float>(
                 std::abs(unit_circle(static_cast<double>(node_tissue_[n]) / 2).sine));
-            flash = flash || tissue * filter.gain(sine) > least;
+            flash = flash || tissue * filter.gain(sine) > min_power;
         }
     return flash;
 }
 
-// Velocity of the blood at a place along d; false where there is none. place: to ask whether a vein
-// is shut there.
+// Velocity of the blood at a place along d; false where there is none. place: says whether a vein
+// is collapsed there; null: none is.
 bool ColourImage::blood_at(Float3 p,
                            std::span<const std::int32_t> among,
                            Float3 d,
@@ -165,7 +166,7 @@ bool ColourImage::blood_at(Float3 p,
     }
     const FlowHit hit = scene_.find(p, among);
     if (hit.vessel < 0) return false;
-    if (place != nullptr && scene_.vein(hit.vessel) && place->shut(rest)) return false;
+    if (place != nullptr && scene_.vein(hit.vessel) && place->closed(rest)) return false;
     along = blood_.speed(hit) * dot(hit.along, d);
     vessel = hit.vessel;
     return true;
@@ -176,9 +177,8 @@ void ColourImage::sample_block(Block& block,
                                const DopplerSettings& settings,
                                const TissuePlace& place) {
     const int across = (box_.lines + kBlockLines - 1) / kBlockLines;
-    const auto n =
-        static_cast<std::size_t>(block.row / kBlockRows * (across + 1) + block.line / kBlockLines);
-    const std::size_t below = n + static_cast<std::size_t>(across) + 1;
+    const int n = block.row / kBlockRows * (across + 1) + block.line / kBlockLines;
+    const int below = n + across + 1;
     const Float3 c00 = nodes_[n], c10 = nodes_[n + 1], c01 = nodes_[below], c11 = nodes_[below + 1];
     const Float3 middle = 0.25f * ((c00 + c10) + (c01 + c11));
     float reach = 0;
@@ -188,17 +188,14 @@ void ColourImage::sample_block(Block& block,
     }
     const int near = scene_.near(middle, std::sqrt(reach) + 1, box_capsules_, block_capsules_);
     if (near == 0 && field_ == nullptr) return;
-    const std::span<const std::int32_t> among(block_capsules_.data(),
-                                              static_cast<std::size_t>(near));
+    const auto among = std::span<const std::int32_t>(block_capsules_).first(near);
     const auto nyquist = static_cast<float>(10 * clean(settings.scale_cm_s, 1, 500, 30));
     const WallFilter filter(settings.wall_filter);
     const bool presses = place.presses();
     for (int r = 0; r < block.rows; ++r)
         for (int l = 0; l < block.lines; ++l) {
             const int line = block.line + l, row = block.row + r;
-            if (static_cast<float>(box_.first_row + row) >
-                shadow_row_[static_cast<std::size_t>(line)])
-                continue;
+            if (static_cast<float>(box_.first_row + row) > shadow_row_[line]) continue;
             const float u = (static_cast<float>(l) + 0.5f) / static_cast<float>(block.lines),
                         v = (static_cast<float>(r) + 0.5f) / static_cast<float>(block.rows);
             const Float3 p = (1 - v) * ((1 - u) * c00 + u * c10) + v * ((1 - u) * c01 + u * c11);
@@ -218,7 +215,7 @@ void ColourImage::sample_block(Block& block,
             truth_[to] = turns;
             is_blood_[to] = 1;
             vessel_[to] = vessel;
-            if (vessel >= 0) ++cells_of_[static_cast<std::size_t>(vessel)];
+            if (vessel >= 0) ++cells_of_[vessel];
             block.blood = true;
             ++report_.blood_cells;
         }
@@ -230,9 +227,8 @@ void ColourImage::add_tissue() {
     const int across = (box_.lines + kBlockLines - 1) / kBlockLines;
     const float tissue = power_of(kTissueDb);
     for (Block& block : blocks_) {
-        const auto n = static_cast<std::size_t>(block.row / kBlockRows * (across + 1) +
-                                                block.line / kBlockLines);
-        const std::size_t below = n + static_cast<std::size_t>(across) + 1;
+        const int n = block.row / kBlockRows * (across + 1) + block.line / kBlockLines;
+        const int below = n + across + 1;
         block.active = true;
         for (int r = 0; r < block.rows; ++r)
             for (int l = 0; l < block.lines; ++l) {
@@ -259,7 +255,7 @@ void ColourImage::blur() {
     for (auto* plane : {&power_, &re_, &im_}) {
         // Across the lines, row by row, then along them.
         for (int row = 0; row < box_.rows; ++row) {
-            if (row_active_[static_cast<std::size_t>(row)] == 0) continue;
+            if (row_active_[row] == 0) continue;
             const float* from = plane->data() + at(0, row);
             float* to = work_.data() + at(0, row);
             for (int l = low; l < high; ++l)
@@ -267,15 +263,13 @@ void ColourImage::blur() {
                         kAcross[2] * (from[l - 2] + from[l + 2]);
         }
         const auto row_of = [&](int row) {
-            const bool there =
-                row >= 0 && row < box_.rows && row_active_[static_cast<std::size_t>(row)] != 0;
-            return there ? work_.data() + at(0, row) : zeros_.data() + kMargin;
+            const bool active = row >= 0 && row < box_.rows && row_active_[row] != 0;
+            return active ? work_.data() + at(0, row) : zeros_.data() + kMargin;
         };
         for (int row = 0; row < box_.rows; ++row) {
             bool any = false;
             for (int k = -3; k <= 3; ++k)
-                any = any || (row + k >= 0 && row + k < box_.rows &&
-                              row_active_[static_cast<std::size_t>(row + k)] != 0);
+                any = any || (row + k >= 0 && row + k < box_.rows && row_active_[row + k] != 0);
             if (!any) continue;
             const float *a = row_of(row), *b = row_of(row - 1), *c = row_of(row + 1),
                         *d = row_of(row - 2), *e = row_of(row + 2), *f = row_of(row - 3),
@@ -288,7 +282,7 @@ void ColourImage::blur() {
     }
 }
 
-// What the last frame left behind.
+// Clears what the last frame left behind.
 void ColourImage::clear() {
     const auto used = static_cast<std::ptrdiff_t>(at(-kMargin, dirty_rows_));
     for (auto* plane : {&power_, &re_, &im_, &truth_})
@@ -332,7 +326,7 @@ ColourReport ColourImage::render(const DopplerSettings& settings,
     }
     box_capsules_.resize(scene_.capsules().size());
     const int near = scene_.near(middle, std::sqrt(reach) + 2, scene_.all(), box_capsules_);
-    box_capsules_.resize(static_cast<std::size_t>(near));
+    box_capsules_.resize(near);
     const bool blood = near > 0 || field_ != nullptr;
     if (blood) find_shadow(place);
     for (Block& block : blocks_) {
@@ -344,7 +338,7 @@ ColourReport ColourImage::render(const DopplerSettings& settings,
     bool any = false;
     for (const Block& block : blocks_)
         for (int r = 0; block.active && r < block.rows; ++r) {
-            row_active_[static_cast<std::size_t>(block.row + r)] = 1;
+            row_active_[block.row + r] = 1;
             any = true;
         }
     if (any) blur();
@@ -359,6 +353,106 @@ ColourCell ColourImage::cell(int line, int row) const {
     const std::size_t i = at(line, row);
     return {power_[i],      truth_[i], is_blood_[i] != 0,
             index_[i] != 0, turns_[i], is_blood_[i] != 0 ? vessel_[i] : -1};
+}
+
+// The draws of earlier frames that persistence still blends are kept.
+inline const float* ColourImage::draws(std::uint32_t cell, std::uint32_t frame) {
+    CellDraws& kept = draws_[cell];
+    const std::size_t slot = frame % kMaxPersisted;
+    float* n = kept.n[slot];
+    const std::uint64_t whose = static_cast<std::uint64_t>(seed_) << 32 | frame;
+    if (kept.whose[slot] == whose) return n;
+    kept.whose[slot] = whose;
+    const std::uint32_t key = mixed(cell, seed_ + 0x632BE5ABu * frame);
+    for (std::uint32_t q = 0; q < 4; ++q) n[q] = normal(key + q * 0x9E3779B9u);
+    return n;
+}
+
+void ColourImage::estimate(const DopplerSettings& settings, const ColourMoment& moment) {
+    const Ensemble ensemble(settings.ensemble);
+    const double gain = clean(settings.gain_db, -30, 30, 0);
+    const auto shown = static_cast<float>(std::pow(10.0, (kShownDb - gain) / 10)) * ensemble.r0;
+    // Below the threshold by more than noise can lift it, nothing is worked out.
+    const bool noise_shows = gain > 2;
+    const int persistence = std::clamp(settings.persistence, 1, kMaxPersisted);
+    const float weight = 1 / std::sqrt(static_cast<float>(persistence));
+    const float baseline = static_cast<float>(clean(settings.baseline, -0.9, 0.9, 0)) / 2;
+    const float full = power_of(12);  // power that is drawn brightest, above the threshold
+    for (int row = 0; row < box_.rows; ++row) {
+        const float noise = noise_[box_.first_row + row], threshold = shown * noise;
+        for (int line = 0; line < box_.lines; ++line) {
+            const std::size_t i = at(line, row);
+            index_[i] = 0;
+            if (power_[i] < 0.02f * noise && !noise_shows) continue;
+            const auto cell = static_cast<std::uint32_t>((box_.first_row + row) * kColourLines +
+                                                         box_.first_line + line);
+            float n[4] = {0, 0, 0, 0};
+            for (int k = 0; k < persistence; ++k) {
+                const float* drawn = draws(cell, moment.frame - static_cast<std::uint32_t>(k));
+                for (int q = 0; q < 4; ++q) n[q] += weight * drawn[q];
+            }
+            const ColourEstimate found =
+                estimate_colour(ensemble, power_[i], re_[i], im_[i], noise, n);
+            turns_[i] = found.turns;
+            shown_power_[i] = found.power;
+            if (!(found.power > threshold)) continue;
+            ++report_.shown_cells;
+            if (is_blood_[i] != 0 && vessel_[i] >= 0) ++shown_of_[vessel_[i]];
+            if (settings.mode == DopplerMode::power) {
+                const float part = (found.power - threshold) / (full * threshold);
+                index_[i] = static_cast<std::uint8_t>(40 + 215 * std::min(std::sqrt(part), 1.0f));
+                continue;
+            }
+            // A shifted baseline wraps elsewhere.
+            float turns = found.turns - baseline;
+            turns -= std::floor(turns + 0.5f);
+            const float signed_part = (settings.invert ? -turns : turns) * 2;
+            const int colour = static_cast<int>(std::lround(128 + 127 * signed_part));
+            index_[i] = static_cast<std::uint8_t>(std::clamp(colour, 1, 255));
+        }
+    }
+}
+
+// Bilinear between cells, the shortest way round the circle of velocities. Only pixels that have a
+// coloured cell among their four are touched.
+void ColourImage::paint(const DopplerSettings& settings,
+                        std::span<const std::uint8_t> grey,
+                        std::span<std::uint8_t> overlay) const {
+    const int priority = static_cast<int>(std::lround(255 * clean(settings.priority, 0, 1, 0.5)));
+    const bool wraps = settings.mode != DopplerMode::power;
+    for (int k = -1; k < box_.rows; ++k) {
+        if (box_.first_row + k < 0) continue;
+        const std::uint8_t *above = k < 0 ? no_colour_.data() : index_.data() + at(-1, k),
+                           *below = k + 1 < box_.rows ? index_.data() + at(-1, k + 1)
+                                                      : no_colour_.data();
+        for (int l = -1; l < box_.lines; ++l) {
+            const int i = l + 1;
+            const int corner[4] = {above[i], above[i + 1], below[i], below[i + 1]};
+            if ((corner[0] | corner[1] | corner[2] | corner[3]) == 0) continue;
+            if (box_.first_line + l < 0) continue;
+            for (const ColourPixels::Pixel& p :
+                 pixels_.of(box_.first_line + l, box_.first_row + k)) {
+                if (grey[p.index] > priority) continue;
+                const int u = p.line_part, v = p.row_part;
+                const int weight[4] = {(256 - u) * (256 - v), u * (256 - v), (256 - u) * v, u * v};
+                int covered = 0, sum = 0, first = 0;
+                for (int c = 0; c < 4; ++c) {
+                    if (corner[c] == 0) continue;
+                    if (covered == 0) first = corner[c];
+                    int away = corner[c] - first;
+                    if (wraps && away > 127) away -= 254;
+                    if (wraps && away < -127) away += 254;
+                    covered += weight[c];
+                    sum += weight[c] * away;
+                }
+                if (covered < 32768) continue;
+                int value = first + sum / covered;
+                if (wraps && value > 255) value -= 254;
+                if (wraps && value < 1) value += 254;
+                overlay[p.index] = static_cast<std::uint8_t>(std::clamp(value, 1, 255));
+            }
+        }
+    }
 }
 
 }  // namespace sonocase::runtime::doppler

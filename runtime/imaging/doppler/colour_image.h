@@ -9,8 +9,8 @@
 // filter, the point spread (0.8 x 1.2 cells), and what the processor estimates from it
 // (colour_estimate.h). Velocities are looked up only in blocks of cells that a vessel meets, tissue
 // is added only where it moves fast enough to pass the filter ("flash"), and noise is estimated
-// only where something can show: the same picture as everywhere, for the cost of the blood in the
-// box.
+// only where something can show: the picture is the same as if all cells were worked out, for the
+// cost of the blood in the box.
 //
 // Nothing is allocated after the constructor. Same bytes on every machine.
 #pragma once
@@ -19,46 +19,45 @@
 #include <span>
 #include <vector>
 
+#include "runtime/imaging/core/frame_input.h"
 #include "runtime/imaging/doppler/colour_box.h"
 #include "runtime/imaging/doppler/colour_estimate.h"
 #include "runtime/imaging/doppler/flow_scene.h"
-#include "runtime/imaging/doppler/tissue_place.h"
-#include "runtime/imaging/frame/doppler_settings.h"
 
 namespace sonocase::runtime::doppler {
 
 // Relative to the power of blood: tissue, and noise at the focus.
 inline constexpr double kTissueDb = 40, kNoiseDb = -20;
-// By which the blood's signal falls beyond the focus, both ways, dB/cm/MHz (a).
+// How much the blood's signal falls beyond the focus, both ways, dB/cm/MHz (assumed).
 inline constexpr double kSignalLoss = 0.5;
-// Above the mean noise, for colour to be drawn at a gain of 0 dB.
+// How far above the mean noise power must be for colour to be drawn at a gain of 0 dB.
 inline constexpr double kShownDb = 6;
 
 struct ColourMoment {
-    double phase = 0;         // of the heart beat
+    double phase = 0;         // phase of the heart beat
     double inspired = 0;      // share of inspiration
-    std::uint32_t frame = 0;  // of the colour frames, which may be fewer than those of the picture
+    std::uint32_t frame = 0;  // counts colour frames, which may be fewer than those of the picture
     std::uint32_t seed = 1;
 };
 
-// What a cell was found to hold, for tests and measuring: before noise, and as shown.
+// What a cell was found to hold, before noise and as shown, for tests and measuring.
 struct ColourCell {
-    float power = 0;  // of blood and tissue after the filter
+    float power = 0;  // power of blood and tissue after the filter
     float truth = 0;  // turns: v / (2 v_N) of blood alone, unwrapped, where the cell holds blood
     bool blood = false;
     bool shown = false;
     float turns = 0;  // as estimated
-    int vessel = -1;  // of its blood
+    int vessel = -1;  // vessel that its blood belongs to
 };
 
 struct ColourReport {
     int cells = 0, blood_cells = 0, shown_cells = 0;
     bool flash = false;   // tissue moves fast enough to pass the wall filter
-    double frame_hz = 0;  // of a machine with this box
+    double frame_hz = 0;  // frame rate of a machine with this box
 };
 
-// Frames a second of a machine that sends `pulses` for each line of the box, and one for each of
-// grey_lines down to depth_mm; PRF from the Nyquist velocity.
+// Frames per second of a machine that sends an ensemble of pulses for each line of the box and one
+// pulse for each of grey_lines down to depth_mm; the PRF follows from the Nyquist velocity.
 double colour_frame_hz(const ColourBox& box,
                        const DopplerSettings& settings,
                        double frequency_mhz,
@@ -85,11 +84,11 @@ class ColourImage {
     void use_field(BloodField field) { field_ = field; }
 
     const ColourBox& box() const { return box_; }
-    // Of the last frame; line and row of the box.
+    // A cell of the last frame; line and row count within the box.
     ColourCell cell(int line, int row) const;
     // Cells of a vessel's blood in the last frame: in the box, and those of them that were shown.
-    int cells_of(int vessel) const { return cells_of_[static_cast<std::size_t>(vessel)]; }
-    int shown_cells_of(int vessel) const { return shown_of_[static_cast<std::size_t>(vessel)]; }
+    int cells_of(int vessel) const { return cells_of_[vessel]; }
+    int shown_cells_of(int vessel) const { return shown_of_[vessel]; }
 
   private:
     struct Block {
@@ -115,14 +114,12 @@ class ColourImage {
     void paint(const DopplerSettings& settings,
                std::span<const std::uint8_t> grey,
                std::span<std::uint8_t> overlay) const;
-    std::size_t at(int line, int row) const {
-        return static_cast<std::size_t>(row) * kStride + static_cast<std::size_t>(line + kMargin);
-    }
+    std::size_t at(int line, int row) const { return row * kStride + line + kMargin; }
 
-    static constexpr int kMostPersisted = 4;
+    static constexpr int kMaxPersisted = 4;
     struct CellDraws {
-        std::uint64_t whose[kMostPersisted];  // seed and frame
-        float n[kMostPersisted][4];
+        std::uint64_t whose[kMaxPersisted];  // seed and frame
+        float n[kMaxPersisted][4];
     };
     static constexpr int kMargin = 8, kStride = kColourLines + 2 * kMargin;
     static constexpr int kBlockLines = 8, kBlockRows = 16;
@@ -136,21 +133,22 @@ class ColourImage {
     ColourBox box_;
     std::vector<Block> blocks_;
     std::vector<Float3> nodes_;           // rest places at the corners of the blocks
-    std::vector<Float3> node_direction_;  // of the beam, at rest
+    std::vector<Float3> node_direction_;  // direction of the beam there, at rest
     std::vector<float> node_tissue_;      // turns of the tissue there
     std::vector<std::int32_t> box_capsules_, block_capsules_;
-    std::vector<float> shadow_row_;  // per line: the row from which nothing comes back
+    std::vector<float> shadow_row_;  // per line: the row below which nothing comes back
     std::vector<float> power_, re_, im_, work_, zeros_;
     WallFilter filter_{0.1};
     std::vector<float> truth_;
     std::vector<std::uint8_t> is_blood_, row_active_;
-    std::vector<std::int32_t> vessel_, cells_of_, shown_of_;  // of each blood cell; # vessels
+    std::vector<std::int32_t> vessel_;               // per cell with blood
+    std::vector<std::int32_t> cells_of_, shown_of_;  // # vessels
     std::vector<float> turns_, shown_power_;
-    std::vector<std::uint8_t> index_;      // of the colour; 0: not shown
-    std::vector<std::uint8_t> no_colour_;  // a row of the index outside the box
+    std::vector<std::uint8_t> index_;      // index of the colour; 0: not shown
+    std::vector<std::uint8_t> no_colour_;  // a row of such indices outside the box
     std::vector<CellDraws> draws_;         // # cells of the whole grid
     std::uint32_t seed_ = 1;
-    int dirty_rows_ = 0;        // of the planes, that the last frame may have written to
+    int dirty_rows_ = 0;        // rows of the planes that the last frame may have written to
     std::vector<float> noise_;  // per row
     ColourReport report_;
 };

@@ -20,7 +20,7 @@ inline std::uint32_t mixed(std::uint32_t a, std::uint32_t b) {
     return mixed(a * 0x9E3779B9u + mixed(b + 0x85EBCA6Bu));
 }
 
-// About normal, mean 0, deviation 1: the sum of eight bytes (excess kurtosis -0.15).
+// Approximately normal, mean 0, deviation 1: the sum of eight bytes (excess kurtosis -0.15).
 inline float normal(std::uint32_t key) {
     const std::uint32_t a = mixed(key), b = mixed(a + 0x68E31DA4u), even = 0x00FF00FFu;
     // Two sums side by side, of at most 4 x 255 each.

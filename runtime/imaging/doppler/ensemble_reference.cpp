@@ -5,14 +5,16 @@
 #include <cmath>
 #include <random>
 
+#include "formats/base/constants.h"
+
 namespace sonocase::runtime::doppler {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr double kPi = 3.14159265358979323846;
 constexpr int kTones = 24;  // per moving part: their sum is a Gaussian process
 
-// Takes the best polynomial out of the samples (Gram-Schmidt on powers of the pulse's number).
+// Removes the best-fitting polynomial from the samples (Gram-Schmidt on powers of the pulse's
+// number).
 void regress(int order, std::vector<Complex>& samples) {
     std::vector<std::vector<double>> basis;
     const auto n = samples.size();

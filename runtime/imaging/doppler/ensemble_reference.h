@@ -24,7 +24,7 @@ struct EnsembleOptions {
     std::uint64_t seed = 1;
 };
 
-// Lag-one autocorrelation of one simulated cell; power[0]: R0 of the same samples.
+// Lag-one autocorrelation of one simulated cell; power: receives R0 of the same samples.
 std::complex<double> simulated_lag_one(std::span<const MovingPower> parts,
                                        const EnsembleOptions& options,
                                        double* power = nullptr);

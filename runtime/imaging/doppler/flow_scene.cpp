@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/flow/flow_at.h"
+#include "formats/base/constants.h"
+#include "formats/flow/flow_velocity.h"
 #include "runtime/imaging/doppler/doppler_maths.h"
 
 namespace sonocase::runtime::doppler {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 Float3 to_float(Vector3 v) {
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
@@ -38,18 +37,17 @@ FlowScene::FlowScene(const FlowField& field, double beat_s) {
                                      : FlowProfile());
         const auto axes = section_axes(field, vessel);
         for (int i = 0; i + 1 < vessel.nodes; ++i) {
-            const auto at = static_cast<std::size_t>(vessel.first_node + i);
+            const int at = vessel.first_node + i;
             const FlowNode &a = field.nodes[at], &b = field.nodes[at + 1];
-            const auto k = static_cast<std::size_t>(i);
             FlowCapsule c;
             c.a = local(a.centre);
             c.b = local(b.centre);
             c.along_a = to_float(a.direction);
             c.along_b = to_float(b.direction);
-            c.first_a = to_float(axes[k].first);
-            c.second_a = to_float(axes[k].second);
-            c.first_b = to_float(axes[k + 1].first);
-            c.second_b = to_float(axes[k + 1].second);
+            c.first_a = to_float(axes[i].first);
+            c.second_a = to_float(axes[i].second);
+            c.first_b = to_float(axes[i + 1].first);
+            c.second_b = to_float(axes[i + 1].second);
             c.slowness_a = static_cast<float>(section_area_mm2(a.radius_mm) /
                                               (1000 * vessel.mean_ml_s + 1e-9));
             c.slowness_b = static_cast<float>(section_area_mm2(b.radius_mm) /
@@ -74,7 +72,7 @@ FlowScene::FlowScene(const FlowField& field, double beat_s) {
 FlowHit FlowScene::find(Float3 p, std::span<const std::int32_t> among) const {
     FlowHit best;
     for (const std::int32_t index : among) {
-        const FlowCapsule& c = capsules_[static_cast<std::size_t>(index)];
+        const FlowCapsule& c = capsules_[index];
         const float past = dot(p - c.a, c.along_a), before = dot(c.b - p, c.along_b);
         if (!(past >= 0 && before >= 0 && past + before > 0)) continue;
         const float t = past / (past + before), u = 1 - t;
@@ -104,18 +102,16 @@ int FlowScene::near(Float3 middle,
                     std::span<std::int32_t> out) const {
     int count = 0;
     for (const std::int32_t index : among) {
-        const FlowCapsule& c = capsules_[static_cast<std::size_t>(index)];
+        const FlowCapsule& c = capsules_[index];
         const Float3 d = c.middle - middle;
         const float limit = c.reach + reach;
-        if (dot(d, d) <= limit * limit) out[static_cast<std::size_t>(count++)] = index;
+        if (dot(d, d) <= limit * limit) out[count++] = index;
     }
     return count;
 }
 
 FlowMoment::FlowMoment(const FlowScene& scene)
-    : scene_(scene),
-      rows_(static_cast<std::size_t>(scene.vessels())),
-      known_(static_cast<std::size_t>(scene.vessels()), 0) {}
+    : scene_(scene), rows_(scene.vessels()), known_(scene.vessels(), 0) {}
 
 void FlowMoment::begin(double phase, double inspired) {
     if (phase == phase_ && inspired == inspired_) return;  // what is known stays
@@ -124,24 +120,24 @@ void FlowMoment::begin(double phase, double inspired) {
     std::fill(known_.begin(), known_.end(), std::uint8_t{0});
 }
 
-const FlowProfile::Row& FlowMoment::row(std::size_t vessel) {
+const FlowProfile::Row& FlowMoment::row(int vessel) {
     if (known_[vessel] == 0) {
-        rows_[vessel] = scene_.profile(static_cast<int>(vessel)).row(phase_, inspired_);
+        rows_[vessel] = scene_.profile(vessel).row(phase_, inspired_);
         known_[vessel] = 1;
     }
     return rows_[vessel];
 }
 
 float FlowMoment::greatest(int vessel) {
-    float most = 0;
-    for (const float u : row(static_cast<std::size_t>(vessel))) most = std::max(most, std::abs(u));
-    return most;
+    float largest = 0;
+    for (const float u : row(vessel)) largest = std::max(largest, std::abs(u));
+    return largest;
 }
 
 float FlowMoment::speed(const FlowHit& hit) {
     const float at = hit.rho * (kProfileRadii - 1);
-    const auto i = static_cast<std::size_t>(std::min(static_cast<int>(at), kProfileRadii - 2));
-    const FlowProfile::Row& row = this->row(static_cast<std::size_t>(hit.vessel));
+    const int i = std::min(static_cast<int>(at), kProfileRadii - 2);
+    const FlowProfile::Row& row = this->row(hit.vessel);
     return hit.per_area * (row[i] + (at - static_cast<float>(i)) * (row[i + 1] - row[i]));
 }
 

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The blood of a case, laid out for looking up places quickly: the same velocities as
-// formats/flow/flow_at.h, in single precision.
+// formats/flow/flow_velocity.h, in single precision.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "formats/base/geometry.h"
 #include "formats/flow/flow_field.h"
-#include "formats/flow/flow_profile.h"
+#include "formats/flow/flow_velocity.h"
+#include "runtime/imaging/core/scan_geometry.h"
 
 namespace sonocase::runtime::doppler {
 
@@ -37,7 +39,7 @@ struct FlowCapsule {
     float slowness_a = 1, slowness_b = 1;  // one over the mean velocity, s/mm
     Float3 middle;
     float reach = 0;          // all of it lies within this distance of the middle
-    float widest_square = 0;  // of the radii, a little more, for rounding
+    float widest_square = 0;  // square of the largest radius, with a margin for rounding
     std::int32_t vessel = 0;
     float radius_a[kFlowRays + 1], radius_b[kFlowRays + 1];  // the first again at the end
 };
@@ -62,17 +64,16 @@ class FlowScene {
         return {static_cast<float>(p.x - origin_.x), static_cast<float>(p.y - origin_.y),
                 static_cast<float>(p.z - origin_.z)};
     }
-    bool vein(int vessel) const { return veins_[static_cast<std::size_t>(vessel)] != 0; }
-    double mean_ml_s(int vessel) const { return mean_ml_s_[static_cast<std::size_t>(vessel)]; }
-    const FlowProfile& profile(int vessel) const {
-        return profiles_[static_cast<std::size_t>(vessel)];
-    }
+    bool vein(int vessel) const { return veins_[vessel] != 0; }
+    double mean_ml_s(int vessel) const { return mean_ml_s_[vessel]; }
+    const FlowProfile& profile(int vessel) const { return profiles_[vessel]; }
     int vessels() const { return static_cast<int>(profiles_.size()); }
 
     // The vessel that holds a place, among the capsules listed.
     FlowHit find(Float3 place, std::span<const std::int32_t> among) const;
 
-    // Capsules that come within `reach` of `middle`; out: room for all. Returns how many.
+    // Writes the capsules that come within `reach` of `middle` to `out`, which has room for all of
+    // them, and returns their number.
     int near(Float3 middle,
              float reach,
              std::span<const std::int32_t> among,
@@ -95,17 +96,38 @@ class FlowMoment {
     void begin(double phase, double inspired);
     // Velocity along the flow, mm/s.
     float speed(const FlowHit& hit);
-    // Greatest size of u anywhere in a section of the vessel: times FlowHit::per_area, its fastest
-    // blood.
+    // Greatest magnitude of the profile in a section of the vessel; times FlowHit::per_area it is
+    // the speed of the fastest blood there.
     float greatest(int vessel);
 
   private:
-    const FlowProfile::Row& row(std::size_t vessel);
+    const FlowProfile::Row& row(int vessel);
 
     const FlowScene& scene_;
-    double phase_ = -1, inspired_ = -1;  // of no moment
+    double phase_ = -1, inspired_ = -1;  // -1: no moment yet
     std::vector<FlowProfile::Row> rows_;
     std::vector<std::uint8_t> known_;
+};
+
+// What a Doppler mode asks about the picture that it is laid over: where the tissue that the
+// picture shows lies in the bundle, and how it moves. doppler_view.cpp implements it on a
+// renderer, tests on a still tube.
+class TissuePlace {
+  public:
+    virtual ~TissuePlace() = default;
+
+    // Where the tissue at a point of the scan plane lies at rest, frame `mannequin`.
+    virtual Point3 rest(PlanePoint shown) const = 0;
+    // Velocity of that tissue relative to the probe, mm/s, frame `mannequin`: breathing, and the
+    // probe's own motion.
+    virtual Vector3 velocity_mm_s(PlanePoint shown) const = 0;
+    // True if the place at rest lies in a collapsed vein.
+    virtual bool closed(Point3 rest) const = 0;
+    // True if the probe presses, so that a vein may be collapsed.
+    virtual bool presses() const = 0;
+    // True where a beam is stopped: bone or gas. They move little, so that motion is left out.
+    virtual bool blocks(PlanePoint shown) const = 0;
+    virtual Rigid mannequin_from_probe() const = 0;
 };
 
 }  // namespace sonocase::runtime::doppler

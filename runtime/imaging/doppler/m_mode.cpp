@@ -8,7 +8,7 @@
 namespace sonocase::runtime::doppler {
 
 MMode::MMode(const ScanGeometry& geometry) : geometry_(geometry) {
-    columns_.assign(static_cast<std::size_t>(kRows) * kColumns, 0);
+    columns_.assign(kRows * kColumns, 0);
 }
 
 void MMode::advance(double line, double time_s, std::span<const std::uint8_t> grey) {
@@ -22,8 +22,7 @@ void MMode::advance(double line, double time_s, std::span<const std::uint8_t> gr
     const double beam = part * (geometry_.scanlines - 1);
     const PlanePoint from = geometry_.beam_origin(beam), d = geometry_.beam_direction(beam);
     for (; last_ < now; ++last_) {
-        std::uint8_t* column =
-            columns_.data() + static_cast<std::size_t>((last_ + 1) % kColumns) * kRows;
+        std::uint8_t* column = columns_.data() + (last_ + 1) % kColumns * kRows;
         for (int k = 0; k < kRows; ++k) {
             const double r = (k + 0.5) * mm_per_row();
             const double x = geometry_.origin_x_px + (from.x + r * d.x) / geometry_.mm_per_px,
@@ -34,8 +33,7 @@ void MMode::advance(double line, double time_s, std::span<const std::uint8_t> gr
                 continue;
             }
             const auto at = [&](int a, int b) {
-                return static_cast<double>(grey[static_cast<std::size_t>(b) *
-                                                    static_cast<std::size_t>(geometry_.width_px) +
+                return static_cast<double>(grey[static_cast<std::size_t>(b) * geometry_.width_px +
                                                 static_cast<std::size_t>(a)]);
             };
             const double u = x - i, v = y - j;

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/imaging/scan/scan_geometry.h"
+#include "runtime/imaging/core/scan_geometry.h"
 
 namespace sonocase::runtime::doppler {
 
@@ -23,7 +23,7 @@ class MMode {
 
     std::int64_t last() const { return last_; }
     std::span<const std::uint8_t> column(std::int64_t k) const {
-        return {columns_.data() + static_cast<std::size_t>(k % kColumns) * kRows, kRows};
+        return {columns_.data() + k % kColumns * kRows, kRows};
     }
     double mm_per_row() const { return geometry_.depth_mm / kRows; }
 

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "runtime/imaging/doppler/colour_box.h"
 
 namespace sonocase::runtime::doppler {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr int kMostPoints = 1024;
+constexpr int kMaxPoints = 1024;
 constexpr double kChordReachMm = 30, kChordStepMm = 0.1;
 
 double clean(double value, double low, double high, double otherwise) {
@@ -29,18 +29,18 @@ float length(Float3 v) {
 }  // namespace
 
 SpectralGate::SpectralGate(const FlowScene& scene) : scene_(scene), blood_(scene) {
-    points_.resize(kMostPoints);
+    points_.resize(kMaxPoints);
     profile_.resize(kProfilePoints);
     near_.resize(scene.capsules().size());
 }
 
-GateLook SpectralGate::aim(const ScanGeometry& geometry,
-                           const DopplerSettings& settings,
-                           const TissuePlace& place) {
-    GateLook look;
+GateContent SpectralGate::aim(const ScanGeometry& geometry,
+                              const DopplerSettings& settings,
+                              const TissuePlace& place) {
+    GateContent found;
     count_ = profile_count_ = 0;
     vessel_ = -1;
-    asked_ = std::clamp(settings.gate_points, 8, kMostPoints);
+    asked_ = std::clamp(settings.gate_points, 8, kMaxPoints);
     const ColourBox lines = colour_box(geometry, settings);
     const double line = clean(settings.gate_line, 0, 1, 0.5) * kColourLines - 0.5;
     const double depth = clean(settings.gate_depth_mm, 0, geometry.depth_mm, geometry.depth_mm / 2),
@@ -52,19 +52,19 @@ GateLook SpectralGate::aim(const ScanGeometry& geometry,
         return PlanePoint{p.x + aside * d.z, p.z - aside * d.x};
     };
     for (double r = 0; r < depth * slant; r += 2)
-        if (place.blocks(shown(r, 0))) return look;
+        if (place.blocks(shown(r, 0))) return found;
     const Rigid pose = place.mannequin_from_probe();
     const Vector3 beam = pose.rotation * Vector3{d.x, 0, d.z}, across = pose.rotation.column(1);
     const Float3 towards = float3(-beam);
     const auto middle = scene_.local(place.rest(shown(depth * slant, 0)));
     const int near =
         scene_.near(middle, static_cast<float>(kChordReachMm + 5), scene_.all(), near_);
-    const std::span<const std::int32_t> among(near_.data(), static_cast<std::size_t>(near));
+    const auto among = std::span<const std::int32_t>(near_).first(near);
     const auto find = [&](double r, double aside, double up, Point& point) {
         const Point3 rest = place.rest(shown(r, aside)) + up * across;
         point.hit = scene_.find(scene_.local(rest), among);
         if (point.hit.vessel < 0) return false;
-        if (place.presses() && scene_.vein(point.hit.vessel) && place.shut(rest)) return false;
+        if (place.presses() && scene_.vein(point.hit.vessel) && place.closed(rest)) return false;
         point.cosine = dot(point.hit.along, towards) / length(point.hit.along);
         return true;
     };
@@ -76,55 +76,55 @@ GateLook SpectralGate::aim(const ScanGeometry& geometry,
         if (!find(r, kBeamLateralMm * static_cast<double>(normal(mixed(key, 11))),
                   kBeamElevationMm * static_cast<double>(normal(mixed(key, 29))), point))
             continue;
-        if (look.vessel < 0) look.vessel = point.hit.vessel;
-        ++votes[point.hit.vessel == look.vessel ? 0 : 1];
+        if (found.vessel < 0) found.vessel = point.hit.vessel;
+        ++votes[point.hit.vessel == found.vessel ? 0 : 1];
         ++count_;
     }
-    look.two_vessels = votes[1] > 0;
+    found.two_vessels = votes[1] > 0;
     if (votes[1] > votes[0])
         for (std::size_t i = 0; i < count_; ++i)
-            if (points_[i].hit.vessel != look.vessel) {
-                look.vessel = points_[i].hit.vessel;
+            if (points_[i].hit.vessel != found.vessel) {
+                found.vessel = points_[i].hit.vessel;
                 break;
             }
-    look.blood = count_ > 0;
-    if (!look.blood) return look;
-    look.fill = static_cast<double>(std::max(votes[0], votes[1])) / asked_;
-    vessel_ = look.vessel;
+    found.blood = count_ > 0;
+    if (!found.blood) return found;
+    found.fill = static_cast<double>(std::max(votes[0], votes[1])) / asked_;
+    vessel_ = found.vessel;
     // The lumen along the beam, from a place of the gate in that vessel outwards.
     Point probe;
     double inside = depth * slant, low = inside, high = inside;
     for (int i = 0; i < 32; ++i) {
         const double r = depth * slant + gate * ((i + 0.5) / 32 - 0.5);
-        if (find(r, 0, 0, probe) && probe.hit.vessel == look.vessel) {
+        if (find(r, 0, 0, probe) && probe.hit.vessel == found.vessel) {
             inside = low = high = r;
             break;
         }
     }
     const auto of_vessel = [&](double r) {
-        return find(r, 0, 0, probe) && probe.hit.vessel == look.vessel;
+        return find(r, 0, 0, probe) && probe.hit.vessel == found.vessel;
     };
     while (inside - low < kChordReachMm && of_vessel(low - kChordStepMm)) low -= kChordStepMm;
     while (high - inside < kChordReachMm && of_vessel(high + kChordStepMm)) high += kChordStepMm;
-    look.chord_mm = high - low + kChordStepMm;
+    found.chord_mm = high - low + kChordStepMm;
     const double from = depth * slant - gate / 2, to = depth * slant + gate / 2;
-    look.spans = from <= low && to >= high;
+    found.spans = from <= low && to >= high;
     const double centre = (low + high) / 2, first = std::max(from, low), last = std::min(to, high);
     double cosine = 0;
     for (int i = 0; i < kProfilePoints; ++i) {
         const double r = first + (last - first) * (i + 0.5) / kProfilePoints;
         Point& point = profile_[profile_count_];
-        if (!find(r, 0, 0, point) || point.hit.vessel != look.vessel) continue;
+        if (!find(r, 0, 0, point) || point.hit.vessel != found.vessel) continue;
         point.weight = static_cast<float>(std::abs(r - centre));
         cosine += static_cast<double>(point.cosine);
-        look.area_mm2 += 1 / static_cast<double>(point.hit.per_area);  // over the flow, so far
+        found.area_mm2 += 1 / static_cast<double>(point.hit.per_area);  // over the flow, so far
         ++profile_count_;
     }
     const double n = static_cast<double>(std::max<std::size_t>(profile_count_, 1));
-    look.angle_deg = std::acos(std::clamp(cosine / n, -1.0, 1.0)) * 180 / kPi;
-    per_area_ = look.area_mm2 > 0 ? static_cast<float>(n / look.area_mm2) : 0.0f;
-    look.area_mm2 *= 1000 * scene_.mean_ml_s(look.vessel) / n;
-    return look;
+    found.angle_deg = std::acos(std::clamp(cosine / n, -1.0, 1.0)) * 180 / kPi;
+    per_area_ = found.area_mm2 > 0 ? static_cast<float>(n / found.area_mm2) : 0.0f;
+    found.area_mm2 *= 1000 * scene_.mean_ml_s(found.vessel) / n;
+    return found;
 }
 
 void SpectralGate::spectrum(const DopplerSettings& settings,
@@ -144,14 +144,13 @@ void SpectralGate::spectrum(const DopplerSettings& settings,
         const float sine = std::sqrt(std::max(0.0f, 1 - p.cosine * p.cosine));
         const float half =
             std::clamp(std::abs(v) * sine * static_cast<float>(kSinDelta) / (2 * nyquist) * kBins,
-                       static_cast<float>(kLeastHalfBins), 0.45f * kBins);
+                       static_cast<float>(kMinHalfBins), 0.45f * kBins);
         const float centre = turns * kBins + 0.5f * kBins;
         const int low = static_cast<int>(std::ceil(centre - half)),
                   high = static_cast<int>(std::floor(centre + half));
         const float height = each * gain / half;
         for (int b = low; b <= high; ++b)
-            out[static_cast<std::size_t>(b & (kBins - 1))] +=
-                height * (1 - std::abs(static_cast<float>(b) - centre) / half);
+            out[b & (kBins - 1)] += height * (1 - std::abs(static_cast<float>(b) - centre) / half);
     }
 }
 
@@ -174,12 +173,12 @@ double SpectralGate::section_greatest_mm_s(double phase, double inspired) {
 
 double SpectralGate::greatest_mm_s(double phase, double inspired) {
     blood_.begin(phase, inspired);
-    double most = 0;
+    double fastest = 0;
     for (std::size_t i = 0; i < count_; ++i) {
         const auto v = static_cast<double>(blood_.speed(points_[i].hit));
-        if (std::abs(v) > std::abs(most)) most = v;
+        if (std::abs(v) > std::abs(fastest)) fastest = v;
     }
-    return most;
+    return fastest;
 }
 
 }  // namespace sonocase::runtime::doppler

@@ -6,16 +6,16 @@
 #include <bit>
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "formats/flow/flow_field.h"
 
 namespace sonocase::runtime::doppler {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846, kSpeed_mm_s = 1.54e6;
 constexpr double kRangeDb = 30;
 constexpr int kEnvelopeLines = 5;
 constexpr float kAboveNoise = 4;
-constexpr int kMostHop = 1024;
+constexpr int kMaxHop = 1024;
 
 double clean(double value, double low, double high, double otherwise) {
     return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
@@ -42,7 +42,7 @@ float decibels(float power) {
 double velocity_turns(double edge, double cosine, double sine) {
     const double past = edge - kEdgeBins / kBins,
                  broad = past / (cosine + kEdgeBroadening * sine * kSinDelta),
-                 narrow = (past - kEdgeBroadening * kLeastHalfBins / kBins) / cosine;
+                 narrow = (past - kEdgeBroadening * kMinHalfBins / kBins) / cosine;
     return std::max(std::min(broad, narrow), 0.0);
 }
 
@@ -102,7 +102,7 @@ SpectralStrip::SpectralStrip(const FlowScene& scene,
     : gate_(scene), geometry_(geometry), frequency_mhz_(frequency_mhz), seed_(seed) {
     tables();  // before the first frame
     lines_.resize(kStripLines);
-    overlap_.assign(2 * (kBins + kMostHop), 0.0f);
+    overlap_.assign(2 * (kBins + kMaxHop), 0.0f);
     sound_.assign(2 * kStripLines * 64, 0.0f);
 }
 
@@ -123,10 +123,10 @@ void SpectralStrip::advance(const DopplerSettings& settings,
     settings_ = settings;
     nyquist_mm_s_ = 10 * clean(settings.spectral_scale_cm_s, 1, 1000, 100);
     baseline_ = clean(settings.baseline, -0.9, 0.9, 0) / 2;
-    sound_hz_ = 4 * frequency_mhz_ * 1e6 * nyquist_mm_s_ / kSpeed_mm_s;
-    const int before = look_.vessel;
-    look_ = gate_.aim(geometry_, settings, place);
-    if (look_.vessel != before) measured_from_ = last_ + 1;
+    sound_hz_ = 4 * frequency_mhz_ * 1e6 * nyquist_mm_s_ / kSpeedOfSoundMmPerS;
+    const int before = content_.vessel;
+    content_ = gate_.aim(geometry_, settings, place);
+    if (content_.vessel != before) measured_from_ = last_ + 1;
     while (last_ < now) {
         const std::int64_t number = ++last_;
         const double t = static_cast<double>(number) / kLinesPerSecond;
@@ -141,7 +141,7 @@ void SpectralStrip::make_line(const DopplerSettings& settings,
                               std::int64_t number,
                               double phase,
                               double inspired) {
-    Spectrum& raw = raw_[static_cast<std::size_t>(number & 7)];
+    Spectrum& raw = raw_[number & 7];
     Spectrum expected;
     gate_.spectrum(settings, phase, inspired, expected);
     const float noise = noise_per_bin();
@@ -153,7 +153,7 @@ void SpectralStrip::make_line(const DopplerSettings& settings,
     constexpr float kSide = 0.40824829f, kMiddle = 0.81649658f;  // [.5 1 .5] / sqrt(1.5)
     const double gain = std::pow(10.0, clean(settings.gain_db, -30, 30, 0) / 10);
     const float top = decibels(static_cast<float>(1.0 / 32 / gain));
-    StripLine& line = lines_[static_cast<std::size_t>(number % kStripLines)];
+    StripLine& line = lines_[number % kStripLines];
     line.number = number;
     line.phase = phase;
     line.edge_turns = 0;
@@ -172,20 +172,19 @@ void SpectralStrip::make_line(const DopplerSettings& settings,
         const std::size_t at = (b + kBins / 2) % kBins;
         draw_[2 * at] = root * re;
         draw_[2 * at + 1] = root * im;
-        const std::size_t shown =
-            static_cast<std::size_t>(static_cast<int>(b) - shift + 4 * kBins) % kBins;
+        const int shown = (static_cast<int>(b) - shift + 4 * kBins) % kBins;
         const float part = 1 + (decibels(raw[b]) - top) / static_cast<float>(kRangeDb);
         line.shade[settings.invert ? kBins - 1 - shown : shown] =
             static_cast<std::uint8_t>(std::clamp(255 * part, 0.0f, 255.0f));
     }
 }
 
-// Of the line two before this one, whose neighbours are then known.
+// Finds the envelope of the line two before this one, whose neighbours are then known.
 void SpectralStrip::find_envelope(std::int64_t number) {
     if (number - measured_from_ < kEnvelopeLines - 1) return;
     Spectrum mean{};
     for (int k = 0; k < kEnvelopeLines; ++k) {
-        const Spectrum& raw = raw_[static_cast<std::size_t>((number - k) & 7)];
+        const Spectrum& raw = raw_[(number - k) & 7];
         for (std::size_t b = 0; b < kBins; ++b) mean[b] += raw[b] / kEnvelopeLines;
     }
     // In the order of velocities from the lower to the upper end of the shifted scale.
@@ -193,38 +192,35 @@ void SpectralStrip::find_envelope(std::int64_t number) {
     const int shift = static_cast<int>(std::lround(baseline_ * kBins));
     float above = 0, below = 0;
     for (int b = 0; b < kBins; ++b) {
-        const auto at = [&](int i) {
-            return mean[static_cast<std::size_t>(i + shift + 4 * kBins) % kBins];
-        };
-        p[static_cast<std::size_t>(b)] = (at(b - 1) + at(b) + at(b + 1)) / 3;
+        const auto at = [&](int i) { return mean[(i + shift + 4 * kBins) % kBins]; };
+        p[b] = (at(b - 1) + at(b) + at(b + 1)) / 3;
         (b + shift > kBins / 2 ? above : below) += at(b);
     }
-    const float least = kAboveNoise * noise_per_bin();
+    const float min_power = kAboveNoise * noise_per_bin();
     const bool upwards = above >= below;
     float edge = 0;
     for (int i = 1; i + 3 < kBins; ++i) {
         const int b = upwards ? kBins - 1 - i : i, step = upwards ? -1 : 1;
-        const auto q = [&](int k) { return p[static_cast<std::size_t>(b + k * step)]; };
-        if (!(q(0) > least && q(1) > least && q(2) > least)) continue;
+        const auto q = [&](int k) { return p[b + k * step]; };
+        if (!(q(0) > min_power && q(1) > min_power && q(2) > min_power)) continue;
         const float outside = q(-1);
-        const float part = outside < least ? (least - outside) / (q(0) - outside) : 0;
+        const float part = outside < min_power ? (min_power - outside) / (q(0) - outside) : 0;
         const float bin = static_cast<float>(b) - static_cast<float>(step) * (1 - part);
         edge = (bin + static_cast<float>(shift) - 0.5f * kBins) / kBins;
         break;
     }
-    edges_[static_cast<std::size_t>(number & 3)] = edge;
+    edges_[number & 3] = edge;
     if (number - measured_from_ < kEnvelopeLines + 1) return;
-    std::array<float, 3> three{edges_[static_cast<std::size_t>(number & 3)],
-                               edges_[static_cast<std::size_t>((number - 1) & 3)],
-                               edges_[static_cast<std::size_t>((number - 2) & 3)]};
+    std::array<float, 3> three{edges_[number & 3], edges_[(number - 1) & 3],
+                               edges_[(number - 2) & 3]};
     std::sort(three.begin(), three.end());
-    lines_[static_cast<std::size_t>((number - 3) % kStripLines)].edge_turns = three[1];
+    lines_[(number - 3) % kStripLines].edge_turns = three[1];
 }
 
 void SpectralStrip::add_sound() {
-    // Frequencies above and below zero apart: blood that comes and blood that goes, one to each
-    // ear. Each ear's sound is the real part of a transform, that is the transform of a Hermitian
-    // spectrum: those of both, one of them times i, need one transform.
+    // Frequencies above and below zero are kept apart: blood that comes and blood that goes, one
+    // for each ear. Each ear's sound is the real part of a transform, that is the transform of a
+    // Hermitian spectrum. The spectra of both, one of them times i, need one transform.
     std::array<float, 2 * kBins> both;
     const auto put = [&](std::size_t k, float re, float im) {
         both[2 * k] = re;
@@ -248,7 +244,7 @@ void SpectralStrip::add_sound() {
     }
     sound_left_ += sound_hz_ / kLinesPerSecond;
     const auto hop = static_cast<std::size_t>(
-        std::clamp(std::floor(sound_left_), 1.0, static_cast<double>(kMostHop)));
+        std::clamp(std::floor(sound_left_), 1.0, static_cast<double>(kMaxHop)));
     sound_left_ -= std::floor(sound_left_);
     for (std::size_t i = 0; i < hop && sound_count_ + 2 <= sound_.size(); ++i) {
         sound_[sound_count_++] = i < kBins ? overlap_[2 * i] : 0;
@@ -273,7 +269,7 @@ SpectralMeasures SpectralStrip::measures() const {
                        oldest = std::max(measured_from_ + 3, last_ - kStripLines + 4);
     double psv = 0, edv = 0, mean = 0, truth = 0, vessel = 0;
     int edv_count = 0, lines = 0, beats = 0;
-    // Whole beats only, so that the mean over time is one.
+    // Only whole beats count, so that the mean over time is that of a beat.
     std::int64_t begin = -1;
     std::array<double, 2> top{};
     double fastest = 0, of_vessel = 0, beat_mean = 0;
@@ -321,11 +317,11 @@ SpectralMeasures SpectralStrip::measures() const {
     m.edv_cm_s = edv_count > 0 ? corrected(edv / edv_count) : 0;
     m.resistive_index = m.psv_cm_s > 0 ? (m.psv_cm_s - m.edv_cm_s) / m.psv_cm_s : 0;
     // The profile was measured along the beam: the angle cursor's error enters here as well.
-    const double true_cosine = std::abs(std::cos(look_.angle_deg * kPi / 180));
+    const double true_cosine = std::abs(std::cos(content_.angle_deg * kPi / 180));
     m.mean_cm_s = lines > 0 ? mean / lines / 10 * true_cosine / cosine : 0;
-    m.diameter_mm = settings_.diameter_mm > 0 ? settings_.diameter_mm : look_.chord_mm * sine;
+    m.diameter_mm = settings_.diameter_mm > 0 ? settings_.diameter_mm : content_.chord_mm * sine;
     m.flow_ml_min = 60 * m.mean_cm_s * kPi * m.diameter_mm * m.diameter_mm / 400;
-    m.flow_true_area_ml_min = 60 * m.mean_cm_s * look_.area_mm2 / 100;
+    m.flow_true_area_ml_min = 60 * m.mean_cm_s * content_.area_mm2 / 100;
     return m;
 }
 

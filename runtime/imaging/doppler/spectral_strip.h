@@ -3,14 +3,14 @@
 // Spectral Doppler over time: lines of spectrum, their envelope, what is measured from it, and the
 // sound.
 //
-// Line number k belongs to the time k / kLinesPerSecond of the session and is drawn from the gate
-// as it lies when it is made: power times |n|^2 with n complex normals smoothed over bins, hashed
-// from k. The same draws, transformed back and overlapped, are the sound.
+// Line number k belongs to the time k / kLinesPerSecond of the session and is drawn from the gate's
+// position when it is made: power times |n|^2, with n complex normals that are hashed from k and
+// smoothed over bins. The same draws, transformed back and overlapped, are the sound.
 //
-// Envelope: the mean of 5 lines and 3 bins, from outside in the first bin that lies, with the two
-// behind it, above 4 x noise, interpolated; the median of 3 lines. A spectrum's edge lies beyond
-// the fastest blood by the intrinsic broadening, as on every machine, and by the bins over which
-// the window and the envelope smooth:
+// Envelope: of the mean over 5 lines and 3 bins, the outermost bin that lies, together with the two
+// bins behind it, above 4 x noise, interpolated; then the median of 3 lines. A spectrum's edge lies
+// beyond the fastest blood by the intrinsic broadening, as on every machine, and by the bins over
+// which the window and the envelope smooth:
 //
 //     edge = V cos(theta) + 0.93 max(V sin(theta) sin(delta), 1.2 bins) + 1.1 bins
 //
@@ -29,15 +29,15 @@
 namespace sonocase::runtime::doppler {
 
 inline constexpr int kLinesPerSecond = 200;
-inline constexpr int kStripLines = 1024;  // that are kept: 5 s
-inline constexpr double kSpectralNoiseDb =
-    -20;  // of all bins together, relative to a gate of blood
+inline constexpr int kStripLines = 1024;  // lines that are kept: 5 s
+// Noise of all bins together, relative to a gate full of blood.
+inline constexpr double kSpectralNoiseDb = -20;
 
-// Of the envelope's formula.
+// Constants of the envelope's formula.
 inline constexpr double kEdgeBroadening = 0.93, kEdgeBins = 1.1;
 
 struct SpectralMeasures {
-    int beats = 0;            // that were measured
+    int beats = 0;            // number of beats that were measured
     double psv_cm_s = 0;      // corrected for broadening, by the angle cursor
     double psv_raw_cm_s = 0;  // as machines show it
     double edv_cm_s = 0;
@@ -45,18 +45,18 @@ struct SpectralMeasures {
     double resistive_index = 0;
     double flow_ml_min = 0;  // by the diameter measured, or the chord's; a circle is assumed
     double flow_true_area_ml_min = 0;  // by the true section
-    double diameter_mm = 0;            // that it was worked out with
-    double true_psv_cm_s = 0;          // of the gate's points
-    double vessel_psv_cm_s = 0;        // true, of the vessel's whole section there
+    double diameter_mm = 0;            // the diameter that flow_ml_min was worked out with
+    double true_psv_cm_s = 0;          // true, among the gate's points
+    double vessel_psv_cm_s = 0;        // true, in the vessel's whole section there
 };
 
 struct StripLine {
     std::int64_t number = -1;
     double phase = 0;
-    float edge_turns = 0;                     // of the envelope; 0: none
-    float mean_mm_s = 0;                      // of the section
-    float true_mm_s = 0;                      // fastest of the gate
-    float vessel_mm_s = 0;                    // fastest of the vessel's section there
+    float edge_turns = 0;                     // the envelope; 0: none
+    float mean_mm_s = 0;                      // mean over the section
+    float true_mm_s = 0;                      // fastest blood in the gate
+    float vessel_mm_s = 0;                    // fastest blood in the vessel's section there
     std::array<std::uint8_t, kBins> shade{};  // bin 0 at -v_N; grey of a range of 30 dB
 };
 
@@ -67,22 +67,21 @@ class SpectralStrip {
                   double frequency_mhz,
                   std::uint32_t seed);
 
-    // Makes the lines up to time_s. After a jump of more than kStripLines it begins anew. A change
-    // of settings or of the vessel in the gate begins the measuring anew, not the strip. Cost: a
-    // line 10 us; nothing is allocated.
+    // Makes the lines up to time_s. After a jump of more than kStripLines the strip begins again. A
+    // change of settings or of the vessel in the gate restarts the measuring, not the strip. Cost:
+    // 10 us per line; nothing is allocated.
     void advance(const DopplerSettings& settings,
                  double time_s,
                  double beats_per_min,
                  double breath_s,
                  const TissuePlace& place);
 
-    const GateLook& look() const { return look_; }
+    // What lay in the gate at the last advance().
+    const GateContent& gate() const { return content_; }
     SpectralMeasures measures() const;
     // The newest line is number last(); line(k) holds line k where last() - k < kStripLines.
     std::int64_t last() const { return last_; }
-    const StripLine& line(std::int64_t k) const {
-        return lines_[static_cast<std::size_t>(k % kStripLines)];
-    }
+    const StripLine& line(std::int64_t k) const { return lines_[k % kStripLines]; }
     // Turns of the middle of the strip: the baseline shift.
     double baseline() const { return baseline_; }
 
@@ -102,14 +101,14 @@ class SpectralStrip {
     ScanGeometry geometry_;
     double frequency_mhz_;
     std::uint32_t seed_;
-    GateLook look_;
+    GateContent content_;
     DopplerSettings settings_;
     double nyquist_mm_s_ = 1000, baseline_ = 0, sound_hz_ = 8000;
     std::vector<StripLine> lines_;
     std::array<Spectrum, 8> raw_{};  // powers of the last lines, by number
     std::array<float, 4> edges_{};
     std::int64_t last_ = -1, measured_from_ = 0;
-    std::array<float, 2 * kBins> draw_{};  // complex amplitudes of the line
+    std::array<float, 2 * kBins> draw_{};  // complex amplitudes of the newest line
     std::vector<float> overlap_, sound_;
     std::size_t sound_count_ = 0;
     double sound_left_ = 0;

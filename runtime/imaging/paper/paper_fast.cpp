@@ -9,20 +9,20 @@
 #include <cmath>
 #include <cstring>
 
-#include "runtime/imaging/host/pass_timer.h"
-#include "runtime/imaging/noise/noise.h"
+#include "runtime/imaging/core/host.h"
+#include "runtime/imaging/core/noise.h"
+#include "runtime/imaging/core/scan_convert.h"
 #include "runtime/imaging/paper/paper_kernels.h"
 #include "runtime/imaging/paper/paper_model.h"
-#include "runtime/imaging/scan/scan_convert.h"
 
 namespace sonocase::runtime {
 namespace {
 
 // Slack behind every row and buffer: the widest vector of any instruction set, so that no kernel
-// needs to treat the last values apart.
+// has to treat the last values separately.
 constexpr int kSlack = 64;
 
-// 16.16 fixed point; beyond its range the point is far outside any volume.
+// 16.16 fixed point; a point beyond its range is far outside any volume.
 std::int32_t fixed_voxel(double v) {
     return static_cast<std::int32_t>(std::floor(std::clamp(v, -32000.0, 32000.0) * 65536.0));
 }
@@ -35,11 +35,11 @@ std::uint32_t fixed_phase(double periods) {
 std::vector<std::uint16_t> make_blur_taps(const ScanGeometry& g) {
     const double spacing = (g.fan ? paper::kBlurStepRad : paper::kBlurStepMm) / g.line_step;
     const int reach = static_cast<int>(std::ceil(paper::kBlurReach * spacing));
-    std::vector<double> taps(static_cast<std::size_t>(2 * reach + 1), 0.0);
+    std::vector<double> taps(2 * reach + 1, 0.0);
     for (int copy = -paper::kBlurReach; copy <= paper::kBlurReach; ++copy) {
         const double at = copy * spacing + reach;
         const auto i = static_cast<std::size_t>(at);
-        const double w = paper::kBlurWeights[static_cast<std::size_t>(copy + paper::kBlurReach)];
+        const double w = paper::kBlurWeights[copy + paper::kBlurReach];
         taps[i] += w * (1 - (at - static_cast<double>(i)));
         if (i + 1 < taps.size()) taps[i + 1] += w * (at - static_cast<double>(i));
     }
@@ -49,8 +49,7 @@ std::vector<std::uint16_t> make_blur_taps(const ScanGeometry& g) {
         fixed[i] = static_cast<std::uint16_t>(std::lround(taps[i] * 256));
         sum += fixed[i];
     }
-    fixed[static_cast<std::size_t>(reach)] =
-        static_cast<std::uint16_t>(fixed[static_cast<std::size_t>(reach)] + 256 - sum);
+    fixed[reach] = static_cast<std::uint16_t>(fixed[reach] + 256 - sum);
     return fixed;
 }
 
@@ -72,14 +71,14 @@ PaperFast::PaperFast(const PaperScene& scene,
     blur_taps_ = make_blur_taps(geometry);
     margin_ = static_cast<int>(blur_taps_.size()) / 2;
     stride_ = margin_ + lines_ + margin_ + kSlack;
-    pair_stride_ =
-        (lines_ + kSlack - 1) / kSlack * kSlack;  // rows of two parts never share a vector
+    // Rows of two parts never share a vector.
+    pair_stride_ = (lines_ + kSlack - 1) / kSlack * kSlack;
     table_ = make_scan_conversion_table(context.jobs, geometry, pair_stride_);
     table_.offset.resize(table_.offset.size() + kSlack);
     table_.weight.resize(table_.weight.size() + kSlack);
-    start_.resize(6 * static_cast<std::size_t>(lines_) + kSlack);
+    start_.resize(6 * lines_ + kSlack);
     step_.resize(start_.size());
-    directions_.resize(12 * static_cast<std::size_t>(lines_) + kSlack);
+    directions_.resize(12 * lines_ + kSlack);
     noise_start_.resize(samples);
     row_scale_.resize(samples);
     brightness_.resize(samples);
@@ -88,9 +87,9 @@ PaperFast::PaperFast(const PaperScene& scene,
     }
     const auto threads = static_cast<std::size_t>(context.workers.threads());
     stage_.resize(threads * samples * kPaperBlock + kSlack);
-    image_.resize(samples * static_cast<std::size_t>(stride_) + kSlack);
-    blurred_.resize(threads * 2 * static_cast<std::size_t>(lines_ + kSlack));
-    pairs_.resize(samples * static_cast<std::size_t>(pair_stride_) + kSlack);
+    image_.resize(samples * stride_ + kSlack);
+    blurred_.resize(threads * 2 * (lines_ + kSlack));
+    pairs_.resize(samples * pair_stride_ + kSlack);
 }
 
 // Where each beam of a block starts and how far a sample steps, in voxels and in texture periods;
@@ -102,7 +101,7 @@ bool PaperFast::place_block(const Rigid& volume_from_probe, int first_line) {
     const double steps = std::max(g.samples - 1, 1);
     bool inside = true;
     for (int l = first_line; l < first_line + kPaperBlock; ++l) {
-        const auto& [o, d] = g.beams[static_cast<std::size_t>(std::min(l, g.scanlines - 1))];
+        const auto& [o, d] = g.beams[std::min(l, g.scanlines - 1)];
         const Point3 first =
             volume_from_probe * Point3{o.x + first_r * d.x, 0, o.z + first_r * d.z};
         const Point3 last = volume_from_probe * Point3{o.x + last_r * d.x, 0, o.z + last_r * d.z};
@@ -110,8 +109,8 @@ bool PaperFast::place_block(const Rigid& volume_from_probe, int first_line) {
                      b = scene_.grid.voxel_from_point(last);
         const Vector3 from_origin = first - scene_.grid.origin_mm;
         for (int axis = 0; axis < 3; ++axis) {
-            const auto i = static_cast<std::size_t>(axis * lines_ + l);
-            const auto t = static_cast<std::size_t>((axis + 3) * lines_ + l);
+            const int i = axis * lines_ + l;
+            const int t = (axis + 3) * lines_ + l;
             start_[i] = fixed_voxel(a[axis] + 0.5);
             step_[i] = fixed_voxel((b[axis] - a[axis]) / steps);
             start_[t] = static_cast<std::int32_t>(fixed_phase(from_origin[axis] / edge_mm));
@@ -132,14 +131,13 @@ void PaperFast::turn_block(const Rigid& volume_from_probe, int first_line) {
     const double per_edge =
         1 / (static_cast<double>(1 << scene_.edge_log2) * scene_.texture_voxel_mm);
     for (int l = first_line; l < first_line + kPaperBlock; ++l) {
-        const PlanePoint d =
-            g.beams[static_cast<std::size_t>(std::min(l, g.scanlines - 1))].direction;
+        const PlanePoint d = g.beams[std::min(l, g.scanlines - 1)].direction;
         const PlanePoint n = press::beside(d);
         const Vector3 along = volume_from_probe.rotation * Vector3{d.x, 0, d.z},
                       beside = volume_from_probe.rotation * Vector3{n.x, 0, n.z};
         for (int axis = 0; axis < 3; ++axis) {
             const auto put = [&](int row, double value) {
-                directions_[static_cast<std::size_t>(row * lines_ + l)] = static_cast<float>(value);
+                directions_[row * lines_ + l] = static_cast<float>(value);
             };
             put(axis, per_voxel * along[axis]);
             put(3 + axis, per_voxel * beside[axis]);
@@ -152,11 +150,10 @@ void PaperFast::turn_block(const Rigid& volume_from_probe, int first_line) {
 // Noise and brightness of every row.
 void PaperFast::set_rows(const PaperFrame& frame) {
     for (int k = 0; k < geometry_.samples; ++k) {
-        const auto i = static_cast<std::size_t>(k);
-        noise_start_[i] = noise_row_start(frame.seed, frame.frame, static_cast<std::uint32_t>(k));
-        const double scale = (frame.effects.attenuation ? brightness_[i] : 1.0) *
-                             static_cast<double>(frame.row_gain[i]);
-        row_scale_[i] =
+        noise_start_[k] = noise_row_start(frame.seed, frame.frame, static_cast<std::uint32_t>(k));
+        const double scale = (frame.effects.attenuation ? brightness_[k] : 1.0) *
+                             static_cast<double>(frame.row_gain[k]);
+        row_scale_[k] =
             static_cast<std::uint16_t>(std::lround(std::clamp(scale * 4096, 0.0, 65535.0)));
     }
 }
@@ -201,8 +198,7 @@ double PaperFast::sample_beams(const PaperFrame& frame, bool keep_all) {
         const int line = block * kPaperBlock;
         b.start = start_.data() + line;
         b.step = step_.data() + line;
-        b.stage = stage_.data() + static_cast<std::size_t>(part) *
-                                      static_cast<std::size_t>(g.samples) * kPaperBlock;
+        b.stage = stage_.data() + static_cast<std::size_t>(part) * g.samples * kPaperBlock;
         b.image = image_.data() + margin_ + line;
         b.noise = noise_.data() + line;
         b.inside = place_block(frame.volume_from_probe, line);
@@ -229,13 +225,13 @@ double PaperFast::sample_beams(const PaperFrame& frame, bool keep_all) {
     return needle_ms.load() / context_.workers.threads();
 }
 
-// Beyond the outermost beams their values repeat, for the blur.
+// Repeats the values of the outermost beams beyond them, for the blur.
 void PaperFast::finish_edges(int block) {
     const int line = block * kPaperBlock;
     const auto repeat = [&](int to, int count, int from) {
         std::uint8_t* row = image_.data() + margin_ + line;
         for (int k = 0; k < geometry_.samples; ++k, row += stride_)
-            std::memset(row + to, row[from], static_cast<std::size_t>(count));
+            std::memset(row + to, row[from], count);
     };
     if (line == 0) repeat(-margin_, margin_, 0);
     if (block == lines_ / kPaperBlock - 1) {
@@ -246,7 +242,7 @@ void PaperFast::finish_edges(int block) {
 
 void PaperFast::blur_rows(const PaperFrame& frame) {
     const int samples = geometry_.samples;
-    constexpr int kRows = 32;  // that a thread takes at a time
+    constexpr int kRows = 32;  // rows that a thread takes at a time
     context_.workers.for_each((samples + kRows - 1) / kRows, [&](int part, int item) {
         const int begin = item * kRows, end = std::min(begin + kRows, samples);
         std::uint8_t* rows[2];
@@ -255,8 +251,7 @@ void PaperFast::blur_rows(const PaperFrame& frame) {
         rows[1] = rows[0] + lines_ + kSlack;
         const auto filtered = [&](int k) -> const std::uint8_t* {
             const std::uint8_t* in =
-                image_.data() + static_cast<std::size_t>(k) * static_cast<std::size_t>(stride_) +
-                margin_;
+                image_.data() + static_cast<std::size_t>(k) * stride_ + margin_;
             if (!frame.effects.blur) return in;
             std::uint8_t* out = rows[k & 1];
             blur_paper_row(context_.simd, in, lines_, blur_taps_.data(), margin_, out);
@@ -266,8 +261,7 @@ void PaperFast::blur_rows(const PaperFrame& frame) {
         for (int k = begin; k < end; ++k) {
             const std::uint8_t* lower = k + 1 < samples ? filtered(k + 1) : upper;
             pair_rows(context_.simd, upper, lower, lines_,
-                      pairs_.data() +
-                          static_cast<std::size_t>(k) * static_cast<std::size_t>(pair_stride_));
+                      pairs_.data() + static_cast<std::size_t>(k) * pair_stride_);
             upper = lower;
         }
     });

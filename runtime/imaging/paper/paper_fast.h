@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Model `paper` in beam space: beams x depth first, then one scan conversion. The shadow is a
-// running product down the beam and the blur a filter across beams, so that no pixel marches and no
-// copy is turned. Integer arithmetic in a fixed order: every instruction set and thread count gives
-// the same pixels. Cost: about 0.6 ms per frame of 512 x 512 samples and pixels on one thread.
+// running product down the beam, and the blur is a filter across beams: no march per pixel, no
+// turned copies of the picture. Integer arithmetic in a fixed order: every instruction set and
+// thread count gives the same pixels. Cost: about 0.6 ms per frame of 512 x 512 samples and pixels
+// on one thread.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "runtime/imaging/formation/render_context.h"
-#include "runtime/imaging/needle/needle_strip.h"
+#include "runtime/imaging/core/image_formation.h"
+#include "runtime/imaging/core/needle_chord.h"
 #include "runtime/imaging/paper/paper_reference.h"
 #include "runtime/imaging/press/press_view.h"
 
@@ -31,7 +32,7 @@ class PaperFast {
     // keep_all: also works out what cannot show; the pixels are the same.
     void render(const PaperFrame& frame, bool flip, bool keep_all, std::span<std::uint8_t> pixels);
 
-    // Of the last frame.
+    // Times of the last frame, and what it met.
     const PassTimes& pass_ms() const { return pass_ms_; }
     const PaperMet& met() const { return met_; }
 
@@ -53,7 +54,7 @@ class PaperFast {
     ScanConversionTable table_;
     std::vector<std::uint16_t> blur_taps_;  // # 2 * reach + 1, sum 256
     int lines_ = 0;                         // padded to whole blocks
-    int stride_ = 0;                        // of a row: margin, lines, margin
+    int stride_ = 0;                        // length of a row: margin, lines, margin
     int margin_ = 0;
     std::vector<std::int32_t> start_, step_;  // # 6 * lines: voxel x, y, z (16.16), texture x, y, z
     std::vector<std::uint32_t> noise_start_;  // # samples

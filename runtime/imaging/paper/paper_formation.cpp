@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "runtime/imaging/host/pass_timer.h"
+#include "runtime/imaging/core/host.h"
 #include "runtime/imaging/paper/paper_fast.h"
 #include "runtime/imaging/paper/paper_reference.h"
 
@@ -26,7 +26,7 @@ class PaperFormation final : public ImageFormation {
 
     void add_level(const ScanGeometry& geometry, double) override {
         Level& level = levels_.emplace_back();
-        level.row_gain.assign(static_cast<std::size_t>(geometry.samples), 1.0f);
+        level.row_gain.assign(geometry.samples, 1.0f);
         if (reference_) {
             geometry_ = geometry;
         } else {
@@ -39,7 +39,7 @@ class PaperFormation final : public ImageFormation {
                             const FrameRequest& request,
                             std::span<std::uint8_t> pixels,
                             std::span<EffectCost> costs) override {
-        Level& at = levels_[static_cast<std::size_t>(level)];
+        Level& at = levels_[level];
         at.fast->render(frame_of(request, at.row_gain), request.input.settings.flip_left_right,
                         keep_all_, pixels);
         fill_costs(kPaperEffects, switches_, &at.fast->met(), at.fast->pass_ms(), costs);
@@ -87,15 +87,14 @@ class PaperFormation final : public ImageFormation {
     const bool reference_, keep_all_;
     const PaperEffects switches_;
     const RenderContext context_;
-    ScanGeometry geometry_;  // of the reference
+    ScanGeometry geometry_;  // for the reference
     std::vector<Level> levels_;
 };
 
 Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
-    Result<PaperScene> scene = make_paper_scene(*input.bundle);
-    if (!scene) return scene.error();
+    SONOCASE_TRY(PaperScene scene, make_paper_scene(*input.bundle));
     return std::unique_ptr<ImageFormation>(
-        std::make_unique<PaperFormation>(std::move(*scene), input));
+        std::make_unique<PaperFormation>(std::move(scene), input));
 }
 
 int beams_and_samples(const Exercise&, const RenderOptions&) {

@@ -3,11 +3,11 @@
 // Model `paper` as the renderer sees it: the image formation of [Magee], 2007.
 #pragma once
 
-#include "runtime/imaging/formation/image_formation.h"
+#include "runtime/imaging/core/image_formation.h"
 
 namespace sonocase::runtime {
 
-// Error of its create(): what make_paper_scene() says.
+// Its create() fails where make_paper_scene() does.
 extern const ImageModelInfo kPaperModel;
 
 }  // namespace sonocase::runtime

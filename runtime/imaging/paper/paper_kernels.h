@@ -6,9 +6,9 @@
 #include <cstdint>
 
 #include "formats/base/geometry.h"
-#include "runtime/imaging/needle/needle_strip.h"
+#include "runtime/imaging/core/needle_chord.h"
+#include "runtime/imaging/core/simd_target.h"
 #include "runtime/imaging/press/press_view.h"
-#include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime {
 
@@ -39,16 +39,17 @@ struct PaperBlock {
     int image_stride = 0;
 };
 
-// Vectorised, for the instruction set that is named: integers, or single precision in fixed order.
+// The calls below are vectorised for the instruction set that is named, in integers or in single
+// precision in a fixed order.
 
 // Fills the stage; returns the union (bitwise or) of all its values.
 std::uint32_t sample_paper_block(SimdTarget simd, const PaperBlock& block);
 
-// The needle over the stage, samples [row_begin, row_end). Same formula as needle_share().
+// Draws the needle over the stage, samples [row_begin, row_end), by the formula of needle_share().
 void draw_paper_needle(
     SimdTarget simd, const PaperBlock& block, const NeedleRow& needle, int row_begin, int row_end);
 
-// Noise, shadow and brightness of the stage, into the image.
+// Adds noise, shadow and brightness to the stage and writes the image.
 void finish_paper_block(SimdTarget simd, const PaperBlock& block);
 
 // One row, filtered across beams: out = sum of taps * in / 256. `in` has a margin of `reach` values

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/imaging/noise/noise.h"
+#include "runtime/imaging/core/noise.h"
 #include "runtime/imaging/paper/paper_model.h"
 
 namespace sonocase::runtime {
@@ -27,11 +27,11 @@ Shown shown_at(const PaperScene& scene,
                PlanePoint p,
                double line,
                double sample) {
-    bool shut = false;
+    bool closed = false;
     if (frame.press != nullptr) {
         const ScanGeometry::Beam beam{g.beam_origin(line), g.beam_direction(line)};
         const double r = (sample + 0.5) * g.step_mm;
-        shut = frame.press->closed_in_plane(
+        closed = frame.press->closed_in_plane(
             press::follows_columns(g) ? press::BeamPoint{press::lateral_of_line(g, line), r}
                                       : press::BeamPoint{p.x, p.z});
         p = press::rest_point(*frame.press, g, beam, line, r);
@@ -39,7 +39,7 @@ Shown shown_at(const PaperScene& scene,
     Shown out{frame.volume_from_probe * Point3{p.x, 0, p.z}};
     const Point3 v = scene.grid.voxel_from_point(out.at);
     out.material = material_at(scene, nearest(v.x), nearest(v.y), nearest(v.z));
-    if (shut) out.material = static_cast<std::uint32_t>(scene.closed_material[out.material]);
+    if (closed) out.material = static_cast<std::uint32_t>(scene.closed_material[out.material]);
     return out;
 }
 
@@ -49,7 +49,7 @@ double texture_grey(const PaperScene& scene, std::uint32_t material, Point3 p) {
         const double cell = std::floor(mm / scene.texture_voxel_mm);
         return static_cast<std::size_t>(cell - edge * std::floor(cell / edge));
     };
-    const std::size_t n = static_cast<std::size_t>(edge);
+    const std::size_t n = edge;
     const Vector3 q = p - scene.grid.origin_mm;
     return scene.atlas[n * n * n * (material & 0x7F) + wrap(q.x) + n * (wrap(q.y) + n * wrap(q.z))];
 }
@@ -58,9 +58,7 @@ double texture_grey(const PaperScene& scene, std::uint32_t material, Point3 p) {
 class Picture {
   public:
     explicit Picture(const ScanGeometry& g)
-        : geometry_(g),
-          values_(static_cast<std::size_t>(g.width_px) * static_cast<std::size_t>(g.height_px),
-                  0.0) {}
+        : geometry_(g), values_(static_cast<std::size_t>(g.width_px) * g.height_px, 0.0) {}
 
     double& at(int column, int row) { return values_[index(column, row)]; }
     double at(int column, int row) const { return values_[index(column, row)]; }
@@ -79,7 +77,7 @@ class Picture {
 
   private:
     std::size_t index(int column, int row) const {
-        return static_cast<std::size_t>(row) * static_cast<std::size_t>(geometry_.width_px) +
+        return static_cast<std::size_t>(row) * geometry_.width_px +
                static_cast<std::size_t>(column);
     }
 
@@ -140,8 +138,7 @@ double grey_at(const PaperScene& scene,
 Picture blurred_picture(const ScanGeometry& g, const Picture& raw) {
     Picture blurred(g);
     for (int copy = -paper::kBlurReach; copy <= paper::kBlurReach; ++copy) {
-        const double weight =
-            paper::kBlurWeights[static_cast<std::size_t>(copy + paper::kBlurReach)];
+        const double weight = paper::kBlurWeights[copy + paper::kBlurReach];
         blurred.for_scanned([&](int column, int row, double line, double sample) {
             // The copy's pixel that lands here; beyond the sector its edge is repeated.
             line += copy * (g.fan ? paper::kBlurStepRad : paper::kBlurStepMm) / g.line_step;
@@ -178,13 +175,12 @@ void render_paper_reference(const PaperScene& scene,
     const Picture blurred = frame.effects.blur ? blurred_picture(g, raw) : raw;
     std::fill(pixels.begin(), pixels.end(), std::uint8_t{0});
     blurred.for_scanned([&](int column, int row, double, double sample) {
-        const auto k = static_cast<std::size_t>(std::clamp(nearest(sample), 0, g.samples - 1));
+        const int k = std::clamp(nearest(sample), 0, g.samples - 1);
         const double grey =
             blurred.at(column, row) *
             paper_brightness((sample + 0.5) * g.step_mm, frame.effects.attenuation) *
             static_cast<double>(frame.row_gain[k]);
-        pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(g.width_px) +
-               static_cast<std::size_t>(column)] =
+        pixels[static_cast<std::size_t>(row) * g.width_px + static_cast<std::size_t>(column)] =
             static_cast<std::uint8_t>(std::lround(std::clamp(grey, 0.0, 255.0)));
     });
 }

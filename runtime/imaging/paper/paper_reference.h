@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The image formation of [Magee], 2007, taken literally: Cartesian pixels, one march per pixel for
-// the shadow, turned copies of the whole picture for the blur. Slow and obvious: the fast renderer
-// is tested against it.
+// the shadow, and turned copies of the whole picture for the blur. Slow and obvious: the fast
+// renderer is tested against it.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "runtime/imaging/needle/needle_chord.h"
-#include "runtime/imaging/paper/paper_effects.h"
+#include "runtime/imaging/core/needle_chord.h"
+#include "runtime/imaging/core/scan_geometry.h"
+#include "runtime/imaging/paper/paper_model.h"
 #include "runtime/imaging/paper/paper_scene.h"
-#include "runtime/imaging/press/press_plane.h"
-#include "runtime/imaging/scan/scan_geometry.h"
+#include "runtime/imaging/press/press_field.h"
 
 namespace sonocase::runtime {
 
@@ -38,7 +38,7 @@ void render_paper_reference(const PaperScene& scene,
                             const PaperFrame& frame,
                             std::span<std::uint8_t> pixels);
 
-// Noise that both renderers draw from, for up to this many beams.
+// The noise that both renderers draw from, for at most this many beams.
 std::vector<std::int8_t> make_paper_noise(std::uint32_t seed, int scanlines);
 
 // Brightness that attenuation leaves at a depth, relative; 1 without attenuation.

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/imaging/press/closed_label.h"
-#include "runtime/imaging/simd/gather_slack.h"
+#include "runtime/imaging/core/simd_target.h"
+#include "runtime/imaging/press/press_bundle.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -28,8 +28,7 @@ void bake(const Tissue& tissue,
     std::array<std::uint8_t, 256> grey{};
     for (int v = 0; v < 256; ++v) {
         const double g = tissue.grey_mean + (v - 128) / 32.0 * tissue.grey_sd;
-        grey[static_cast<std::size_t>(v)] =
-            static_cast<std::uint8_t>(std::lround(std::clamp(g, 0.0, 255.0)));
+        grey[v] = static_cast<std::uint8_t>(std::lround(std::clamp(g, 0.0, 255.0)));
     }
     if (texture == nullptr) {
         std::fill_n(out, static_cast<std::size_t>(edge) * edge * edge, grey[128]);
@@ -38,12 +37,11 @@ void bake(const Tissue& tissue,
     int period = 1;
     while (period < edge && period * 1.4142 * voxel_mm < texture->edge * texture->voxel_mm)
         period *= 2;
-    std::vector<std::size_t> source(static_cast<std::size_t>(edge));
+    std::vector<std::size_t> source(edge);
     for (int i = 0; i < edge; ++i) {
-        source[static_cast<std::size_t>(i)] =
-            static_cast<std::size_t>((i % period) * texture->edge / period);
+        source[i] = (i % period) * texture->edge / period;
     }
-    const auto n = static_cast<std::size_t>(texture->edge);
+    const std::size_t n = texture->edge;
     for (const std::size_t k : source) {
         for (const std::size_t j : source) {
             const std::uint8_t* row = texture->voxels.data() + n * (j + n * k);
@@ -52,9 +50,9 @@ void bake(const Tissue& tissue,
     }
 }
 
-// Gives every draining lumen a material of its own, a copy of its tissue's, and says what is shown
-// of it when it is shut. A bundle with too many materials draws such lumens as the others of their
-// tissue, and they stay open.
+// Gives every draining lumen a material of its own, a copy of its tissue's, and notes what is shown
+// of it when it is collapsed. In a bundle with too many materials such lumens keep the material of
+// their tissue and stay open.
 void add_closed_materials(const CaseBundle& bundle,
                           std::size_t cube,
                           std::array<std::uint8_t, 256>& material,
@@ -64,7 +62,7 @@ void add_closed_materials(const CaseBundle& bundle,
     for (std::size_t l = 1; l < bundle.labels.size() && l < material.size(); ++l) {
         if (shown[l] == static_cast<std::int32_t>(l) || scene.flat_grey.size() > 127) continue;
         const std::size_t from = material[l] & ~PaperScene::kShadowBit;
-        wall[l] = material[static_cast<std::size_t>(shown[l])];
+        wall[l] = material[shown[l]];
         material[l] = static_cast<std::uint8_t>(scene.flat_grey.size() |
                                                 (material[l] & PaperScene::kShadowBit));
         scene.atlas.resize(scene.atlas.size() + cube);
@@ -93,7 +91,7 @@ Result<PaperScene> make_paper_scene(const CaseBundle& bundle) {
     const std::vector<int> tissue_of = tissue_of_label(bundle);
     std::vector<bool> used(bundle.tissues.size(), false);
     for (std::size_t l = 1; l < tissue_of.size(); ++l) {
-        if (tissue_of[l] >= 0) used[static_cast<std::size_t>(tissue_of[l])] = true;
+        if (tissue_of[l] >= 0) used[tissue_of[l]] = true;
     }
     // The largest edge and the finest voxel in use decide the cube.
     int edge = 0;
@@ -136,8 +134,7 @@ Result<PaperScene> make_paper_scene(const CaseBundle& bundle) {
     }
     std::array<std::uint8_t, 256> material{};
     for (std::size_t l = 1; l < tissue_of.size() && l < material.size(); ++l) {
-        if (tissue_of[l] >= 0)
-            material[l] = material_of_tissue[static_cast<std::size_t>(tissue_of[l])];
+        if (tissue_of[l] >= 0) material[l] = material_of_tissue[tissue_of[l]];
     }
     add_closed_materials(bundle, cube, material, scene);
     const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
@@ -157,14 +154,12 @@ std::uint32_t material_at(const PaperScene& s, int i, int j, int k) {
     if (i < 0 || j < 0 || k < 0 || i >= s.grid.size.x || j >= s.grid.size.y || k >= s.grid.size.z)
         return 0;
     const std::size_t brick =
-        static_cast<std::size_t>(i / kBrickEdge) +
-        static_cast<std::size_t>(s.bricks.x) *
-            (static_cast<std::size_t>(j / kBrickEdge) +
-             static_cast<std::size_t>(s.bricks.y) * static_cast<std::size_t>(k / kBrickEdge));
+        i / kBrickEdge +
+        s.bricks.x * (j / kBrickEdge + s.bricks.y * static_cast<std::size_t>(k / kBrickEdge));
     const std::uint32_t entry = s.table[brick];
     if (entry & kUniformBrick) return entry & 0xFFu;
-    return s.pool[static_cast<std::size_t>(entry) * kBrickVoxels +
-                  static_cast<std::size_t>((i % 4) + 4 * (j % 4) + 16 * (k % 4))];
+    return s.pool[static_cast<std::size_t>(entry) * kBrickVoxels + (i % 4) + 4 * (j % 4) +
+                  16 * (k % 4)];
 }
 
 }  // namespace sonocase::runtime

@@ -31,8 +31,8 @@ struct PaperScene {
     double texture_voxel_mm = 0.5;
     std::vector<std::uint8_t> atlas;
     std::vector<std::uint8_t> flat_grey;  // # materials: mean grey alone
-    // # 256: the material itself, or what is shown of a lumen that is pressed shut. A draining
-    // lumen is a material of its own.
+    // # 256: the material itself, or what is shown of a collapsed lumen. Each draining lumen is a
+    // material of its own.
     std::vector<std::int32_t> closed_material;
 };
 

@@ -7,10 +7,9 @@
 #include <optional>
 #include <utility>
 
-#include "runtime/imaging/host/pass_timer.h"
+#include "runtime/imaging/core/host.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
 #include "runtime/imaging/physical/model/read_ahead.h"
-#include "runtime/imaging/physical/model/scan_reach.h"
 #include "runtime/imaging/physical/reference/physical_reference.h"
 
 namespace sonocase::runtime {
@@ -76,7 +75,7 @@ class PhysicalFormation final : public ImageFormation {
                             const FrameRequest& request,
                             std::span<std::uint8_t> pixels,
                             std::span<EffectCost> costs) override {
-        Level& at = *levels_[static_cast<std::size_t>(level)];
+        Level& at = *levels_[level];
         const PhysicalFrame frame = frame_of(request);
         if (blocks_ != nullptr) {
             const double shift_mm = norm(frame.motion.breathing_mm) +
@@ -106,7 +105,7 @@ class PhysicalFormation final : public ImageFormation {
     }
 
   private:
-    // Stays in place: its renderer, and the thread that reads ahead, look at its members.
+    // A level keeps its address: its renderer and the thread that reads ahead refer to its members.
     struct Level {
         ScanGeometry geometry;
         physical::Tables tables;
@@ -143,7 +142,7 @@ class PhysicalFormation final : public ImageFormation {
     const RenderContext context_;
     const Machine machine_;
     std::vector<std::unique_ptr<Level>> levels_;
-    std::optional<ReadAhead> ahead_;  // ends before the levels that it looks at
+    std::optional<ReadAhead> ahead_;  // ends before the levels that it refers to
 };
 
 Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {

@@ -4,11 +4,11 @@
 // processing, beam by beam.
 #pragma once
 
-#include "runtime/imaging/formation/image_formation.h"
+#include "runtime/imaging/core/image_formation.h"
 
 namespace sonocase::runtime {
 
-// Error of its create(): what make_physical_scene() says.
+// Its create() fails where make_physical_scene() does.
 extern const ImageModelInfo kPhysicalModel;
 
 // See make_physical_textures() of renderer.h.

@@ -9,7 +9,7 @@
 #define HWY_TARGET_INCLUDE "press_elastic.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-// After them: included again for each instruction set.
+// This comes after Highway's: it is included again for each instruction set.
 #include "runtime/imaging/press/press_law-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -19,7 +19,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // At most 16 lanes, so that the columns are a whole number of groups.
 using Lanes = hn::CappedTag<float, 16>;
 
-// One number per column, added up by halves: the same order for any number of lanes.
+// Adds up one number per column by halves, in the same order for any number of lanes.
 float sum_columns(std::array<float, kColumns>& each) {
     for (std::size_t half = kColumns / 2; half >= 3; half /= 2)
         for (std::size_t i = 0; i < half; ++i) each[i] += each[i + half];
@@ -45,7 +45,7 @@ void set_compliance(const PressSamples& s, const PressFace& face, PressElastic& 
     }
 }
 
-// Couplings beside each other and to the foundation, which are the same in every increment.
+// Couplings between columns and to the foundation, which are the same in every increment.
 void set_couplings(const PressSamples& s, const PressFace& face, PressElastic& w) {
     const Lanes d;
     const double h = column_width_mm(face);
@@ -55,18 +55,16 @@ void set_couplings(const PressSamples& s, const PressFace& face, PressElastic& w
         const double spread = face.radius_mm > 0 ? 1 + t / face.radius_mm : 1;
         // Half of a cell's share for the node above it and half for the one below; half of the sum
         // of two columns.
-        beside[static_cast<std::size_t>(k)] =
-            static_cast<float>(0.25 * width * kShear * row_height(k) / (h * spread));
-        below[static_cast<std::size_t>(k)] =
-            static_cast<float>(0.5 * kFoundation / width * row_height(k) * h * spread);
+        beside[k] = static_cast<float>(0.25 * width * kShear * row_height(k) / (h * spread));
+        below[k] = static_cast<float>(0.5 * kFoundation / width * row_height(k) * h * spread);
     }
     for (int k = 0; k < kRows; ++k) {
         const int above = std::max(k - 1, 0);
         const float share = k == 0 ? 0.0f : 1.0f;
-        const auto beside_here = hn::Set(d, beside[static_cast<std::size_t>(k)]);
-        const auto beside_above = hn::Set(d, share * beside[static_cast<std::size_t>(above)]);
-        const auto below_here = hn::Set(d, below[static_cast<std::size_t>(k)]);
-        const auto below_above = hn::Set(d, share * below[static_cast<std::size_t>(above)]);
+        const auto beside_here = hn::Set(d, beside[k]);
+        const auto beside_above = hn::Set(d, share * beside[above]);
+        const auto below_here = hn::Set(d, below[k]);
+        const auto below_above = hn::Set(d, share * below[above]);
         for_columns(d, [&](int i) HWY_ATTR {
             const auto here = hn::LoadU(d, s.lateral_kpa.row(k) + i);
             const auto up = hn::LoadU(d, s.lateral_kpa.row(above) + i);
@@ -80,14 +78,13 @@ void set_couplings(const PressSamples& s, const PressFace& face, PressElastic& w
         w.right.row(k)[kColumns - 1] = 0;
     }
     for (int i = 0; i < kColumns; ++i) {
-        const auto at = static_cast<std::size_t>(i);
         for (int k = 0; k < kRows; ++k)
-            w.free.row(k)[i] = k < s.fixed_row[at] && !(k == 0 && s.touching[at]) ? 1.0f : 0.0f;
+            w.free.row(k)[i] = k < s.fixed_row[i] && !(k == 0 && s.touching[i]) ? 1.0f : 0.0f;
     }
 }
 
-// Modulus of every row at the stress reached: a row is its parts in series. Then the pivots of each
-// column by itself.
+// Modulus of every row at the stress reached (the parts of a row are in series), then the pivots of
+// each column by itself.
 void set_moduli(const PressSamples& s, const PressFace& face, PressElastic& w) {
     const Lanes d;
     const auto quarter = hn::Set(d, 1.0f / kParts);
@@ -103,7 +100,7 @@ void set_moduli(const PressSamples& s, const PressFace& face, PressElastic& w) {
                 const auto compliance = hn::LoadU(d, w.compliance.row(j) + i);
                 const auto strain = hn::Mul(stress, compliance);
                 auto slope = tissue_stretch(d, strain).slope;
-                if (s.lumen[static_cast<std::size_t>(j)])
+                if (s.lumen[j])
                     slope = mix(d, slope, lumen_stretch(d, strain).slope,
                                 hn::LoadU(d, s.drains.row(j) + i));
                 yielding = hn::Add(yielding, hn::Mul(slope, compliance));
@@ -122,7 +119,7 @@ void set_moduli(const PressSamples& s, const PressFace& face, PressElastic& w) {
                 pivot = hn::Sub(hn::Add(pivot, up),
                                 hn::Mul(hn::Mul(up, up), hn::LoadU(d, w.pivot.row(k - 1) + i)));
             }
-            // Zero where a node does not move: whatever force is on it, it stays.
+            // Zero where a node does not move, whatever the force on it.
             hn::StoreU(hn::Div(hn::LoadU(d, w.free.row(k) + i), pivot), d, w.pivot.row(k) + i);
         });
 }
@@ -150,8 +147,8 @@ HWY_INLINE void apply_row(
     });
 }
 
-// Takes `step` times the product off the residual, then relaxed = the residual with every column
-// solved by itself; returns residual . relaxed.
+// Subtracts `step` times the product from the residual, then sets `relaxed` to the solution of
+// every column by itself for that residual; returns residual . relaxed.
 float relax(float step, PressElastic& w) {
     const Lanes d;
     const auto off = hn::Set(d, step);
@@ -195,8 +192,8 @@ HWY_INLINE void turn_row(D d, V step, V keep, int k, PressElastic& w) {
     });
 }
 
-// The turn of every row, with the new search's product one row behind: the planes are more than the
-// nearest cache holds, and are gone through once. Returns search . A search.
+// Turns every row, and applies A to the new search one row behind: the planes are larger than the
+// nearest cache and are gone through only once. Returns search . A search.
 float turn_and_apply(float step, float keep, PressElastic& w) {
     const Lanes d;
     const auto s = hn::Set(d, step), kept = hn::Set(d, keep);
@@ -259,9 +256,8 @@ void solve(const PressSamples& s,
     w.shift.values.fill(0);
     w.iterations_done = 0;
     for (int i = 0; i < kColumns; ++i) {
-        const auto at = static_cast<std::size_t>(i);
-        if (s.touching[at])
-            w.shift.row(0)[i] = s.pressed_mm[at] / static_cast<float>(options.increments);
+        if (s.touching[i])
+            w.shift.row(0)[i] = s.pressed_mm[i] / static_cast<float>(options.increments);
     }
     for (int n = 0; n < options.increments; ++n) {
         set_moduli(s, face, w);

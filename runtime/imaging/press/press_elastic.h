@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The stresses in the columns: the energy of press_law.h, least in some equal increments of the
+// The stresses in the columns: minimises the energy of press_law.h in some equal increments of the
 // pressed depth.
 #pragma once
 
+#include "runtime/imaging/core/simd_target.h"
 #include "runtime/imaging/press/press_samples.h"
-#include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime::press {
 
 struct PressSolveOptions {
-    int increments = 3;         // of the pressed depth, 1 to 64
-    int first_iterations = 16;  // of conjugate gradients in the first increment
-    int iterations = 12;        // and in each of the others, which start from the one before
+    int increments = 3;         // increments of the pressed depth, 1 to 64
+    int first_iterations = 16;  // conjugate gradients in the first increment
+    int iterations = 12;        // in each of the others, which start from the one before
 };
 
 // Memory of a solve: about 0.3 MB, made once.
@@ -23,7 +23,7 @@ struct PressElastic {
     Plane<kRows> stress_kpa;
     int iterations_done = 0;
 
-    // Of the linear system of an increment; nodes are the upper edges of rows.
+    // The linear system of an increment; nodes are the upper edges of rows.
     Plane<kRows> down, right, ground, free, pivot;  // couplings, foundation, 1 where it moves
     Plane<kRows> residual, relaxed, product;
     Plane<kRows + 1> shift, search;  // of the increment, mm

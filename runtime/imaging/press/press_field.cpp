@@ -6,13 +6,78 @@
 #include <cassert>
 #include <cmath>
 
-#include "formats/base/falling_exponential.h"
+#include "formats/base/portable_math.h"
 #include "runtime/imaging/press/press_law.h"
 
 namespace sonocase::runtime::press {
+
+void mark_closed(std::span<const PressTissue> tissues,
+                 const PressFace& face,
+                 const PressSamples& samples,
+                 const PressColumns& columns,
+                 PressClosed& out) {
+    if (out.any) {
+        out.node.fill(0);
+        out.row.fill(false);
+    }
+    out.any = false;
+    const auto closed = [&](int j, int i) {
+        if (j < 0 || j >= kFineRows || i < 0 || i >= kColumns) return false;
+        if (!samples.lumen[j]) return false;
+        const float share = samples.drains.row(j)[i];
+        return share >= 0.5f &&
+               columns.stretch.row(j)[i] < share * static_cast<float>(kClosed) + (1 - share);
+    };
+    // A round lumen reaches less far up and down beside its middle, so half a row around is
+    // searched, and a quarter of a row in the columns beside.
+    constexpr int kAround = kParts / 2, kBeside = kParts / 4;
+    const auto near = [&](int j, int i) {
+        for (int n = j - kAround; n <= j + kAround; ++n)
+            if (closed(n, i)) return true;
+        for (int n = j - kBeside; n <= j + kBeside; ++n)
+            if (closed(n, i - 1) || closed(n, i + 1)) return true;
+        return false;
+    };
+    const auto nearest = [](float mm) {
+        return std::clamp(static_cast<int>(double{mm} / kTableStepMm + 0.5), 0, kTableRows - 1);
+    };
+    // Only the scan plane counts here: two places of each part were looked up in it.
+    const auto drains = [&](int j, int i) {
+        int both = 0;
+        for (int s = 0; s < 2; ++s) both += tissues[samples.tissue[s][j * kColumns + i]].drains;
+        return 0.5 * both;
+    };
+    double rest = 0, open = 0;  // heights
+    for (int j = 0; j < kFineRows; ++j) {
+        bool lumens = false;
+        for (int n = std::max(j - kParts / 2, 0); n <= std::min(j + kParts / 2, kFineRows - 1); ++n)
+            lumens = lumens || samples.lumen[n];
+        if (!lumens) continue;
+        for (int i = 0; i < kColumns; ++i) {
+            const bool closed = near(j, i);
+            if (samples.lumen[j] && i >= kSideColumns && i < kSideColumns + kFaceColumns) {
+                const double height = drains(j, i) * fine_height(j);
+                rest += height;
+                if (!closed) open += height * double{columns.lumen.row(j)[i]};
+            }
+            if (!closed) continue;
+            out.any = true;
+            // One of these nodes is the nearest to each place of the part.
+            const int first = nearest(columns.pressed_mm.row(j)[i]),
+                      last = nearest(columns.pressed_mm.row(j + 1)[i]);
+            for (int m = first; m <= last; ++m) {
+                out.row_of(m)[i] = 1;
+                out.row[m] = true;
+            }
+        }
+    }
+    constexpr double kMinMm2 = 4;
+    out.open = rest * column_width_mm(face) < kMinMm2 ? -1 : open / rest;
+}
+
 namespace {
 
-// A plane of numbers under the columns, between them; row may be a fraction.
+// Interpolates a plane of numbers between columns and rows.
 template <int kHeight>
 double between(const Plane<kHeight>& plane, double column, double row) {
     const double x = std::clamp(column, 0.0, kColumns - 1.0);
@@ -30,39 +95,39 @@ double column_of(const PressFace& face, double lateral_mm) {
     return lateral_mm / column_width_mm(face) + (kColumns - 1) / 2.0;
 }
 
-// Of a pressed place in the plane, to where it lies at rest.
+// From a pressed place in the plane to where it lies at rest.
 struct Shift {
     double lateral_mm = 0, depth_mm = 0;
-    double tilt = 0;  // of depth_mm per mm along the face
+    double tilt = 0;  // change of depth_mm per mm along the face
 };
 
-// Beside the columns and below the table the shift fades.
+// Share of the shift that is left beside the columns and below the table.
 double fade_at(const PressFace& face, double column, double row) {
     const double past =
         std::max(std::abs(column - (kColumns - 1) / 2.0) - (kColumns - 1) / 2.0, 0.0);
-    const double beyond = std::max(0.0, row - (kTableRows - 1)) * kTableStep_mm;
-    return std::max(0.0, 1 - past * column_width_mm(face) / kTableFade_mm) *
-           std::max(0.0, 1 - beyond / kTableFade_mm);
+    const double beyond = std::max(0.0, row - (kTableRows - 1)) * kTableStepMm;
+    return std::max(0.0, 1 - past * column_width_mm(face) / kTableFadeMm) *
+           std::max(0.0, 1 - beyond / kTableFadeMm);
 }
 
-// The sideways shift alone: from where tissue lies at rest to where it shows.
+// The sideways shift alone, from where tissue lies at rest to where it shows.
 double bulge_at(const PressFace& face, const PressTable& table, BeamPoint p) {
-    const double row = p.depth_mm / kTableStep_mm, column = column_of(face, p.lateral_mm);
+    const double row = p.depth_mm / kTableStepMm, column = column_of(face, p.lateral_mm);
     return fade_at(face, column, row) * between(table.bulge_mm, column, row / kBulgeEvery);
 }
 
 Shift shift_at(const PressFace& face, const PressTable& table, BeamPoint p) {
-    const double row = p.depth_mm / kTableStep_mm;
+    const double row = p.depth_mm / kTableStepMm;
     const double column = column_of(face, p.lateral_mm);
     const double share = fade_at(face, column, row);
     const double lateral = -share * between(table.bulge_mm, column, row / kBulgeEvery);
-    const double there = column_of(face, p.lateral_mm + lateral);
-    const double depth = std::clamp(row, 0.0, kTableRows - 1.0) * kTableStep_mm;
-    // Between the two columns beside it, each at this depth: their difference is the slope.
-    const double left = std::floor(std::clamp(there, 0.0, kColumns - 2.0));
+    const double target = column_of(face, p.lateral_mm + lateral);
+    const double depth = std::clamp(row, 0.0, kTableRows - 1.0) * kTableStepMm;
+    // Interpolates between the two columns beside it at this depth: their difference is the slope.
+    const double left = std::floor(std::clamp(target, 0.0, kColumns - 2.0));
     const double before = between(table.rest_mm, left, row),
                  after = between(table.rest_mm, left + 1, row);
-    const double part = std::clamp(there - left, 0.0, 1.0);
+    const double part = std::clamp(target - left, 0.0, 1.0);
     const double rest = before + part * (after - before);
     return {lateral, share * (rest - depth), share * (after - before) / column_width_mm(face)};
 }
@@ -71,9 +136,9 @@ Shift shift_at(const PressFace& face, const PressTable& table, BeamPoint p) {
 double skin_mm(const PressFace& face, const PressSamples& samples, double lateral_mm) {
     const double x =
         std::clamp(lateral_mm / column_width_mm(face) + (kColumns - 1) / 2.0, 0.0, kColumns - 1.0);
-    const auto i = static_cast<std::size_t>(std::min(static_cast<int>(x), kColumns - 2));
+    const int i = std::min(static_cast<int>(x), kColumns - 2);
     const double left = samples.pressed_mm[i], right = samples.pressed_mm[i + 1];
-    return -(left + (x - static_cast<double>(i)) * (right - left));
+    return -(left + (x - i) * (right - left));
 }
 
 }  // namespace
@@ -115,7 +180,7 @@ bool PressField::press(SimdTarget simd, const PressScene& scene, const PressOpti
     state_.force_n = work_->columns.force_n;
     const double area_mm2 = touching * column_width_mm(face_) * 2 * face_.half_height_mm;
     state_.pressure_kpa = 1e3 * state_.force_n / area_mm2;
-    state_.least_determinant = work_->table.least_determinant;
+    state_.min_determinant = work_->table.min_determinant;
     state_.vein_open = work_->closed.open;
     float sideways = 0;
     for (const float v : work_->table.bulge_mm.values) sideways = std::max(sideways, std::abs(v));
@@ -143,8 +208,8 @@ RestPlace PressField::rest_in_plane(BeamPoint shown) const {
 
 BeamPoint PressField::shown_before_dent(BeamPoint rest) const {
     if (!state_.pressed) return rest;
-    // The rest depth rises down the column of `rest`: the row by halving, then the sideways shift
-    // of that row.
+    // The rest depth rises down the column of `rest`: the row is found by halving, then the
+    // sideways shift of that row.
     const PressTable& table = work_->table;
     const double column = column_of(face_, rest.lateral_mm);
     const double x = std::clamp(column, 0.0, kColumns - 1.0);
@@ -163,14 +228,14 @@ BeamPoint PressField::shown_before_dent(BeamPoint rest) const {
             (depth_at(middle) <= rest.depth_mm ? low : high) = middle;
         }
         const double above = depth_at(low), below = depth_at(high);
-        shown = (low + (rest.depth_mm - above) / (below - above)) * kTableStep_mm;
+        shown = (low + (rest.depth_mm - above) / (below - above)) * kTableStepMm;
     }
     double lateral = rest.lateral_mm;
     for (int step = 0; step < 8; ++step) {
         const double next = rest.lateral_mm + bulge_at(face_, table, {lateral, shown});
-        const bool settled = std::abs(next - lateral) < 1e-4;
+        const bool converged = std::abs(next - lateral) < 1e-4;
         lateral = next;
-        if (settled) break;
+        if (converged) break;
     }
     return {lateral, shown};
 }
@@ -178,7 +243,8 @@ BeamPoint PressField::shown_before_dent(BeamPoint rest) const {
 BeamPoint PressField::shown_in_plane(BeamPoint rest) const {
     const BeamPoint before = shown_before_dent(rest);
     if (!dent_.moves()) return before;
-    // A needle moves tissue by less per millimetre than a millimetre: each step comes nearer.
+    // The needle's shift changes by less than a millimetre per millimetre, so each step comes
+    // nearer.
     const Point3 p = probe_point(face_, before, 0);
     Point3 at = p;
     for (int step = 0; step < 12; ++step) {
@@ -200,13 +266,13 @@ bool PressField::closed_in_plane(BeamPoint shown) const {
     if (dent_.moves()) shown = before_dent(shown);
     const RestPlace rest = pressed_in_plane(shown);
     const double column = std::clamp(column_of(face_, rest.lateral_mm), 0.0, kColumns - 1.0);
-    const double row = std::clamp(shown.depth_mm / kTableStep_mm, 0.0, kTableRows - 1.0);
+    const double row = std::clamp(shown.depth_mm / kTableStepMm, 0.0, kTableRows - 1.0);
     return nodes.at(static_cast<int>(row + 0.5), static_cast<int>(column + 0.5)) != 0;
 }
 
 Point3 PressField::pull_back(Point3 pressed) const {
     if (!state_.pressed) return pressed;
-    // The face stands where bone holds it.
+    // Relative to the face where bone holds it.
     Point3 held = pressed;
     held.z += state_.excess_mm;
     const BeamPoint p = beam_point(face_, held);
@@ -225,7 +291,7 @@ Point3 PressField::pull_back(Point3 pressed) const {
             sideways = falling_exponential(y2 / (2 * w * w * kLateralFade * kLateralFade));
             end_mm = depth_mm + (1 - share) * shift.depth_mm;
         };
-        double low = p.depth_mm - kReach_mm, high = p.depth_mm + 2 * kReach_mm, end = 0;
+        double low = p.depth_mm - kReachMm, high = p.depth_mm + 2 * kReachMm, end = 0;
         for (int n = 0; n < 40; ++n) {
             const double middle = 0.5 * (low + high);
             faded(middle, end);
@@ -247,7 +313,8 @@ bool PressField::closed(Point3 rest) const {
     const double below = p.depth_mm - skin_mm(face_, work_->samples, p.lateral_mm);
     const auto part = std::upper_bound(kFineEdge.begin(), kFineEdge.end(), below);
     const int j = std::clamp(static_cast<int>(part - kFineEdge.begin()) - 1, 0, kFineRows - 1);
-    // A round lumen reaches less far up and down beside its middle: look half a row around.
+    // A round lumen reaches less far up and down beside its middle, so half a row around is
+    // searched.
     constexpr int kAround = kParts / 2;
     const int i = std::min(static_cast<int>(column), kColumns - 2);
     for (int n = std::max(0, j - kAround); n <= std::min(kFineRows - 1, j + kAround); ++n)
@@ -264,26 +331,26 @@ Point3 PressField::push_forward(Point3 rest) const {
     // A damped Newton iteration on the pull-back, whose Jacobian is taken by differences in the
     // plane: the map is one to one and piecewise smooth.
     Point3 at = rest;
-    constexpr double kStep_mm = 1e-3;
+    constexpr double kStepMm = 1e-3;
     double error = 1e9;
     for (int n = 0; n < 40 && error > 1e-5; ++n) {
         const Point3 here = pull_back(at);
         const double ex = rest.x - here.x, ez = rest.z - here.z;
         error = std::sqrt(ex * ex + ez * ez);
-        const Point3 px = pull_back({at.x + kStep_mm, at.y, at.z});
-        const Point3 pz = pull_back({at.x, at.y, at.z + kStep_mm});
-        const double a = (px.x - here.x) / kStep_mm, b = (pz.x - here.x) / kStep_mm;
-        const double c = (px.z - here.z) / kStep_mm, d = (pz.z - here.z) / kStep_mm;
+        const Point3 px = pull_back({at.x + kStepMm, at.y, at.z});
+        const Point3 pz = pull_back({at.x, at.y, at.z + kStepMm});
+        const double a = (px.x - here.x) / kStepMm, b = (pz.x - here.x) / kStepMm;
+        const double c = (px.z - here.z) / kStepMm, d = (pz.z - here.z) / kStepMm;
         const double det = std::max(a * d - b * c, 1e-3);
         double dx = (d * ex - b * ez) / det, dz = (a * ez - c * ex) / det;
         double length = std::sqrt(dx * dx + dz * dz);
-        const double most = std::max(2 * error, 1e-4);
-        const double scale = length > most ? most / length : 1;
+        const double limit = std::max(2 * error, 1e-4);
+        const double scale = length > limit ? limit / length : 1;
         double best = error;
         for (double t = scale; t > scale / 64; t /= 2) {
             const Point3 tried{at.x + t * dx, at.y, at.z + t * dz};
-            const Point3 there = pull_back(tried);
-            const double fx = rest.x - there.x, fz = rest.z - there.z;
+            const Point3 back = pull_back(tried);
+            const double fx = rest.x - back.x, fz = rest.z - back.z;
             const double e = std::sqrt(fx * fx + fz * fz);
             if (e < best) {
                 best = e;
@@ -295,6 +362,17 @@ Point3 PressField::push_forward(Point3 rest) const {
         error = best;
     }
     return at;
+}
+
+PressFace press_face(const Probe& probe) {
+    switch (probe.shape) {
+        case ProbeShape::linear: return {0.5 * probe.width_mm, 4, 0};
+        case ProbeShape::curvilinear:
+            return {0.5 * probe.radius_mm * probe.field_of_view_rad, 6.5, probe.radius_mm};
+        case ProbeShape::phased: return {0.5 * probe.width_mm, 5, 0};
+    }
+    assert(false);
+    return {};
 }
 
 }  // namespace sonocase::runtime::press

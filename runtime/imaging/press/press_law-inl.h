@@ -24,8 +24,8 @@ struct StretchLanes {
 template <class D, class V>
 HWY_INLINE StretchLanes<V> tissue_stretch(D d, V s) {
     const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-    const auto pressed = hn::Min(hn::Max(s, zero), hn::Set(d, static_cast<float>(kGreatestStress)));
-    const auto pulled = hn::Max(hn::Min(s, zero), hn::Set(d, static_cast<float>(kLeastStress)));
+    const auto pressed = hn::Min(hn::Max(s, zero), hn::Set(d, static_cast<float>(kMaxStress)));
+    const auto pulled = hn::Max(hn::Min(s, zero), hn::Set(d, static_cast<float>(kMinStress)));
     const auto l = hn::Div(one, hn::Sqrt(hn::Add(one, hn::Add(pressed, pressed))));
     return {hn::Sub(l, pulled), hn::Mul(l, hn::Mul(l, l))};
 }
@@ -33,8 +33,8 @@ HWY_INLINE StretchLanes<V> tissue_stretch(D d, V s) {
 template <class D, class V>
 HWY_INLINE StretchLanes<V> lumen_stretch(D d, V s) {
     const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-    const auto pressed = hn::Min(hn::Max(s, zero), hn::Set(d, static_cast<float>(kGreatestStress)));
-    const auto pulled = hn::Max(hn::Min(s, zero), hn::Set(d, static_cast<float>(kLeastStress)));
+    const auto pressed = hn::Min(hn::Max(s, zero), hn::Set(d, static_cast<float>(kMaxStress)));
+    const auto pulled = hn::Max(hn::Min(s, zero), hn::Set(d, static_cast<float>(kMinStress)));
     const auto w = hn::Sqrt(hn::Add(one, hn::Mul(pressed, pressed)));
     const auto l = hn::Div(one, hn::Add(w, pressed));
     return {hn::Sub(l, pulled), hn::Div(l, w)};
@@ -43,7 +43,7 @@ HWY_INLINE StretchLanes<V> lumen_stretch(D d, V s) {
 template <class D, class V>
 HWY_INLINE V closing(D d, V l) {
     constexpr double kSteep = kClosing / (kClosing - kClosed);
-    const auto ramp = hn::Max(hn::Set(d, static_cast<float>(kLeastLumen)),
+    const auto ramp = hn::Max(hn::Set(d, static_cast<float>(kMinLumen)),
                               hn::Mul(hn::Set(d, static_cast<float>(kSteep)),
                                       hn::Sub(l, hn::Set(d, static_cast<float>(kClosed)))));
     return hn::IfThenElse(hn::Ge(l, hn::Set(d, static_cast<float>(kClosing))), l, ramp);

@@ -4,12 +4,12 @@
 // piece of tissue under a stress. docs/deformation.md derives them and names their sources.
 //
 // u(x, t) is the shift along the beam of the tissue that lies at rest t below the skin of column x.
-// It has the least energy
+// It minimises the energy
 //
 //   sum over cells  s/2 [ E B u_t^2 + 0.122 E' u_x^2 + 0.351 E' u^2 / s^2 ],
 //   s = 1.35 a + 0.30 t,   B = 1 + (b/t)^2,   1/b^2 = 1/a^2 + 1/d^2
 //
-// with u = the pressed depth at the skin under the face, and 0 at bone and at 71.6 mm. a is half
+// where u is the pressed depth at the skin under the face, and 0 at bone and at 71.6 mm. a is half
 // the face's extent across the plane and s the width of the field there; d is the distance to the
 // edge of the contact, so that b is the half width of the contact in both directions together. In a
 // lumen B is 1. E' is E, and 1.93 E in skin.
@@ -22,25 +22,26 @@ namespace sonocase::runtime::press {
 inline constexpr double kWidthPerHalfHeight = 1.35, kWidthPerDepth = 0.30;
 inline constexpr double kShear = 0.122, kFoundation = 0.351, kMembrane = 1.93;
 
-inline constexpr double kLeastStress = -0.5, kGreatestStress = 500;  // in units of the stiffness
+inline constexpr double kMinStress = -0.5, kMaxStress = 500;  // in units of the stiffness
 
-// In the last increment a lumen's stress S becomes 2 S + S^2: the rest of its closing, which the
-// columns beside it cannot push it into.
+// In the last increment a lumen's stress S becomes 2 S + S^2. That is the rest of its closing,
+// which the columns beside it cannot bring about.
 inline constexpr double kLumenGain = 2, kLumenGrowth = 1;
 // A lumen's stretch of 0.3 and less falls linearly to 0.02 at 0.2: its walls touch.
-inline constexpr double kClosing = 0.3, kClosed = 0.2, kLeastLumen = 0.02;
+inline constexpr double kClosing = 0.3, kClosed = 0.2, kMinLumen = 0.02;
 
 // Force on the face: the stress below the skin and a part of what the skin spreads to its sides,
 // q = (1 - 0.12) q_2 + 0.12 q_0 with q_k the stress of row k over the width of the field there.
 inline constexpr double kSkinShare = 0.12;
 inline constexpr int kBelowSkinRow = 2;
 
-// What is squeezed along the beam goes sideways within this length, and the rest across the plane.
-inline constexpr double kBulgeLateral_mm = 20, kBulgeAxial_mm = 4;
+// Tissue that is squeezed along the beam goes sideways within this length, and the rest goes across
+// the plane.
+inline constexpr double kBulgeLateralMm = 20, kBulgeAxialMm = 4;
 
-inline constexpr double kGreatestShare = 0.7;  // of the depth to bone that can be pressed
-inline constexpr double kReach_mm = 30;        // the skin is looked for so far behind the face
-inline constexpr double kSearch_mm = 40;       // and so far in front of it
+inline constexpr double kMaxShare = 0.7;  // share of the depth to bone that can be pressed
+inline constexpr double kReachMm = 30;    // the skin is searched for this far behind the face
+inline constexpr double kSearchMm = 40;   // and this far in front of it
 
 inline double field_width_mm(double half_height_mm, double depth_mm) {
     return kWidthPerHalfHeight * half_height_mm + kWidthPerDepth * depth_mm;
@@ -61,19 +62,19 @@ struct Stretch {
     double l = 1, slope = 1;
 };
 inline Stretch tissue_stretch(double s) {
-    if (s < 0) return {1 - std::fmax(s, kLeastStress), 1};
-    const double l = 1 / std::sqrt(1 + 2 * std::fmin(s, kGreatestStress));
+    if (s < 0) return {1 - std::fmax(s, kMinStress), 1};
+    const double l = 1 / std::sqrt(1 + 2 * std::fmin(s, kMaxStress));
     return {l, l * l * l};
 }
 inline Stretch lumen_stretch(double s) {
-    if (s < 0) return {1 - std::fmax(s, kLeastStress), 1};
-    s = std::fmin(s, kGreatestStress);
+    if (s < 0) return {1 - std::fmax(s, kMinStress), 1};
+    s = std::fmin(s, kMaxStress);
     const double w = std::sqrt(1 + s * s), l = 1 / (w + s);
     return {l, l / w};
 }
 inline double closing(double l) {
     if (l >= kClosing) return l;
-    return std::fmax(kLeastLumen, kClosing * (l - kClosed) / (kClosing - kClosed));
+    return std::fmax(kMinLumen, kClosing * (l - kClosed) / (kClosing - kClosed));
 }
 
 }  // namespace sonocase::runtime::press

@@ -11,15 +11,15 @@
 #define HWY_TARGET_INCLUDE "press_samples.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-// After them: included again for each instruction set.
+// This comes after Highway's: it is included again for each instruction set.
 #include "runtime/imaging/press/press_law-inl.h"
 
 #ifndef SONOCASE_PRESS_SAMPLES_ONCE
 #define SONOCASE_PRESS_SAMPLES_ONCE
 namespace sonocase::runtime::press {
 
-// What a tissue counts for, as one word: its stiffness, whose four lowest bits (a millionth of it)
-// say the rest.
+// A tissue's figures in one word: its stiffness, whose four lowest bits (a millionth of it) hold
+// the flags.
 inline constexpr std::int32_t kDrainsBit = 1, kRigidBit = 2, kOutsideBit = 4, kMembraneBit = 8;
 using FigureTable = std::array<std::int32_t, kMaxPressTissues>;
 
@@ -32,8 +32,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Lanes = hn::CappedTag<float, 16>;
 
-// The means of every cell from the tissues that were looked up: two places in the plane, and one
-// each in front of it and behind it.
+// Takes the means of every cell over the tissues that were looked up: two places in the plane, and
+// one each in front of it and behind it.
 void average(const FigureTable& figures, PressSamples& out) {
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
@@ -41,7 +41,7 @@ void average(const FigureTable& figures, PressSamples& out) {
     const auto one = hn::Set(d, 1.0f), quarter = hn::Set(d, 0.25f);
     const auto stiff = hn::Set(di, ~15), once = hn::Set(di, 1);
     const auto membrane = hn::Set(d, static_cast<float>(kMembrane));
-    const auto look = [&](std::size_t which, int row, int i) HWY_ATTR {
+    const auto figure_at = [&](std::size_t which, int row, int i) HWY_ATTR {
         const std::uint8_t* tissue = out.tissue[which].data() + row * kColumns + i;
         return hn::GatherIndex(di, figures.data(), hn::PromoteTo(di, hn::LoadU(d8, tissue)));
     };
@@ -58,11 +58,11 @@ void average(const FigureTable& figures, PressSamples& out) {
                 drains = hn::Zero(di);
                 rigid = hn::Zero(di);
                 for (std::size_t s = 0; s < 2; ++s) {
-                    const auto here = look(s, j, i), beside = look(2 + s, j, i);
-                    const auto there =
+                    const auto here = figure_at(s, j, i), beside = figure_at(2 + s, j, i);
+                    const auto counted =
                         hn::IfThenElse(hn::TestBit(beside, hn::Set(di, kOutsideBit)), here, beside);
                     rigid = hn::Or(rigid, here);
-                    for (const auto figure : {here, there}) {
+                    for (const auto figure : {here, counted}) {
                         const auto kpa = hn::BitCast(d, hn::And(figure, stiff));
                         sum = hn::Add(sum, kpa);
                         const auto skin = hn::TestBit(figure, hn::Set(di, kMembraneBit));
@@ -75,8 +75,7 @@ void average(const FigureTable& figures, PressSamples& out) {
                 hn::StoreU(hn::Mul(quarter, sum), d, out.stiffness_kpa.row(j) + i);
                 const auto tissue = hn::Sub(one, hn::Mul(quarter, hn::ConvertTo(d, drains)));
                 hn::StoreU(hn::Sub(one, hn::Mul(tissue, tissue)), d, out.drains.row(j) + i);
-                if (!hn::AllTrue(di, hn::Eq(drains, hn::Zero(di))))
-                    out.lumen[static_cast<std::size_t>(j)] = true;
+                if (!hn::AllTrue(di, hn::Eq(drains, hn::Zero(di)))) out.lumen[j] = true;
                 const auto hard = hn::TestBit(rigid, hn::Set(di, kRigidBit));
                 first_bone = hn::IfThenElse(hard, hn::Min(first_bone, hn::Set(di, j)), first_bone);
             }
@@ -88,7 +87,7 @@ void average(const FigureTable& figures, PressSamples& out) {
     for (std::size_t i = 0; i < kColumns; ++i) {
         out.bone_part[i] = bone[i];
         out.fixed_row[i] = (bone[i] + kParts - 1) / kParts;
-        out.bone_mm[i] = static_cast<float>(kFineEdge[static_cast<std::size_t>(bone[i])]);
+        out.bone_mm[i] = static_cast<float>(kFineEdge[bone[i]]);
     }
 }
 
@@ -102,11 +101,11 @@ HWY_EXPORT(average);
 
 namespace {
 
-constexpr double kSkinStep_mm = 2;  // no part of a body that is pressed is thinner
-constexpr int kSkinSteps = static_cast<int>((kReach_mm + kSearch_mm) / kSkinStep_mm) + 1;
-constexpr int kFinerSteps = 8;      // of such a step,
-constexpr int kFinerLevels = 4;     // again and again: 0.0005 mm
-constexpr double kSidePlane = 1.5;  // times half the face's height
+constexpr double kSkinStepMm = 2;  // no part of a body that can be pressed is thinner
+constexpr int kSkinSteps = static_cast<int>((kReachMm + kSearchMm) / kSkinStepMm) + 1;
+constexpr int kFinerSteps = 8;      // parts of such a step
+constexpr int kFinerLevels = 4;     // times that a step is divided: down to 0.0005 mm
+constexpr double kSidePlane = 1.5;  // distance of the side planes over half the face's height
 
 template <std::size_t kCount>
 constexpr std::array<float, kCount> evenly(double first, double step) {
@@ -115,7 +114,7 @@ constexpr std::array<float, kCount> evenly(double first, double step) {
         t[n] = static_cast<float>(first + static_cast<double>(n) * step);
     return t;
 }
-constexpr auto kSkinDepth_mm = evenly<kSkinSteps>(-kReach_mm, kSkinStep_mm);
+constexpr auto kSkinDepthMm = evenly<kSkinSteps>(-kReachMm, kSkinStepMm);
 
 constexpr std::array<float, kFineRows> part_middles() {
     std::array<float, kFineRows> t{};
@@ -137,17 +136,18 @@ void set_figures(std::span<const PressTissue> tissues, float scale, FigureTable&
 using Lines = std::array<PressLine, kColumns>;
 using SkinDepths = std::array<double, kColumns>;
 
-struct Looker {
+// Looks up tissue under a face.
+struct TissueReader {
     const PressScene& scene;
-    Vector3 shift;  // of the face, for a probe that bone has stopped
+    Vector3 shift;  // shift of the face, for a probe that bone has stopped
 
     void along(Lines lines, std::span<const float> depth, std::uint8_t* out) const {
         for (PressLine& line : lines) line.from = line.from + shift;
         scene.lookup.along(scene.lookup.context, lines, depth, out);
     }
-    void settle_skin(Lines lines, SkinDepths& skin) const {
+    void refine_skin(Lines lines, SkinDepths& skin) const {
         for (PressLine& line : lines) line.from = line.from + shift;
-        scene.lookup.settle_skin(scene.lookup.context, lines, skin);
+        scene.lookup.refine_skin(scene.lookup.context, lines, skin);
     }
     bool outside(std::uint8_t tissue) const { return scene.tissues[tissue].outside; }
 };
@@ -158,26 +158,29 @@ Lines lines_of(const ColumnBeams& beams) {
     return lines;
 }
 
-// Depth of the skin from the face, negative behind it: the first step that lies in the body, then
-// the first of its parts. kSearch_mm where there is none.
-void find_skin(const Looker& look, const Lines& lines, SkinDepths& skin, bool& out_of_reach) {
+// Finds the depth of the skin from the face, negative behind it: the first step that lies in the
+// body, then the first of its parts. kSearchMm where there is none.
+void find_skin(const TissueReader& reader,
+               const Lines& lines,
+               SkinDepths& skin,
+               bool& out_of_reach) {
     std::array<std::uint8_t, std::size_t{kSkinSteps} * kColumns> tissue{};
     const auto first_inside = [&](std::size_t steps, std::size_t column) {
         std::size_t n = 0;
-        while (n < steps && look.outside(tissue[n * kColumns + column])) ++n;
+        while (n < steps && reader.outside(tissue[n * kColumns + column])) ++n;
         return n;
     };
-    std::array<bool, kColumns> settled{};
-    // Some steps at a time: most columns meet the body long before the last one.
+    std::array<bool, kColumns> found_end{};  // the skin lies beyond the first or the last step
+    // Several steps at a time: most columns meet the body long before the last one.
     constexpr std::size_t kTogether = 9;
     static_assert(kSkinSteps % kTogether == 0);
     std::array<std::size_t, kColumns> met{};
     for (std::size_t from = 0; from < kSkinSteps; from += kTogether) {
-        look.along(lines, std::span(kSkinDepth_mm).subspan(from, kTogether),
-                   tissue.data() + from * kColumns);
+        reader.along(lines, std::span(kSkinDepthMm).subspan(from, kTogether),
+                     tissue.data() + from * kColumns);
         bool all = true;
         for (std::size_t i = 0; i < kColumns; ++i) {
-            while (met[i] < from + kTogether && look.outside(tissue[met[i] * kColumns + i]))
+            while (met[i] < from + kTogether && reader.outside(tissue[met[i] * kColumns + i]))
                 ++met[i];
             all = all && met[i] < from + kTogether;
         }
@@ -185,54 +188,55 @@ void find_skin(const Looker& look, const Lines& lines, SkinDepths& skin, bool& o
     }
     for (std::size_t i = 0; i < kColumns; ++i) {
         const std::size_t n = met[i];
-        settled[i] = n == 0 || n == kSkinSteps;
+        found_end[i] = n == 0 || n == kSkinSteps;
         out_of_reach = out_of_reach || n == 0;
-        skin[i] = n == kSkinSteps ? kSearch_mm : static_cast<double>(kSkinDepth_mm[n]);
+        skin[i] = n == kSkinSteps ? kSearchMm : static_cast<double>(kSkinDepthMm[n]);
     }
-    double step = kSkinStep_mm;
+    double step = kSkinStepMm;
     for (int level = 0; level < kFinerLevels; ++level) {
-        // From the last place that is known to lie outside; the end of the step is known to be in.
+        // Starts at the last place that is known to lie outside; the end of the step lies inside.
         Lines from = lines;
         for (std::size_t i = 0; i < kColumns; ++i)
             from[i].from = from[i].from + (skin[i] - step) * from[i].direction;
         const double finer = step / kFinerSteps;
         const auto depth = evenly<kFinerSteps - 1>(finer, finer);
-        look.along(from, depth, tissue.data());
+        reader.along(from, depth, tissue.data());
         for (std::size_t i = 0; i < kColumns; ++i) {
-            if (settled[i]) continue;
+            if (found_end[i]) continue;
             const std::size_t n = first_inside(depth.size(), i);
             skin[i] += static_cast<double>(n + 1) * finer - step;
         }
         step = finer;
     }
-    if (look.scene.lookup.settle_skin == nullptr) return;
+    if (reader.scene.lookup.refine_skin == nullptr) return;
     SkinDepths found = skin;
     for (std::size_t i = 0; i < kColumns; ++i)
-        if (settled[i]) found[i] = std::numeric_limits<double>::quiet_NaN();
-    look.settle_skin(lines, found);
+        if (found_end[i]) found[i] = std::numeric_limits<double>::quiet_NaN();
+    reader.refine_skin(lines, found);
     for (std::size_t i = 0; i < kColumns; ++i)
-        if (!settled[i]) skin[i] = found[i];
+        if (!found_end[i]) skin[i] = found[i];
 }
 
-// Whether the body lies at the face anywhere: all that a frame costs while nothing is pressed.
-bool touches(const Looker& look, const Lines& lines) {
+// Whether the body lies at the face anywhere. This is all that a frame costs while nothing is
+// pressed.
+bool touches(const TissueReader& reader, const Lines& lines) {
     std::array<std::uint8_t, kFaceColumns> tissue{};
     constexpr float kFace = 0;
-    look.scene.lookup.along(look.scene.lookup.context,
-                            std::span(lines).subspan(kSideColumns, kFaceColumns), {&kFace, 1},
-                            tissue.data());
+    reader.scene.lookup.along(reader.scene.lookup.context,
+                              std::span(lines).subspan(kSideColumns, kFaceColumns), {&kFace, 1},
+                              tissue.data());
     return std::any_of(tissue.begin(), tissue.end(),
-                       [&](std::uint8_t t) { return !look.outside(t); });
+                       [&](std::uint8_t t) { return !reader.outside(t); });
 }
 
-// By how much the face lies deeper than bone lets it; of the scan plane's tissue alone. Only parts
-// that are near enough to stop it are looked at.
+// How much deeper the face lies than bone lets it; only tissue of the scan plane counts, and only
+// parts that are near enough to stop the face are examined.
 double excess_of(const FigureTable& figures, const PressSamples& s) {
     double excess = 0;
     for (std::size_t i = kSideColumns; i < kSideColumns + kFaceColumns; ++i) {
         const auto pressed = static_cast<double>(s.pressed_mm[i]);
         for (std::size_t j = 0; j < kFineRows; ++j) {
-            const double beyond = pressed - kGreatestShare * kFineEdge[j];
+            const double beyond = pressed - kMaxShare * kFineEdge[j];
             if (beyond <= excess) break;
             const std::size_t at = j * kColumns + i;
             if (((figures[s.tissue[0][at]] | figures[s.tissue[1][at]]) & kRigidBit) == 0) continue;
@@ -243,24 +247,24 @@ double excess_of(const FigureTable& figures, const PressSamples& s) {
     return excess;
 }
 
-// Skin and the tissue of the scan plane.
-void sample_plane(const Looker& look,
+// Finds the skin and the tissue of the scan plane.
+void sample_plane(const TissueReader& reader,
                   const PressBeams& beams,
                   SkinDepths& skin,
                   PressSamples& out) {
-    find_skin(look, lines_of(beams.middle), skin, out.out_of_reach);
+    find_skin(reader, lines_of(beams.middle), skin, out.out_of_reach);
     for (std::size_t i = 0; i < kColumns; ++i) out.pressed_mm[i] = static_cast<float>(-skin[i]);
     for (std::size_t s = 0; s < 2; ++s) {
         Lines plane = lines_of(s == 0 ? beams.left : beams.right);
         for (std::size_t i = 0; i < kColumns; ++i)
             plane[i].from = plane[i].from + skin[i] * plane[i].direction;
-        look.along(plane, kPartMiddle, out.tissue[s].data());
+        reader.along(plane, kPartMiddle, out.tissue[s].data());
     }
 }
 
-// The tissue beside the plane, then the means.
+// Finds the tissue beside the plane, then the means.
 void sample_beside(SimdTarget simd,
-                   const Looker& look,
+                   const TissueReader& reader,
                    const PressFace& face,
                    const PressBeams& beams,
                    const SkinDepths& skin,
@@ -272,24 +276,25 @@ void sample_beside(SimdTarget simd,
             beside[i].from = beside[i].from + skin[i] * beside[i].direction;
             beside[i].from.y = (s == 0 ? -kSidePlane : kSidePlane) * face.half_height_mm;
         }
-        look.along(beside, kPartMiddle, out.tissue[2 + s].data());
+        reader.along(beside, kPartMiddle, out.tissue[2 + s].data());
     }
     out.lumen.fill(false);
     HWY_DISPATCH_TABLE(average)[simd.index](figures, out);
 }
 
-// Distance to where the pressed depth passes zero between columns, or to the end of the face.
+// Finds the distance to where the pressed depth passes zero between columns, or to the end of the
+// face.
 void measure_edges(const PressFace& face, PressSamples& s) {
     const float width = static_cast<float>(column_width_mm(face));
     const auto sweep = [&](int first, int step) {
         float distance = 0;
         for (int n = 0; n < kFaceColumns; ++n) {
-            const auto i = static_cast<std::size_t>(first + n * step);
+            const int i = first + n * step;
             if (!s.touching[i]) {
                 distance = 0;
                 continue;
             }
-            const auto before = static_cast<std::size_t>(first + (n - 1) * step);
+            const int before = first + (n - 1) * step;
             if (distance > 0) {
                 distance += width;
             } else if (n == 0) {
@@ -317,34 +322,33 @@ void sample_tissue(SimdTarget simd,
                    PressSamples& out) {
     FigureTable figures{};
     set_figures(scene.tissues, static_cast<float>(stiffness_scale), figures);
-    Looker look{scene, {}};
+    TissueReader reader{scene, {}};
     out.out_of_reach = out.any_touch = false;
     out.excess_mm = 0;
-    if (!touches(look, lines_of(beams.middle))) return;
+    if (!touches(reader, lines_of(beams.middle))) return;
     SkinDepths skin{};
-    sample_plane(look, beams, skin, out);
+    sample_plane(reader, beams, skin, out);
     out.excess_mm = excess_of(figures, out);
     const bool again = out.excess_mm > 0 && face.radius_mm > 0;
     if (again) {
-        // The beams of a curved face have moved over the body as well. What the bone under them
-        // still lacks is small, and is taken from the pressed depth alone.
-        look.shift = {0, 0, -out.excess_mm};
-        sample_plane(look, beams, skin, out);
+        // The beams of a curved face have moved over the body too. What is still missing above the
+        // bone is small, and only the pressed depth is corrected for it.
+        reader.shift = {0, 0, -out.excess_mm};
+        sample_plane(reader, beams, skin, out);
     }
-    sample_beside(simd, look, face, beams, skin, figures, out);
+    sample_beside(simd, reader, face, beams, skin, figures, out);
     if (again) {
         for (std::size_t i = kSideColumns; i < kSideColumns + kFaceColumns; ++i)
             out.pressed_mm[i] =
-                std::min(out.pressed_mm[i], static_cast<float>(kGreatestShare) * out.bone_mm[i]);
+                std::min(out.pressed_mm[i], static_cast<float>(kMaxShare) * out.bone_mm[i]);
     } else if (out.excess_mm > 0) {
         for (float& pressed : out.pressed_mm) pressed -= static_cast<float>(out.excess_mm);
     }
     out.any_touch = false;
     for (int i = 0; i < kColumns; ++i) {
-        const auto at = static_cast<std::size_t>(i);
         const bool under = i >= kSideColumns && i < kSideColumns + kFaceColumns;
-        out.touching[at] = under && out.pressed_mm[at] > 0;
-        out.any_touch = out.any_touch || out.touching[at];
+        out.touching[i] = under && out.pressed_mm[i] > 0;
+        out.any_touch = out.any_touch || out.touching[i];
     }
     measure_edges(face, out);
 }

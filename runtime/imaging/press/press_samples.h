@@ -1,18 +1,73 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What lies under a face: where each column's resting skin is, how deep it is pressed, and the
-// stiffness below it.
+// What the press field needs to know about a body: the tissue at a point at rest and how it yields;
+// and the samples of it under a face: where each column's resting skin is, how deep it is pressed,
+// and the stiffness below it. Points are in the frame `probe` (x along the face, y across it, z
+// into the body; origin in the middle of the face): the look-up takes care of the pose.
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <span>
 
+#include "formats/base/geometry.h"
+#include "runtime/imaging/core/simd_target.h"
 #include "runtime/imaging/press/press_face.h"
-#include "runtime/imaging/press/press_rows.h"
-#include "runtime/imaging/press/press_scene.h"
-#include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime::press {
 
+struct PressTissue {
+    float stiffness_kpa = 8;
+    bool outside = false;   // air around the body
+    bool drains = false;    // a lumen that closes
+    bool rigid = false;     // bone
+    bool membrane = false;  // skin: carries tension along itself
+};
+
+inline constexpr int kMaxPressTissues = 256;
+
+struct PressLine {
+    Point3 from;
+    Vector3 direction;  // unit
+};
+
+// Looks up the tissues at the same depths along some lines: from + depth * direction. Called some
+// ten times per frame, with at most kMaxPressLines lines. Neither allocates nor throws; `tissue`
+// has # depths x # lines places, the lines of a depth side by side.
+inline constexpr int kMaxPressLines = 64;
+struct TissueLookup {
+    const void* context = nullptr;
+    void (*along)(const void* context,
+                  std::span<const PressLine> lines,
+                  std::span<const float> depth_mm,
+                  std::uint8_t* tissue) = nullptr;
+    // Null: the skin is where the tissue changes. Otherwise this moves depths at which the tissue
+    // changes to where the skin runs, by at most two voxels; NaN: a line that has none.
+    void (*refine_skin)(const void* context,
+                        std::span<const PressLine> lines,
+                        std::span<double> depth_mm) = nullptr;
+};
+
+struct PressScene {
+    std::span<const PressTissue> tissues;  // [0] is the outside
+    TissueLookup lookup;
+};
+
+// A look-up from anything that can be called with a point and returns the index of a tissue. It
+// refers to `at`, which must outlive it.
+template <class At>
+TissueLookup lookup_of(const At& at) {
+    return {&at, [](const void* context, std::span<const PressLine> lines,
+                    std::span<const float> depth_mm, std::uint8_t* tissue) {
+                const At& tissue_at = *static_cast<const At*>(context);
+                for (const float depth : depth_mm)
+                    for (const PressLine& line : lines)
+                        *tissue++ = static_cast<std::uint8_t>(
+                            tissue_at(line.from + static_cast<double>(depth) * line.direction));
+            }};
+}
+
+// What lies under a face.
 struct PressSamples {
     std::array<float, kColumns> pressed_mm{};  // face beyond the skin; negative: a gap
     std::array<bool, kColumns> touching{};     // pressed_mm > 0, under the face
@@ -27,25 +82,24 @@ struct PressSamples {
     Plane<kRows> lateral_kpa;             // stiffness along the skin
     std::array<bool, kFineRows> lumen{};  // some column drains there
 
-    std::array<std::uint8_t, static_cast<std::size_t>(kFineRows) * kColumns>
-        tissue[4]{};  // looked up
+    std::array<std::uint8_t, kFineRows * kColumns> tissue[4]{};  // as looked up
 
-    // The probe was stopped by bone: everything is relative to a face drawn back by this along z.
+    // Bone stopped the probe: everything is relative to a face that is drawn back this far along z.
     double excess_mm = 0;
     bool out_of_reach = false;  // more than 30 mm inside: the skin is taken to be there
     bool any_touch = false;
 };
 
-// Skin and stiffness under `face` at its pose; beams: of the face. The mean of a cell is over two
-// places side by side in the plane (weight 1/2) and one each at 1.5 times half the face's height in
-// front of and behind it (1/4); places outside the body count as the tissue in the plane beside
-// them. A cell of which a share d is a draining lumen yields as one to a share of 1 - (1 - d)^2:
-// the wall follows its lumen.
+// Finds skin and stiffness under `face` at its pose; beams: those of the face. The mean of a cell
+// is over two places side by side in the plane (weight 1/2) and one each at 1.5 times half the
+// face's height in front of and behind it (1/4); places outside the body count as the tissue in
+// the plane beside them. A cell with a share d of draining lumen yields like a lumen to a share of
+// 1 - (1 - d)^2, because the wall follows its lumen.
 //
-// Hard cases: nobody there (no touch); bone (the face is drawn back until no column is pressed by
-// more than 0.7 of its depth to bone); a face deep inside (30 mm at most); air pockets, which yield
-// as gas does. Cost: 32 look-ups where nothing is touched; about 18,000 where something is, 3,000
-// of them at most for the skin, and 10,000 more where bone stops a curved face.
+// Hard cases: no body there (no touch); bone (the face is drawn back until no column is pressed by
+// more than 0.7 of its depth to bone); a face deep inside (at most 30 mm count); air pockets, which
+// yield as gas does. Cost: 32 look-ups where nothing is touched; about 18,000 where something is,
+// at most 3,000 of them for the skin, and 10,000 more where bone stops a curved face.
 void sample_tissue(SimdTarget simd,
                    const PressScene& scene,
                    const PressFace& face,

@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "press_table.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-// After them: included again for each instruction set.
+// This comes after Highway's: it is included again for each instruction set.
 #include "runtime/imaging/press/press_law-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -17,9 +18,115 @@ namespace sonocase::runtime::press::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using Lanes = hn::CappedTag<float, 16>;
+using Each = std::array<float, kColumns>;
 
-constexpr float kMostSqueezed = 0.95f;
-// Parts of the rows that are all equally high.
+constexpr int kNewtonSteps = 3;
+
+// Stretch of part j of the columns from i on, how fast it falls as the stresses grow by a factor,
+// and the stretch of the lumen in it.
+template <class V>
+struct PartLanes {
+    V l, slope, lumen;
+};
+template <class D, class V>
+HWY_INLINE PartLanes<V> part_stretch(
+    D d, const PressSamples& s, const PressElastic& e, int j, int i, V factor) {
+    const auto strain = hn::Mul(hn::LoadU(d, e.stress_kpa.row(j / kParts) + i),
+                                hn::LoadU(d, e.compliance.row(j) + i));
+    const auto stress = hn::Mul(strain, factor);
+    auto part = tissue_stretch(d, stress);
+    part.slope = hn::Mul(part.slope, strain);
+    if (!s.lumen[j]) return {part.l, part.slope, part.l};
+    const auto gain = hn::Set(d, static_cast<float>(kLumenGain));
+    const auto growth = hn::Set(d, static_cast<float>(kLumenGrowth));
+    // Only pressed lumens get more: one in tension stays as it is.
+    const auto more = hn::Mul(stress, hn::Add(gain, hn::Mul(growth, stress)));
+    const auto steeper = hn::Mul(strain, hn::Add(gain, hn::Mul(hn::Add(growth, growth), stress)));
+    const auto pressed = hn::Gt(stress, hn::Zero(d));
+    const auto lumen = lumen_stretch(d, hn::IfThenElse(pressed, more, stress));
+    const auto share = hn::LoadU(d, s.drains.row(j) + i);
+    const auto closed = closing(d, lumen.l);
+    return {
+        mix(d, part.l, closed, share),
+        mix(d, part.slope, hn::Mul(lumen.slope, hn::IfThenElse(pressed, steeper, strain)), share),
+        closed};
+}
+
+// Newton's steps for the factor of each column; 1 where the face does not touch.
+template <class D>
+void find_factors(
+    D d, const PressSamples& s, const PressElastic& e, const Each& touching, Each& factor) {
+    const auto fifth = hn::Set(d, 0.2f), five = hn::Set(d, 5.0f), tiny = hn::Set(d, 1e-9f);
+    factor.fill(1);
+    for (int step = 0; step < kNewtonSteps; ++step)
+        for_columns(d, [&](int i) HWY_ATTR {
+            const auto f = hn::LoadU(d, factor.data() + i);
+            auto pressed = hn::Zero(d), slope = hn::Zero(d);
+            const auto bone = hn::LoadU(d, s.bone_mm.data() + i);
+            for (int j = 0; j < kFineRows; ++j) {
+                const auto edge = hn::Set(d, static_cast<float>(kFineEdge[j]));
+                const auto height = hn::IfThenElseZero(
+                    hn::Lt(edge, bone), hn::Set(d, static_cast<float>(fine_height(j))));
+                const auto part = part_stretch(d, s, e, j, i, f);
+                pressed = hn::Add(pressed, hn::Mul(height, hn::Sub(hn::Set(d, 1.0f), part.l)));
+                slope = hn::Add(slope, hn::Mul(height, part.slope));
+            }
+            const auto missing = hn::Sub(hn::LoadU(d, s.pressed_mm.data() + i), pressed);
+            const auto next = hn::Add(f, hn::Div(missing, hn::Max(slope, tiny)));
+            const auto held = hn::Min(hn::Max(next, hn::Mul(fifth, f)), hn::Mul(five, f));
+            const auto moves = hn::And(hn::Gt(hn::LoadU(d, touching.data() + i), hn::Zero(d)),
+                                       hn::Gt(slope, tiny));
+            hn::StoreU(hn::IfThenElse(moves, held, f), d, factor.data() + i);
+        });
+}
+
+void stretch(const PressSamples& s, const PressElastic& e, PressColumns& out) {
+    const Lanes d;
+    const auto one = hn::Set(d, 1.0f);
+    Each touching{}, length{}, scale{};
+    for (std::size_t i = 0; i < kColumns; ++i) touching[i] = s.touching[i] ? 1.0f : 0.0f;
+    find_factors(d, s, e, touching, out.factor);
+    for (int j = 0; j < kFineRows; ++j) {
+        const auto edge = hn::Set(d, static_cast<float>(kFineEdge[j]));
+        const auto height = hn::Set(d, static_cast<float>(fine_height(j)));
+        for_columns(d, [&](int i) HWY_ATTR {
+            const auto soft = hn::Lt(edge, hn::LoadU(d, s.bone_mm.data() + i));
+            const auto part = part_stretch(d, s, e, j, i, hn::LoadU(d, out.factor.data() + i));
+            hn::StoreU(hn::IfThenElse(soft, part.l, one), d, out.stretch.row(j) + i);
+            if (s.lumen[j]) hn::StoreU(part.lumen, d, out.lumen.row(j) + i);
+            hn::StoreU(hn::Add(hn::LoadU(d, length.data() + i),
+                               hn::IfThenElseZero(soft, hn::Mul(part.l, height))),
+                       d, length.data() + i);
+        });
+    }
+    for (std::size_t i = 0; i < kColumns; ++i)
+        scale[i] = s.touching[i] ? (s.bone_mm[i] - s.pressed_mm[i]) / length[i] : 1.0f;
+    for_columns(d, [&](int i) HWY_ATTR {
+        // Bone, or the last row, stays where it is.
+        hn::StoreU(hn::Sub(hn::Set(d, static_cast<float>(kFineEdge[kFineRows])),
+                           hn::LoadU(d, s.pressed_mm.data() + i)),
+                   d, out.pressed_mm.row(kFineRows) + i);
+    });
+    for (int j = kFineRows - 1; j >= 0; --j) {
+        const auto edge = hn::Set(d, static_cast<float>(kFineEdge[j]));
+        const auto height = hn::Set(d, static_cast<float>(fine_height(j)));
+        for_columns(d, [&](int i) HWY_ATTR {
+            const auto soft = hn::Lt(edge, hn::LoadU(d, s.bone_mm.data() + i));
+            auto l = hn::LoadU(d, out.stretch.row(j) + i);
+            l = hn::IfThenElse(soft, hn::Mul(l, hn::LoadU(d, scale.data() + i)), l);
+            hn::StoreU(l, d, out.stretch.row(j) + i);
+            if (s.lumen[j])
+                hn::StoreU(
+                    hn::Mul(hn::LoadU(d, out.lumen.row(j) + i), hn::LoadU(d, scale.data() + i)), d,
+                    out.lumen.row(j) + i);
+            hn::StoreU(hn::Sub(hn::LoadU(d, out.pressed_mm.row(j + 1) + i), hn::Mul(l, height)), d,
+                       out.pressed_mm.row(j) + i);
+        });
+    }
+}
+
+constexpr float kMaxSqueezed = 0.95f;
+// Parts of the rows that are equally high.
 constexpr int kEvenParts = 30 * kParts;
 static_assert(kFineEdge[kEvenParts] == kEvenParts * kFineEdge[1]);
 
@@ -28,12 +135,12 @@ inline float rows_near(int n) {
     return n == 0 || n == kBulgeRows - 1 ? kBulgeEvery / 2 + 1 : kBulgeEvery;
 }
 
-// Rest depth from the face at every node, and what is squeezed there.
+// Finds the rest depth from the face at every node, and what is squeezed there.
 void invert(const PressSamples& s, const PressColumns& columns, PressTable& t) {
     const Lanes d;
     const hn::RebindToSigned<Lanes> di;
     const auto one = hn::Set(d, 1.0f), zero = hn::Zero(d);
-    const auto most = hn::Set(d, kMostSqueezed);
+    const auto limit = hn::Set(d, kMaxSqueezed);
     const auto even = hn::Set(d, static_cast<float>(kFineEdge[1]));
     bool lumens = false;
     for (const bool lumen : s.lumen) lumens = lumens || lumen;
@@ -41,7 +148,7 @@ void invert(const PressSamples& s, const PressColumns& columns, PressTable& t) {
     for (std::size_t j = 0; j < edges.size(); ++j) edges[j] = static_cast<float>(kFineEdge[j]);
     t.bulge_mm.values.fill(0);
     for (int m = 0; m < kTableRows; ++m) {
-        const auto r = hn::Set(d, static_cast<float>(m * kTableStep_mm));
+        const auto r = hn::Set(d, static_cast<float>(m * kTableStepMm));
         const int near = (m + kBulgeEvery / 2) / kBulgeEvery;
         const auto weight = hn::Set(d, 1 / rows_near(near));
         std::int32_t* parts = t.part.data() + m * kStride;
@@ -53,7 +160,7 @@ void invert(const PressSamples& s, const PressColumns& columns, PressTable& t) {
             const auto above = hn::GatherIndex(d, columns.pressed_mm.row(0), place);
             const auto below = hn::GatherIndex(d, columns.pressed_mm.row(1), place);
             const auto l = hn::GatherIndex(d, columns.stretch.row(0), place);
-            // Most parts are of the even rows, whose edges need no look-up; both ways are exact.
+            // Most parts belong to the even rows, whose edges need no look-up; both ways are exact.
             auto edge = hn::Mul(hn::ConvertTo(d, part), even);
             auto next = hn::Add(edge, even);
             if (!hn::AllTrue(di, hn::Lt(part, hn::Set(di, kEvenParts)))) {
@@ -68,7 +175,7 @@ void invert(const PressSamples& s, const PressColumns& columns, PressTable& t) {
             hn::StoreU(hn::Sub(rest, hn::LoadU(d, s.pressed_mm.data() + i)), d,
                        t.rest_mm.row(m) + i);
             const auto body = hn::And(hn::Ge(within, zero), hn::Le(past, zero));
-            const auto squeezed = hn::Min(hn::Max(hn::Sub(one, l), zero), most);
+            const auto squeezed = hn::Min(hn::Max(hn::Sub(one, l), zero), limit);
             auto e = hn::IfThenElseZero(body, hn::Mul(squeezed, weight));
             if (lumens) e = hn::Mul(e, hn::Sub(one, hn::GatherIndex(d, s.drains.row(0), place)));
             float* bulge = t.bulge_mm.row(near) + i;
@@ -80,14 +187,14 @@ void invert(const PressSamples& s, const PressColumns& columns, PressTable& t) {
 // Solves (1 - length^2 d_rr) e' = e down every column, in place; no flow over the ends.
 void smooth_down(Plane<kBulgeRows>& e) {
     const Lanes d;
-    constexpr double kStep_mm = kBulgeEvery * kTableStep_mm;
-    constexpr float k = static_cast<float>(kBulgeAxial_mm * kBulgeAxial_mm / (kStep_mm * kStep_mm));
+    constexpr double kStepMm = kBulgeEvery * kTableStepMm;
+    constexpr float k = static_cast<float>(kBulgeAxialMm * kBulgeAxialMm / (kStepMm * kStepMm));
     std::array<float, kBulgeRows> carry{};
     float before = 0;
     for (int m = 0; m < kBulgeRows; ++m) {
         const bool end = m == 0 || m == kBulgeRows - 1;
         const float pivot = 1 / (1 + (end ? k : 2 * k) - (m == 0 ? 0 : k * before));
-        before = carry[static_cast<std::size_t>(m)] = k * pivot;
+        before = carry[m] = k * pivot;
         const auto p = hn::Set(d, pivot), coupling = hn::Set(d, m == 0 ? 0.0f : k);
         for_columns(d, [&](int i) HWY_ATTR {
             const auto above = hn::LoadU(d, e.row(std::max(m - 1, 0)) + i);
@@ -96,7 +203,7 @@ void smooth_down(Plane<kBulgeRows>& e) {
         });
     }
     for (int m = kBulgeRows - 2; m >= 0; --m) {
-        const auto c = hn::Set(d, carry[static_cast<std::size_t>(m)]);
+        const auto c = hn::Set(d, carry[m]);
         for_columns(d, [&](int i) HWY_ATTR {
             hn::StoreU(
                 hn::Add(hn::LoadU(d, e.row(m) + i), hn::Mul(c, hn::LoadU(d, e.row(m + 1) + i))), d,
@@ -105,19 +212,19 @@ void smooth_down(Plane<kBulgeRows>& e) {
     }
 }
 
-// Least of dR/dr over the table.
-float least_rise(const Plane<kTableRows>& rest) {
+// Minimum of dR/dr over the table.
+float min_rise(const Plane<kTableRows>& rest) {
     const Lanes d;
-    auto least = hn::Set(d, 1e9f);
+    auto lowest = hn::Set(d, 1e9f);
     for (int m = 0; m + 1 < kTableRows; ++m)
         for_columns(d, [&](int i) HWY_ATTR {
-            least = hn::Min(
-                least, hn::Sub(hn::LoadU(d, rest.row(m + 1) + i), hn::LoadU(d, rest.row(m) + i)));
+            lowest = hn::Min(
+                lowest, hn::Sub(hn::LoadU(d, rest.row(m + 1) + i), hn::LoadU(d, rest.row(m) + i)));
         });
     std::array<float, 16> each{};
     each.fill(1e9f);
-    hn::StoreU(least, d, each.data());
-    return *std::min_element(each.begin(), each.end()) / static_cast<float>(kTableStep_mm);
+    hn::StoreU(lowest, d, each.data());
+    return *std::min_element(each.begin(), each.end()) / static_cast<float>(kTableStepMm);
 }
 
 }  // namespace sonocase::runtime::press::HWY_NAMESPACE
@@ -126,39 +233,41 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace sonocase::runtime::press {
 
+HWY_EXPORT(stretch);
 HWY_EXPORT(invert);
 HWY_EXPORT(smooth_down);
-HWY_EXPORT(least_rise);
+HWY_EXPORT(min_rise);
 
 namespace {
 
-// The last part of a row that begins at or above each node. Each part is written where it begins,
-// later ones over earlier ones; the nodes between take what is above them, in invert().
+// Marks at the nodes the last part that begins at or above them. Each part is written where it
+// begins, later ones over earlier ones; invert() fills in the nodes between from those above.
 void mark_parts(const PressColumns& columns, PressTable& t) {
     t.part.fill(0);
-    constexpr float kInverse = static_cast<float>(1 / kTableStep_mm);
+    constexpr float kInverse = static_cast<float>(1 / kTableStepMm);
     for (int j = 1; j < kFineRows; ++j) {
         const float* edge = columns.pressed_mm.row(j);
         for (int i = 0; i < kColumns; ++i) {
             // The first node at or below the edge; edges above the face belong to the first node.
             const int m = std::max(0, static_cast<int>(edge[i] * kInverse + 0.99999f));
-            if (m < kTableRows) t.part[static_cast<std::size_t>(m * kStride + i)] = j;
+            if (m < kTableRows) t.part[m * kStride + i] = j;
         }
     }
 }
 
-// From what is squeezed to the sideways shift, row by row: v_x = e' - (1 - length^2 d_xx)^-1 e',
+// Turns what is squeezed into the sideways shift, row by row: v_x = e' - (1 - length^2 d_xx)^-1 e',
 // summed from the left. Both ends stay where they are.
 void sum_sideways(const PressFace& face, Plane<kBulgeRows>& e) {
     const double width = column_width_mm(face);
-    const double k = kBulgeLateral_mm * kBulgeLateral_mm / (width * width);
+    const double k = kBulgeLateralMm * kBulgeLateralMm / (width * width);
     std::array<double, kColumns> pivot{}, carry{};
     for (std::size_t i = 0; i < kColumns; ++i) {
         const bool end = i == 0 || i == kColumns - 1;
         pivot[i] = 1 / (1 + (end ? k : 2 * k) - (i == 0 ? 0 : k * carry[i - 1]));
         carry[i] = k * pivot[i];
     }
-    // Some rows at a time: each is one long chain of additions, and a processor works on several.
+    // Several rows at a time: each is one long chain of additions, and a processor can overlap
+    // them.
     constexpr int kTogether = 7;
     static_assert(kBulgeRows % kTogether == 0);
     using Numbers = std::array<double, kTogether>;
@@ -182,16 +291,36 @@ void sum_sideways(const PressFace& face, Plane<kBulgeRows>& e) {
     }
 }
 
-// Least of dx/dX.
-float least_spread(const PressFace& face, const Plane<kBulgeRows>& bulge) {
-    float most = 0;
+// Minimum of dx/dX.
+float min_spread(const PressFace& face, const Plane<kBulgeRows>& bulge) {
+    float steepest = 0;
     for (int n = 0; n < kBulgeRows; ++n)
         for (int i = 0; i + 1 < kColumns; ++i)
-            most = std::max(most, bulge.row(n)[i + 1] - bulge.row(n)[i]);
-    return 1 - most / static_cast<float>(column_width_mm(face));
+            steepest = std::max(steepest, bulge.row(n)[i + 1] - bulge.row(n)[i]);
+    return 1 - steepest / static_cast<float>(column_width_mm(face));
 }
 
 }  // namespace
+
+void stretch_columns(SimdTarget simd,
+                     const PressSamples& samples,
+                     const PressFace& face,
+                     const PressElastic& elastic,
+                     PressColumns& out) {
+    HWY_DISPATCH_TABLE(stretch)[simd.index](samples, elastic, out);
+    double newtons = 0;
+    for (int i = 0; i < kColumns; ++i) {
+        if (!samples.touching[i]) continue;
+        const auto over_width = [&](int k) {
+            return field_width_mm(face.half_height_mm, row_middle(k)) *
+                   static_cast<double>(elastic.stress_kpa.row(k)[i]);
+        };
+        newtons += static_cast<double>(out.factor[i]) *
+                   ((1 - kSkinShare) * over_width(kBelowSkinRow) + kSkinShare * over_width(0));
+    }
+    const double root_pi = 1.7724538509055159;
+    out.force_n = std::max(0.0, 1e-3 * root_pi * column_width_mm(face) * newtons);
+}
 
 void build_table(SimdTarget simd,
                  const PressSamples& samples,
@@ -202,8 +331,8 @@ void build_table(SimdTarget simd,
     HWY_DISPATCH_TABLE(invert)[simd.index](samples, columns, out);
     HWY_DISPATCH_TABLE(smooth_down)[simd.index](out.bulge_mm);
     sum_sideways(face, out.bulge_mm);
-    const float rise = HWY_DISPATCH_TABLE(least_rise)[simd.index](out.rest_mm);
-    out.least_determinant = rise * least_spread(face, out.bulge_mm);
+    const float rise = HWY_DISPATCH_TABLE(min_rise)[simd.index](out.rest_mm);
+    out.min_determinant = rise * min_spread(face, out.bulge_mm);
 }
 
 }  // namespace sonocase::runtime::press

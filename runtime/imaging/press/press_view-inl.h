@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What yields along a stretch of a block of beams, in lanes. Included once per instruction set.
+// The shifts of pressed tissue along a stretch of a block of beams, in lanes. Included once per
+// instruction set.
 #include <hwy/highway.h>
 
+#include "runtime/imaging/core/simd_math-inl.h"
 #include "runtime/imaging/press/press_view.h"
-#include "runtime/imaging/simd/simd_math-inl.h"
 
 #if defined(SONOCASE_PRESS_VIEW_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SONOCASE_PRESS_VIEW_INL_H
@@ -18,17 +19,17 @@ namespace sonocase::runtime::press::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 namespace math = sonocase::runtime::HWY_NAMESPACE;
 
-// The numbers of a vector of beams, between those of the nodes around them.
+// Interpolates the numbers of a vector of beams between those of the nodes around them.
 template <class D>
 class BetweenNodes {
   public:
-    // line: of the picture, the vector's first.
+    // line: the vector's first beam in the picture.
     HWY_INLINE BetweenNodes(D d, const PressView& v, int line)
         : d_(d),
           first_(line >> v.every_log2),
           node_(hn::SetTableIndices(d, v.node_of + (line & (v.every - 1)))),
           part_(hn::LoadU(d, v.part_of + (line & (v.every - 1)))) {}
-    // row: of a plane of nodes
+    // row: a row of a plane of nodes
     HWY_INLINE hn::Vec<D> operator()(const float* row) const {
         const auto before = hn::TableLookupLanes(hn::LoadU(d_, row + first_), node_),
                    after = hn::TableLookupLanes(hn::LoadU(d_, row + first_ + 1), node_);
@@ -42,7 +43,7 @@ class BetweenNodes {
     hn::Vec<D> part_;
 };
 
-// PlaneShift::tilt of sample k; line: the vector's first.
+// PlaneShift::tilt of sample k; line: the vector's first beam.
 template <class D>
 HWY_INLINE hn::Vec<D> press_tilt(D d, const PressView& v, int line, int k) {
     if (!v.pressed) return hn::Zero(d);
@@ -68,8 +69,8 @@ HWY_INLINE PlaceLanes<D> places_of_beams(D d, const PressView& v, int line, int 
             r};
 }
 
-// needle_shift.h, in lanes: zone_shift at rho^2 and z of the needle's frame, as factors of the axis
-// and of what points away from it.
+// zone_shift() of needle_shift.h in lanes, at rho^2 and z of the needle's frame, as factors of the
+// axis and of the vector away from it.
 template <class D, class V>
 HWY_INLINE void add_zone(
     D d, const NeedleZone& zone, double strength_mm, V rho2, V z, V& along_axis, V& outward) {
@@ -116,7 +117,7 @@ HWY_INLINE bool needle_lanes(D d, const PressView& v, const PlaceLanes<D>& p, V&
     const auto qx = hn::Sub(p.x, number(needle.tip.x)), qz = hn::Sub(p.z, number(needle.tip.z));
     const auto qy = number(-needle.tip.y);
     const auto distance2 = hn::Add(hn::Add(hn::Mul(qx, qx), hn::Mul(qz, qz)), hn::Mul(qy, qy));
-    const auto near = hn::Lt(distance2, number(kDentReach_mm * kDentReach_mm));
+    const auto near = hn::Lt(distance2, number(kDentReachMm * kDentReachMm));
     if (hn::AllFalse(d, near)) return false;
     const auto ax = number(needle.axis.x), ay = number(needle.axis.y), az = number(needle.axis.z);
     const auto z = hn::Add(hn::Add(hn::Mul(qx, ax), hn::Mul(qz, az)), hn::Mul(qy, ay));
@@ -148,8 +149,9 @@ HWY_INLINE ShiftLanes<D> shift_lanes(D d, const PressView& v, const PlaceLanes<D
     const ScanGeometry& g = *v.geometry;
     const auto number = [&](double x) HWY_ATTR { return hn::Set(d, static_cast<float>(x)); };
     if (!v.columns_follow_beams) {
-        // Beams from one point: near it a small shift is a large turn. Sine and cosine of the turn
-        // to the beam of the place at rest; its arc sine is good to 0.01 within 45 degrees.
+        // Beams come from one point, near which a small shift is a large turn. Sine and cosine of
+        // the turn to the beam of the place at rest; the arc sine is good to 0.01 within 45
+        // degrees.
         const auto on = hn::Sub(p.r, by);
         const auto length =
             hn::Max(hn::Sqrt(hn::Add(hn::Mul(on, on), hn::Mul(aside, aside))), number(1e-3));
@@ -175,7 +177,7 @@ HWY_INLINE ShiftLanes<D> shift_lanes(D d, const PressView& v, const PlaceLanes<D
             hn::Sub(at_place(d, v, v.side, node, sample), aside)};
 }
 
-// 1 where places, shifted like this, lie in a lumen that is shut.
+// 1 where places, shifted like this, lie in a collapsed lumen.
 template <class D>
 HWY_INLINE hn::Vec<hn::RebindToSigned<D>> closed_lanes(D d,
                                                        const PressView& v,
@@ -183,7 +185,7 @@ HWY_INLINE hn::Vec<hn::RebindToSigned<D>> closed_lanes(D d,
                                                        const ShiftLanes<D>& shift) {
     const hn::RebindToSigned<D> di;
     const PressClosed& nodes = v.field->closed_nodes();
-    constexpr float kPerStep = static_cast<float>(1 / kTableStep_mm);
+    constexpr float kPerStep = static_cast<float>(1 / kTableStepMm);
     const auto half = hn::Set(d, 0.5f), per_mm = hn::Set(d, v.columns_per_mm);
     const auto nearest = [&](auto x, float last) HWY_ATTR {
         return hn::ConvertTo(di, hn::Add(hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, last)), half));
@@ -206,17 +208,17 @@ HWY_INLINE hn::Vec<hn::RebindToSigned<D>> closed_lanes(D d,
         hn::Add(hn::Mul(m, hn::Set(di, kStride)), nearest(column, kColumns - 1.0f)));
 }
 
-// False where no sample of a row can lie in a lumen that is shut.
+// False where no sample of a row can lie in a collapsed lumen.
 inline bool may_close(const PressView& v, int k) {
     if (!v.columns_follow_beams) return true;
-    constexpr float kPerStep = static_cast<float>(1 / kTableStep_mm);
+    constexpr float kPerStep = static_cast<float>(1 / kTableStepMm);
     const float r = (static_cast<float>(k) + 0.5f) * v.step_mm;
     const int m = static_cast<int>(std::min(r * kPerStep, kTableRows - 1.0f) + 0.5f);
-    return v.field->closed_nodes().row[static_cast<std::size_t>(m)];
+    return v.field->closed_nodes().row[m];
 }
 
-// Fills the lanes of one vector of beams. first_beam: of the block; beam: the vector's first within
-// it; [first, first + rows): samples, all active.
+// Fills the lanes of one vector of beams. first_beam: first beam of the block; beam: the vector's
+// first within it; [first, first + rows): samples, all active.
 template <class D>
 HWY_NOINLINE void press_chunk(
     D d, const PressView& v, int first_beam, int beam, int first, int rows, PressChunk& out) {

@@ -10,7 +10,7 @@
 #define HWY_TARGET_INCLUDE "press_view.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-// After them: included again for each instruction set.
+// This comes after Highway's: it is included again for each instruction set.
 #include "runtime/imaging/press/press_law-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -19,8 +19,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Lanes = hn::CappedTag<float, 16>;
 
-// Calls f(d, at) for groups of nodes, at the first of each: the same nodes on every instruction
-// set. The last node stands alone beyond a whole number of blocks of beams, as a rule.
+// Calls f(d, at) for groups of nodes, at the first of each; all instruction sets take the same
+// nodes. As a rule the last node stands alone beyond a whole number of blocks of beams.
 template <class F>
 HWY_INLINE void for_nodes(const PressView& v, F&& f) {
     const Lanes d;
@@ -52,32 +52,31 @@ void spread_bulge(const PressTable& table, PressView& v) {
 void spread(const PressTable& table, PressView& v) {
     spread_bulge(table, v);
     const Lanes columns;
-    constexpr float kPerStep = static_cast<float>(1 / kTableStep_mm);
-    constexpr float kPerRow = static_cast<float>(1 / (kBulgeEvery * kTableStep_mm));
+    constexpr float kPerStep = static_cast<float>(1 / kTableStepMm);
+    constexpr float kPerRow = static_cast<float>(1 / (kBulgeEvery * kTableStepMm));
     alignas(64) float deeper_row[kColumns];  // depth at rest less depth shown
-    const auto least = hn::Set(columns, 0.5f * kStill_mm);
+    const auto still_mm = hn::Set(columns, 0.5f * kStillMm);
     std::array<std::uint8_t, kBulgeRows + 1> bulge_moves{};
     for (int n = 0; n < kBulgeRows; ++n)
         for_columns(columns, [&](int i) HWY_ATTR {
             const auto shift = hn::Abs(hn::LoadU(columns, table.bulge_mm.row(n) + i));
-            if (!hn::AllTrue(columns, hn::Lt(shift, least)))
-                bulge_moves[static_cast<std::size_t>(n)] = 1;
+            if (!hn::AllTrue(columns, hn::Lt(shift, still_mm))) bulge_moves[n] = 1;
         });
     v.moving = 0;
     for (int k = 0; k < v.capacity; ++k) {
         const float r = (static_cast<float>(k) + 0.5f) * v.step_mm;
-        const float share = v.share[static_cast<std::size_t>(k)];
+        const float share = v.share[k];
         const float table_row = std::min(r * kPerStep, kTableRows - 1.0f);
         const int m = std::min(static_cast<int>(table_row), kTableRows - 2);
         const auto below_row = hn::Set(columns, table_row - static_cast<float>(m));
-        const auto depth = hn::Set(columns, table_row * static_cast<float>(kTableStep_mm));
+        const auto depth = hn::Set(columns, table_row * static_cast<float>(kTableStepMm));
         bool still = true;  // every column
         for_columns(columns, [&](int i) HWY_ATTR {
             const auto upper = hn::LoadU(columns, table.rest_mm.row(m) + i);
             const auto lower = hn::LoadU(columns, table.rest_mm.row(m + 1) + i);
             const auto rest = mix(columns, upper, lower, below_row);
             const auto deeper = hn::Mul(hn::Set(columns, share), hn::Sub(rest, depth));
-            still = still && hn::AllTrue(columns, hn::Lt(hn::Abs(deeper), least));
+            still = still && hn::AllTrue(columns, hn::Lt(hn::Abs(deeper), still_mm));
             hn::Store(deeper, columns, deeper_row + i);
         });
         const float bulge_row = std::min(r * kPerRow, kBulgeRows - 1.0f);
@@ -86,8 +85,7 @@ void spread(const PressTable& table, PressView& v) {
         const float* bulge = v.bulge.data() + static_cast<std::ptrdiff_t>(n) * v.node_stride;
         const std::ptrdiff_t to = static_cast<std::ptrdiff_t>(k) * v.node_stride;
         bool moves = false;
-        if (still && bulge_moves[static_cast<std::size_t>(n)] == 0 &&
-            bulge_moves[static_cast<std::size_t>(n + 1)] == 0) {
+        if (still && bulge_moves[n] == 0 && bulge_moves[n + 1] == 0) {
             for (auto* plane : {&v.along, &v.side, &v.tilt})
                 std::fill_n(plane->begin() + to, v.node_stride, 0.0f);
             continue;
@@ -109,7 +107,7 @@ void spread(const PressTable& table, PressView& v) {
                        right = hn::GatherIndex(d, deeper_row + 1, i);
             const auto slope = hn::Sub(right, left);
             const auto deeper = hn::Add(left, hn::Mul(hn::Sub(column, hn::ConvertTo(d, i)), slope));
-            // For a turn of the beam by a small angle, as in plane_shift().
+            // The beam turns by a small angle, as in plane_shift().
             const auto grow =
                 hn::Add(hn::Set(d, 1.0f), hn::Mul(hn::Add(hn::Set(d, r), deeper), per_radius));
             const auto side = hn::Mul(sideways, grow);
@@ -117,7 +115,7 @@ void spread(const PressTable& table, PressView& v) {
                 hn::Mul(hn::Mul(hn::Mul(hn::Set(d, 0.5f), sideways), per_radius), side);
             const auto shift = hn::Sub(deeper, turned);
             const auto farther = hn::Max(hn::Abs(shift), hn::Abs(side));
-            moves = moves || !hn::AllTrue(d, hn::Lt(farther, hn::Set(d, kStill_mm)));
+            moves = moves || !hn::AllTrue(d, hn::Lt(farther, hn::Set(d, kStillMm)));
             hn::StoreU(shift, d, v.along.data() + to + at);
             hn::StoreU(side, d, v.side.data() + to + at);
             hn::StoreU(hn::Mul(slope, per_mm), d, v.tilt.data() + to + at);
@@ -141,14 +139,14 @@ PressView::PressView(const ScanGeometry& g, const PressFace& face)
       step_mm(static_cast<float>(g.step_mm)),
       columns_per_mm(static_cast<float>(1 / column_width_mm(face))),
       per_radius_mm(g.fan && g.radius_mm > 0 ? static_cast<float>(1 / g.radius_mm) : 0.0f) {
-    constexpr double kDeepest_mm = (kTableRows - 1) * kTableStep_mm + kTableFade_mm;
-    constexpr double kMostColumns = 0.7;  // between nodes
-    const int deepest = static_cast<int>(kDeepest_mm / g.step_mm + 0.5) + 1;
+    constexpr double kDeepestMm = (kTableRows - 1) * kTableStepMm + kTableFadeMm;
+    constexpr double kMaxColumns = 0.7;  // distance of nodes
+    const int deepest = static_cast<int>(kDeepestMm / g.step_mm + 0.5) + 1;
     capacity = active = std::min(g.samples, (deepest + kPressRows - 1) / kPressRows * kPressRows);
     const double beams_per_column = g.scanlines / static_cast<double>(kFaceColumns);
     for (const int each : {2, 4})
-        if (each <= kMostColumns * beams_per_column) every = each;
-    every_log2 = every / 2;  // of 1, 2 and 4
+        if (each <= kMaxColumns * beams_per_column) every = each;
+    every_log2 = every / 2;  // true for 1, 2 and 4
     for (int n = 0; n < kPressBeams + 4; ++n) {
         node_of[n] = n / every;
         part_of[n] = static_cast<float>(n % every) / static_cast<float>(every);
@@ -156,10 +154,8 @@ PressView::PressView(const ScanGeometry& g, const PressFace& face)
     // The last node lies beyond the last beam, and a vector may be read from it.
     nodes = lines / every + 1;
     node_stride = (nodes + 15) / 16 * 16;
-    const auto stride = static_cast<std::size_t>(node_stride);
-    for (auto* plane : {&along, &side, &tilt})
-        plane->assign(static_cast<std::size_t>(capacity) * stride + 32, 0.0f);
-    bulge.assign(kBulgeRows * stride, 0.0f);
+    for (auto* plane : {&along, &side, &tilt}) plane->assign(capacity * node_stride + 32, 0.0f);
+    bulge.assign(kBulgeRows * node_stride, 0.0f);
     for (int node = 0; node < node_stride; ++node) {
         const double lateral = columns_follow_beams ? lateral_of_line(g, node * every) : 0;
         const double at = lateral / column_width_mm(face) + (kColumns - 1) / 2.0;
@@ -167,8 +163,8 @@ PressView::PressView(const ScanGeometry& g, const PressFace& face)
     }
     for (int k = 0; k < capacity; ++k) {
         const double beyond =
-            std::max(0.0, (k + 0.5) * g.step_mm - (kTableRows - 1) * kTableStep_mm);
-        share.push_back(static_cast<float>(std::max(0.0, 1 - beyond / kTableFade_mm)));
+            std::max(0.0, (k + 0.5) * g.step_mm - (kTableRows - 1) * kTableStepMm);
+        share.push_back(static_cast<float>(std::max(0.0, 1 - beyond / kTableFadeMm)));
     }
     if (columns_follow_beams) {
         const double width = column_width_mm(face);
@@ -188,14 +184,14 @@ PressView::PressView(const ScanGeometry& g, const PressFace& face)
 
 PressView::Shift PressView::at(int line, int k) const {
     if (field->needle().moves()) {
-        const auto l = static_cast<std::size_t>(std::min(line, geometry->scanlines - 1));
+        const int l = std::min(line, geometry->scanlines - 1);
         const ScanGeometry::Beam& beam = geometry->beams[l];
         const double r = (k + 0.5) * geometry->step_mm;
         const Point3 p{beam.origin.x + r * beam.direction.x, 0,
                        beam.origin.z + r * beam.direction.z};
         const Vector3 away = p - field->needle().tip;
-        if (dot(away, away) < kDentReach_mm * kDentReach_mm) {
-            const PlaneShift s = plane_shift(*field, *geometry, beam, static_cast<double>(l), r);
+        if (dot(away, away) < kDentReachMm * kDentReachMm) {
+            const PlaneShift s = plane_shift(*field, *geometry, beam, l, r);
             return {static_cast<float>(s.along_mm), static_cast<float>(s.side_mm)};
         }
     }
@@ -207,7 +203,7 @@ bool PressView::dents(int line, int first, int rows) const {
     if (!needle.moves()) return false;
     // The stretch lies in a circle about its middle.
     const auto corner = [&](int l, int k) {
-        const auto at = static_cast<std::size_t>(std::min(l, lines - 1));
+        const int at = std::min(l, lines - 1);
         const double r = (k + 0.5) * static_cast<double>(step_mm);
         const auto number = [&](int row) { return static_cast<double>(beam_row(row)[at]); };
         return Point3{number(0) + r * number(2), 0, number(1) + r * number(3)};
@@ -217,10 +213,11 @@ bool PressView::dents(int line, int first, int rows) const {
     for (const int l : {line, line + kPressBeams - 1})
         for (const int k : {first, first + rows - 1})
             reach = std::max(reach, norm(corner(l, k) - middle));
-    return norm(needle.tip - middle) < reach + kDentReach_mm;
+    return norm(needle.tip - middle) < reach + kDentReachMm;
 }
 
-// Phased arrays, whose beams cross columns: every other sample of the nodes, one by one.
+// Fills the planes for phased arrays, whose beams cross columns: every other sample of the nodes is
+// worked out one by one.
 void PressView::cross_columns() {
     const ScanGeometry& g = *geometry;
     moving = capacity;
@@ -232,7 +229,7 @@ void PressView::cross_columns() {
             const PlanePoint p{o.x + r * d.x, o.z + r * d.z};
             const RestPlace rest = field->pressed_in_plane({p.x, p.z});
             const double x = rest.lateral_mm - p.x, z = rest.depth_mm - p.z;
-            const auto to = static_cast<std::size_t>(k * node_stride + node);
+            const int to = k * node_stride + node;
             along[to] = static_cast<float>(x * d.x + z * d.z);
             side[to] = static_cast<float>(x * n.x + z * n.z);
         }
@@ -243,8 +240,8 @@ void PressView::cross_columns() {
         const std::ptrdiff_t next = k + 1 < capacity ? 2 * node_stride : 0;
         const std::ptrdiff_t to = static_cast<std::ptrdiff_t>(k) * node_stride;
         for (int node = 0; node < nodes; ++node) {
-            along[static_cast<std::size_t>(to + node)] = 0.5f * (a[node] + a[next + node]);
-            side[static_cast<std::size_t>(to + node)] = 0.5f * (s[node] + s[next + node]);
+            along[to + node] = 0.5f * (a[node] + a[next + node]);
+            side[to + node] = 0.5f * (s[node] + s[next + node]);
         }
     }
 }
@@ -261,7 +258,7 @@ void PressView::show(SimdTarget simd, const PressField& now) {
             cross_columns();
         }
     }
-    // A needle may dent any of them.
+    // A needle may dent any sample.
     const int needed = now.needle().moves() ? capacity : moving;
     active = std::min(capacity, (needed + kPressRows - 1) / kPressRows * kPressRows);
 }

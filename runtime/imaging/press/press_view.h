@@ -3,31 +3,31 @@
 // The press field laid out for the beams and samples of one level of a renderer, and a stretch of a
 // block of beams as the kernels read it.
 //
-// What the probe does is worked out for every few beams (nodes, at most 0.7 columns of the field
-// apart) at every sample, and is linear between nodes: straight rows without look-ups. What a
-// needle does is narrower, and is added sample by sample near its tip.
+// The probe's shift is worked out for every few beams (nodes, at most 0.7 columns of the field
+// apart) at every sample, and is linear between nodes, so that rows need no look-ups. A needle's
+// shift is narrower, and is added sample by sample near its tip.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "runtime/imaging/press/press_plane.h"
-#include "runtime/imaging/simd/simd_target.h"
+#include "runtime/imaging/core/simd_target.h"
+#include "runtime/imaging/press/press_field.h"
 
 namespace sonocase::runtime::press {
 
-inline constexpr int kPressBeams = 16;      // of a block
-inline constexpr int kPressRows = 32;       // of a stretch
-inline constexpr float kStill_mm = 0.002f;  // less is drawn as if nothing moved
+inline constexpr int kPressBeams = 16;     // beams of a block
+inline constexpr int kPressRows = 32;      // rows of a stretch
+inline constexpr float kStillMm = 0.002f;  // a smaller shift is drawn as none
 
 // Filled by press_chunk() (press_view-inl.h): rows of kPressBeams numbers for samples from `first`.
 struct PressChunk {
     int first = 0;
-    bool any_closed = false;  // else `closed` is not filled in
+    bool any_closed = false;  // if not, `closed` is not filled in
     // mm, see PlaneShift; the first row is the sample's before `first`, or its own where first is 0
     alignas(64) float along[(kPressRows + 1) * kPressBeams];
     alignas(64) float side[kPressRows * kPressBeams];
-    alignas(64) std::int32_t closed[kPressRows * kPressBeams];  // 1: in a lumen that is shut
+    alignas(64) std::int32_t closed[kPressRows * kPressBeams];  // 1: in a collapsed lumen
     const float* along_row(int k) const { return along + (k - first + 1) * kPressBeams; }
     const float* side_row(int k) const { return side + (k - first) * kPressBeams; }
 };
@@ -37,8 +37,8 @@ class PressView {
     // Allocates; the rest of the class does not.
     PressView(const ScanGeometry& geometry, const PressFace& face);
 
-    // Takes over what moves; the field must stay as it is until the frame is drawn. Cost: 25 us;
-    // nothing where the field is still as it was.
+    // Takes over the field, which must stay unchanged until the frame is drawn. Cost: 25 us;
+    // nothing where the field has not changed.
     void show(SimdTarget simd, const PressField& field);
 
     // False where nothing moves in the samples [first, first + rows) of the beams [line, line +
@@ -48,7 +48,7 @@ class PressView {
     }
     bool dents(int line, int first, int rows) const;
 
-    // The shift of one sample, k < active; line <= lines. by_probe: what the probe alone does.
+    // The shift of one sample, k < active; line <= lines. by_probe: the probe's shift alone.
     struct Shift {
         float along_mm = 0, side_mm = 0;
     };
@@ -68,14 +68,14 @@ class PressView {
     bool pressed = false;  // by the probe
     bool columns_follow_beams = true;
     int lines = 0;
-    // Samples of the planes: below them nothing ever moves. A whole number of stretches.
+    // Samples of the planes, a whole number of stretches; nothing ever moves below them.
     int capacity = 0;
-    int active = 0;  // of the field shown: samples from here on move by less than kStill_mm
+    int active = 0;  // samples from here on move by less than kStillMm in the field shown
     float step_mm = 1, columns_per_mm = 1, per_radius_mm = 0;
     int every = 1, every_log2 = 0;         // beams between nodes: 1, 2 or 4
-    int node_stride = 0;                   // of the three planes below
+    int node_stride = 0;                   // row length of the three planes below
     std::vector<float> along, side, tilt;  // # capacity x node_stride, mm; tilt: see PlaneShift
-    // Of beam n beyond a node: the node before it, and its part of the way to the next.
+    // For beam n beyond a node: the node before it, and its part of the way to the next.
     alignas(64) std::int32_t node_of[kPressBeams + 4];
     alignas(64) float part_of[kPressBeams + 4];
     std::vector<float> beams;                      // origin x, z, direction x, z: # lines each
@@ -84,12 +84,12 @@ class PressView {
         return beams.data() + static_cast<std::ptrdiff_t>(number) * lines;
     }
 
-    // Of the nodes, for laying out.
+    // Per node or row, for filling in the planes.
     std::vector<float> column;  // # node_stride
     std::vector<float> bulge;   // # kBulgeRows x node_stride: sideways shift to rest, mm
     std::vector<float> share;   // # capacity: 1, fading below the table
-    int nodes = 0;              // in use; the others of node_stride pad the rows
-    int moving = 0;             // samples that the probe moves by kStill_mm or more, from the face
+    int nodes = 0;              // nodes in use; the others of node_stride pad the rows
+    int moving = 0;  // samples, from the face on, that the probe moves by kStillMm or more
 
   private:
     void cross_columns();

@@ -17,7 +17,7 @@ ProbePress::ProbePress(const CaseView& bundle, const Exercise& exercise, SimdTar
 void ProbePress::press(const Rigid& pose) {
     if (solved_ && pose == pose_) return;
     Rigid touching = pose;
-    touching.translation = touching.translation - kTouch_mm * pose.rotation.column(2);
+    touching.translation = touching.translation - kTouchMm * pose.rotation.column(2);
     field_.press(simd_, body_.scene(touching), options_);
     pose_ = pose;
     from_mannequin_ = inverse(pose);
@@ -28,7 +28,7 @@ Rigid ProbePress::at(const Rigid& mannequin_from_probe, double press_mm) {
     Rigid pose = mannequin_from_probe;
     const Vector3 inwards = pose.rotation.column(2);
     if (press_mm > 0)
-        pose.translation = pose.translation + std::min(press_mm, kMostPress_mm) * inwards;
+        pose.translation = pose.translation + std::min(press_mm, kMaxPressMm) * inwards;
     press(pose);
     pose.translation = pose.translation - field_.state().excess_mm * inwards;
     return pose;
@@ -36,13 +36,20 @@ Rigid ProbePress::at(const Rigid& mannequin_from_probe, double press_mm) {
 
 PressReport ProbePress::report() const {
     const PressState& s = field_.state();
-    return {true,         s.vein_open, s.pressed,     s.force_n, s.pressed ? s.pressure_kpa : 0,
-            s.deepest_mm, s.excess_mm, s.out_of_reach};
+    return {.solved = true,
+            .vein_open = s.vein_open,
+            .pressed = s.pressed,
+            .force_n = s.force_n,
+            .pressure_kpa = s.pressed ? s.pressure_kpa : 0,
+            .deepest_mm = s.deepest_mm,
+            .excess_mm = s.excess_mm,
+            .out_of_reach = s.out_of_reach};
 }
 
 double ProbePress::press_mm_for(const Rigid& pose, double force_n, double start_mm) {
-    // Force grows about as the square of depth: between bounds, by the roots of their forces.
-    double low = 0, high = kMostPress_mm, at = std::clamp(start_mm, 0.5, 30.0);
+    // Force grows about as the square of depth, so the depth is interpolated between bounds by the
+    // roots of their forces.
+    double low = 0, high = kMaxPressMm, at = std::clamp(start_mm, 0.5, 30.0);
     double low_n = 0, high_n = -1;
     for (int step = 0; step < 6; ++step) {
         Rigid deeper = pose;
@@ -53,7 +60,7 @@ double ProbePress::press_mm_for(const Rigid& pose, double force_n, double start_
         (n < force_n ? low : high) = at;
         (n < force_n ? low_n : high_n) = n;
         if (high_n < 0) {
-            at = std::min(2 * at + 1, 0.5 * (at + kMostPress_mm));
+            at = std::min(2 * at + 1, 0.5 * (at + kMaxPressMm));
         } else {
             const double a = std::sqrt(low_n), b = std::sqrt(high_n), f = std::sqrt(force_n);
             at = low + (high - low) * std::clamp((f - a) / std::max(b - a, 1e-9), 0.05, 0.95);
@@ -66,11 +73,11 @@ Point3 ProbePress::at_rest(Point3 now) const {
     return field_.state().pressed ? pose_ * field_.pull_back(from_mannequin_ * now) : now;
 }
 
-Point3 ProbePress::now_at(Point3 rest) const {
+Point3 ProbePress::current_position(Point3 rest) const {
     return field_.state().pressed ? pose_ * field_.push_forward(from_mannequin_ * rest) : rest;
 }
 
-bool ProbePress::shut(Point3 rest) const {
+bool ProbePress::closed(Point3 rest) const {
     return field_.state().pressed && field_.closed(from_mannequin_ * rest);
 }
 

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A probe on the body of a bundle, frame after frame: where bone holds it, and what yields.
+// A probe on the body of a bundle, frame after frame: where bone holds it, and how tissue yields.
 #pragma once
 
 #include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
-#include "runtime/imaging/frame/frame_input.h"
+#include "runtime/imaging/core/frame_input.h"
 #include "runtime/imaging/press/press_bundle.h"
-#include "runtime/imaging/press/press_plane.h"
+#include "runtime/imaging/press/press_field.h"
 
 namespace sonocase::runtime::press {
 
-// A face this far below the resting skin touches it and does not press yet: gel, and a voxel, since
-// a bundle knows its skin no better, and poses are snapped to it. The field is solved for a face
-// this much further out and holds for the face itself, so that pressing begins without a step.
-inline constexpr double kTouch_mm = 1;
-inline constexpr double kMostPress_mm = 40;  // by which a probe is pressed beyond its pose
+// A face this far below the resting skin touches it and does not press yet: there is gel, and a
+// bundle knows its skin, to which poses are snapped, only to a voxel. The field is solved for a
+// face this much further out and holds for the face itself, so that pressing begins without a
+// step.
+inline constexpr double kTouchMm = 1;
+inline constexpr double kMaxPressMm = 40;  // furthest that a probe is pressed beyond its pose
 
 class ProbePress {
   public:
@@ -23,22 +24,23 @@ class ProbePress {
     ProbePress(const CaseView& bundle, const Exercise& exercise, SimdTarget simd);
 
     // Presses a face at the pose, press_mm deeper; a pose that stays is solved once. Returns the
-    // pose at which bone holds it: that of the picture.
+    // pose at which bone holds the face, which is that of the picture.
     Rigid at(const Rigid& mannequin_from_probe, double press_mm);
     // A needle that moves tissue, in the frame of the pose that at() returned.
     void dent(const NeedleDent& needle) { field_.dent(needle); }
 
-    // The depth of pressing, [0, kMostPress_mm], at which the force is force_n: at most six
-    // solutions, from start_mm on.
+    // The depth of pressing, [0, kMaxPressMm], at which the force is force_n. Solves at most six
+    // times, beginning at start_mm.
     double press_mm_for(const Rigid& mannequin_from_probe, double force_n, double start_mm);
 
     // Null: nothing moves.
     const PressField* moving() const { return field_.moves() ? &field_ : nullptr; }
     PressReport report() const;
-    // By the probe alone, in the frame `mannequin`. Without pressing: the place itself, and false.
+    // As moved by the probe alone, in the frame `mannequin`. Without pressing: the place itself,
+    // and false.
     Point3 at_rest(Point3 now) const;
-    Point3 now_at(Point3 rest) const;
-    bool shut(Point3 rest) const;
+    Point3 current_position(Point3 rest) const;
+    bool closed(Point3 rest) const;
 
   private:
     void press(const Rigid& pose);

@@ -7,15 +7,62 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <string>
+#include <vector>
 
-#include "runtime/imaging/formation/effect_choice.h"
+#include "formats/scoring/anatomy.h"
+#include "formats/scoring/sight.h"
+#include "runtime/imaging/core/effect_table.h"
 #include "runtime/imaging/paper/paper_formation.h"
 #include "runtime/imaging/physical/physical_formation.h"
-#include "runtime/imaging/press/closed_label.h"
-#include "runtime/imaging/truth/truth_state.h"
+#include "runtime/imaging/press/press_bundle.h"
+#include "runtime/imaging/press/probe_press.h"
+#include "runtime/imaging/truth/plane_look_up.h"
+#include "runtime/imaging/truth/truth_inputs.h"
 
 namespace sonocase::runtime {
+
+struct TruthRenderer::Impl {
+    Impl(CaseView view,
+         const Exercise& e,
+         const RenderOptions& o,
+         const MovingEffects& moves,
+         SimdTarget s);
+
+    // Presses the tissue as the frame does, and changes the input's pose to that of the picture.
+    void press(FrameInput& input, bool wants_entry);
+    // Loads the blocks that the plane meets, for bundles that are unpacked on demand.
+    void ensure_loaded(const Rigid& pose);
+    void lay_out_rows(const Rigid& pose);
+    void planes_of(const FrameInput& input, const TruthPlanes& planes);
+    void shadows(const TruthPlanes& planes);
+    void count_shadowed(const TruthPlanes& planes);
+    void facts(const FrameInput& input);
+    void needle_facts(const FrameInput& input);
+    void target_facts();
+    bool needle_shape_of(const FrameInput& input, NeedleShape& shape) const;
+
+    CaseView bundle;
+    Exercise exercise;
+    RenderOptions options;
+    SimdTarget simd;
+    ScanGeometry geometry;
+    TruthPixels pixels;
+    PlaneLookUp look_up;
+    CaseAnatomy anatomy;
+    NeedleModel needle;
+    TruthVoxels voxels;
+    std::unique_ptr<press::ProbePress> probe;  // null: effect deformation is off
+    std::unique_ptr<press::PressView> press_view;
+    std::vector<std::int32_t> closed_label;
+    const press::PressField* pressed = nullptr;  // in this frame; null: nothing moves
+    std::vector<float> first_hard_mm;
+    TruthFrameRows rows{};
+    TruthFrameRows region_rows{};  // for the fine region
+    FrameTruth truth;
+};
+
 namespace {
 
 constexpr float kNoHardMm = 1e9f;
@@ -24,12 +71,13 @@ bool valid_pose(const Rigid& t) {
     return is_finite(t) && orthonormality_error(t.rotation) < 1e-3 && determinant(t.rotation) > 0;
 }
 
-// Beyond this many voxels single precision no longer tells neighbours apart, and nothing is there.
+// False where the plane lies so many voxels away that single precision cannot tell neighbours
+// apart; there is no body there.
 bool near_enough(const Grid& grid, const Rigid& pose, const ScanGeometry& g) {
     const double reach_mm = 2 * (g.radius_mm + g.depth_mm + g.half_extent);
     const Point3 v = grid.voxel_from_point(Point3{} + pose.translation);
-    const double most = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-    return most + reach_mm / grid.spacing_mm.x < 1e5;
+    const double farthest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    return farthest + reach_mm / grid.spacing_mm.x < 1e5;
 }
 
 }  // namespace
@@ -50,7 +98,7 @@ TruthRenderer::Impl::Impl(CaseView view,
       anatomy(view, moves.breathing ? e.breathing : BreathingMotion{}),
       needle(e.needle),
       voxels(*view, o.model == ImageModel::physical),
-      first_hard_mm(static_cast<std::size_t>(pixels.rays())) {
+      first_hard_mm(pixels.rays()) {
     const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
     if (!(needle.slab_mm > 0)) needle.slab_mm = info.needle_slab_mm(exercise);
     truth.targets.resize(exercise.targets.size());
@@ -79,8 +127,8 @@ void TruthRenderer::Impl::press(FrameInput& input, bool wants_entry) {
 void TruthRenderer::Impl::ensure_loaded(const Rigid& pose) {
     VoxelBlocks* blocks = bundle.blocks();
     if (blocks == nullptr) return;
-    // A ball around each block, in the probe's frame: how far from the plane, and from the middle
-    // of what the probe sees.
+    // Tests a ball around each block, in the probe's frame: its distance from the plane, and from
+    // the middle of what the probe sees.
     const Rigid probe_from_mannequin = inverse(pose);
     const double voxel_mm = bundle->grid.spacing_mm.x;
     const double half = 0.5 * (blocks->edge() - 1);
@@ -90,7 +138,7 @@ void TruthRenderer::Impl::ensure_loaded(const Rigid& pose) {
     const double across = geometry.fan ? (radius + geometry.depth_mm) : geometry.half_extent;
     const double middle_z = 0.5 * geometry.depth_mm;
     const double seen_mm = std::hypot(across, 0.5 * geometry.depth_mm + radius) +
-                           25 +  // a gap is closed by this at most
+                           25 +  // the largest gap that contact closes
                            (pressed != nullptr ? pressed->farthest_mm() : 0);
     blocks->ensure_loaded([&](Int3 lower) {
         const Point3 centre =
@@ -145,7 +193,7 @@ void TruthRenderer::Impl::shadows(const TruthPlanes& planes) {
         if (!(first_hard_mm[ray] < kNoHardMm)) continue;
         first = std::min(first, ray);
         end = ray + 1;
-        // The face itself is lit: what lies a pixel behind it is not.
+        // The face itself is lit; what lies a pixel behind it is not.
         first_hard_mm[ray] += static_cast<float>(geometry.mm_per_px);
     }
     if (first >= end) return;
@@ -156,8 +204,7 @@ void TruthRenderer::Impl::shadows(const TruthPlanes& planes) {
         const auto skip = low - run.ray;
         const TruthRun dark{run.row, run.begin + static_cast<int>(skip),
                             static_cast<int>(high - low), low, run.r_mm + skip};
-        truth_shadows(simd, dark, first_hard_mm.data(),
-                      planes.shadowed.data() + at + static_cast<std::size_t>(skip));
+        truth_shadows(simd, dark, first_hard_mm.data(), planes.shadowed.data() + at + skip);
     });
     if (!planes.labels.empty()) count_shadowed(planes);
 }
@@ -170,7 +217,7 @@ void TruthRenderer::Impl::count_shadowed(const TruthPlanes& planes) {
         std::memcpy(&dark, planes.shadowed.data() + n, left);
         if (dark == 0) continue;
         std::memcpy(&labels, planes.labels.data() + n, left);
-        if (dark == kEach && labels == kEach * planes.labels[n]) {  // as nearly everywhere
+        if (dark == kEach && labels == kEach * planes.labels[n]) {  // true nearly everywhere
             truth.shadowed_pixels_of_label[planes.labels[n]] += 8;
             continue;
         }
@@ -180,8 +227,7 @@ void TruthRenderer::Impl::count_shadowed(const TruthPlanes& planes) {
 }
 
 void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& planes) {
-    const std::size_t area =
-        static_cast<std::size_t>(geometry.width_px) * static_cast<std::size_t>(geometry.height_px);
+    const std::size_t area = static_cast<std::size_t>(geometry.width_px) * geometry.height_px;
     assert(planes.labels.empty() || planes.labels.size() == area);
     assert(planes.needle.empty() || planes.needle.size() == area);
     assert(planes.shadowed.empty() || planes.shadowed.size() == area);
@@ -219,7 +265,7 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
             needle_plane(geometry, pixels, shape, kTipLengthMm, planes.needle);
     }
     if (input.settings.flip_left_right) {
-        const auto width = static_cast<std::size_t>(geometry.width_px);
+        const std::size_t width = geometry.width_px;
         flip_rows(planes.labels, width);
         flip_rows(planes.needle, width);
         flip_rows(planes.shadowed, width);
@@ -236,13 +282,12 @@ Result<TruthRenderer> TruthRenderer::create(CaseView bundle,
                                             const Exercise& exercise,
                                             const RenderOptions& options) {
     if (bundle->labels.empty()) return Error{"the bundle has no labels", "", "cook it again"};
-    const Result<MovingEffects> moves = moving_effects(options);
-    if (!moves) return moves.error();
+    SONOCASE_TRY(const MovingEffects moves, moving_effects(options));
     SimdTarget simd = available_simd_targets().front();
     for (const SimdTarget& target : available_simd_targets()) {
         if (options.simd == target.name) simd = target;
     }
-    return TruthRenderer(std::make_unique<Impl>(bundle, exercise, options, *moves, simd));
+    return TruthRenderer(std::make_unique<Impl>(bundle, exercise, options, moves, simd));
 }
 
 const FrameTruth& TruthRenderer::render(const FrameInput& frame, const TruthPlanes& planes) {
@@ -275,11 +320,79 @@ PixelTruth TruthRenderer::at(const FrameInput& frame, int column, int row) {
     const double r = (sample + 0.5) * m.geometry.step_mm;
     pixel.rest = m.look_up.rest(p, line, r, gap);
     pixel.label = gap < 0 ? 0 : m.anatomy.label(pixel.rest);
-    if (m.look_up.shut(p, line, r))
-        pixel.label = m.closed_label[static_cast<std::size_t>(pixel.label)];
+    if (m.look_up.closed(p, line, r)) pixel.label = m.closed_label[pixel.label];
     pixel.skin_depth_mm = r + std::max(gap, 0.0) * std::exp(-r / m.look_up.contact_reach_mm()) -
                           m.look_up.entry_at(ray);
     return pixel;
+}
+
+bool TruthRenderer::Impl::needle_shape_of(const FrameInput& input, NeedleShape& shape) const {
+    const Vector3 d = input.needle.direction;
+    const Point3 tip = input.needle.tip;
+    const bool finite = std::isfinite(tip.x) && std::isfinite(tip.y) && std::isfinite(tip.z) &&
+                        std::isfinite(d.x) && std::isfinite(d.y) && std::isfinite(d.z);
+    if (!input.has_needle || !finite || !(norm(d) > 0.5)) return false;
+    const Rigid probe_from_mannequin = inverse(input.mannequin_from_probe);
+    shape = needle_shape(needle, probe_from_mannequin * tip, normalized(probe_from_mannequin * d));
+    return shape.radius_mm > 0 && std::isfinite(shape.slab_mm);
+}
+
+void TruthRenderer::Impl::needle_facts(const FrameInput& input) {
+    NeedleShape shape;
+    truth.has_needle = needle_shape_of(input, shape);
+    truth.tip_in_plane = false;
+    truth.needle_in_image_mm = 0;
+    truth.tip_label = 0;
+    if (!truth.has_needle) return;
+    truth.needle = {input.needle.tip, normalized(input.needle.direction)};
+    if (probe) {
+        const NeedlePose& in = input.needle;
+        const NeedleDent dent = bounded_dent(shape.tip, shape.axis, in.tent_mm, in.drag_mm);
+        truth.needle.tent_mm = dent.tent_mm;
+        truth.needle.drag_mm = dent.drag_mm;
+    }
+    truth.tip_probe = shape.tip;
+    const double half_slab = 0.5 * shape.slab_mm;
+    truth.tip_in_plane =
+        std::abs(shape.tip.y) <= half_slab && in_image(exercise.probe, shape.tip.x, shape.tip.z);
+    truth.needle_in_image_mm = length_in_image(
+        exercise.probe, shape.tip - shape.length_mm * shape.axis, shape.tip, half_slab);
+    const Point3 tip = probe ? probe->at_rest(input.needle.tip) : input.needle.tip;
+    truth.tip_label = anatomy.label(anatomy.at_rest(tip, truth.time_s));
+}
+
+void TruthRenderer::Impl::target_facts() {
+    const Rigid probe_from_mannequin = inverse(truth.mannequin_from_probe);
+    truth.nearest_target = -1;
+    double nearest = INFINITY;
+    for (std::size_t i = 0; i < truth.targets.size(); ++i) {
+        const Target& target = exercise.targets[i];
+        TargetTruth& out = truth.targets[i];
+        out.centre = anatomy.moved(target.centre, truth.time_s);
+        if (probe) out.centre = probe->current_position(out.centre);
+        const Point3 p = probe_from_mannequin * out.centre;
+        out.plane_mm = p.y;
+        const double cut = target.radius_mm * target.radius_mm - p.y * p.y;
+        out.in_image =
+            cut > 0 && distance_to_image(exercise.probe, p.x, p.z) < std::sqrt(std::max(cut, 0.0));
+        out.tip_mm = truth.has_needle ? distance(truth.needle.tip, out.centre)
+                                      : std::numeric_limits<double>::quiet_NaN();
+        if (out.tip_mm < nearest) {
+            nearest = out.tip_mm;
+            truth.nearest_target = static_cast<int>(i);
+        }
+    }
+}
+
+void TruthRenderer::Impl::facts(const FrameInput& input) {
+    truth.posed = true;
+    truth.mannequin_from_probe = input.mannequin_from_probe;
+    truth.time_s = std::isfinite(input.time_s) ? input.time_s : 0;
+    truth.mm2_per_px = geometry.mm_per_px * geometry.mm_per_px;
+    truth.beams = geometry.scanlines;
+    truth.beams_touching = look_up.contact().touching;
+    needle_facts(input);
+    target_facts();
 }
 
 }  // namespace sonocase::runtime

@@ -2,14 +2,14 @@
 
 // The truth beside a picture: what each pixel shows, and what the frame as a whole shows.
 //
-//     auto truth = TruthRenderer::create(bundle, exercise, options);  // those of the Renderer
+//     auto truth = TruthRenderer::create(bundle, exercise, options);  // the same as the Renderer's
 //     truth->render(input, planes);                    // the FrameInput of the frame
 //
 // A pixel shows the tissue at its place in the middle of the scan plane, after the contact that
 // closes a gap to the skin, the probe and the needle that press it and the breathing that moves it
-// (where these effects are on), and on the side of the surface in its voxel where that place lies.
-// What makes the picture uneven is left out: the beam's thickness, the roughness of surfaces, the
-// point spread.
+// (where these effects are on), on the side of the surface where that place lies in its voxel. The
+// beam's thickness, the roughness of surfaces and the point spread, which blur the picture, are
+// left out.
 //
 // Part of the portable core: no files, no clock, no thread; render() neither throws nor allocates.
 // Source and limits: docs/python.md.
@@ -22,20 +22,20 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "runtime/imaging/renderer.h"
 
 namespace sonocase::runtime {
 
-// Planes of the caller, # width * height each, row by row from the top; an empty span is left out
-// and costs nothing. Pixels outside the scanned area hold 0, and NaN in skin_depth_mm.
+// The caller's planes, # width * height each, row by row from the top; an empty one is left out and
+// costs nothing. Pixels outside the scanned area hold 0, and NaN in skin_depth_mm.
 struct TruthPlanes {
     std::span<std::uint8_t> labels;    // palette index; 0: outside the body
     std::span<std::uint8_t> needle;    // 0: none, 1: shaft, 2: tip (its last kTipLengthMm)
     std::span<std::uint8_t> shadowed;  // 1: the beam met bone or gas before (`paper`: casts_shadow)
-    // From where the beam enters the body to the tissue that the pixel shows, along the beam.
-    // Negative in the gel before it. NaN where the beam finds no body within 30 mm.
+    // Distance along the beam from where it enters the body to the tissue that the pixel shows.
+    // Negative in the gel before the body. NaN where the beam finds no body within 30 mm.
     std::span<float> skin_depth_mm;
 };
 inline constexpr double kTipLengthMm = 2;
@@ -44,27 +44,27 @@ struct TargetTruth {
     Point3 centre;          // where it is now, frame `mannequin`
     double plane_mm = 0;    // distance of the centre to the scan plane, along the probe's y
     bool in_image = false;  // its ball meets the plane inside the scanned area
-    double tip_mm = 0;      // from the needle's tip to the centre; NaN without a needle
+    double tip_mm = 0;      // distance of the needle's tip to the centre; NaN without a needle
 };
 
 struct FrameTruth {
     bool posed = false;          // false: the pose was not rigid, and everything else is empty
-    Rigid mannequin_from_probe;  // pressed, and where bone holds it
+    Rigid mannequin_from_probe;  // as pressed, and where bone holds it
     PressReport press;
     double time_s = 0;
     std::array<std::uint32_t, 256> pixels_of_label{};           // in the scanned area
     std::array<std::uint32_t, 256> shadowed_pixels_of_label{};  // 0 without the plane `shadowed`
     double mm2_per_px = 0;
-    int beams_touching = 0, beams = 0;  // model `physical`, effect contact on; else all touch
+    int beams_touching = 0, beams = 0;  // all touch unless model `physical` has effect contact on
 
     bool has_needle = false;
     NeedlePose needle;          // as drawn; its dent is 0 without effect deformation
     Point3 tip_probe;           // frame `probe`: y is the distance to the scan plane
     bool tip_in_plane = false;  // inside the slab that the needle shows in, and the scanned area
     double needle_in_image_mm = 0;     // length of the shaft that the slab shows
-    int tip_label = 0;                 // what the tip is in; 0: outside the body
-    std::vector<TargetTruth> targets;  // # of the exercise's
-    int nearest_target = -1;           // to the tip; -1: no needle or no target
+    int tip_label = 0;                 // tissue that the tip is in; 0: outside the body
+    std::vector<TargetTruth> targets;  // one per target of the exercise
+    int nearest_target = -1;           // nearest to the tip; -1: no needle or no target
 };
 
 // One pixel: what it shows and where that lies.
@@ -90,8 +90,8 @@ class TruthRenderer {
     // A pose that is not rigid leaves the planes as they were. Cost: docs/python.md.
     const FrameTruth& render(const FrameInput& input, const TruthPlanes& planes);
 
-    // The same for one pixel, literally: in double precision, one step after the other. column,
-    // row: of the picture as it is shown, also where it is flipped. Cost: microseconds.
+    // The same for one pixel, in double precision and one step after the other. column, row: in the
+    // picture as it is shown, also where it is flipped. Cost: microseconds.
     PixelTruth at(const FrameInput& input, int column, int row);
 
   private:

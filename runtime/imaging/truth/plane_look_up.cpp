@@ -5,13 +5,43 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "formats/volume/brick_volume.h"
+#include "runtime/imaging/core/effect_table.h"
+#include "runtime/imaging/core/image_formation.h"
+#include "runtime/imaging/paper/paper_formation.h"
 #include "runtime/imaging/physical/model/physical_frame.h"
 #include "runtime/imaging/physical/model/physical_model.h"
-#include "runtime/imaging/press/skin_plane.h"
+#include "runtime/imaging/physical/physical_formation.h"
+#include "runtime/imaging/press/press_bundle.h"
 
 namespace sonocase::runtime {
+
+Result<MovingEffects> moving_effects(const RenderOptions& options) {
+    MovingEffects moves;
+    const bool physical = options.model == ImageModel::physical;
+    const auto own = physical ? kPhysicalModel.effects : kPaperModel.effects;
+    const auto others = physical ? kPaperModel.effects : kPhysicalModel.effects;
+    SONOCASE_TRY(const EffectChoice choice, choose_effects(options.effects, own, others));
+    for (std::size_t i = 0; i < own.size(); ++i) {
+        const std::string name = own[i];
+        if (name == "deformation") moves.deformation = choice.on[i];
+        if (!physical) continue;
+        if (name == "contact") moves.contact = choice.on[i];
+        if (name == "breathing") moves.breathing = choice.on[i];
+        if (name == "pulsation") moves.pulsation = choice.on[i];
+    }
+    return moves;
+}
+
+ScanGeometry shown_geometry(const Exercise& exercise, const RenderOptions& o) {
+    const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
+    return make_scan_geometry(
+        exercise.probe, o.scanlines > 0 ? o.scanlines : info.scanlines(exercise, o),
+        o.samples > 0 ? o.samples : info.samples(exercise, o), o.width_px, o.height_px);
+}
+
 namespace {
 
 constexpr double kEntryReachMm = 30, kEntryStepMm = 1, kEntryErrorMm = 0.01;
@@ -67,7 +97,7 @@ PlaneLookUp::PlaneLookUp(CaseView bundle,
     const auto count = static_cast<std::size_t>(rays);
     contact_.gap_mm.assign(count, 0.0f);
     contact_.entry_mm.assign(count, 0.0f);
-    raw_.assign(static_cast<std::size_t>(geometry.scanlines), 0.0f);
+    raw_.assign(geometry.scanlines, 0.0f);
     gaps_ = raw_;
 }
 
@@ -86,8 +116,7 @@ void PlaneLookUp::begin(const Rigid& mannequin_from_probe,
 }
 
 void PlaneLookUp::find_gaps_of_rays() {
-    // The frame's own gaps, by the function that finds them for the picture; it reads no more of
-    // the scene than this.
+    // The function that finds the picture's gaps reads no more of the scene than this.
     PhysicalScene scene;
     scene.bundle = &*bundle_;
     scene.grid = bundle_->grid;
@@ -130,7 +159,7 @@ double PlaneLookUp::entry_along(PlanePoint origin, PlanePoint direction) const {
     const auto body = [&](double s) {
         return body_at(pose_ * Point3{origin.x + s * direction.x, 0, origin.z + s * direction.z});
     };
-    // Outwards from a face inside the body, inwards from one outside.
+    // The search goes outwards where the face lies inside the body, and inwards otherwise.
     const bool inside = body(0);
     const double step = inside ? -kEntryStepMm : kEntryStepMm;
     double in = 0, out = 0;
@@ -160,11 +189,10 @@ void PlaneLookUp::find_entries() {
         const double after = entry_of(std::min(last, rays - 1));
         for (int i = ray; i < last; ++i) {
             const double part = static_cast<double>(i - ray) / (last - ray);
-            contact_.entry_mm[static_cast<std::size_t>(i)] =
-                static_cast<float>(before + part * (after - before));
+            contact_.entry_mm[i] = static_cast<float>(before + part * (after - before));
         }
         if (last >= rays - 1) {
-            contact_.entry_mm[static_cast<std::size_t>(rays - 1)] = static_cast<float>(after);
+            contact_.entry_mm[rays - 1] = static_cast<float>(after);
             break;
         }
         ray = last;
@@ -233,7 +261,7 @@ Point3 PlaneLookUp::without_breathing(Point3 now) const {
     return now - field_.weight(now) * motion_.breathing_mm;
 }
 
-bool PlaneLookUp::shut(PlanePoint p, double line, double r_mm) const {
+bool PlaneLookUp::closed(PlanePoint p, double line, double r_mm) const {
     if (press_ == nullptr) return false;
     return press_->closed_in_plane(
         press::follows_columns(geometry_)

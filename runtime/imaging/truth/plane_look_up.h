@@ -1,30 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Where a point of the scan plane is looked up in the anatomy: the one place that knows how
-// contact, pressing and breathing move tissue from where it lies at rest to where the picture shows
-// it.
+// What truth and Doppler modes share with the picture that they accompany: which effects move
+// tissue, how the picture is laid out, and where a point of it is looked up in the anatomy.
 #pragma once
 
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/base/result.h"
+#include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "formats/exercise/motion.h"
-#include "runtime/imaging/press/press_plane.h"
+#include "runtime/imaging/core/render_options.h"
+#include "runtime/imaging/core/scan_geometry.h"
+#include "runtime/imaging/press/press_field.h"
 #include "runtime/imaging/renderer.h"
-#include "runtime/imaging/scan/scan_geometry.h"
 
 namespace sonocase::runtime {
 
-// The beams' meeting with the skin in one frame, one value per ray; rays divide the face evenly,
-// ray i in the middle of its part.
+// Which of an image model's effects move tissue.
+struct MovingEffects {
+    bool contact = false, breathing = false, pulsation = false, deformation = false;
+};
+// Errors: those of choose_effects.
+Result<MovingEffects> moving_effects(const RenderOptions& options);
+
+// The geometry that a renderer of these options draws in.
+ScanGeometry shown_geometry(const Exercise& exercise, const RenderOptions& options);
+
+// Where the beams of one frame meet the skin, one value per ray; rays divide the face evenly, ray i
+// lies in the middle of its part.
 struct RayContact {
     std::vector<float> gap_mm;    // closed by contact; negative: the beam sees air
     std::vector<float> entry_mm;  // along the beam from the face to the skin; NaN: none found
     bool any_gap = false;
-    int touching = 0;  // beams, not rays
+    int touching = 0;  // number of beams (not rays) in contact
 };
 
 // The breathing weight on a lattice of its own, for vector look-ups: the values of BreathingField
@@ -36,6 +47,9 @@ struct BreathingLattice {
     std::vector<float> weight;  // x fastest
 };
 
+// Where a point of the scan plane is looked up in the anatomy: the only place that knows how
+// contact, pressing and breathing move tissue from where it lies at rest to where the picture shows
+// it.
 class PlaneLookUp {
   public:
     PlaneLookUp(CaseView bundle,
@@ -46,8 +60,8 @@ class PlaneLookUp {
                 const ScanGeometry& geometry,
                 int rays);
 
-    // Begins a frame: where the beams touch, and how the tissue stands. press: what yields to probe
-    // and needle, as for the picture; null: nothing does. The pose is where bone holds the face.
+    // Begins a frame: finds where the beams touch and how the tissue has moved. press: the field of
+    // the picture; null: nothing is pressed. The pose is where bone holds the face.
     void begin(const Rigid& mannequin_from_probe,
                double time_s,
                bool wants_entry,
@@ -61,15 +75,15 @@ class PlaneLookUp {
     double contact_reach_mm() const;
 
     // Where the tissue that the plane's point p shows is now, and where it lies at rest. gap_mm:
-    // of its beam.
+    // gap of its beam.
     Point3 shown(PlanePoint p, double gap_mm) const;
-    // line, r_mm: of p.
+    // line, r_mm: beam and depth of p.
     Point3 rest(PlanePoint p, double line, double r_mm, double gap_mm) const;
     // A place less the breathing that carries its tissue.
     Point3 without_breathing(Point3 now) const;
-    // p lies in a lumen that is pressed shut: the picture shows what is around it.
-    bool shut(PlanePoint p, double line, double r_mm) const;
-    // Fraction of the ray of a beam's position across the face.
+    // True if p lies in a collapsed lumen: the picture shows the tissue around it.
+    bool closed(PlanePoint p, double line, double r_mm) const;
+    // The ray, as a fraction, at a beam's position across the face.
     double ray_of(double line) const;
     double gap_at(double ray) const;
     double entry_at(double ray) const;

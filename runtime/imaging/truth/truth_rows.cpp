@@ -4,21 +4,22 @@
 
 #include <algorithm>
 
+#include "formats/volume/boundary_record.h"
+#include "formats/volume/brick_volume.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "truth_rows.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-//
-#include "formats/volume/boundary_record.h"
-#include "formats/volume/brick_volume.h"
+// These come after Highway's: they are included again for each instruction set.
+#include "runtime/imaging/core/simd_math-inl.h"
 #include "runtime/imaging/press/press_view-inl.h"
-#include "runtime/imaging/simd/simd_math-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kMostLanes = 64;  // of any instruction set that the kernels are compiled for
+constexpr int kMaxLanes = 64;  // of any instruction set that the kernels are compiled for
 
 template <class D>
 using IntOf = hn::Vec<hn::RebindToSigned<D>>;
@@ -36,7 +37,7 @@ HWY_INLINE IntOf<D> rays_of(D, const TruthRun& run, int first) {
     return hn::PromoteTo(di, hn::LoadU(d16, run.ray + first));
 }
 
-// Contact: along its beam by gap exp(-r / reach).
+// Contact: moves each point along its beam by gap exp(-r / reach).
 template <class D, class V>
 HWY_INLINE void close_gap(
     D d, const TruthFrameRows& f, const TruthRun& run, int first, V column, V& air, Places<D>& p) {
@@ -62,10 +63,15 @@ HWY_INLINE void close_gap(
     p = {moved(p.x, 0), moved(p.y, 1), moved(p.z, 2)};
 }
 
-// Pressing: back to where the tissue lies at rest. shut: 1 where a lumen is.
+// Pressing: moves each point back to where its tissue lies at rest. closed: 1 in a closed lumen.
 template <class D, class V, class I>
-HWY_NOINLINE void press_back(
-    D d, const TruthFrameRows& f, const TruthRun& run, int first, V column, Places<D>& p, I& shut) {
+HWY_NOINLINE void press_back(D d,
+                             const TruthFrameRows& f,
+                             const TruthRun& run,
+                             int first,
+                             V column,
+                             Places<D>& p,
+                             I& closed) {
     namespace lanes = press::HWY_NAMESPACE;
     const hn::RebindToSigned<D> di;
     const auto r = hn::LoadU(d, run.r_mm + first);
@@ -90,12 +96,13 @@ HWY_NOINLINE void press_back(
                                   hn::Mul(move_z, hn::Set(d, f.beam_z[axis]))));
     };
     p = {moved(p.x, 0), moved(p.y, 1), moved(p.z, 2)};
-    shut = hn::Zero(di);
+    closed = hn::Zero(di);
     if (f.press->pressed && f.press->field->closed_nodes().any)
-        shut = lanes::closed_lanes(d, *f.press, place, shift);
+        closed = lanes::closed_lanes(d, *f.press, place, shift);
 }
 
-// Breathing: back by the shift times the weight, trilinear in its lattice, whose rim holds 0.
+// Breathing: moves each point back by the shift times the weight, trilinear in its lattice, whose
+// rim holds 0.
 template <class D>
 HWY_INLINE void breathe_back(D d, const TruthFrameRows& f, Places<D>& p) {
     const hn::RebindToSigned<D> di;
@@ -132,7 +139,8 @@ HWY_INLINE void breathe_back(D d, const TruthFrameRows& f, Places<D>& p) {
     p.z = hn::Sub(p.z, hn::Mul(sum, hn::Set(d, f.shift_vx[2])));
 }
 
-// On which side of the plane in its voxel each point lies; off: from the voxel's centre.
+// The label on that side of the voxel's surface on which each point lies. off: the point relative
+// to the voxel's centre.
 template <class D, class I>
 HWY_INLINE I side_of_surface(D d, const TruthFrameRows& f, I record, I own, const Places<D>& off) {
     const hn::RebindToSigned<D> di;
@@ -161,7 +169,7 @@ template <class D>
 HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) {
     const hn::RebindToSigned<D> di;
     using I = IntOf<D>;
-    // The nearest voxel; TruthRenderer leaves frames further away than this is exact to none.
+    // The nearest voxel. TruthRenderer draws no frame so far away that this is not exact.
     const hn::RebindToUnsigned<D> du;
     const auto shift = hn::Set(d, kRoundingShift);
     const auto bits = hn::Set(di, kRoundingBits);
@@ -231,7 +239,7 @@ HWY_INLINE IntOf<D> labels_shown(D d, const TruthFrameRows& f, const Places<D>& 
     return hn::IfThenElse(mask, labels_at(d, *f.region, place), label);
 }
 
-// Rays that a hard pixel covers are dark from it on.
+// Makes the rays that a hard pixel covers dark from it on.
 template <class D, class I>
 HWY_INLINE void darken(D,
                        const TruthFrameRows& f,
@@ -243,7 +251,7 @@ HWY_INLINE void darken(D,
                        std::span<float> first_hard_mm) {
     const hn::RebindToSigned<D> di;
     const I hard = hn::GatherIndex(di, f.hard, label);
-    HWY_ALIGN std::int32_t is_hard[kMostLanes];
+    HWY_ALIGN std::int32_t is_hard[kMaxLanes];
     hn::Store(hard, di, is_hard);
     const int rays = static_cast<int>(first_hard_mm.size());
     for (int lane = 0; lane < used; ++lane) {
@@ -252,10 +260,10 @@ HWY_INLINE void darken(D,
         const int ray = run.ray[first + lane];
         const float away =
             f.fan ? std::max(f.radius_mm + r, 1e-3f) / std::max(f.radius_mm, 1e-3f) : 1.0f;
-        // As many to each side as leave none out between two pixels.
+        // So many to each side that no ray between two hard pixels stays bright.
         const int half = std::max(static_cast<int>(0.5f * rays_per_px_at_face / away + 0.499f), 0);
         for (int n = std::max(ray - half, 0); n <= std::min(ray + half, rays - 1); ++n) {
-            float& dark = first_hard_mm[static_cast<std::size_t>(n)];
+            float& dark = first_hard_mm[n];
             dark = std::min(dark, r);
         }
     }
@@ -289,19 +297,19 @@ void labels_of_run(const TruthFrameRows& f,
             const auto column = hn::Add(n, hn::Set(d, static_cast<float>(run.begin)));
             close_gap(d, f, run, first, column, air, p);
         }
-        auto shut = hn::Zero(di);
+        auto closed = hn::Zero(di);
         if (f.press != nullptr) {
             const auto column = hn::Add(n, hn::Set(d, static_cast<float>(run.begin)));
-            press_back(d, f, run, first, column, p, shut);
+            press_back(d, f, run, first, column, p, closed);
         }
         if (f.weight != nullptr) breathe_back(d, f, p);
         auto label = labels_shown(d, f, p);
-        const auto is_shut = hn::Gt(shut, hn::Zero(di));
-        if (!hn::AllFalse(di, is_shut))
-            label = hn::IfThenElse(is_shut, hn::GatherIndex(di, f.closed_label, label), label);
+        const auto is_closed = hn::Gt(closed, hn::Zero(di));
+        if (!hn::AllFalse(di, is_closed))
+            label = hn::IfThenElse(is_closed, hn::GatherIndex(di, f.closed_label, label), label);
         label = hn::IfThenElseZero(hn::RebindMask(di, hn::Ge(air, hn::Zero(d))), label);
         const int used = std::min(lanes, run.count - first);
-        HWY_ALIGN std::uint8_t bytes[kMostLanes];
+        HWY_ALIGN std::uint8_t bytes[kMaxLanes];
         hn::Store(hn::DemoteTo(d8, label), d8, bytes);
         std::copy_n(bytes, used, labels + first);
         // Few labels meet in a vector: each is counted at once.
@@ -328,7 +336,7 @@ void shadows_of_run(const TruthRun& run, const float* first_hard_mm, std::uint8_
     for (int first = 0; first < run.count; first += lanes) {
         const auto dark = hn::GatherIndex(d, first_hard_mm, rays_of(d, run, first));
         const auto behind = hn::Gt(hn::LoadU(d, run.r_mm + first), dark);
-        HWY_ALIGN std::uint8_t bytes[kMostLanes];
+        HWY_ALIGN std::uint8_t bytes[kMaxLanes];
         hn::Store(hn::DemoteTo(d8, hn::IfThenElseZero(hn::RebindMask(di, behind), hn::Set(di, 1))),
                   d8, bytes);
         std::copy_n(bytes, std::min(lanes, run.count - first), shadowed + first);
@@ -353,7 +361,7 @@ void depths_of_run(const TruthFrameRows& f,
         if (first + lanes <= run.count) {
             hn::StoreU(depth, d, depth_mm + first);
         } else {
-            HWY_ALIGN float rest[kMostLanes];
+            HWY_ALIGN float rest[kMaxLanes];
             hn::Store(depth, d, rest);
             std::copy_n(rest, run.count - first, depth_mm + first);
         }

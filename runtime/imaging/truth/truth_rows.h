@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <span>
 
+#include "runtime/imaging/core/simd_target.h"
 #include "runtime/imaging/press/press_view.h"
-#include "runtime/imaging/simd/simd_target.h"
 
 namespace sonocase::runtime {
 
@@ -43,9 +43,9 @@ struct TruthFrameRows {
     bool fan = true;
     float radius_mm = 0, mm_per_px = 0, origin_x_px = 0, origin_y_px = 0;
 
-    // What yields to probe and needle; null: nothing does.
+    // Tissue that moves under probe and needle; null: none does.
     const press::PressView* press = nullptr;
-    const std::int32_t* closed_label = nullptr;  // # labels: shown of a lumen that is shut
+    const std::int32_t* closed_label = nullptr;  // # labels: the label shown where a lumen closed
     float lines_per_ray = 1;
 
     // Breathing; null weight: none.
@@ -62,7 +62,7 @@ struct TruthRun {
 };
 
 // Writes labels, counts them, and lowers first_hard_mm (# rays, or empty) of the rays whose pixels
-// are hard. rays_per_px_at_face: that lie within a pixel's width where the beams leave the probe.
+// are hard. rays_per_px_at_face: rays within a pixel's width where the beams leave the probe.
 void truth_labels(SimdTarget simd,
                   const TruthFrameRows& frame,
                   const TruthRun& run,

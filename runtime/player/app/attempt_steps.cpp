@@ -4,30 +4,40 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <random>
+#include <sstream>
+#include <thread>
 #include <utility>
 
-#include "formats/attempt/difficulty.h"
-#include "formats/attempt/draw_attempt.h"
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "formats/scoring/draw_attempt.h"
 #include "runtime/player/app/case_steps.h"
-#include "runtime/player/app/progress_steps.h"
+#include "runtime/player/app/next_exercise.h"
 #include "runtime/player/app/tracker_steps.h"
 #include "runtime/player/session/clock.h"
 #include "runtime/player/session/frame_server.h"
-#include "runtime/player/session/session_replay.h"
-#include "runtime/player/training/next_exercise.h"
-#include "runtime/player/training/review_page.h"
+#include "runtime/player/session/session_run.h"
+#include "runtime/recording/session_words.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_app {
+
 namespace {
 
-// Draws a new attempt, unless the targets are given: a script aims at those that are written, a
-// replayed recording at its own.
-// exam: as hard as it is written, else as the trainee's last attempts suggest.
-std::uint64_t new_attempt_seed(const App& app, bool exam) {
-    if (app.player.arguments.attempt_seed >= 0)
-        return static_cast<std::uint64_t>(app.player.arguments.attempt_seed);
-    const std::string& spec = app.scan.tracker.spec;
+// The seed of a new attempt. 0, the targets as they are written, for a script that aims at them; a
+// replayed recording brings its own. exam: as hard as it is written, else as hard as the trainee's
+// last attempts suggest.
+std::uint64_t new_attempt_seed(const PlayerState& player,
+                               const CaseState& loaded,
+                               const std::string& spec,
+                               bool exam) {
+    if (player.arguments.attempt_seed >= 0)
+        return static_cast<std::uint64_t>(player.arguments.attempt_seed);
     if (spec.rfind("replay:", 0) == 0) {
         const auto replay = session_replay(spec.substr(7));
         return replay ? attempt_seed(replay->header) : 0;
@@ -37,68 +47,70 @@ std::uint64_t new_attempt_seed(const App& app, bool exam) {
     const std::uint64_t seed = 1 + (std::uint64_t{random()} << 16 ^ random()) % 1000000000;
     if (exam) return seed;
     return seed_with_difficulty(
-        seed, next_difficulty(app.player.history, app.loaded.open->bundle->manifest.case_name,
-                              app.loaded.exercise().name));
+        seed, next_difficulty(player.progress.history, loaded.open->bundle->manifest.case_name,
+                              loaded.exercise().name));
 }
 
-// Targets and start of a new attempt; the mouse begins there without a needle.
-void draw_new_attempt(App& app, bool exam) {
-    CaseState& loaded = app.loaded;
+// Draws targets and start of a new attempt; the mouse begins there without a needle.
+void draw_new_attempt(PlayerState& player, CaseState& loaded, ScanState& scan, bool exam) {
+    Training& training = scan.training;
     loaded.drawn.reset();
-    app.scan.exam = exam || loaded.exercise().mode == ExerciseMode::exam;
-    loaded.attempt_seed = new_attempt_seed(app, app.scan.exam);
+    training.exam = exam || loaded.exercise().mode == ExerciseMode::exam;
+    loaded.attempt_seed = new_attempt_seed(player, loaded, scan.tracker.spec, training.exam);
     if (loaded.attempt_seed != 0) {
         const CaseAnatomy at_rest(loaded.open->bundle);
         AttemptDraw draw = draw_attempt(loaded.exercise(), at_rest, loaded.open->bundle->labels,
                                         loaded.attempt_seed);
-        for (const std::string& warning : draw.warnings) app.view.notices.warning(warning);
+        for (const Message& warning : draw.warnings) player.notices.warning(warning);
         loaded.drawn = std::move(draw.exercise);
     }
-    if (app.scan.exam) {
+    if (training.exam) {
         if (!loaded.drawn) loaded.drawn = loaded.exercise();
         loaded.drawn->mode = ExerciseMode::exam;
     }
-    app.scan.hints_shown = 0;
-    if (app.view.small_view.view) app.view.small_view.view->set_exercise(loaded.exercise());
-    put_mouse_at_start(app);
-    loaded.exact = true;
-    rebuild_engine(app, false);
+    training.hints_shown = 0;
+    if (loaded.view3d) loaded.view3d->set_exercise(loaded.exercise());
+    put_mouse_at_start(scan.tracker, loaded, steady_seconds() - player.clock_start_s);
+    loaded.engine.exact = true;
+    rebuild_engine(player, loaded, scan.console, false);
 }
 
-// An exact picture where the frame budget would reduce its accuracy.
-void set_exact(App& app, bool exact) {
-    app.loaded.exact = exact;
-    if (app.player.arguments.frame_budget_ms > 0) rebuild_engine(app);
+// Makes the picture exact where the frame budget would reduce its accuracy.
+void set_exact(PlayerState& player, CaseState& loaded, Console& console, bool exact) {
+    loaded.engine.exact = exact;
+    if (player.arguments.frame_budget_ms > 0) rebuild_engine(player, loaded, console);
 }
 
 }  // namespace
 
-void set_frozen(ScanState& scan, bool frozen) {
-    scan.controls.frozen = frozen;
-    scan.controls.cine_back = 0;
-    scan.cine.playing = false;
+void set_frozen(Console& console, bool frozen) {
+    console.controls.frozen = frozen;
+    console.controls.cine_back = 0;
+    console.cine.playing = false;
 }
 
-void step_cine(ScanState& scan, int frames, int kept) {
-    if (!scan.controls.frozen) set_frozen(scan, true);
-    scan.controls.cine_back =
-        std::clamp(scan.controls.cine_back + frames, 0, std::max(kept - 1, 0));
+void step_cine(Console& console, int frames, int kept) {
+    if (!console.controls.frozen) set_frozen(console, true);
+    console.controls.cine_back =
+        std::clamp(console.controls.cine_back + frames, 0, std::max(kept - 1, 0));
 }
 
-void advance_cine(ScanState& scan, int kept, double now_s) {
-    if (!scan.cine.playing || now_s - scan.cine.last_step_s < 1 / kCineRate) return;
-    scan.cine.last_step_s = now_s;
-    int& back = scan.controls.cine_back;
+void advance_cine(Console& console, int kept, double now_s) {
+    if (!console.cine.playing || now_s - console.cine.last_step_s < 1 / kCineRate) return;
+    console.cine.last_step_s = now_s;
+    int& back = console.controls.cine_back;
     back = back > 0 ? back - 1 : std::max(kept - 1, 0);
 }
 
-void observe_frames(const ScanState& scan, ScanThread& thread) {
-    if (!scan.attempt && !scan.server && !scan.poses) {
+void observe_frames(const std::shared_ptr<Attempt>& attempt,
+                    const Servers& servers,
+                    ScanThread& thread) {
+    if (!attempt && !servers.igtl && !servers.poses) {
         thread.set_observer({});
         return;
     }
     thread.set_observer(
-        [attempt = scan.attempt, server = scan.server, poses = scan.poses](const ScanFrame& frame) {
+        [attempt, server = servers.igtl, poses = servers.poses](const ScanFrame& frame) {
             if (attempt)
                 attempt->observe(frame.record, frame.width_px, frame.height_px, frame.layout,
                                  frame.pixels);
@@ -110,141 +122,144 @@ void observe_frames(const ScanState& scan, ScanThread& thread) {
         });
 }
 
-void start_attempt(App& app, const std::string& path, bool exam) {
-    CaseState& loaded = app.loaded;
-    if (app.scan.attempt || !loaded.open) return;
-    end_replay(app);
-    app.scan.guide.reset();
-    app.view.page = Page::scan;
+void start_attempt(
+    PlayerState& player, CaseState& loaded, ScanState& scan, const std::string& path, bool exam) {
+    Training& training = scan.training;
+    if (training.attempt || !loaded.open) return;
+    end_replay(player, loaded, scan);
+    training.guide.reset();
     const FrameRecord& shown = loaded.frame().record;
-    if (!app.scan.tracker.mouse && !app.scan.tracker.paced && shown.tools.has_needle &&
+    if (!scan.tracker.mouse && !scan.tracker.paced && shown.tools.has_needle &&
         shown.needle.depth_mm > 0) {
-        app.view.notices.warning("Take the needle out of the body, then start the attempt.");
+        player.notices.warning("Take the needle out of the body, then start the attempt.");
         return;
     }
     const std::string name = loaded.exercise().name;
     std::string file = path;
     if (file.empty()) file = new_session_path(loaded.open->bundle->manifest.case_name, name);
     if (file.empty()) {
-        app.view.notices.error("There is no folder to record to: set HOME or XDG_DATA_HOME.");
+        player.notices.error("There is no folder to record to: set HOME or XDG_DATA_HOME.");
         return;
     }
-    draw_new_attempt(app, exam);
+    draw_new_attempt(player, loaded, scan, exam);
     const Exercise& exercise = loaded.exercise();
     Result<std::unique_ptr<SessionRun>> run = Error{"there is no picture to record", file, ""};
-    const double now_s = steady_seconds() - app.player.clock_start_s;
+    const double now_s = steady_seconds() - player.clock_start_s;
     const std::string started = utc_now();
     loaded.scan->with_engine([&](ScanEngine& engine) {
-        run = SessionRun::start(file, *loaded.open, engine, app.player.trainee, started, now_s,
+        run = SessionRun::start(file, *loaded.open, engine, player.progress.trainee, started, now_s,
                                 loaded.attempt_seed);
     });
     if (!run) {
-        app.view.notices.error(run.error().message());
-        set_exact(app, false);
+        player.notices.error(run.error().message());
+        set_exact(player, loaded, scan.console, false);
         return;
     }
-    app.scan.attempt = std::make_shared<Attempt>(*loaded.open, exercise, std::move(*run), started);
-    app.scan.score.reset();
-    app.scan.result.reset();
-    std::vector<bool>& reached = app.scan.targets_reached;
+    training.attempt = std::make_shared<Attempt>(*loaded.open, exercise, std::move(*run), started);
+    training.score.reset();
+    training.result.reset();
+    std::vector<bool>& reached = training.targets_reached;
     reached.assign(reached.size(), false);
-    observe_frames(app.scan, *loaded.scan);
+    observe_frames(training.attempt, scan.servers, *loaded.scan);
 }
 
-void finish_attempt(App& app) {
-    if (!app.scan.attempt) return;
-    const std::shared_ptr<Attempt> attempt = std::move(app.scan.attempt);
-    observe_frames(app.scan, *app.loaded.scan);
-    set_exact(app, false);
+void finish_attempt(PlayerState& player, CaseState& loaded, ScanState& scan) {
+    Training& training = scan.training;
+    if (!training.attempt) return;
+    const std::shared_ptr<Attempt> attempt = std::move(training.attempt);
+    observe_frames(nullptr, scan.servers, *loaded.scan);
+    set_exact(player, loaded, scan.console, false);
     Result<SessionScore> score = attempt->finish();
     if (!score) {
-        app.view.notices.error(score.error().message());
+        player.notices.error(score.error().message());
         return;
     }
-    app.scan.score = std::move(*score);
-    app.scan.score_file = attempt->path();
-    note_attempt(app, attempt->started());
-    app.view.page = Page::after;
-    app.view.all_measures = false;
-    app.view.scroll = 0;
-    set_frozen(app.scan, false);
+    training.score = std::move(*score);
+    training.score_file = attempt->path();
+    note_attempt(player.progress, loaded, training, attempt->started());
+    set_frozen(scan.console, false);
 }
 
-void toggle_attempt(App& app) {
-    if (app.scan.attempt) {
-        finish_attempt(app);
-    } else {
-        start_attempt(app, "", app.scan.exam && app.scan.score.has_value());
+bool toggle_attempt(PlayerState& player, CaseState& loaded, ScanState& scan) {
+    const Training& training = scan.training;
+    if (!training.attempt) {
+        start_attempt(player, loaded, scan, "", training.exam && training.score.has_value());
+        return false;
     }
+    finish_attempt(player, loaded, scan);
+    return training.result.has_value();
 }
 
-void start_replay(App& app) {
-    if (app.scan.attempt || !app.scan.score || app.scan.score_file.empty() || replays(app.scan))
-        return;
-    set_frozen(app.scan, false);
-    app.scan.replayed_over = app.scan.tracker.spec;
-    choose_tracker(app, "replay:" + app.scan.score_file);
-    if (!app.scan.tracker.paced) {  // the recording could not be read; a notice says so
-        choose_tracker(app, std::exchange(app.scan.replayed_over, {}));
-        return;
+bool start_replay(PlayerState& player, CaseState& loaded, ScanState& scan) {
+    const Training& training = scan.training;
+    if (training.attempt || !training.score || training.score_file.empty() || scan.replay.runs())
+        return false;
+    set_frozen(scan.console, false);
+    scan.replay.tracker_before = scan.tracker.spec;
+    choose_tracker(player, loaded, scan.tracker, "replay:" + training.score_file);
+    if (!scan.tracker.paced) {  // the recording could not be read; a notice says so
+        choose_tracker(player, loaded, scan.tracker, std::exchange(scan.replay.tracker_before, {}));
+        return false;
     }
-    app.view.page = Page::scan;
-    app.scan.recorded = session_replay(app.scan.score_file);
-    app.scan.before_replay = app.scan.controls.settings;
-    app.scan.replayed_frame = 0;
+    scan.replay.recorded = session_replay(scan.training.score_file);
+    scan.replay.settings_before = scan.console.controls.settings;
+    scan.replay.frame = 0;
+    return true;
 }
 
-void end_replay(App& app) {
-    if (!replays(app.scan)) return;
-    if (app.scan.recorded) {
-        choose_mode(app, app.scan.before_replay.doppler.mode);
-        app.scan.controls.settings = app.scan.before_replay;
-        app.scan.recorded.reset();
+void end_replay(PlayerState& player, CaseState& loaded, ScanState& scan) {
+    if (!scan.replay.runs()) return;
+    if (scan.replay.recorded) {
+        choose_mode(player.notices, loaded, scan.console, scan.replay.settings_before.doppler.mode);
+        scan.console.controls.settings = scan.replay.settings_before;
+        scan.replay.recorded.reset();
     }
-    choose_tracker(app, std::exchange(app.scan.replayed_over, {}));
+    choose_tracker(player, loaded, scan.tracker, std::exchange(scan.replay.tracker_before, {}));
 }
 
-void open_review(App& app) {
-    if (!app.scan.score || app.scan.score_file.empty()) return;
-    const OpenCase& open = *app.loaded.open;
-    const auto index = static_cast<std::size_t>(app.loaded.exercise_index);
+void open_review(Notices& notices, const CaseState& loaded, const Training& training) {
+    if (!training.score || training.score_file.empty()) return;
+    const OpenCase& open = *loaded.open;
+    const auto index = static_cast<std::size_t>(loaded.exercise_index);
     const Status opened =
-        show_review(app.scan.score_file, open.path,
+        show_review(training.score_file, open.path,
                     index < open.exercise_files.size() ? open.exercise_files[index] : "");
     if (!opened) {
-        app.view.notices.warning(opened.error().message());
+        notices.warning(opened.error().message());
         return;
     }
-    app.view.notices.news("The review page is being made; it opens in the browser.");
+    notices.news("The review page is being made; it opens in the browser.");
 }
 
-bool may_leave_attempt(App& app, const std::string& key) {
+bool may_leave_attempt(PlayerState& player, Training& training, const std::string& key) {
     constexpr double kAskedForS = 4;
     const bool asked =
-        app.player.now_s - app.scan.leave_asked_s < kAskedForS && app.scan.leave_asked == key;
-    if (!app.scan.attempt || asked) return true;
-    app.scan.leave_asked_s = app.player.now_s;
-    app.scan.leave_asked = key;
-    app.view.notices.warning("An attempt is running. " + key +
-                             " again ends it as it is; B finishes it and shows the result.");
+        player.now_s - training.leave_asked_s < kAskedForS && training.leave_asked == key;
+    if (!training.attempt || asked) return true;
+    training.leave_asked_s = player.now_s;
+    training.leave_asked = key;
+    player.notices.warning(
+        {"An attempt is running. {} again ends it as it is; B finishes it and shows the result.",
+         {key}});
     return false;
 }
 
-void show_next_hint(App& app) {
-    if (!app.scan.attempt || !app.loaded.open) return;
-    const Exercise& exercise = app.loaded.exercise();
+void show_next_hint(Notices& notices, const CaseState& loaded, Training& training) {
+    if (!training.attempt || !loaded.open) return;
+    const Exercise& exercise = loaded.exercise();
     if (exercise.mode == ExerciseMode::exam) {
-        app.view.notices.news("An exam gives no hints.");
+        notices.news("An exam gives no hints.");
         return;
     }
-    const int most = static_cast<int>(exercise.hints.size()) + 1;
-    app.scan.hints_shown = std::min(app.scan.hints_shown + 1, most);
+    const int max_hints = static_cast<int>(exercise.hints.size()) + 1;
+    training.hints_shown = std::min(training.hints_shown + 1, max_hints);
 }
 
 bool shows_targets(const ScanState& scan, const Exercise& exercise) {
-    if (!scan.attempt) return !(scan.exam && scan.score && !replays(scan));
+    if (!scan.training.attempt)
+        return !(scan.training.exam && scan.training.score && !scan.replay.runs());
     return exercise.mode == ExerciseMode::practice &&
-           scan.hints_shown > static_cast<int>(exercise.hints.size());
+           scan.training.hints_shown > static_cast<int>(exercise.hints.size());
 }
 
 void mark_targets_reached(const Exercise& exercise,
@@ -259,4 +274,179 @@ void mark_targets_reached(const Exercise& exercise,
     }
 }
 
-}  // namespace sonocase::runtime
+void sign_in(PlayerState& player, const std::string& name) {
+    player.progress.trainee = name;
+    player.settings.trainee = name;
+    player.progress.history.clear();
+    std::error_code ignored;
+    if (!std::filesystem::exists(default_progress_path(), ignored)) return;
+    auto book = ProgressBook::open(default_progress_path());
+    if (!book) {
+        player.notices.warning(book.error().message());
+        return;
+    }
+    if (auto names = book->trainees()) player.progress.trainees = std::move(*names);
+    if (name.empty()) return;
+    auto sessions = book->sessions(name, "");
+    if (!sessions) {
+        player.notices.warning(sessions.error().message());
+        return;
+    }
+    player.progress.history = std::move(*sessions);
+}
+
+void note_attempt(Progress& progress,
+                  const CaseState& loaded,
+                  Training& training,
+                  const std::string& started) {
+    const SessionScore& score = *training.score;
+    const std::string& case_name = loaded.open->bundle->manifest.case_name;
+    const std::string& exercise = loaded.exercise().name;
+    std::vector<ProgressEntry> earlier;
+    for (const ProgressEntry& entry : progress.history) {
+        if (entry.case_name == case_name && entry.exercise == exercise) earlier.push_back(entry);
+    }
+    training.result = attempt_result(score, earlier);
+    progress.class_records.reset();
+    // A slip of the hand is not an attempt; the progress book leaves it out too.
+    constexpr double kMinAttemptS = 3;
+    if (!(score.value("elapsed_time_s") >= kMinAttemptS)) return;
+    ProgressEntry entry;
+    entry.trainee = progress.trainee;
+    entry.case_name = case_name;
+    entry.exercise = exercise;
+    entry.started = started;
+    entry.recording = training.score_file;
+    entry.passed = score.passed;
+    entry.seed = loaded.attempt_seed;
+    for (const Metric& metric : score.metrics) {
+        if (std::isfinite(metric.value)) entry.metrics.push_back(metric);
+    }
+    progress.history.push_back(std::move(entry));
+}
+
+namespace {
+
+constexpr double kStepMm = 2;
+constexpr std::size_t kMaxPoints = 4000;
+
+// The console as it was recorded up to a time of the replay: mode, box, gate, gain and the rest.
+// What the user changes stays until the recording changes it.
+void take_recorded_settings(Notices& notices, CaseState& loaded, ScanState& scan) {
+    if (!scan.replay.recorded || !scan.tracker.paced) return;
+    const SessionReplay& recorded = *scan.replay.recorded;
+    const double at_s = scan.tracker.paced->at_s();
+    const auto after = std::upper_bound(recorded.times_s.begin(), recorded.times_s.end(), at_s);
+    const auto end = static_cast<std::size_t>(after - recorded.times_s.begin());
+    // A replay that went back takes its settings from the beginning again.
+    std::size_t from = end < scan.replay.frame ? 0 : scan.replay.frame;
+    scan.replay.frame = end;
+    ImageSettings settings = scan.console.controls.settings;
+    bool changed = false;
+    for (; from < end; ++from) {
+        if (recorded.settings[from].empty()) continue;
+        apply_settings_text(recorded.settings[from], settings);
+        changed = true;
+    }
+    if (!changed) return;
+    choose_mode(notices, loaded, scan.console, settings.doppler.mode);
+    settings.doppler.mode =
+        scan.console.controls.settings.doppler.mode;  // off where it cannot be shown
+    scan.console.controls.settings = settings;
+}
+
+}  // namespace
+
+std::vector<Point3> straight_way(Point3 a, Point3 b) {
+    const Vector3 way = b - a;
+    const int steps = std::max(static_cast<int>(std::lround(norm(way) / kStepMm)), 1);
+    std::vector<Point3> points;
+    for (int i = 0; i <= steps; ++i) points.push_back(a + (double(i) / steps) * way);
+    return points;
+}
+
+void follow_replay(Notices& notices, CaseState& loaded, ScanState& scan) {
+    if (!scan.replay.runs()) {
+        scan.replay.tip_path.clear();
+        scan.replay.best_way.clear();
+        return;
+    }
+    take_recorded_settings(notices, loaded, scan);
+    if (scan.replay.best_way.empty() && scan.training.score) {
+        // The insertion that came nearest to its target.
+        const InsertionScore* best = nullptr;
+        for (const InsertionScore& insertion : scan.training.score->insertions) {
+            if (insertion.target < 0) continue;
+            if (!best || insertion.tip_to_target_mm < best->tip_to_target_mm) best = &insertion;
+        }
+        if (best) scan.replay.best_way = straight_way(best->entry, best->target_centre);
+    }
+    const FrameRecord& record = loaded.frame().record;
+    if (record.input.time_s < scan.replay.time_s) scan.replay.tip_path.clear();  // jumped back
+    scan.replay.time_s = record.input.time_s;
+    if (!record.tools.has_needle || record.needle.depth_mm <= 0) return;
+    const Point3 tip = record.needle.mannequin_from_drawn * Point3{0, 0, 0};
+    const bool moved =
+        scan.replay.tip_path.empty() || distance(scan.replay.tip_path.back(), tip) > 0.5;
+    if (moved && scan.replay.tip_path.size() < kMaxPoints) scan.replay.tip_path.push_back(tip);
+}
+
+}  // namespace sonocase::runtime::inline player_app
+
+extern char** environ;
+
+namespace sonocase::runtime::inline player_app {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string find_program() {
+    std::error_code failed;
+    const fs::path self = fs::read_symlink("/proc/self/exe", failed);
+    if (!failed) {
+        const fs::path beside = self.parent_path() / "sonocase";
+        if (access(beside.c_str(), X_OK) == 0) return beside.string();
+    }
+    std::stringstream folders(std::getenv("PATH") ? std::getenv("PATH") : "");
+    for (std::string folder; std::getline(folders, folder, ':');) {
+        const fs::path file = fs::path(folder) / "sonocase";
+        if (!folder.empty() && access(file.c_str(), X_OK) == 0) return file.string();
+    }
+    return {};
+}
+
+}  // namespace
+
+Status show_review(const std::string& session,
+                   const std::string& bundle,
+                   const std::string& exercise) {
+    const std::string program = find_program();
+    if (program.empty()) {
+        return Error{"the review page is made by the program sonocase, which is not installed",
+                     "review",
+                     "install the package sonocase, or copy the recording to where it is"};
+    }
+    fs::path folder = session;
+    folder.replace_extension();  // .mha
+    folder.replace_extension();  // .igs
+    const std::string out = folder.string() + ".review";
+    // One shell with the names as arguments, never as text: they may hold anything.
+    const char* script =
+        "\"$1\" review \"$2\" --case \"$3\" -o \"$4\" ${5:+--exercise \"$5\"} && exec xdg-open "
+        "\"$4/review.html\"";
+    const char* arguments[] = {
+        "sh",           "-c",        script,           "sh",   program.c_str(), session.c_str(),
+        bundle.c_str(), out.c_str(), exercise.c_str(), nullptr};
+    pid_t child = 0;
+    const int failed =
+        posix_spawnp(&child, "sh", nullptr, nullptr, const_cast<char* const*>(arguments), environ);
+    if (failed != 0)
+        return Error{"the program sonocase cannot be started", program, "check its permissions"};
+    std::thread([child] {
+        int status = 0;
+        waitpid(child, &status, 0);
+    }).detach();
+    return Done{};
+}
+
+}  // namespace sonocase::runtime::inline player_app

@@ -6,33 +6,36 @@
 #include <cmath>
 #include <filesystem>
 
-#include "formats/bundle/attribution.h"
-#include "formats/files/calibration_file.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/files/load_save.h"
 #include "runtime/player/app/attempt_steps.h"
-#include "runtime/player/app/kept/user_folders.h"
+#include "runtime/player/app/settings.h"
 #include "runtime/player/app/tracker_steps.h"
 #include "runtime/player/session/calibration_set.h"
 #include "runtime/player/session/clock.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_app {
 
 std::vector<Point3> CaseState::target_centres() const {
     const double time_s = frame().record.input.time_s;
     std::vector<Point3> centres;
     for (const Target& target : exercise().targets)
-        centres.push_back(anatomy ? anatomy->moved(target.centre, time_s) : target.centre);
+        centres.push_back(engine.anatomy ? engine.anatomy->moved(target.centre, time_s)
+                                         : target.centre);
     return centres;
 }
 
 namespace {
 
-// Of that engine; null while no mode is on.
-std::unique_ptr<DopplerView> make_doppler(App& app, const ScanEngine& engine) {
-    if (app.scan.controls.settings.doppler.mode == DopplerMode::off) return nullptr;
-    auto view =
-        DopplerView::create(app.loaded.open->bundle, engine.exercise(), engine.render_options());
+// The Doppler modes of that engine; null while no mode is on.
+std::unique_ptr<DopplerView> make_doppler(Notices& notices,
+                                          const OpenCase& open,
+                                          DopplerMode mode,
+                                          const ScanEngine& engine) {
+    if (mode == DopplerMode::off) return nullptr;
+    auto view = DopplerView::create(open.bundle, engine.exercise(), engine.render_options());
     if (!view) {
-        app.view.notices.error(view.error().message());
+        notices.error(view.error().message());
         return nullptr;
     }
     return std::make_unique<DopplerView>(std::move(*view));
@@ -40,56 +43,59 @@ std::unique_ptr<DopplerView> make_doppler(App& app, const ScanEngine& engine) {
 
 }  // namespace
 
-void rebuild_engine(App& app, bool keep_session) {
-    CaseState& loaded = app.loaded;
-    ImageChoice image = loaded.image;
+void rebuild_engine(PlayerState& player, CaseState& loaded, Console& console, bool keep_session) {
+    ImageChoice image = loaded.engine.image;
     // A recording is replayed to the same pixels, which reduced accuracy would not allow.
-    image.frame_budget_ms = loaded.exact ? 0 : app.player.arguments.frame_budget_ms;
+    image.frame_budget_ms = loaded.engine.exact ? 0 : player.arguments.frame_budget_ms;
     const auto make = [&] {
-        return make_engine(*loaded.open, loaded.exercise(), app.player.arguments, image);
+        return make_engine(*loaded.open, loaded.exercise(), player.arguments, image);
     };
     Result<ScanEngine> engine = make();
     if (!engine && image.effects != std::vector<std::string>{"auto"}) {
-        // The effects named may be those of the other model.
+        // The effects that are named may belong to the other model.
         image.effects = {"auto"};
         engine = make();
     }
     if (!engine) {
-        app.view.notices.error(engine.error().message());
+        player.notices.error(engine.error().message());
         return;
     }
-    app.scan.controls.frozen = false;
-    app.scan.controls.cine_back = 0;
-    loaded.scan->set_controls(app.scan.controls);
-    loaded.anatomy = engine->anatomy();
-    ++loaded.engine_number;
-    auto doppler = make_doppler(app, *engine);
+    console.controls.frozen = false;
+    console.controls.cine_back = 0;
+    loaded.scan->set_controls(console.controls);
+    loaded.engine.anatomy = engine->anatomy();
+    ++loaded.engine.number;
+    auto doppler =
+        make_doppler(player.notices, *loaded.open, console.controls.settings.doppler.mode, *engine);
     loaded.scan->set_engine(std::make_unique<ScanEngine>(std::move(*engine)), keep_session,
                             std::move(doppler));
 }
 
-void close_bundle(App& app) {
-    CaseState& loaded = app.loaded;
+void close_bundle(PlayerState& player, CaseState& loaded, ScanState& scan) {
     if (loaded.scan) {
-        finish_attempt(app);
-        app.scan.replayed_over.clear();
+        finish_attempt(player, loaded, scan);
+        scan.replay.tracker_before.clear();
         loaded.scan->set_tracker(nullptr);
         loaded.scan->set_engine(nullptr);
     }
-    loaded.guide.reset();
-    app.view.look = {};
-    if (app.view.small_view.view) app.view.small_view.view->leave_case();
-    app.scan.guide.reset();
-    app.scan.clip.reset();
-    forget_tracker(app.scan.tracker);
-    loaded.anatomy.reset();
+    loaded.set_up.guide.reset();
+    loaded.names = {};
+    if (loaded.view3d) loaded.view3d->leave_case();
+    scan.training.guide.reset();
+    scan.console.clip.reset();
+    forget_tracker(scan.tracker);
+    loaded.engine.anatomy.reset();
     loaded.drawn.reset();
     loaded.skin.reset();
     loaded.open.reset();
 }
 
-bool open_bundle(App& app, const std::string& given_path, const std::string& exercise) {
-    Notices& notices = app.view.notices;
+bool open_bundle(PlayerState& player,
+                 CaseState& loaded,
+                 ScanState& scan,
+                 const std::string& given_path,
+                 const std::string& exercise) {
+    Notices& notices = player.notices;
     const std::string path = expand_home(given_path);
     Result<std::unique_ptr<OpenCase>> opened = open_case_to_render(path);
     if (!opened) {
@@ -101,134 +107,132 @@ bool open_bundle(App& app, const std::string& given_path, const std::string& exe
         notices.error(index.error().message());
         index = 0;
     }
-    close_bundle(app);
-    CaseState& loaded = app.loaded;
+    close_bundle(player, loaded, scan);
     loaded.open = std::move(*opened);
     loaded.damage_reported = false;
-    for (const std::string& warning : loaded.open->warnings) notices.warning(warning);
+    for (const Message& warning : loaded.open->warnings) notices.warning(warning);
     if (const std::string credits = attribution_of(*loaded.open->bundle); !credits.empty())
         notices.news(credits);
     loaded.skin = std::make_unique<Skin>(*loaded.open->bundle);
-    app.view.small_view.view->set_case(*loaded.open->bundle);
-    app.view.page = Page::scan;
-    choose_exercise(app, *index);
-    app.view.window->set_title(loaded.open->bundle->manifest.case_name + " - sonocase");
-    remember_bundle(path, app.player.settings.recent);
+    loaded.view3d->set_case(*loaded.open->bundle);
+    choose_exercise(player, loaded, scan, *index);
+    remember_bundle(path, player.settings.recent);
     return true;
 }
 
-void show_bundles(const PlayerState& player, ViewState& view) {
-    view.chooser.bundles = find_bundles(player.settings.recent);
-    view.chooser.asked = false;
-    view.dialog = Dialog::none;
-    view.page = Page::bundles;
-}
-
-void choose_exercise(App& app, int index) {
-    finish_attempt(app);
-    end_replay(app);
-    app.scan.exam_set = {};
-    app.scan.score.reset();
-    app.scan.result.reset();
-    CaseState& loaded = app.loaded;
+void choose_exercise(PlayerState& player, CaseState& loaded, ScanState& scan, int index) {
+    finish_attempt(player, loaded, scan);
+    end_replay(player, loaded, scan);
+    scan.training.exam_set = {};
+    scan.training.score.reset();
+    scan.training.result.reset();
     const int count = static_cast<int>(loaded.open->exercises.size());
     loaded.exercise_index = (index % count + count) % count;
     loaded.drawn.reset();
     const Exercise& exercise = loaded.exercise();
-    const int width_px = loaded.image.width_px, height_px = loaded.image.height_px;
-    loaded.image = initial_image(app.player.arguments, exercise);
-    loaded.image.width_px = width_px;
-    loaded.image.height_px = height_px;
-    loaded.image.depth_mm = exercise.probe.depth_mm;
-    loaded.image.focus_mm = exercise.probe.focus_mm;
-    app.scan.targets_reached.assign(exercise.targets.size(), false);
-    app.view.measurements.clear();
-    app.scan.controls.settings.doppler = app.player.arguments.doppler;
-    app.view.doppler_aimed = app.player.arguments.box_given || app.player.arguments.gate_given;
-    app.view.small_view.view->set_exercise(exercise);
+    const int width_px = loaded.engine.image.width_px, height_px = loaded.engine.image.height_px;
+    loaded.engine.image = initial_image(player.arguments, exercise);
+    loaded.engine.image.width_px = width_px;
+    loaded.engine.image.height_px = height_px;
+    loaded.engine.image.depth_mm = exercise.probe.depth_mm;
+    loaded.engine.image.focus_mm = exercise.probe.focus_mm;
+    scan.training.targets_reached.assign(exercise.targets.size(), false);
+    ++loaded.exercise_number;
+    scan.console.controls.settings.doppler = player.arguments.doppler;
+    scan.console.doppler_aimed = player.arguments.box_given || player.arguments.gate_given;
+    loaded.view3d->set_exercise(exercise);
     loaded.scan->set_tracker(nullptr);
-    rebuild_engine(app, false);
-    choose_tracker(app, app.scan.tracker.spec);
+    rebuild_engine(player, loaded, scan.console, false);
+    choose_tracker(player, loaded, scan.tracker, scan.tracker.spec);
 }
 
-void choose_model(App& app, const std::string& model) {
-    app.loaded.image.model = model;
-    rebuild_engine(app);
+void choose_model(PlayerState& player,
+                  CaseState& loaded,
+                  Console& console,
+                  const std::string& model) {
+    loaded.engine.image.model = model;
+    rebuild_engine(player, loaded, console);
 }
 
-void choose_mode(App& app, DopplerMode mode) {
-    DopplerSettings& doppler = app.scan.controls.settings.doppler;
-    if (!app.loaded.open || mode == doppler.mode) return;
+void choose_mode(Notices& notices, CaseState& loaded, Console& console, DopplerMode mode) {
+    DopplerSettings& doppler = console.controls.settings.doppler;
+    if (!loaded.open || mode == doppler.mode) return;
     const bool first = doppler.mode == DopplerMode::off;
     doppler.mode = mode;
     if (mode == DopplerMode::off || !first) return;
     std::unique_ptr<DopplerView> view;
-    app.loaded.scan->with_engine([&](ScanEngine& engine) { view = make_doppler(app, engine); });
+    loaded.scan->with_engine([&](ScanEngine& engine) {
+        view = make_doppler(notices, *loaded.open, doppler.mode, engine);
+    });
     if (!view) {
         doppler.mode = DopplerMode::off;
         return;
     }
     if (!view->has_flow() && mode != DopplerMode::m_mode)
-        app.view.notices.warning(
+        notices.warning(
             "This case says nothing about the flow of blood, so that Doppler modes show none.");
-    if (!app.view.doppler_aimed) {
+    if (!console.doppler_aimed) {
         FrameInput input;
-        input.mannequin_from_probe = app.loaded.frame().record.tools.mannequin_from_probe;
+        input.mannequin_from_probe = loaded.frame().record.tools.mannequin_from_probe;
         doppler = view->aimed(input, doppler);
-        app.view.doppler_aimed = true;
+        console.doppler_aimed = true;
     }
-    app.loaded.scan->set_doppler(std::move(view));
+    loaded.scan->set_doppler(std::move(view));
 }
 
-void aim_doppler(App& app) {
-    DopplerSettings& doppler = app.scan.controls.settings.doppler;
-    if (!app.loaded.open || doppler.mode == DopplerMode::off) return;
+void aim_doppler(Notices& notices, CaseState& loaded, Console& console) {
+    DopplerSettings& doppler = console.controls.settings.doppler;
+    if (!loaded.open || doppler.mode == DopplerMode::off) return;
     std::unique_ptr<DopplerView> view;
-    app.loaded.scan->with_engine([&](ScanEngine& engine) { view = make_doppler(app, engine); });
+    loaded.scan->with_engine([&](ScanEngine& engine) {
+        view = make_doppler(notices, *loaded.open, doppler.mode, engine);
+    });
     if (!view) return;
     FrameInput input;
-    input.mannequin_from_probe = app.loaded.frame().record.tools.mannequin_from_probe;
+    input.mannequin_from_probe = loaded.frame().record.tools.mannequin_from_probe;
     const DopplerSettings aimed = view->aimed(input, doppler);
-    if (aimed == doppler) app.view.notices.news("The picture's plane cuts no vessel.");
+    if (aimed == doppler) notices.news("The picture's plane cuts no vessel.");
     doppler = aimed;
 }
 
-void change_depth(App& app, double by_mm) {
-    ImageChoice& image = app.loaded.image;
+void change_depth(PlayerState& player, CaseState& loaded, Console& console, double by_mm) {
+    ImageChoice& image = loaded.engine.image;
     const double depth = std::clamp(std::round((image.depth_mm + by_mm) / 10) * 10, 30.0, 300.0);
     if (depth == image.depth_mm) return;
     image.depth_mm = depth;
     image.focus_mm = std::min(image.focus_mm, depth);
-    rebuild_engine(app);
+    rebuild_engine(player, loaded, console);
 }
 
-void change_focus(App& app, double by_mm) {
-    ImageChoice& image = app.loaded.image;
+void change_focus(PlayerState& player, CaseState& loaded, Console& console, double by_mm) {
+    ImageChoice& image = loaded.engine.image;
     const double focus =
         std::clamp(std::round((image.focus_mm + by_mm) / 5) * 5, 10.0, image.depth_mm);
     if (focus == image.focus_mm) return;
     image.focus_mm = focus;
-    rebuild_engine(app);
+    rebuild_engine(player, loaded, console);
 }
 
-void fit_image(App& app, int width_px, int height_px) {
-    ImageChoice& image = app.loaded.image;
+void fit_image(
+    PlayerState& player, CaseState& loaded, Console& console, int width_px, int height_px) {
+    ImageChoice& image = loaded.engine.image;
     const bool same = width_px == image.width_px && height_px == image.height_px;
     if (same) return;
     image.width_px = width_px;
     image.height_px = height_px;
-    rebuild_engine(app);
+    rebuild_engine(player, loaded, console);
 }
 
-void choose_preset(App& app, const ImagePreset& preset) {
-    app.loaded.image.depth_mm = preset.depth_mm;
-    app.loaded.image.focus_mm = preset.focus_mm;
-    rebuild_engine(app);
+void choose_preset(PlayerState& player,
+                   CaseState& loaded,
+                   Console& console,
+                   const ImagePreset& preset) {
+    loaded.engine.image.depth_mm = preset.depth_mm;
+    loaded.engine.image.focus_mm = preset.focus_mm;
+    rebuild_engine(player, loaded, console);
 }
 
-void adjust_gain(App& app) {
-    const ScanFrame& frame = app.loaded.frame();
-    ImageSettings& image = app.scan.controls.settings;
+void adjust_gain(const ScanFrame& frame, ImageSettings& image) {
     if (frame.width_px <= 0 || frame.status != FrameStatus::rendered) return;
     // Means of the eight depths where there is an echo at all; a level of 255 is the whole range.
     std::array<double, 8> sum{}, count{};
@@ -239,8 +243,8 @@ void adjust_gain(App& app) {
         for (int x = frame.width_px / 3; x < 2 * frame.width_px / 3; ++x) {
             const int level = frame.pixels[static_cast<std::size_t>(y) * frame.width_px + x];
             if (level < 6) continue;
-            sum[static_cast<std::size_t>(row)] += level;
-            count[static_cast<std::size_t>(row)] += 1;
+            sum[row] += level;
+            count[row] += 1;
         }
     }
     constexpr double kWanted = 95;
@@ -269,8 +273,9 @@ void check_bundle(CaseState& loaded, Notices& notices) {
     loaded.damage_reported = true;
 }
 
-Status load_initial_calibrations(const PlayerState& player, CaseState& loaded, Notices& notices) {
-    Calibrations& in_use = loaded.calibrations;
+Status load_initial_calibrations(PlayerState& player, SetUp& set_up) {
+    Notices& notices = player.notices;
+    Calibrations& in_use = set_up.calibrations;
     if (player.arguments.calibrations.empty()) {
         for (const std::string& file : player.settings.calibrations) {
             const Result<Calibrations> saved = load_calibrations({file});
@@ -281,23 +286,23 @@ Status load_initial_calibrations(const PlayerState& player, CaseState& loaded, N
             merge_calibrations(*saved, in_use);
         }
     } else {
-        const Result<Calibrations> given = load_calibrations(player.arguments.calibrations);
-        if (!given) return given.error();
-        in_use = *given;
+        SONOCASE_TRY(const Calibrations given, load_calibrations(player.arguments.calibrations));
+        in_use = given;
     }
-    for (const std::string& warning : calibration_warnings(in_use, "", utc_now()))
+    for (const Message& warning : calibration_warnings(in_use, "", utc_now()))
         notices.warning(warning);
     return Done{};
 }
 
 void follow_setup(CaseState& loaded, const SensorAssignment& assignment, double now_s) {
-    if (!loaded.guide) loaded.guide = std::make_unique<SetupGuide>(*loaded.open->bundle);
-    SetupGuide& guide = *loaded.guide;
+    if (!loaded.set_up.guide)
+        loaded.set_up.guide = std::make_unique<SetupGuide>(*loaded.open->bundle);
+    SetupGuide& guide = *loaded.set_up.guide;
     guide.observe(loaded.frame().reading, assignment, now_s);
     const Calibrations found = guide.calibrations(loaded.scan->tracker_health().device, utc_now());
     if (guide.recording() || !(found.probe || found.needle || found.mannequin)) return;
-    merge_calibrations(found, loaded.calibrations);
-    loaded.scan->set_calibrations(loaded.calibrations);
+    merge_calibrations(found, loaded.set_up.calibrations);
+    loaded.scan->set_calibrations(loaded.set_up.calibrations);
 }
 
 bool save_calibrations(const Calibrations& calibrations, Settings& settings, Notices& notices) {
@@ -324,8 +329,8 @@ bool save_calibrations(const Calibrations& calibrations, Settings& settings, Not
         }
         settings.calibrations.push_back(path);
     }
-    notices.news("Saved in " + folder + ".");
+    notices.news({"Saved in {}.", {folder}});
     return true;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_app

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cstdio>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_app {
 namespace {
 
-constexpr std::size_t kMostStanding = 4, kMostKept = 40;
+constexpr std::size_t kMaxStanding = 4, kMaxKept = 40;
 
 double life_s(Notice::Kind kind) {
     switch (kind) {
@@ -33,10 +33,10 @@ void Notices::dismiss(std::size_t i) {
     standing_.erase(standing_.begin() + static_cast<std::ptrdiff_t>(i));
 }
 
-void Notices::add(Notice::Kind kind, const std::string& sentence) {
+void Notices::add(Notice::Kind kind, const Message& sentence) {
     if (kind != Notice::Kind::news) std::fprintf(stderr, "sonoplay: %s\n", sentence.c_str());
     kept_.push_back({kind, sentence, now_s_});
-    if (kept_.size() > kMostKept) kept_.erase(kept_.begin());
+    if (kept_.size() > kMaxKept) kept_.erase(kept_.begin());
     for (Notice& notice : standing_) {
         if (notice.text == sentence) {
             notice.since_s = now_s_;
@@ -44,7 +44,7 @@ void Notices::add(Notice::Kind kind, const std::string& sentence) {
         }
     }
     standing_.push_back({kind, sentence, now_s_});
-    if (standing_.size() > kMostStanding) standing_.erase(standing_.begin());
+    if (standing_.size() > kMaxStanding) standing_.erase(standing_.begin());
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_app

@@ -5,14 +5,15 @@
 // Warnings and errors also go to standard error, for users who started the player from a terminal.
 #pragma once
 
-#include <string>
 #include <vector>
 
-namespace sonocase::runtime {
+#include "formats/base/message.h"
+
+namespace sonocase::runtime::inline player_app {
 
 struct Notice {
     enum class Kind { news, warning, error } kind = Kind::news;
-    std::string text;
+    Message text;
     double since_s = 0;
 };
 
@@ -24,9 +25,9 @@ class Notices {
 
     // A whole sentence. One that stands already is not repeated, but stands for its full time
     // again.
-    void news(const std::string& sentence) { add(Notice::Kind::news, sentence); }
-    void warning(const std::string& sentence) { add(Notice::Kind::warning, sentence); }
-    void error(const std::string& sentence) { add(Notice::Kind::error, sentence); }
+    void news(const Message& sentence) { add(Notice::Kind::news, sentence); }
+    void warning(const Message& sentence) { add(Notice::Kind::warning, sentence); }
+    void error(const Message& sentence) { add(Notice::Kind::error, sentence); }
 
     // At most four, oldest first.
     const std::vector<Notice>& standing() const { return standing_; }
@@ -35,10 +36,10 @@ class Notices {
     void dismiss(std::size_t i);
 
   private:
-    void add(Notice::Kind kind, const std::string& sentence);
+    void add(Notice::Kind kind, const Message& sentence);
 
     double now_s_ = 0;
     std::vector<Notice> standing_, kept_;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_app

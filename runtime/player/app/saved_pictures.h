@@ -6,12 +6,12 @@
 
 #include "runtime/player/app/states.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_app {
 
-void save_picture(App& app);
+void save_picture(Notices& notices, const CaseState& loaded);
 // Freezes the picture until the film is written. Does nothing while one is.
-void start_clip(App& app);
+void start_clip(Notices& notices, const CaseState& loaded, Console& console);
 // Once per picture, before the controls go to the scan thread.
-void advance_clip(App& app);
+void advance_clip(Notices& notices, const CaseState& loaded, Console& console);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_app

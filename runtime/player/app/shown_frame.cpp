@@ -4,17 +4,16 @@
 
 #include "runtime/player/app/attempt_steps.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_app {
 namespace {
 
-// Those of the engine in use; made when they are first asked for. Null: they cannot be made.
-TissueNames* tissue_names(App& app) {
-    TissueLook& look = app.view.look;
-    CaseState& loaded = app.loaded;
-    if (!loaded.open || look.failed) return nullptr;
-    if (look.names && look.engine == loaded.engine_number) return look.names.get();
-    look.names.reset();
-    look.engine = loaded.engine_number;
+// The names of the engine in use, made when they are first asked for. Null: they cannot be made.
+TissueNames* tissue_names(Notices& notices, CaseState& loaded) {
+    NamesInUse& in_use = loaded.names;
+    if (!loaded.open || in_use.failed) return nullptr;
+    if (in_use.names && in_use.engine == loaded.engine.number) return in_use.names.get();
+    in_use.names.reset();
+    in_use.engine = loaded.engine.number;
     Result<TissueNames> names = Error{"there is no engine", "", ""};
     Exercise exercise;
     RenderOptions options;
@@ -24,12 +23,12 @@ TissueNames* tissue_names(App& app) {
     });
     names = TissueNames::create(loaded.open->bundle, exercise, options);
     if (!names) {
-        look.failed = true;
-        app.view.notices.warning(names.error().message());
+        in_use.failed = true;
+        notices.warning(names.error().message());
         return nullptr;
     }
-    look.names = std::make_unique<TissueNames>(std::move(*names));
-    return look.names.get();
+    in_use.names = std::make_unique<TissueNames>(std::move(*names));
+    return in_use.names.get();
 }
 
 bool fits(const TissueNames& names, const ScanFrame& frame) {
@@ -38,22 +37,25 @@ bool fits(const TissueNames& names, const ScanFrame& frame) {
 
 }  // namespace
 
-bool may_name_tissue(const App& app) {
-    return !(app.scan.exam && (app.scan.attempt || app.scan.score) && !replays(app.scan));
+bool may_name_tissue(const ScanState& scan) {
+    const Training& training = scan.training;
+    return !(training.exam && (training.attempt || training.score) && !scan.replay.runs());
 }
 
-std::string name_of_pixel(App& app, int column, int row) {
-    if (!may_name_tissue(app)) return {};
-    const ScanFrame& frame = app.loaded.frame();
-    TissueNames* names = frame.width_px > 0 ? tissue_names(app) : nullptr;
+std::string name_of_pixel(Notices& notices, CaseState& loaded, int column, int row) {
+    const ScanFrame& frame = loaded.frame();
+    TissueNames* names = frame.width_px > 0 ? tissue_names(notices, loaded) : nullptr;
     if (!names || !fits(*names, frame)) return {};
     return names->at(frame.record.input, column, row);
 }
 
-bool outline_frame(App& app, std::vector<std::uint8_t>& rgb, std::vector<TissueName>& found) {
-    const ScanFrame& frame = app.loaded.frame();
+bool outline_frame(Notices& notices,
+                   CaseState& loaded,
+                   std::vector<std::uint8_t>& rgb,
+                   std::vector<TissueName>& found) {
+    const ScanFrame& frame = loaded.frame();
     found.clear();
-    TissueNames* names = frame.width_px > 0 ? tissue_names(app) : nullptr;
+    TissueNames* names = frame.width_px > 0 ? tissue_names(notices, loaded) : nullptr;
     if (!names || !fits(*names, frame)) return false;
     rgb = frame.doppler.rgb;
     if (rgb.empty()) {
@@ -64,22 +66,22 @@ bool outline_frame(App& app, std::vector<std::uint8_t>& rgb, std::vector<TissueN
     return true;
 }
 
-void show_frame(App& app) {
-    ViewState& view = app.view;
-    const ScanFrame& frame = app.loaded.frame();
+void show_frame(
+    Notices& notices, CaseState& loaded, Display& display, HoverNames& hover, bool may_name) {
+    const ScanFrame& frame = loaded.frame();
     if (frame.width_px <= 0) return;
     const DopplerFrame& doppler = frame.doppler;
-    if (!doppler.strip.empty()) view.strip->upload(doppler.strip, kStripWidth, kStripHeight);
-    view.look.shown.clear();
-    const bool outlined = view.look.outlines && may_name_tissue(app) &&
-                          outline_frame(app, view.look.rgb, view.look.shown);
+    if (!doppler.strip.empty()) display.strip->upload(doppler.strip, kStripWidth, kStripHeight);
+    hover.shown.clear();
+    const bool outlined =
+        hover.outlines && may_name && outline_frame(notices, loaded, hover.rgb, hover.shown);
     if (outlined) {
-        view.texture->upload_rgb(view.look.rgb, frame.width_px, frame.height_px);
+        display.texture->upload_rgb(hover.rgb, frame.width_px, frame.height_px);
     } else if (!doppler.rgb.empty()) {
-        view.texture->upload_rgb(doppler.rgb, frame.width_px, frame.height_px);
+        display.texture->upload_rgb(doppler.rgb, frame.width_px, frame.height_px);
     } else {
-        view.texture->upload(frame.pixels, frame.width_px, frame.height_px);
+        display.texture->upload(frame.pixels, frame.width_px, frame.height_px);
     }
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_app

@@ -5,15 +5,15 @@
 
 #include "runtime/player/app/states.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_app {
 
 // Once per picture. In an exam the target has no tone. The device is opened when there is first
 // something to hear; one that cannot be opened is reported once, and nothing is heard.
-void follow_sounds(App& app);
-void toggle_sound(App& app);
+void follow_sounds(PlayerState& player, CaseState& loaded, ScanState& scan);
+void toggle_sound(PlayerState& player, Sounds& sounds);
 
 // Whether something is heard between two moments of an attempt or of free scanning.
-bool heard_target(const Heard& before, const Heard& now, bool exam);
-bool heard_harm(const Heard& before, const Heard& now);
+bool heard_target(const SoundState& before, const SoundState& now, bool exam);
+bool heard_harm(const SoundState& before, const SoundState& now);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_app

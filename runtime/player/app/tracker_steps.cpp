@@ -8,9 +8,9 @@
 
 #include "runtime/player/session/calibration_set.h"
 #include "runtime/player/session/clock.h"
-#include "runtime/tracking/factory/make_tracker.h"
+#include "runtime/tracking/devices/make_tracker.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_app {
 
 void forget_tracker(TrackerInUse& tracker) {
     tracker.mouse.reset();
@@ -18,9 +18,10 @@ void forget_tracker(TrackerInUse& tracker) {
     tracker.paced.reset();
 }
 
-void choose_tracker(App& app, const std::string& spec) {
-    CaseState& loaded = app.loaded;
-    TrackerInUse& tracker = app.scan.tracker;
+void choose_tracker(PlayerState& player,
+                    CaseState& loaded,
+                    TrackerInUse& tracker,
+                    const std::string& spec) {
     loaded.scan->set_tracker(nullptr);
     forget_tracker(tracker);
     tracker.compared_device.clear();
@@ -32,11 +33,11 @@ void choose_tracker(App& app, const std::string& spec) {
         return;
     }
     Result<std::unique_ptr<Tracker>> made =
-        make_case_tracker(spec, *loaded.skin, loaded.exercise(), loaded.calibrations,
-                          session_clock(app.player.clock_start_s));
+        make_case_tracker(spec, *loaded.skin, loaded.exercise(), loaded.set_up.calibrations,
+                          session_clock(player.clock_start_s));
     if (!made) {
-        app.view.notices.error(made.error().message());
-        choose_tracker(app, "mouse");
+        player.notices.error(made.error().message());
+        choose_tracker(player, loaded, tracker, "mouse");
         return;
     }
     if ((*made)->duration_s() > 0) {
@@ -47,27 +48,26 @@ void choose_tracker(App& app, const std::string& spec) {
     loaded.scan->set_tracker(std::shared_ptr<Tracker>(std::move(*made)));
 }
 
-void put_mouse_at_start(App& app) {
-    TrackerInUse& tracker = app.scan.tracker;
+void put_mouse_at_start(TrackerInUse& tracker, const CaseState& loaded, double now_s) {
     if (!tracker.mouse) return;
-    tracker.mouse = std::make_unique<MouseTracker>(*app.loaded.skin, app.loaded.exercise());
-    feed_mouse(tracker, steady_seconds() - app.player.clock_start_s);
+    tracker.mouse = std::make_unique<MouseTracker>(*loaded.skin, loaded.exercise());
+    feed_mouse(tracker, now_s);
 }
 
-void step_tracker(App& app, bool back) {
+void step_tracker(PlayerState& player, CaseState& loaded, TrackerInUse& tracker, bool back) {
     std::vector<const TrackerKind*> kinds;
     int at = 0;
     for (const TrackerKind& kind : tracker_kinds()) {
         if (!kind.stepped_through) continue;
-        if (app.scan.tracker.spec.rfind(kind.prefix, 0) == 0) at = static_cast<int>(kinds.size());
+        if (tracker.spec.rfind(kind.prefix, 0) == 0) at = static_cast<int>(kinds.size());
         kinds.push_back(&kind);
     }
     const int count = static_cast<int>(kinds.size());
     const int next = (at + (back ? count - 1 : 1)) % count;
-    choose_tracker(app, kinds[static_cast<std::size_t>(next)]->prefix);
+    choose_tracker(player, loaded, tracker, kinds[next]->prefix);
 }
 
-void change_pace(TrackerInUse& tracker, int steps) {
+void change_pace(const TrackerInUse& tracker, int steps) {
     if (!tracker.paced) return;
     constexpr double kSpeeds[] = {0, 0.1, 0.25, 0.5, 1, 2, 4, 8};
     constexpr int kCount = static_cast<int>(std::size(kSpeeds));
@@ -102,7 +102,8 @@ void check_device(TrackerInUse& tracker,
         std::fprintf(stderr, "sonoplay: %s\n", health.message.c_str());
     if (health.phase != TrackerPhase::streaming || health.device == tracker.compared_device) return;
     tracker.compared_device = health.device;
-    for (const std::string& warning : sensor_mismatch_warnings(loaded.calibrations, health.device))
+    for (const Message& warning :
+         sensor_mismatch_warnings(loaded.set_up.calibrations, health.device))
         notices.warning(warning);
 }
 
@@ -120,4 +121,4 @@ void note_readings(TrackerInUse& tracker, const CaseState& loaded, bool frozen, 
     if (now_s - tracker.last_reading_s > kSilentS) tracker.lost_since_s = tracker.last_reading_s;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_app

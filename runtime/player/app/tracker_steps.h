@@ -7,19 +7,23 @@
 
 #include "runtime/player/app/states.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_app {
 
 // spec: as --tracker takes it. One that cannot be made becomes a notice, and the mouse is used.
-void choose_tracker(App& app, const std::string& spec);
-// The mouse at the start of the exercise, without a needle. Does nothing unless it is in use.
-void put_mouse_at_start(App& app);
+void choose_tracker(PlayerState& player,
+                    CaseState& loaded,
+                    TrackerInUse& tracker,
+                    const std::string& spec);
+// Puts the mouse at the start of the exercise, without a needle. Does nothing unless it is in use.
+// now_s: session clock.
+void put_mouse_at_start(TrackerInUse& tracker, const CaseState& loaded, double now_s);
 // The next tracker of those that F7 steps through, or the one before.
-void step_tracker(App& app, bool back);
+void step_tracker(PlayerState& player, CaseState& loaded, TrackerInUse& tracker, bool back);
 // Lets go of what the window's thread holds of the tracker.
 void forget_tracker(TrackerInUse& tracker);
 
 // steps: how many speeds faster, < 0 slower. Does nothing unless a recording or script is in use.
-void change_pace(TrackerInUse& tracker, int steps);
+void change_pace(const TrackerInUse& tracker, int steps);
 // Takes the mouse's needle, in the scan plane or across it, or withdraws it. Does nothing unless
 // the mouse is in use.
 void toggle_needle(TrackerInUse& tracker, const Probe& probe, bool in_plane, Notices& notices);
@@ -37,4 +41,4 @@ void check_device(TrackerInUse& tracker,
 // says nothing about that.
 void note_readings(TrackerInUse& tracker, const CaseState& loaded, bool frozen, double now_s);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_app

@@ -1,31 +1,214 @@
 // SPDX-License-Identifier: Apache-2.0
 
+// A run without a window, and its Doppler modes: pictures, measures and sound.
+
 #include "runtime/player/headless/run_headless.h"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <memory>
 #include <optional>
+#include <span>
+#include <string>
 #include <thread>
 #include <vector>
 
-#include "formats/attempt/draw_attempt.h"
-#include "formats/base/event.h"
-#include "formats/bundle/attribution.h"
-#include "runtime/player/headless/doppler_run.h"
+#include <nlohmann/json.hpp>
+
+#include "formats/base/mailbox.h"
+#include "formats/base/result.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/files/atomic_file.h"
+#include "formats/scoring/draw_attempt.h"
+#include "runtime/engine/scan_engine.h"
+#include "runtime/imaging/doppler/doppler_picture.h"
+#include "runtime/imaging/doppler/doppler_view.h"
 #include "runtime/player/headless/frame_files.h"
 #include "runtime/player/headless/truth_files.h"
 #include "runtime/player/session/calibration_set.h"
-#include "runtime/player/session/case_set_up.h"
 #include "runtime/player/session/clock.h"
 #include "runtime/player/session/frame_server.h"
 #include "runtime/player/session/frame_stats.h"
-#include "runtime/player/session/session_replay.h"
+#include "runtime/player/session/open_case.h"
 #include "runtime/player/session/session_run.h"
-#include "runtime/player/session/text_output.h"
-#include "runtime/recording/settings_text.h"
+#include "runtime/recording/session_words.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_headless {
+
+class DopplerRun {
+  public:
+    // Errors: those of DopplerView::create. The case must outlive the run.
+    static Result<DopplerRun> create(CaseView bundle, const ScanEngine& engine);
+
+    bool has_flow() const { return view_.has_flow(); }
+    // Box, and gate with its cursor, in the widest vessel of the plane; lines are steered towards
+    // its flow.
+    struct Aim {
+        bool box = true, gate = true, cursor = true, steering = true;
+    };
+    void aim(const Rigid& mannequin_from_probe, Aim what, DopplerSettings& settings) const;
+    // What the recording keeps of the last frame.
+    DopplerReport report() const { return view_.report(); }
+    // The Doppler picture of the frame that the engine rendered last.
+    void frame(const ScanEngine& engine, std::span<const std::uint8_t> pixels);
+
+    // The picture in colour with its overlay, or with the strip of spectrum or M-mode below it.
+    std::span<const std::uint8_t> picture(std::span<const std::uint8_t> pixels,
+                                          int width,
+                                          int height);
+    // {"doppler": {...}}: psv_cm_s, edv_cm_s, mean_cm_s, flow_ml_min and what they were measured
+    // with; shown cells and frame rate of a colour box; ms a frame.
+    std::string json() const;
+    // Error: no spectrum was made, or the file cannot be written.
+    Status write_sound(const std::string& path) const;
+
+  private:
+    explicit DopplerRun(DopplerView view) : view_(std::move(view)) {}
+
+    DopplerView view_;
+    DopplerMode mode_ = DopplerMode::off;
+    std::vector<std::uint8_t> rgb_;
+    std::vector<float> sound_;
+    double sound_hz_ = 0, ms_ = 0, shown_cells_ = 0;
+    int frames_ = 0;
+};
+
+namespace {
+
+double rounded(double value) {
+    return std::round(value * 1e4) / 1e4;
+}
+
+template <class T>
+void put(std::vector<std::uint8_t>& bytes, T value) {
+    const std::size_t at = bytes.size();
+    bytes.resize(at + sizeof value);
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+
+void put(std::vector<std::uint8_t>& bytes, const char* text) {
+    bytes.insert(bytes.end(), text, text + 4);
+}
+
+// RIFF, 16 bits, two channels.
+std::vector<std::uint8_t> wav_of(std::span<const float> pairs, double hz) {
+    float loudest = 1e-9f;
+    for (const float v : pairs) loudest = std::max(loudest, std::abs(v));
+    const auto data = static_cast<std::uint32_t>(2 * pairs.size());
+    const auto rate = static_cast<std::uint32_t>(std::lround(hz));
+    std::vector<std::uint8_t> bytes;
+    put(bytes, "RIFF");
+    put(bytes, std::uint32_t{36} + data);
+    put(bytes, "WAVE");
+    put(bytes, "fmt ");
+    put(bytes, std::uint32_t{16});
+    put(bytes, std::uint16_t{1});
+    put(bytes, std::uint16_t{2});
+    put(bytes, rate);
+    put(bytes, 4 * rate);
+    put(bytes, std::uint16_t{4});
+    put(bytes, std::uint16_t{16});
+    put(bytes, "data");
+    put(bytes, data);
+    for (const float v : pairs)
+        put(bytes, static_cast<std::int16_t>(std::lround(32000 * v / loudest)));
+    return bytes;
+}
+
+}  // namespace
+
+Result<DopplerRun> DopplerRun::create(CaseView bundle, const ScanEngine& engine) {
+    SONOCASE_TRY(auto view,
+                 DopplerView::create(bundle, engine.exercise(), engine.render_options()));
+    return DopplerRun(std::move(view));
+}
+
+void DopplerRun::aim(const Rigid& mannequin_from_probe, Aim what, DopplerSettings& settings) const {
+    FrameInput input;
+    input.mannequin_from_probe = mannequin_from_probe;
+    const DopplerSettings aimed = view_.aimed(input, settings, what.steering);
+    settings.steer_deg = aimed.steer_deg;
+    if (what.box) {
+        settings.box_left = aimed.box_left;
+        settings.box_right = aimed.box_right;
+        settings.box_top_mm = aimed.box_top_mm;
+        settings.box_bottom_mm = aimed.box_bottom_mm;
+    }
+    if (what.gate) {
+        settings.gate_line = aimed.gate_line;
+        settings.gate_depth_mm = aimed.gate_depth_mm;
+        settings.gate_mm = aimed.gate_mm;
+    }
+    if (what.gate && what.cursor) settings.angle_deg = aimed.angle_deg;
+}
+
+void DopplerRun::frame(const ScanEngine& engine, std::span<const std::uint8_t> pixels) {
+    const FrameInput& input = engine.last().input;
+    mode_ = input.settings.doppler.mode;
+    if (mode_ == DopplerMode::off) return;
+    const double before_s = steady_seconds();
+    view_.frame(input, engine.renderer(), pixels);
+    ms_ += (steady_seconds() - before_s) * 1e3;
+    ++frames_;
+    if (mode_ == DopplerMode::spectral) {
+        const auto sound = view_.spectrum().sound();
+        sound_.insert(sound_.end(), sound.begin(), sound.end());
+        sound_hz_ = view_.spectrum().sound_hz();
+    } else {
+        shown_cells_ += view_.colour().shown_cells;
+    }
+}
+
+std::span<const std::uint8_t> DopplerRun::picture(std::span<const std::uint8_t> pixels,
+                                                  int width,
+                                                  int height) {
+    rgb_.resize(3 * static_cast<std::size_t>(width) * doppler_rows(mode_, height));
+    draw_doppler(view_, mode_, pixels, width, height, rgb_);
+    return rgb_;
+}
+
+std::string DopplerRun::json() const {
+    nlohmann::ordered_json out;
+    auto& d = out["doppler"];
+    d["ms"] = rounded(frames_ > 0 ? ms_ / frames_ : 0);
+    if (mode_ == DopplerMode::spectral) {
+        const doppler::SpectralMeasures m = view_.spectrum().measures();
+        const doppler::GateContent& gate = view_.spectrum().gate();
+        d["beats"] = m.beats;
+        d["psv_cm_s"] = rounded(m.psv_cm_s);
+        d["psv_raw_cm_s"] = rounded(m.psv_raw_cm_s);
+        d["true_psv_cm_s"] = rounded(m.true_psv_cm_s);
+        d["edv_cm_s"] = rounded(m.edv_cm_s);
+        d["mean_cm_s"] = rounded(m.mean_cm_s);
+        d["resistive_index"] = rounded(m.resistive_index);
+        d["flow_ml_min"] = rounded(m.flow_ml_min);
+        d["flow_true_area_ml_min"] = rounded(m.flow_true_area_ml_min);
+        d["diameter_mm"] = rounded(m.diameter_mm);
+        d["true_angle_deg"] = rounded(gate.angle_deg);
+        d["gate_spans_vessel"] = gate.spans;
+        d["gate_in_two_vessels"] = gate.two_vessels;
+    } else if (mode_ == DopplerMode::colour || mode_ == DopplerMode::power) {
+        const doppler::ColourReport& report = view_.colour();
+        d["cells"] = report.cells;
+        d["blood_cells"] = report.blood_cells;
+        d["shown_cells_mean"] = rounded(frames_ > 0 ? shown_cells_ / frames_ : 0);
+        d["flash"] = report.flash;
+        d["machine_frames_per_s"] = rounded(report.frame_hz);
+    }
+    return out.dump();
+}
+
+Status DopplerRun::write_sound(const std::string& path) const {
+    if (sound_.empty())
+        return Error{"no spectrum was made, so that there is no sound", path,
+                     "use --sound with --mode pw"};
+    return write_file(path, wav_of(sound_, sound_hz_));
+}
+
 namespace {
 
 constexpr double kFrameRate = 30;   // per second, of scripted runs that --frames does not spread
@@ -118,13 +301,11 @@ Status HeadlessRun::set_up() {
 }
 
 Status HeadlessRun::set_up_case() {
-    Result<std::unique_ptr<OpenCase>> opened = open_case_to_render(arguments_.bundle);
-    if (!opened) return opened.error();
-    open_ = std::move(*opened);
+    SONOCASE_TRY(std::unique_ptr<OpenCase> opened, open_case_to_render(arguments_.bundle));
+    open_ = std::move(opened);
     for (const std::string& warning : open_->warnings) warn(warning);
-    const Result<int> index = choose_or_load_exercise(*open_, arguments_.exercise);
-    if (!index) return index.error();
-    Exercise& exercise = open_->exercises[static_cast<std::size_t>(*index)];
+    SONOCASE_TRY(const int index, choose_or_load_exercise(*open_, arguments_.exercise));
+    Exercise& exercise = open_->exercises[index];
     exercise_ = &exercise;
     // A replayed session brings its targets and the console's settings along.
     if (arguments_.tracker.compare(0, 7, "replay:") == 0)
@@ -136,9 +317,8 @@ Status HeadlessRun::set_up_case() {
         draw_attempt(exercise, CaseAnatomy(open_->bundle), open_->bundle->labels, seed_);
     exercise = std::move(drawn.exercise);
     for (const std::string& warning : drawn.warnings) warn(warning);
-    const Result<Calibrations> calibrations = load_calibrations(arguments_.calibrations);
-    if (!calibrations) return calibrations.error();
-    calibrations_ = *calibrations;
+    SONOCASE_TRY(const Calibrations calibrations, load_calibrations(arguments_.calibrations));
+    calibrations_ = calibrations;
     for (const std::string& warning : calibration_warnings(calibrations_, "", utc_now()))
         warn(warning);
 
@@ -146,9 +326,8 @@ Status HeadlessRun::set_up_case() {
     width_px_ = image.width_px;
     height_px_ = image.height_px;
     pixels_.resize(static_cast<std::size_t>(width_px_) * height_px_);
-    Result<ScanEngine> engine = make_engine(*open_, *exercise_, arguments_, image);
-    if (!engine) return engine.error();
-    engine_.emplace(std::move(*engine));
+    SONOCASE_TRY(ScanEngine engine, make_engine(*open_, *exercise_, arguments_, image));
+    engine_.emplace(std::move(engine));
     engine_->set_calibrations(calibrations_);
     settings_.press_mm =
         arguments_.press_mm >= 0 ? arguments_.press_mm : exercise_->deformation.press_offset_mm;
@@ -162,10 +341,9 @@ Status HeadlessRun::set_up_tracker() {
     clock_ = session_clock(steady_seconds());
     spec_ = arguments_.tracker;
     if (spec_.empty()) spec_ = exercise_->sweeps.empty() ? "null" : "sweep";
-    Result<std::unique_ptr<Tracker>> made =
-        make_case_tracker(spec_, *skin_, *exercise_, calibrations_, clock_);
-    if (!made) return made.error();
-    tracker_ = std::move(*made);
+    SONOCASE_TRY(std::unique_ptr<Tracker> made,
+                 make_case_tracker(spec_, *skin_, *exercise_, calibrations_, clock_));
+    tracker_ = std::move(made);
     tracker_->set_wake([this] { reading_arrived_.notify(); });
     frames_ = frame_count(arguments_, *tracker_);
     return Done{};
@@ -173,32 +351,27 @@ Status HeadlessRun::set_up_tracker() {
 
 Status HeadlessRun::set_up_outputs() {
     if (!arguments_.out.empty()) {
-        auto files = FrameFiles::in(arguments_.out);
-        if (!files) return files.error();
-        files_ = std::move(*files);
+        SONOCASE_TRY(auto files, FrameFiles::in(arguments_.out));
+        files_ = std::move(files);
         files_->set_copyright(attribution_of(*open_->bundle));
         files_->begin(frames_, width_px_, height_px_);
     }
     if (!arguments_.truth.empty()) {
-        auto truth = TruthFiles::in(arguments_.truth, open_->bundle, *engine_);
-        if (!truth) return truth.error();
-        truth_ = std::move(*truth);
+        SONOCASE_TRY(auto truth, TruthFiles::in(arguments_.truth, open_->bundle, *engine_));
+        truth_ = std::move(truth);
     }
     if (!arguments_.record.empty()) {
-        auto session = SessionRun::start(arguments_.record, *open_, *engine_, arguments_.trainee,
-                                         utc_now(), 0, seed_);
-        if (!session) return session.error();
-        session_ = std::move(*session);
+        SONOCASE_TRY(auto session, SessionRun::start(arguments_.record, *open_, *engine_,
+                                                     arguments_.trainee, utc_now(), 0, seed_));
+        session_ = std::move(session);
     }
     if (!arguments_.serve.empty()) {
-        auto server = IgtlServer::start(arguments_.serve);
-        if (!server) return server.error();
-        server_ = std::move(*server);
+        SONOCASE_TRY(auto server, IgtlServer::start(arguments_.serve));
+        server_ = std::move(server);
     }
     if (!arguments_.serve_poses.empty()) {
-        auto server = PoseServer::start(arguments_.serve_poses);
-        if (!server) return server.error();
-        poses_ = std::move(*server);
+        SONOCASE_TRY(auto server, PoseServer::start(arguments_.serve_poses));
+        poses_ = std::move(server);
         std::printf("poses for pages: %s\n", poses_->url().c_str());
         std::fflush(stdout);
     }
@@ -241,11 +414,10 @@ Status HeadlessRun::take_pose(int i, double& now_s) {
 Status HeadlessRun::render(int i, double now_s) {
     const bool device = tracker_->is_device();
     if (replay_ && static_cast<std::size_t>(i) < replay_->settings.size())
-        apply_settings_text(replay_->settings[static_cast<std::size_t>(i)], settings_);
+        apply_settings_text(replay_->settings[i], settings_);
     if (settings_.doppler.mode != DopplerMode::off && !doppler_) {
-        auto run = DopplerRun::create(open_->bundle, *engine_);
-        if (!run) return run.error();
-        doppler_.emplace(std::move(*run));
+        SONOCASE_TRY(auto run, DopplerRun::create(open_->bundle, *engine_));
+        doppler_.emplace(std::move(run));
         if (!doppler_->has_flow() && settings_.doppler.mode != DopplerMode::m_mode)
             warn("The bundle has no flow, so that Doppler modes show none; cook the case again.");
         if (!replay_)
@@ -317,9 +489,8 @@ Status HeadlessRun::finish() {
     }
     std::string metrics;
     if (session_) {
-        const Result<SessionScore> score = session_->finish();
-        if (!score) return score.error();
-        metrics = score_json(*score, *exercise_);
+        SONOCASE_TRY(const SessionScore score, session_->finish());
+        metrics = score_json(score, *exercise_);
     }
     if (doppler_ && !arguments_.sound.empty()) {
         if (Status written = doppler_->write_sound(arguments_.sound); !written) return written;
@@ -341,4 +512,4 @@ Status run_headless(const PlayerArguments& arguments, double start_s) {
     return run.finish();
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_headless

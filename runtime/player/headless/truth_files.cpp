@@ -10,9 +10,9 @@
 
 #include "formats/files/atomic_file.h"
 #include "runtime/player/session/clock.h"
-#include "runtime/player/session/pictures/png_file.h"
+#include "runtime/player/session/png_file.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_headless {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -94,7 +94,7 @@ std::string truth_json(const FrameTruth& truth,
         line["tip"] = {{"probe_mm", point_json(truth.tip_probe)},
                        {"in_plane", truth.tip_in_plane},
                        {"label", tip},
-                       {"name", labels[static_cast<std::size_t>(tip)].name},
+                       {"name", labels[tip].name},
                        {"shaft_in_image_mm", truth.needle_in_image_mm},
                        {"dent_mm", {truth.needle.tent_mm, truth.needle.drag_mm}}};
     }
@@ -115,7 +115,7 @@ std::string truth_json(const FrameTruth& truth,
 TruthPlaneBuffers::TruthPlaneBuffers(int width, int height)
     : width_px(width),
       height_px(height),
-      labels(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
+      labels(static_cast<std::size_t>(width) * height),
       needle(labels.size()),
       shadowed(labels.size()),
       skin_depth_mm(labels.size()) {}
@@ -153,9 +153,9 @@ Result<std::unique_ptr<TruthFiles>> TruthFiles::in(const std::string& folder,
         return Error{"cannot make the folder: " + failed.message(), folder,
                      "check the path and its permissions"};
     }
-    auto truth = TruthRenderer::create(bundle, engine.exercise(), engine.render_options());
-    if (!truth) return truth.error();
-    return std::unique_ptr<TruthFiles>(new TruthFiles(folder, bundle, std::move(*truth), engine));
+    SONOCASE_TRY(auto truth,
+                 TruthRenderer::create(bundle, engine.exercise(), engine.render_options()));
+    return std::unique_ptr<TruthFiles>(new TruthFiles(folder, bundle, std::move(truth), engine));
 }
 
 Status TruthFiles::add(int frame, const FrameInput& input, FrameStatus status, double& ms) {
@@ -173,4 +173,4 @@ Status TruthFiles::finish() {
     return write_file(folder_ + "/truth.jsonl", lines_);
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_headless

@@ -11,7 +11,7 @@
 #include "runtime/engine/scan_engine.h"
 #include "runtime/imaging/truth/frame_truth.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_headless {
 
 // One frame's facts as a line of JSON without its end of line, always the same bytes for the same
 // facts. frame: its number in the run.
@@ -57,4 +57,4 @@ class TruthFiles {
     std::string lines_;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_headless

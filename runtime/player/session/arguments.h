@@ -1,22 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the user asked for on the command line of sonoplay. A value; the program's command_line.h
-// fills it in.
+// What the user asked for on the command line of sonoplay (runtime/player/main.cpp).
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "runtime/imaging/frame/doppler_settings.h"
+#include "runtime/imaging/core/frame_input.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
 
 struct PlayerArguments {
     std::string bundle;    // empty: the list of bundles
     std::string exercise;  // name, or a TOML file; empty: the first of the bundle
-    // Of the attempt's target positions; 0: as written. Negative: new for each attempt in a window,
-    // the recording's own where one is replayed, else 0.
+    // Seed of the attempt's target positions; 0: as written. Negative: a new one for each attempt
+    // in a window, the recording's own where one is replayed, else 0.
     std::int64_t attempt_seed = -1;
     std::string tracker;  // empty: mouse in a window, the first sweep when headless
     bool headless = false;
@@ -32,7 +31,7 @@ struct PlayerArguments {
     std::string machine;               // name or file; empty: by the probe's shape
     std::string renderer = "fast";     // "fast", "reference"
     DopplerSettings doppler;           // mode and controls that the run begins with
-    // Else in the widest vessel of the first frame, along its flow.
+    // False: box and gate go to the widest vessel of the first frame, along its flow.
     bool box_given = false, gate_given = false, angle_given = false, steer_given = false;
     std::string sound;     // WAV of the spectral mode; empty: none
     double press_mm = -1;  // that the probe is pressed in; negative: the exercise's
@@ -49,4 +48,4 @@ struct PlayerArguments {
     std::string script;       // window: input events to play, for tests
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

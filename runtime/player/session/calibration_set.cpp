@@ -5,37 +5,34 @@
 #include <optional>
 #include <utility>
 
-#include "formats/calibration/quality.h"
+#include "formats/calibration/calibration.h"
 #include "formats/files/atomic_file.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
 
 Result<Calibrations> load_calibrations(const std::vector<std::string>& files) {
     Calibrations calibrations;
     for (const std::string& file : files) {
-        const Result<std::string> text = read_text_file(file);
-        if (!text) return text.error();
-        const Result<std::optional<double>> lag = parse_lag_s(*text, file);
-        if (!lag) return lag.error();
-        if (*lag) {
-            calibrations.needle_lag_s = **lag;
+        SONOCASE_TRY(const std::string text, read_text_file(file));
+        SONOCASE_TRY(const std::optional<double> lag, parse_lag_s(text, file));
+        if (lag) {
+            calibrations.needle_lag_s = *lag;
             continue;
         }
-        Result<Calibration> calibration = parse_calibration(*text, file);
-        if (!calibration) return calibration.error();
+        SONOCASE_TRY(Calibration calibration, parse_calibration(text, file));
         std::optional<Calibration>* place = nullptr;
-        if (calibration->kind == "probe") place = &calibrations.probe;
-        if (calibration->kind == "needle") place = &calibrations.needle;
-        if (calibration->kind == "mannequin") place = &calibrations.mannequin;
+        if (calibration.kind == "probe") place = &calibrations.probe;
+        if (calibration.kind == "needle") place = &calibrations.needle;
+        if (calibration.kind == "mannequin") place = &calibrations.mannequin;
         if (!place) {
-            return Error{"kind is \"" + calibration->kind + "\"", file,
+            return Error{"kind is \"" + calibration.kind + "\"", file,
                          "expected probe, needle or mannequin; make one with sonocase calibrate"};
         }
         if (*place) {
-            return Error{"second calibration of the " + calibration->kind, file,
+            return Error{"second calibration of the " + calibration.kind, file,
                          "give one --calibration of each kind"};
         }
-        *place = std::move(*calibration);
+        *place = std::move(calibration);
     }
     return calibrations;
 }
@@ -46,37 +43,37 @@ void merge_calibrations(const Calibrations& newer, Calibrations& in_use) {
     if (newer.mannequin) in_use.mannequin = newer.mannequin;
 }
 
-std::vector<std::string> calibration_warnings(const Calibrations& calibrations,
-                                              const std::string& device,
-                                              const std::string& now) {
-    std::vector<std::string> sentences;
+std::vector<Message> calibration_warnings(const Calibrations& calibrations,
+                                          const std::string& device,
+                                          const std::string& now) {
+    std::vector<Message> sentences;
     const auto look = [&](const std::optional<Calibration>& calibration) {
         if (!calibration) return;
-        for (const std::string& concern : calibration_concerns(*calibration, now)) {
-            sentences.push_back("Calibration of the " + calibration->kind + ": " + concern);
+        for (const Message& concern : calibration_concerns(*calibration, now)) {
+            sentences.push_back({"Calibration of the {}: {}", {calibration->kind, concern}});
         }
     };
     look(calibrations.probe);
     look(calibrations.needle);
     look(calibrations.mannequin);
-    for (std::string& sentence : sensor_mismatch_warnings(calibrations, device))
+    for (Message& sentence : sensor_mismatch_warnings(calibrations, device))
         sentences.push_back(std::move(sentence));
     return sentences;
 }
 
-std::vector<std::string> sensor_mismatch_warnings(const Calibrations& calibrations,
-                                                  const std::string& device) {
-    std::vector<std::string> sentences;
+std::vector<Message> sensor_mismatch_warnings(const Calibrations& calibrations,
+                                              const std::string& device) {
+    std::vector<Message> sentences;
     for (const auto* calibration :
          {&calibrations.probe, &calibrations.needle, &calibrations.mannequin}) {
         if (!*calibration || (*calibration)->sensor.empty() || device.empty()) continue;
         // A serial number or a short name is part of what the device calls itself.
         if (device.find((*calibration)->sensor) != std::string::npos) continue;
-        sentences.push_back("The calibration of the " + (*calibration)->kind + " was made with " +
-                            (*calibration)->sensor + ", and " + device +
-                            " is in use; calibrate again.");
+        sentences.push_back(
+            {"The calibration of the {} was made with {}, and {} is in use; calibrate again.",
+             {(*calibration)->kind, (*calibration)->sensor, device}});
     }
     return sentences;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

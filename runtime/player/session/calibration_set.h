@@ -9,7 +9,7 @@
 #include "formats/base/result.h"
 #include "runtime/engine/scan_engine.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
 
 // Reads --calibration files: at most one each of probe, needle and mannequin, and lags.
 // Errors: a file that cannot be read or parsed, an unknown kind, a second one of the same kind.
@@ -23,12 +23,12 @@ void merge_calibrations(const Calibrations& newer, Calibrations& in_use);
 // device.
 // device  as TrackerHealth::device; empty: not known, not compared
 // now     ISO 8601, UTC
-std::vector<std::string> calibration_warnings(const Calibrations& calibrations,
-                                              const std::string& device,
-                                              const std::string& now);
+std::vector<Message> calibration_warnings(const Calibrations& calibrations,
+                                          const std::string& device,
+                                          const std::string& now);
 
 // Only the warnings about calibrations that were made with another device.
-std::vector<std::string> sensor_mismatch_warnings(const Calibrations& calibrations,
-                                                  const std::string& device);
+std::vector<Message> sensor_mismatch_warnings(const Calibrations& calibrations,
+                                              const std::string& device);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

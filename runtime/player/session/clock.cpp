@@ -5,7 +5,7 @@
 #include <chrono>
 #include <ctime>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
 
 double steady_seconds() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
@@ -30,4 +30,4 @@ SessionClock session_clock(double start_s) {
     return [start_s] { return steady_seconds() - start_s; };
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

@@ -7,7 +7,7 @@
 
 #include "runtime/tracking/tracker.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
 
 // Seconds since an arbitrary start; never goes back.
 double steady_seconds();
@@ -19,4 +19,4 @@ std::string utc_now();
 // The session's clock: 0 when steady_seconds() was start_s.
 SessionClock session_clock(double start_s);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

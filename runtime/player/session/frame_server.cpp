@@ -2,7 +2,7 @@
 
 #include "runtime/player/session/frame_server.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
 
 void serve_frame(IgtlServer& server,
                  const FrameRecord& record,
@@ -35,4 +35,4 @@ void serve_poses(PoseServer& server, const FrameRecord& record) {
     server.publish();
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

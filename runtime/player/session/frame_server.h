@@ -6,10 +6,10 @@
 #include <span>
 
 #include "runtime/engine/scan_engine.h"
-#include "runtime/tracking/igtl/igtl_server.h"
-#include "runtime/tracking/websocket/pose_server.h"
+#include "runtime/tracking/devices/igtl_server.h"
+#include "runtime/tracking/devices/pose_server.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
 
 // Called by the thread that renders; never waits, and does nothing while no client is connected.
 // unix_time_s: of the frame.
@@ -24,4 +24,4 @@ void serve_frame(IgtlServer& server,
 // The tools of the frame as they were tracked: the page bends the needle itself.
 void serve_poses(PoseServer& server, const FrameRecord& record);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

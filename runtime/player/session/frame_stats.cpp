@@ -5,16 +5,31 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+
 #include <nlohmann/json.hpp>
+
+#include "formats/files/atomic_file.h"
+
+namespace sonocase::runtime::inline player_session {
+
+Status write_text_output(const std::string& path, const std::string& text) {
+    if (path == "-") {
+        std::fwrite(text.data(), 1, text.size(), stdout);
+        return Done{};
+    }
+    return write_file(path, text);
+}
+
+}  // namespace sonocase::runtime::inline player_session
 
 #ifdef __linux__
 #include <unistd.h>
 #endif
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
 namespace {
 
-constexpr double kSmallest = 1e-3, kRatio = 1.01;
+constexpr double kMin = 1e-3, kRatio = 1.01;
 
 // Four significant digits, because people read the JSON.
 double rounded(double value) {
@@ -40,7 +55,7 @@ double resident_mb() {
 
 void TimeHistogram::add(double ms) {
     if (!std::isfinite(ms)) return;
-    const double bin = std::log(std::max(ms, kSmallest) / kSmallest) / std::log(kRatio);
+    const double bin = std::log(std::max(ms, kMin) / kMin) / std::log(kRatio);
     ++bins_[static_cast<std::size_t>(std::clamp(bin, 0.0, kBins - 1.0))];
     ++count_;
     largest_ = std::max(largest_, ms);
@@ -51,9 +66,9 @@ double TimeHistogram::quantile(double q) const {
     const auto rank = static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(count_)));
     std::uint64_t seen = 0;
     for (int i = 0; i < kBins; ++i) {
-        seen += bins_[static_cast<std::size_t>(i)];
+        seen += bins_[i];
         if (seen >= std::max<std::uint64_t>(rank, 1)) {
-            return std::min(kSmallest * std::pow(kRatio, i + 0.5), largest_);
+            return std::min(kMin * std::pow(kRatio, i + 0.5), largest_);
         }
     }
     return largest_;
@@ -152,4 +167,4 @@ std::string WindowStats::json() const {
     return out.dump();
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Times of frames and effects, for --stats, the bars on screen and the benchmarks.
+// Times of frames, effects and pictures, and the text that --stats writes of them.
 #pragma once
 
 #include <array>
@@ -9,9 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/result.h"
 #include "runtime/imaging/renderer.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
+
+// path  "-" is standard output; any other file is written under a temporary name and renamed
+Status write_text_output(const std::string& path, const std::string& text);
 
 // A histogram with bins of 1 % from 1 us to 100 s: any number of samples, no allocation, quantiles
 // to half a bin.
@@ -53,7 +57,7 @@ class FrameStats {
     void set_accuracy(const Renderer::Accuracy& accuracy);
     // Frames whose probe touched skin that was not fitted to the mannequin.
     void count_unfitted(bool not_fitted) { unfitted_frames_ += not_fitted ? 1 : 0; }
-    // Of the frame just added, effect deformation.
+    // How the frame just added was deformed by the probe.
     void set_press(const PressReport& press);
     void set_first_frame_ms(double ms) { first_frame_ms_ = ms; }
     // Time of the truth planes and facts of a frame, without writing them.
@@ -83,4 +87,4 @@ class FrameStats {
     std::vector<Effect> effects_;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

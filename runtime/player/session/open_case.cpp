@@ -4,15 +4,20 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <new>
+#include <thread>
 #include <utility>
 
 #include "formats/base/digest.h"
 #include "formats/exercise/case_exercises.h"
 #include "formats/files/atomic_file.h"
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "formats/scoring/anatomy.h"
+#include "runtime/tracking/devices/make_tracker.h"
+#include "runtime/workers/thread_host.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
+
 namespace {
 
 void add_own_exercises(OpenCase& open) {
@@ -25,18 +30,17 @@ void add_own_exercises(OpenCase& open) {
     std::sort(files.begin(), files.end());
     for (const std::string& file : files) {
         if (const auto added = choose_or_load_exercise(open, file); !added)
-            open.warnings.push_back(added.error().message() + ".");
+            open.warnings.push_back({"{}.", {added.error().message()}});
     }
 }
 
 }  // namespace
 
 Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
-    Result<StreamedBundle> bundle = open_bundle(path);
-    if (!bundle) return bundle.error();
+    SONOCASE_TRY(StreamedBundle bundle, open_bundle(path));
     auto open = std::make_unique<OpenCase>();
     open->path = path;
-    open->bundle = std::move(*bundle);
+    open->bundle = std::move(bundle);
     CaseExercises found = exercises_of(*open->bundle, path);
     open->exercises = std::move(found.exercises);
     open->warnings = std::move(found.warnings);
@@ -58,19 +62,18 @@ Result<int> find_exercise(const OpenCase& open, const std::string& name) {
         if (open.exercises[i].name == name) return static_cast<int>(i);
         names += (i ? ", " : "") + open.exercises[i].name;
     }
-    return Error{"no exercise named " + name, open.path, "this bundle holds: " + names};
+    return Error{Message("no exercise named {}", {name}), open.path,
+                 Message("this bundle holds: {}", {names})};
 }
 
 Result<int> choose_or_load_exercise(OpenCase& open, const std::string& name_or_file) {
     const std::string& file = name_or_file;
     if (file.size() < 5 || file.compare(file.size() - 5, 5, ".toml") != 0)
         return find_exercise(open, name_or_file);
-    const Result<std::string> text = read_text_file(file);
-    if (!text) return text.error();
-    Result<Exercise> exercise = parse_exercise(*text, file);
-    if (!exercise) return exercise.error();
+    SONOCASE_TRY(const std::string text, read_text_file(file));
+    SONOCASE_TRY(Exercise exercise, parse_exercise(text, file));
     const CaseAnatomy anatomy(open.bundle);
-    for (const Target& target : exercise->targets) {
+    for (const Target& target : exercise.targets) {
         const auto label = static_cast<std::size_t>(anatomy.label(target.centre));
         const std::string found =
             label == 0 ? "outside the body" : "in '" + open.bundle->labels[label].name + "'";
@@ -82,14 +85,82 @@ Result<int> choose_or_load_exercise(OpenCase& open, const std::string& name_or_f
     }
     open.exercise_digests.resize(open.exercises.size());
     std::size_t at = 0;
-    while (at < open.exercises.size() && open.exercises[at].name != exercise->name) ++at;
+    while (at < open.exercises.size() && open.exercises[at].name != exercise.name) ++at;
     open.exercises.resize(std::max(open.exercises.size(), at + 1));
     open.exercise_digests.resize(open.exercises.size());
-    open.exercises[at] = std::move(*exercise);
-    open.exercise_digests[at] = digest_of(*text);
+    open.exercises[at] = std::move(exercise);
+    open.exercise_digests[at] = digest_of(text);
     open.exercise_files.resize(std::max(open.exercise_files.size(), at + 1));
     open.exercise_files[at] = file;
     return static_cast<int>(at);
 }
 
-}  // namespace sonocase::runtime
+Result<std::unique_ptr<OpenCase>> open_case_to_render(const std::string& path) {
+    std::shared_ptr<const PhysicalTextures> textures;
+    std::thread making([&textures] {
+        try {
+            textures = make_physical_textures();
+        } catch (const std::bad_alloc&) {  // the renderer makes its own, or reports it
+        }
+    });
+    Result<std::unique_ptr<OpenCase>> opened = open_case(path);
+    making.join();
+    if (opened) (*opened)->textures = std::move(textures);
+    return opened;
+}
+
+ImageChoice initial_image(const PlayerArguments& arguments, const Exercise& exercise) {
+    ImageChoice image;
+    image.model = arguments.model.empty() ? exercise.model : arguments.model;
+    image.machine = arguments.machine;
+    image.effects = arguments.effects.empty() ? exercise.effects : arguments.effects;
+    if (arguments.width_px > 0) {
+        image.width_px = arguments.width_px;
+        image.height_px = arguments.height_px;
+    }
+    return image;
+}
+
+Result<ScanEngine> make_engine(const OpenCase& open,
+                               const Exercise& exercise,
+                               const PlayerArguments& arguments,
+                               const ImageChoice& image) {
+    EngineOptions options;
+    options.depth_mm = image.depth_mm;
+    options.focus_mm = image.focus_mm;
+    RenderOptions& render = options.render;
+    render.width_px = image.width_px;
+    render.height_px = image.height_px;
+    render.model = image.model == "paper" ? ImageModel::paper : ImageModel::physical;
+    render.kind = arguments.renderer == "reference" ? RendererKind::reference : RendererKind::fast;
+    render.threads = arguments.threads;
+    render.read_ahead = true;
+    render.textures = open.textures;
+    render.host = thread_host();
+    render.scanlines = arguments.scanlines;
+    render.samples = arguments.samples;
+    render.looks = arguments.looks;
+    render.effects = image.effects;
+    if (!image.machine.empty()) {
+        SONOCASE_TRY(Machine machine, load_machine(image.machine));
+        render.machine = std::move(machine);
+    }
+    render.frame_budget_ms = image.frame_budget_ms;
+    return ScanEngine::create(open.bundle, exercise, options);
+}
+
+Result<std::unique_ptr<Tracker>> make_case_tracker(const std::string& spec,
+                                                   const Skin& skin,
+                                                   const Exercise& exercise,
+                                                   const Calibrations& calibrations,
+                                                   const SessionClock& clock) {
+    TrackerContext context;
+    context.skin = &skin;
+    context.exercise = &exercise;
+    context.clock = clock;
+    context.loop = true;
+    context.needle_lag_s = calibrations.needle_lag_s;
+    return make_tracker(spec, context);
+}
+
+}  // namespace sonocase::runtime::inline player_session

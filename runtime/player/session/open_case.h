@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A bundle opened for playing, with its exercises parsed.
+// A bundle opened for playing, with its exercises parsed, and the engine and the tracker that
+// arguments, exercise and console ask for: made in one place, so that the window and the headless
+// run show the same frames.
 #pragma once
 
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
+#include "runtime/engine/scan_engine.h"
 #include "runtime/imaging/renderer.h"
+#include "runtime/player/session/arguments.h"
+#include "runtime/tracking/tracker.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
 
 struct OpenCase {
     std::string path;
@@ -20,13 +25,13 @@ struct OpenCase {
     std::vector<std::string> exercise_digests;         // of their TOML; may be shorter
     std::vector<std::string> exercise_files;           // empty name: in the bundle; may be shorter
     std::shared_ptr<const PhysicalTextures> textures;  // null: each renderer makes its own
-    std::vector<std::string> warnings;                 // whole sentences
+    std::vector<Message> warnings;                     // whole sentences
 };
 
-// With the exercises of the bundle come those of the folder FILE.exercises beside it, where
-// educators keep their own. Exercises that do not parse are left out and named in `warnings`. On
-// the heap, because renderer and skin point into it. Errors: a file that cannot be read or is not a
-// bundle.
+// Opens the bundle with its exercises and those of the folder FILE.exercises beside it, where
+// educators keep their own. Exercises that do not parse are left out and named in `warnings`. The
+// case is on the heap, because renderer and skin point into it. Errors: a file that cannot be read
+// or is not a bundle.
 Result<std::unique_ptr<OpenCase>> open_case(const std::string& path);
 
 // An Error after a part of the bundle that a frame needed turned out to be damaged. Constant time,
@@ -41,4 +46,36 @@ Result<int> find_exercise(const OpenCase& open, const std::string& name);
 // that cannot be read or parsed, or that is written for a CT, and targets outside the body.
 Result<int> choose_or_load_exercise(OpenCase& open, const std::string& name_or_file);
 
-}  // namespace sonocase::runtime
+// Opens a case, and meanwhile computes on another thread the tables that the physical model needs
+// for any case. Errors: those of open_case.
+Result<std::unique_ptr<OpenCase>> open_case_to_render(const std::string& path);
+
+// What may differ from one engine of a run to the next. `initial_image` gives what arguments and
+// exercise ask for; the console of the window changes it.
+struct ImageChoice {
+    std::string model;                 // "paper", "physical"
+    std::string machine;               // name or file; empty: by the probe's shape
+    std::vector<std::string> effects;  // as RenderOptions::effects
+    int width_px = 512, height_px = 512;
+    double depth_mm = 0, focus_mm = 0;  // 0: the exercise's
+    double frame_budget_ms = 0;         // 0: full accuracy, as recordings and headless runs need
+};
+ImageChoice initial_image(const PlayerArguments& arguments, const Exercise& exercise);
+
+// The engine of an image. The case must outlive it. Errors: those of ScanEngine::create and of
+// load_machine.
+Result<ScanEngine> make_engine(const OpenCase& open,
+                               const Exercise& exercise,
+                               const PlayerArguments& arguments,
+                               const ImageChoice& image);
+
+// The tracker of a --tracker specification; scripts and recordings start over when they end.
+// skin, exercise  of the case; the case must outlive the tracker
+// Errors: those of make_tracker.
+Result<std::unique_ptr<Tracker>> make_case_tracker(const std::string& spec,
+                                                   const Skin& skin,
+                                                   const Exercise& exercise,
+                                                   const Calibrations& calibrations,
+                                                   const SessionClock& clock);
+
+}  // namespace sonocase::runtime::inline player_session

@@ -8,9 +8,26 @@
 #include <vector>
 
 #include "runtime/engine/scan_engine.h"
-#include "runtime/player/session/doppler_frame.h"
+#include "runtime/imaging/core/frame_input.h"
+#include "runtime/imaging/doppler/colour_image.h"
+#include "runtime/imaging/doppler/doppler_picture.h"
+#include "runtime/imaging/doppler/spectral_strip.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
+
+// Pixels of the strip below the picture, and the time that it shows.
+inline constexpr int kStripWidth = 768, kStripHeight = 192;
+
+// What a frame shows in a Doppler mode, beside its grey picture.
+struct DopplerFrame {
+    DopplerMode mode = DopplerMode::off;
+    bool has_flow = false;            // the bundle says where blood flows
+    std::vector<std::uint8_t> rgb;    // # 3 * pixels of the picture; empty: it is grey
+    std::vector<std::uint8_t> strip;  // # kStripWidth * kStripHeight; empty: none
+    doppler::SpectralMeasures measures;
+    doppler::GateContent gate;
+    doppler::ColourReport colour;
+};
 
 inline constexpr double kCineSeconds = 20;
 inline constexpr double kCineRate = 60;  // frames per second that are kept
@@ -53,4 +70,4 @@ struct ScanFrame {
     std::uint64_t number = 0;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

@@ -7,17 +7,31 @@
 #include <filesystem>
 #include <optional>
 
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
+#include "formats/files/thread_jobs.h"
 #include "formats/progress_book/progress_book.h"
-#include "formats/threads/thread_jobs.h"
-#include "runtime/engine/tool_sample.h"
-#include "runtime/recording/session_header.h"
-#include "runtime/recording/settings_text.h"
+#include "runtime/engine/scan_engine.h"
+#include "runtime/recording/session_words.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
+
+std::optional<SessionReplay> session_replay(const std::string& path) {
+    const auto sequence = load_sequence(path);
+    if (!sequence || sequence->transform_index(kProbeTransform) < 0) return {};
+    const auto session = session_from_sequence(*sequence, guess_names(*sequence), path);
+    if (!session || session->header.program.empty()) return {};
+    SessionReplay replay;
+    replay.header = session->header;
+    for (const SessionSample& sample : session->samples) {
+        replay.settings.push_back(sample.settings);
+        replay.times_s.push_back(sample.time_s - session->samples.front().time_s);
+    }
+    return replay;
+}
+
 namespace {
 
-constexpr double kLeastAttemptS = 3;  // shorter ones are slips of the hand
+constexpr double kMinAttemptS = 3;  // shorter ones are slips of the hand
 
 // Why a frame with these events is kept as a picture; null: it is not.
 const char* picture_reason(std::span<const LiveEvent> events) {
@@ -63,9 +77,9 @@ Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
             header.exercise_digest = open.exercise_digests[i];
     }
     if (attempt_seed != 0) header.attempt = "seed=" + std::to_string(attempt_seed);
-    auto recorder = SessionRecorder::start(path, header, run->exercise_, open.bundle->labels);
-    if (!recorder) return recorder.error();
-    run->recorder_ = std::move(*recorder);
+    SONOCASE_TRY(auto recorder,
+                 SessionRecorder::start(path, header, run->exercise_, open.bundle->labels));
+    run->recorder_ = std::move(recorder);
     engine.begin_session(now_s);
     return run;
 }
@@ -104,24 +118,23 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
 }
 
 Result<SessionScore> SessionRun::finish() {
-    if (Status written = recorder_->finish(); !written) return written.error();
+    SONOCASE_TRY_DONE(recorder_->finish());
     // The file as it is goes before the session is scored: of eight hours it is a gigabyte.
-    const auto session = [&]() -> Result<Session> {
+    SONOCASE_TRY(const auto session, [&]() -> Result<Session> {
         const auto sequence = load_sequence(path_);
         if (!sequence) return sequence.error();
         return session_from_sequence(*sequence, guess_names(*sequence), path_);
-    }();
-    if (!session) return session.error();
+    }());
     ThreadJobs jobs;
     ScoreOptions options;
     options.jobs = &jobs;
     SessionScore score =
-        score_session(*session, exercise_, anatomy_.get(), open_.bundle->labels, options);
-    const auto& samples = session->samples;
+        score_session(session, exercise_, anatomy_.get(), open_.bundle->labels, options);
+    const auto& samples = session.samples;
     const double seconds = samples.empty() ? 0 : samples.back().time_s - samples.front().time_s;
-    if (!session->header.trainee.empty() && seconds < kLeastAttemptS) {
+    if (!session.header.trainee.empty() && seconds < kMinAttemptS) {
         score.warnings.push_back("An attempt this short is not put into the progress book.");
-    } else if (!session->header.trainee.empty()) {
+    } else if (!session.header.trainee.empty()) {
         // A session that cannot be added to the book still has scores: the trainee sees them, and
         // why.
         std::error_code failed;
@@ -129,7 +142,7 @@ Result<SessionScore> SessionRun::finish() {
         auto book = ProgressBook::open(default_progress_path());
         Status kept = Done{};
         if (book)
-            kept = book->add(progress_entry(session->header, score, failed ? path_ : recording));
+            kept = book->add(progress_entry(session.header, score, failed ? path_ : recording));
         if (!book || !kept) {
             score.warnings.push_back("The session was not put into the progress book: " +
                                      (book ? kept.error() : book.error()).message() + ".");
@@ -138,4 +151,4 @@ Result<SessionScore> SessionRun::finish() {
     return score;
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

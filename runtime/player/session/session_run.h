@@ -1,20 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A session of the player from its first frame to its scores: events, the recording, and pictures
-// of the moments that matter. The window and the headless run use the same one.
+// A session of the player from its first frame to its scores, and how a recorded one was rendered,
+// so that its replay gives the same pixels.
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "formats/recording/session.h"
 #include "formats/scoring/session_monitor.h"
 #include "formats/scoring/session_score.h"
 #include "runtime/engine/scan_engine.h"
 #include "runtime/player/session/open_case.h"
 #include "runtime/recording/session_recorder.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_session {
+
+struct SessionReplay {
+    SessionHeader header;
+    // The console's settings as text (runtime/recording/session_words.h), # frames; empty: as in
+    // the frame before.
+    std::vector<std::string> settings;
+    std::vector<double> times_s;  // # frames, from the first
+};
+// Nothing if the file is not a recording of this player.
+std::optional<SessionReplay> session_replay(const std::string& path);
+
+// A session of the player from its first frame to its scores: events, the recording, and pictures
+// of the moments that matter. The window and the headless run use the same one.
 
 class SessionRun {
   public:
@@ -67,4 +83,4 @@ class SessionRun {
     FrameRecord last_;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_session

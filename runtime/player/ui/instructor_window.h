@@ -6,17 +6,21 @@
 #include <string>
 
 #include "runtime/player/app/states.h"
+#include "runtime/player/ui/pages.h"
 #include "runtime/player/ui/parts/ui.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_ui {
 
 // Once per picture of the first window, after it was shown: opens, draws or closes the second one,
-// as app.view.instructor says. Drawn so rarely that it takes a seventh of the time, and not at all
-// where there is no such window.
+// as view.display.instructor says. Drawn so rarely that it takes a seventh of the time, and not at
+// all where there is no such window.
 // ui: of the second window. shot: file to save this picture of it in; empty: none.
-Status follow_instructor_window(App& app,
+// loaded: the case that `session` shows; names of its tissues are made for the outlines.
+Status follow_instructor_window(const SessionView& session,
+                                Notices& notices,
+                                CaseState& loaded,
+                                ViewState& view,
                                 Ui& ui,
-                                const TrackerHealth& tracker,
                                 const std::string& shot);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_ui

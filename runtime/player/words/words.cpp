@@ -5,26 +5,22 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
-#include <cstring>
-#include <initializer_list>
-#include <vector>
 
-#include "runtime/player/words/german.h"
+#include "runtime/player/words/po_text.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_words {
 namespace {
 
 const Language* g_in_use = nullptr;  // ImGui, which shows the words, is one per process too
 
 std::set<std::string> g_missing;
 
-std::vector<Translation> sorted(std::initializer_list<std::span<const Translation>> parts) {
-    std::vector<Translation> all;
-    for (const auto part : parts) all.insert(all.end(), part.begin(), part.end());
-    std::sort(all.begin(), all.end(), [](const Translation& a, const Translation& b) {
-        return std::strcmp(a.english, b.english) < 0;
-    });
-    return all;
+const std::string* find_translation(std::string_view english) {
+    const std::vector<Translation>& catalogue = language_in_use().catalogue;
+    const auto found = std::lower_bound(
+        catalogue.begin(), catalogue.end(), english,
+        [](const Translation& t, std::string_view key) { return t.english < key; });
+    return found != catalogue.end() && found->english == english ? &found->other : nullptr;
 }
 
 }  // namespace
@@ -34,18 +30,20 @@ const std::set<std::string>& missing_words() {
 }
 
 std::span<const Language> languages() {
-    static const std::vector<Translation> kGerman =
-        sorted({german_measures(), german_modes(), german_notices(), german_sentences(),
-                german_setup(), german_tissue(), german_window()});
-    static const Language kLanguages[] = {{"en", "English", {}}, {"de", "Deutsch", kGerman}};
+    static const std::vector<Language> kLanguages = [] {
+        std::vector<Language> all{{"en", "English", {}}};
+        for (const std::string_view text : catalogue_texts()) all.push_back(read_po(text));
+        return all;
+    }();
     return kLanguages;
 }
 
 void use_language(const std::string& code) {
     g_in_use = &languages().front();
     for (const Language& language : languages()) {
+        const std::size_t end = language.code.size();
         if (code.rfind(language.code, 0) == 0 &&
-            (code.size() == 2 || !std::isalpha(static_cast<unsigned char>(code[2]))))
+            (code.size() == end || !std::isalpha(static_cast<unsigned char>(code[end]))))
             g_in_use = &language;
     }
 }
@@ -63,12 +61,8 @@ std::string locale_language() {
 }
 
 const char* translation(const char* english) {
-    const auto catalogue = language_in_use().catalogue;
-    const auto found = std::lower_bound(
-        catalogue.begin(), catalogue.end(), english,
-        [](const Translation& t, const char* key) { return std::strcmp(t.english, key) < 0; });
-    if (found != catalogue.end() && std::strcmp(found->english, english) == 0) return found->other;
-    return nullptr;
+    const std::string* other = find_translation(english);
+    return other ? other->c_str() : nullptr;
 }
 
 const char* tr(const char* english) {
@@ -77,4 +71,60 @@ const char* tr(const char* english) {
     return english;
 }
 
-}  // namespace sonocase::runtime
+std::string tr_message(const Message& message) {
+    if (language_in_use().catalogue.empty()) return message;
+    const std::string* other = find_translation(message.format());
+    if (message.arguments().empty()) return other ? *other : message;
+    std::vector<std::string> arguments;
+    for (const Message& argument : message.arguments()) arguments.push_back(tr_message(argument));
+    return filled_in(other ? *other : message.format(), arguments);
+}
+
+namespace {
+
+std::string readable(std::string words) {
+    for (char& c : words) {
+        if (c == '_') c = ' ';
+    }
+    if (!words.empty())
+        words[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(words[0])));
+    return words;
+}
+
+bool whole_number(std::string_view text) {
+    if (text.empty()) return false;
+    for (const char c : text) {
+        if (!std::isdigit(static_cast<unsigned char>(c))) return false;
+    }
+    return true;
+}
+
+// "a_b_c" without its last part, which is put into `last`; false: there is one part alone.
+bool split_last(std::string& name, std::string& last) {
+    const std::size_t at = name.rfind('_');
+    if (at == std::string::npos || at == 0) return false;
+    last = name.substr(at + 1);
+    name.resize(at);
+    return true;
+}
+
+}  // namespace
+
+std::string tissue_words(const std::string& label) {
+    const std::string english = readable(label);
+    if (language_in_use().catalogue.empty()) return english;
+    if (const char* whole = translation(english.c_str())) return whole;
+    std::string base = label, last, end;
+    if (!split_last(base, last)) return english;
+    if (base == "vertebrae") return std::string(tr("Vertebra")) + " " + last;
+    if (whole_number(last)) {
+        end = " " + last;
+        if (const char* known = translation(readable(base).c_str())) return known + end;
+        if (!split_last(base, last)) return english;
+    }
+    if (last != "left" && last != "right") return english;
+    const char* known = translation(readable(base).c_str());
+    return known ? std::string(known) + " " + tr(last.c_str()) + end : english;
+}
+
+}  // namespace sonocase::runtime::inline player_words

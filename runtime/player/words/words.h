@@ -1,24 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the window says, in the user's language. The English words stand in the code and are the key
-// of the catalogue; a test finds every tr("...") and sees that each other language has it, with the
-// same printf fields.
+// What the window says, in the user's language, by gettext's method: the English words stand in the
+// code and are the key of the catalogues, runtime/player/locale/<language>.po, which are compiled
+// into the program. A test finds every tr("...") and Message("...") and sees that each language has
+// it, with the same fields.
 #pragma once
 
 #include <set>
 #include <span>
 #include <string>
+#include <vector>
 
-namespace sonocase::runtime {
+#include "formats/base/message.h"
+
+namespace sonocase::runtime::inline player_words {
 
 struct Translation {
-    const char *english, *other;
+    std::string english, other;
 };
 
 struct Language {
-    const char* code;                        // ISO 639-1
-    const char* name;                        // in that language
-    std::span<const Translation> catalogue;  // empty: English itself; sorted by `english`
+    std::string code;                    // ISO 639-1
+    std::string name;                    // in that language
+    std::vector<Translation> catalogue;  // empty: English itself; sorted by `english`
 };
 
 std::span<const Language> languages();  // English first
@@ -38,4 +42,14 @@ const char* translation(const char* english);
 // The words in the language in use; those that the catalogue lacks as they are.
 const char* tr(const char* english);
 
-}  // namespace sonocase::runtime
+// What is put together before it reaches the window (notices, errors, messages of trackers), in the
+// language in use: the format and each argument are translated by themselves, and what the
+// catalogue lacks stays as it is. Standard error keeps the English.
+std::string tr_message(const Message& message);
+
+// The name of a label as people write it: "kidney_left" is "Kidney left", "Niere links". Sides,
+// numbers of ribs, vertebrae and lesions are put together from parts. A name that the catalogue
+// lacks stays as it is.
+std::string tissue_words(const std::string& label);
+
+}  // namespace sonocase::runtime::inline player_words

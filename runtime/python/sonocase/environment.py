@@ -191,7 +191,7 @@ class VectorEnvironment:
         for episode, random in zip(self._episodes, self._random):
             episode.reset(random)
         self._ended[:] = False
-        info = self._look()
+        info = self._observe()
         for n, episode in enumerate(self._episodes):
             episode.judge(info["facts"][n])
         return self._pictures.copy(), info
@@ -205,7 +205,7 @@ class VectorEnvironment:
         for n, episode in enumerate(self._episodes):
             episode.reset(self._random[n]) if fresh[n] else episode.act(actions[n])
         self._frame += 1
-        info = self._look()
+        info = self._observe()
         judged = [episode.judge(info["facts"][n]) for n, episode in enumerate(self._episodes)]
         reward = np.array([0.0 if fresh[n] else j[0] for n, j in enumerate(judged)])
         terminated = np.array([j[1] for j in judged]) & ~fresh
@@ -213,7 +213,7 @@ class VectorEnvironment:
         self._ended = terminated | truncated
         return self._pictures.copy(), reward, terminated, truncated, info
 
-    def _look(self):
+    def _observe(self):
         facts, planes = [None] * self.num_envs, [None] * self.num_envs
         for r, renderer in enumerate(self._renderers):
             mine = np.flatnonzero(self._of == r)

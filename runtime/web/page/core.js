@@ -3,14 +3,14 @@
 // The program (program/exports.cpp) as an object: memory, texts and calls. Runs in pages and in
 // node alike.
 
-// In the order of exports.cpp.
+// The values that the program returns, in the order of exports.cpp.
 export const kValues = [
     'side', 'mm_per_px', 'origin_x', 'origin_y', 'depth_mm', 'focus_mm', 'model_paper', 'has_needle',
     'needle_depth_mm', 'in_contact', 'press_mm', 'kept', 'attempt', 'seconds', 'insertions',
     'targets_hit', 'tip_to_target_mm', 'tip_in_view', 'in_no_go', 'damaged', 'frame_number',
     'missing', 'segments_left', 'has_flow', 'machine_hz', 'sound_hz', 'beats', 'psv', 'edv', 'resistive_index', 'flow'];
 
-// In the order of exports_doppler.cpp; mode as in kDopplerModes.
+// The settings of the Doppler modes, in the order of exports.cpp; mode as in kDopplerModes.
 export const kDoppler = [
     'mode', 'box_left', 'box_right', 'box_top_mm', 'box_bottom_mm', 'steer_deg', 'scale_cm_s',
     'spectral_scale_cm_s', 'baseline', 'invert', 'wall_filter', 'gain_db', 'gate_line',
@@ -104,8 +104,8 @@ export class Core {
     }
     look_again() { this.check(this.calls.look_again()); }
     // What to fetch next: [{first, count}] of segments.
-    next_runs(most) {
-        const count = this.calls.next_runs(most);
+    next_runs(max_segments) {
+        const count = this.calls.next_runs(max_segments);
         const pairs = new Uint32Array(this.memory.buffer, this.calls.runs(), 2 * count).slice();
         return Array.from({length: count}, (unused, n) => ({first: pairs[2 * n], count: pairs[2 * n + 1]}));
     }
@@ -149,7 +149,7 @@ export class Core {
         this.set_text(`${trainee.replaceAll('\n', ' ')}\n${started}`);
         this.check(this.calls.start_attempt(now_s, seed));
     }
-    // Of the last picture, mm in the probe's frame: y is the distance to the plane.
+    // The targets of the last picture, mm in the probe's frame: y is the distance to the plane.
     targets() {
         const count = this.calls.target_count();
         const from = new Float64Array(this.memory.buffer, this.calls.numbers(), 4 * count);

@@ -10,7 +10,7 @@ const kSpectrumSeconds = 4, kMColumns = 5.12;
 const kReachPx = 14, kFingerReachPx = 22;
 const $ = (id) => document.getElementById(id);
 
-// Of the console: setting, its part of what is shown.
+// Each setting of the console, and where its value is shown.
 const kFields = {
     'd-scale': ['scale', 1], 'd-gain': ['gain_db', 1], 'd-filter': ['wall_filter', 0.01], 'd-zero': ['baseline', 1],
     'd-steer': ['steer_deg', 1], 'd-angle': ['angle_deg', 1], 'd-gate': ['gate_mm', 1], 'd-line': ['gate_line', 0.01],
@@ -189,9 +189,9 @@ export class Doppler {
             on.to.fillRect(12, top + n * high / 48, 9, high / 48 + 0.6);
         }
         if (this.mode !== 'colour') return;
-        const most = Math.round(settings.scale_cm_s), [plus, minus] = settings.invert ? ['-', '+'] : ['+', '-'];
-        on.say(`${plus}${most} cm/s`, 26, top + 10);
-        on.say(`${minus}${most}`, 26, top + high);
+        const scale = Math.round(settings.scale_cm_s), [plus, minus] = settings.invert ? ['-', '+'] : ['+', '-'];
+        on.say(`${plus}${scale} cm/s`, 26, top + 10);
+        on.say(`${minus}${scale}`, 26, top + high);
     }
     draw_axes(on) {
         const strip = $('strip').getBoundingClientRect(), box = this.scan.picture.box.getBoundingClientRect(), v = this.scan.values;

@@ -119,7 +119,7 @@ export class Hands {
         this.scan.touched();
     }
 
-    // By position: KeyboardEvent.code.
+    // Keys go by their position: KeyboardEvent.code.
     key(e, is_down) {
         Object.assign(this.modifiers, {shift: e.shiftKey, alt: e.altKey, ctrl: e.ctrlKey || e.metaKey});
         if (!is_down) {

@@ -28,7 +28,7 @@ export class Picture {
         if (this.canvas.width !== side) this.canvas.width = this.canvas.height = side;
         this.image = this.context.createImageData(side, side);
         this.words = new Uint32Array(this.image.data.buffer);
-        // In the middle, but for the room that the depth scale takes.
+        // The picture lies in the middle, less the room that the depth scale takes.
         this.left = Math.max(0, Math.min((width - this.css_side) / 2, width - this.css_side - 44));
         this.canvas.style.left = `${this.left}px`;
         this.canvas.style.width = this.canvas.style.height = `${this.css_side}px`;

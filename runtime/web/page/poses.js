@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Probe and needle of a tracker on another program: `sonoplay --serve-poses`, named by ?poses=ws://... in the page's
-// address. Messages are those of runtime/tracking/websocket/pose_server.h.
+// address. Messages are those of runtime/tracking/devices/pose_server.h.
 
 const kLongestTrackerWaitMs = 10000;
 
-// {probe, needle} of a message, needle may be null; null: it is none of ours.
+// {probe, needle} of a message, needle may be null; null: it is not one of ours.
 export function parse_poses(text) {
     let message;
     try {

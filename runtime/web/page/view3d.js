@@ -112,7 +112,7 @@ export class View3d {
         this.orbit.distance = Math.min(Math.max(this.orbit.distance * 0.9 ** -Math.sign(e.deltaY), 150), 3000);
         this.turned();
     }
-    // With the view in focus the arrows turn it, not the probe.
+    // When the view has the focus, the arrows turn it, not the probe.
     key(e) {
         const by = {ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1]}[e.code];
         const nearer = {Equal: 0.9, Minus: 1 / 0.9}[e.code];

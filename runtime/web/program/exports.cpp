@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the page calls: plain functions over one PagePlayer. Texts and bytes come back through
-// text() and bytes(), numbers that the page shows through values(). Functions that can fail return
-// 0 and leave the reason in text(). page/core.js is the other side.
+// What the page calls: plain functions over the one PagePlayer that a page has. Texts and bytes
+// come back through text() and bytes(), numbers that the page shows through values(). Functions
+// that can fail return 0 and leave the reason in text(). page/core.js is the other side.
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -13,21 +14,77 @@
 #include <vector>
 
 #include "formats/base/digest.h"
+#include "runtime/imaging/doppler/doppler_picture.h"
 #include "runtime/web/page_json.h"
-#include "runtime/web/program/page_state.h"
+#include "runtime/web/page_player.h"
+#include "runtime/web/page_scene.h"
 #include "runtime/web/warm_up.h"
+
+#define SONOCASE_EXPORT(name) extern "C" __attribute__((export_name(#name)))
 
 using namespace sonocase;
 using namespace sonocase::runtime;
 
-Page sonocase::runtime::page;
+namespace {
 
-int sonocase::runtime::answer(const Status& status) {
+// Order of values(); page/core.js names them in the same order.
+enum Value {
+    kSide,
+    kMmPerPx,
+    kOriginX,
+    kOriginY,
+    kDepthMm,
+    kFocusMm,
+    kModelPaper,
+    kHasNeedle,
+    kNeedleDepthMm,
+    kInContact,
+    kPressMm,
+    kKept,
+    kAttempt,
+    kSeconds,
+    kInsertions,
+    kTargetsHit,
+    kTipToTargetMm,
+    kTipInView,
+    kInNoGo,
+    kDamaged,
+    kFrameNumber,
+    kMissing,  // blocks
+    kSegmentsLeft,
+    kHasFlow,    // 0: says nothing of the flow of blood, or no Doppler mode was on
+    kMachineHz,  // pictures per second of a machine with this colour box
+    kSoundHz,
+    kBeats,  // of the spectrum, that were measured; the next four are of them
+    kPsv,
+    kEdv,
+    kResistiveIndex,
+    kFlow,
+    kValueCount
+};
+
+struct Page {
+    RawVector<std::uint8_t> incoming;
+    std::optional<Arrivals> arrivals;  // of incoming; the player's own once it is open
+    std::vector<std::uint64_t> segment_hashes;
+    std::vector<SegmentRun> runs;
+    std::unique_ptr<PagePlayer> player, warming;
+    ImageSettings settings;
+    std::string text;
+    std::vector<std::uint8_t> bytes;
+    std::vector<std::uint32_t> screen;
+    std::array<double, kValueCount> values{};
+    std::array<double, 32> poses{};
+    std::vector<double> numbers;  // of what was asked for last: targets, marks
+    std::array<double, 16> doppler{};
+};
+Page page;
+
+// Returns 1, or 0 with the reason in text().
+int answer(const Status& status) {
     page.text = status ? std::string() : status.error().message();
     return status ? 1 : 0;
 }
-
-namespace {
 
 Rigid rigid_at(const double* rows) {
     Rigid out;
@@ -159,8 +216,8 @@ SONOCASE_EXPORT(look_again) int look_again() {
     return answer(page.player->look_again());
 }
 // Returns how many runs there are: pairs of first segment and count, at runs().
-SONOCASE_EXPORT(next_runs) std::size_t next_runs(std::size_t most) {
-    page.runs = page.player->next_runs(most);
+SONOCASE_EXPORT(next_runs) std::size_t next_runs(std::size_t max_segments) {
+    page.runs = page.player->next_runs(max_segments);
     return page.runs.size();
 }
 SONOCASE_EXPORT(runs) const SegmentRun* runs() {
@@ -332,4 +389,187 @@ SONOCASE_EXPORT(finish_attempt) int finish_attempt() {
     page.bytes = std::move(finished->recording);
     page.text = std::move(finished->score_json);
     return 1;
+}
+
+// The Doppler modes.
+
+namespace {
+
+// Order of doppler(); page/core.js names them in the same order.
+void fill_doppler(const DopplerSettings& d) {
+    page.doppler = {double(d.mode),  d.box_left,       d.box_right,   d.box_top_mm,
+                    d.box_bottom_mm, d.steer_deg,      d.scale_cm_s,  d.spectral_scale_cm_s,
+                    d.baseline,      double(d.invert), d.wall_filter, d.gain_db,
+                    d.gate_line,     d.gate_depth_mm,  d.gate_mm,     d.angle_deg};
+}
+
+DopplerSettings settings_of(const std::array<double, 16>& from) {
+    DopplerSettings d;
+    d.mode = static_cast<DopplerMode>(std::clamp(static_cast<int>(from[0]), 0, 4));
+    d.box_left = from[1];
+    d.box_right = from[2];
+    d.box_top_mm = from[3];
+    d.box_bottom_mm = from[4];
+    d.steer_deg = from[5];
+    d.scale_cm_s = from[6];
+    d.spectral_scale_cm_s = from[7];
+    d.baseline = from[8];
+    d.invert = from[9] != 0;
+    d.wall_filter = from[10];
+    d.gain_db = from[11];
+    d.gate_line = from[12];
+    d.gate_depth_mm = from[13];
+    d.gate_mm = from[14];
+    d.angle_deg = from[15];
+    return d;
+}
+
+int put_points(std::span<const PlanePoint> points) {
+    page.numbers.clear();
+    for (const PlanePoint p : points) page.numbers.insert(page.numbers.end(), {p.x, p.z});
+    return static_cast<int>(points.size());
+}
+
+}  // namespace
+
+// The settings: read here, and written here before set_doppler().
+SONOCASE_EXPORT(doppler) double* doppler_settings() {
+    fill_doppler(page.settings.doppler);
+    return page.doppler.data();
+}
+SONOCASE_EXPORT(set_doppler) int set_doppler() {
+    const DopplerSettings wanted = settings_of(page.doppler);
+    if (wanted.mode != DopplerMode::off)
+        if (const Status begun = page.player->begin_doppler(); !begun) return answer(begun);
+    page.settings.doppler = wanted;
+    return 1;
+}
+// Box and gate to the widest vessel of the plane. 0: it cuts none.
+SONOCASE_EXPORT(aim_doppler) int aim_doppler() {
+    DopplerSettings& settings = page.settings.doppler;
+    const DopplerSettings aimed = page.player->doppler().aimed(page.player->engine(), settings);
+    const bool moved = !(aimed == settings);
+    settings = aimed;
+    return moved;
+}
+// A linear probe's lines can be steered.
+SONOCASE_EXPORT(steers) int steers() {
+    return !doppler_geometry(page.player->engine()).fan;
+}
+// What a pointer takes hold of at a place of the scan plane, as doppler::Held.
+SONOCASE_EXPORT(hold_doppler) int hold_doppler(double x_mm, double z_mm, double reach_mm) {
+    return static_cast<int>(doppler::hold_at(doppler_geometry(page.player->engine()),
+                                             page.settings.doppler, {x_mm, z_mm}, reach_mm));
+}
+SONOCASE_EXPORT(drag_doppler)
+void drag_doppler(int held, double from_x, double from_z, double to_x, double to_z) {
+    doppler::drag_held(doppler_geometry(page.player->engine()), static_cast<doppler::Held>(held),
+                       {from_x, from_z}, {to_x, to_z}, page.settings.doppler);
+}
+// Two numbers for each point at numbers(): the box's outline, or face, end, upper, lower and middle
+// of the gate.
+SONOCASE_EXPORT(doppler_marks) int doppler_marks() {
+    const ScanGeometry geometry = doppler_geometry(page.player->engine());
+    const DopplerSettings& settings = page.settings.doppler;
+    if (settings.mode == DopplerMode::colour || settings.mode == DopplerMode::power)
+        return put_points(doppler::box_outline(geometry, settings));
+    const doppler::GateMarks gate = doppler::gate_marks(geometry, settings);
+    return put_points(std::array{gate.face, gate.end, gate.upper, gate.lower, gate.middle});
+}
+
+// Null: the last picture is grey.
+SONOCASE_EXPORT(overlay) const std::uint8_t* overlay() {
+    return page.player->doppler().overlay().data();
+}
+// 256 times red, green, blue.
+SONOCASE_EXPORT(palette) const std::uint8_t* palette(int power) {
+    return doppler::palette(power ? DopplerMode::power : DopplerMode::colour)[0].data();
+}
+// Null: the mode has none.
+SONOCASE_EXPORT(strip) const std::uint8_t* strip(int width, int height) {
+    return page.player->doppler().strip(width, height).data();
+}
+// Pairs of samples at sound().
+SONOCASE_EXPORT(sound_count) std::size_t sound_count() {
+    return page.player->doppler().sound().size() / 2;
+}
+SONOCASE_EXPORT(sound) const float* sound() {
+    return page.player->doppler().sound().data();
+}
+
+// The 3-D view.
+
+namespace {
+
+struct Scene {
+    const PagePlayer* of = nullptr;  // whose case it shows
+    PageScene scene;
+    Model model;
+} shown;
+
+PageScene& scene() {
+    if (shown.of != page.player.get() || !shown.scene.begun()) {
+        shown.scene.begin(*page.player->bundle());
+        shown.of = page.player.get();
+    }
+    return shown.scene;
+}
+
+PlanePicture picture_of(const PagePlayer& player) {
+    const PageImage& image = player.image();
+    return {player.engine().renderer().layout(), image.depth_mm,
+            player.engine().last().input.settings.flip_left_right, image.side_px, image.side_px};
+}
+
+}  // namespace
+
+// Number of parts without organs; makes the skin of a case when it is first asked.
+SONOCASE_EXPORT(scene_parts) int scene_parts() {
+    return scene().parts();
+}
+// The same with organs, which are made now.
+SONOCASE_EXPORT(scene_organs) int scene_organs() {
+    scene().add_organs(*page.player->bundle());
+    return scene().parts();
+}
+// Memory of the meshes is given back.
+SONOCASE_EXPORT(scene_end) void scene_end() {
+    shown = {};
+}
+// Number of vertices, of eight floats each, at scene_vertices(); indices at scene_indices().
+SONOCASE_EXPORT(scene_part) std::size_t scene_part(int part) {
+    shown.model = scene().part(part, page.player->engine(), picture_of(*page.player));
+    return shown.model.vertices.size();
+}
+SONOCASE_EXPORT(scene_vertices) const float* scene_vertices() {
+    return reinterpret_cast<const float*>(shown.model.vertices.data());
+}
+SONOCASE_EXPORT(scene_indices) const std::uint32_t* scene_indices() {
+    return shown.model.indices.data();
+}
+SONOCASE_EXPORT(scene_index_count) std::size_t scene_index_count() {
+    return shown.model.indices.size();
+}
+SONOCASE_EXPORT(scene_rgb) unsigned scene_rgb(int part) {
+    return scene().rgb(part);
+}
+// At numbers(): yaw, pitch, distance of the first view.
+SONOCASE_EXPORT(scene_first) void scene_first() {
+    const Orbit orbit = scene().first(page.player->engine());
+    page.numbers = {orbit.yaw_rad, orbit.pitch_rad, orbit.distance_mm};
+}
+// At numbers(): three matrices of 16, row by row: camera_from_mannequin, mannequin_from_probe,
+// mannequin_from_needle as it is drawn. from: as ViewFrom.
+SONOCASE_EXPORT(scene_places)
+void scene_places(int from, double yaw_rad, double pitch_rad, double distance_mm) {
+    const ScanEngine& engine = page.player->engine();
+    const FrameRecord& record = engine.last();
+    page.numbers.clear();
+    for (const Rigid& place :
+         {inverse(scene().camera(static_cast<ViewFrom>(from), {yaw_rad, pitch_rad, distance_mm},
+                                 engine)),
+          record.tools.mannequin_from_probe, record.needle.mannequin_from_drawn}) {
+        const std::array<double, 16> rows = matrix_from_rigid(place);
+        page.numbers.insert(page.numbers.end(), rows.begin(), rows.end());
+    }
 }

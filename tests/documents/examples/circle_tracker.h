@@ -1,11 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // A tracker that leads the probe once round a circle: a function of time, without a thread.
 #pragma once
 
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "runtime/tracking/tracker.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline tracking {
 
 class CircleTracker final : public Tracker {
   public:
@@ -14,7 +17,7 @@ class CircleTracker final : public Tracker {
     CircleTracker(const Rigid& start, double radius_mm) : start_(start), radius_mm_(radius_mm) {}
 
     bool poll(double now_s, TrackerReading& reading) override {
-        const double angle_rad = 2 * 3.14159265358979 * now_s / duration_s();
+        const double angle_rad = 2 * kPi * now_s / duration_s();
         const Vector3 offset_probe{radius_mm_ * std::sin(angle_rad),
                                    radius_mm_ * (1 - std::cos(angle_rad)), 0};
         Rigid pose = start_;
@@ -42,4 +45,4 @@ class CircleTracker final : public Tracker {
     std::uint64_t readings_ = 0;
 };
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline tracking

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+
 // The worked tracker of docs/extending.md.
 #include "documents/examples/circle_tracker.h"
 

@@ -16,21 +16,19 @@ OptionGroup options() {
 }
 
 Result<StageValue> run(StageInputs& inputs, const Progress&) {
-    const auto labels = inputs.get<LabelFile>("ct_labels");
-    if (!labels) return labels.error();
-    auto cropped = crop_labels((*labels)->volume, inputs.options<CropOptions>("crop"));
-    if (!cropped) return cropped.error();
+    SONOCASE_TRY(const LabelFile* const labels, inputs.get(kCtLabels));
+    SONOCASE_TRY(CropResult cropped, crop_labels(labels->volume, inputs.options<CropOptions>()));
     return StageValue::of(
-        LabelFile{"ct", std::move(cropped->volume), {}, {}, {std::move(cropped->report)}});
+        kCtLabels, LabelFile{"ct", std::move(cropped.volume), {}, {}, {std::move(cropped.report)}});
 }
 
 StageVerb verb() {
     StageVerb verb;
-    verb.files = {label_input("ct_labels", "Labels in the ct frame: .labels or any label map")};
+    verb.files = {label_input(kCtLabels, "Labels in the ct frame: .labels or any label map")};
     verb.output_type = "OUT.labels";
     verb.output_meaning = "Where to write";
     verb.save = [](StageInputs&, const StageValue& value, const std::string& path) {
-        return save_labels(value.as<LabelFile>(), {}, path);
+        return save_labels(value.as(kCtLabels), {}, path);
     };
     return verb;
 }
@@ -43,14 +41,14 @@ StageDescriptor crop_stage() {
     stage.version = kCropVersion;
     stage.summary = "cut a label map down to its body";
     stage.about = "Cut a label map down to the box of its body and a margin";
-    stage.takes = {"ct_labels"};
-    stage.provides = "ct_labels";  // instead of those that import provides
+    stage.takes = {kCtLabels};
+    stage.provides = kCtLabels;  // instead of those that import provides
     stage.options = options();
     stage.run = run;
-    stage.codec = label_codec();
-    stage.reports = label_reports;
+    stage.codec = label_codec(kCtLabels);
+    stage.reports = reports_of(kCtLabels);
     stage.share = 0.01;
-    stage.cost = {1, 240, 0, 4, 0};
+    stage.cost = {.threads = 1, .base_mb = 240, .per_label_voxel = 4};
     stage.verb = verb();
     return stage;
 }

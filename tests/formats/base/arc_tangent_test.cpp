@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "formats/base/arc_tangent.h"
+#include "formats/base/portable_math.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
+
+#include "formats/base/constants.h"
 
 namespace sonocase {
 namespace {
@@ -17,7 +19,7 @@ constexpr double kFewUlp = 3 * std::numeric_limits<double>::epsilon();
 
 TEST(ArcTangent, AgreesWithTheLibraryAllRound) {
     for (int i = -180000; i <= 180000; ++i) {
-        const double angle = i * 1e-5 * 3.141592653589793 / 1.8;
+        const double angle = i * 1e-5 * kPi / 1.8;
         for (const double length : {1e-150, 1.0, 3e7}) {
             const double y = length * std::sin(angle), x = length * std::cos(angle);
             ASSERT_NEAR(arc_tangent(y, x), std::atan2(y, x), kFewUlp * std::fabs(angle) + 1e-300)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "formats/base/geometry.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +11,6 @@ namespace sonocase {
 namespace {
 
 using testing::Random;
-constexpr double kPi = 3.14159265358979323846;
 
 TEST(Geometry, RigidInverseUndoesTheMotion) {
     Random random(1);

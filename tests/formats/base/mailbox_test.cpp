@@ -6,7 +6,7 @@
 
 #include <thread>
 
-namespace sonocase::runtime {
+namespace sonocase {
 namespace {
 
 TEST(Mailbox, GivesTheLatestOnceAndNothingBefore) {
@@ -51,4 +51,4 @@ TEST(Mailbox, NeverTearsNorGoesBackBetweenThreads) {
 }
 
 }  // namespace
-}  // namespace sonocase::runtime
+}  // namespace sonocase

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 #include "support/random.h"
 #include "support/tiny_case.h"
 
@@ -135,7 +135,7 @@ TEST(ArrivingBundle, OpensWithLittleAndIsWholeInTheEnd) {
     for (const std::size_t segment : order) {
         link.bring(segment, streamed.bytes().data());
         streamed.arrived(segment);
-        ASSERT_TRUE(streamed.look_again());
+        ASSERT_TRUE(streamed.read_arrived());
         blocks.ensure_loaded([](Int3) { return true; });
     }
     EXPECT_TRUE(streamed.arrivals()->whole() && streamed.has_textures());
@@ -192,7 +192,7 @@ TEST(ArrivingBundle, AWrongBlockIsFoundWhenItIsAskedFor) {
                     std::uint8_t{0x5A});
         opened->arrived(n);
     }
-    EXPECT_FALSE(opened->look_again()) << "chunks that are read whole have checksums";
+    EXPECT_FALSE(opened->read_arrived()) << "chunks that are read whole have checksums";
     opened->blocks()->ensure_loaded([](Int3) { return true; });
     EXPECT_TRUE(opened->blocks()->damaged());
     for (const std::uint32_t v : (*opened)->boundary.pool)

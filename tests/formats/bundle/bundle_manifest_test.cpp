@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/bundle/case_bundle.h"
-#include "formats/container/chunk_file.h"
+#include "formats/bundle/codec/chunk_file.h"
 #include "support/random.h"
 #include "support/tiny_case.h"
 

@@ -9,11 +9,11 @@
 #include <cstring>
 #include <type_traits>
 
+#include "formats/bundle/codec/chunk_file.h"
 #include "formats/bundle/stage_files.h"
-#include "formats/container/chunk_file.h"
 #include "formats/files/atomic_file.h"
-#include "formats/files/bundle_file.h"
-#include "formats/threads/thread_jobs.h"
+#include "formats/files/load_save.h"
+#include "formats/files/thread_jobs.h"
 #include "formats/volume/boundary_record.h"
 #include "support/paths.h"
 #include "support/random.h"

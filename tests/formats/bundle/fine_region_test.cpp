@@ -6,10 +6,10 @@
 
 #include <cmath>
 
+#include "formats/bundle/case_bundle.h"
+#include "formats/bundle/codec/chunk_file.h"
 #include "formats/bundle/codec/region_codec.h"
 #include "formats/bundle/stage_files.h"
-#include "formats/bundle/streamed_bundle.h"
-#include "formats/container/chunk_file.h"
 #include "formats/volume/boundary_record.h"
 #include "support/tiny_case.h"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "formats/calibration/direction.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -16,8 +17,6 @@ namespace {
 
 using testing::Random;
 using testing::read_recording;
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 double angle(Vector3 a, Vector3 b) {
     return std::atan2(norm(cross(a, b)), dot(a, b));
@@ -76,8 +75,8 @@ TEST(Direction, LineBeatsThePaperPairsOnNoisyReadings) {
         line += angle(fit_direction(poses).direction, truth);
         pairs += angle(fit_direction_paper(poses, 1), truth);
     }
-    std::printf("mean error: line %.3f degrees, pairs %.3f degrees\n", line / 100 / kDegree,
-                pairs / 100 / kDegree);
+    std::printf("mean error: line %.3f degrees, pairs %.3f degrees\n", line / 100 / kRadPerDeg,
+                pairs / 100 / kRadPerDeg);
     EXPECT_LT(line, 0.5 * pairs);
 }
 
@@ -93,7 +92,7 @@ TEST(Direction, StrayPosesAreLeftOut) {
         }
     }
     const DirectionFit fit = fit_direction(poses);
-    EXPECT_LT(angle(fit.direction, truth), 0.3 * kDegree);
+    EXPECT_LT(angle(fit.direction, truth), 0.3 * kRadPerDeg);
     EXPECT_LT(fit.inliers, 85);
 }
 
@@ -129,7 +128,7 @@ TEST(Direction, FrameIsOrthonormalAndKeepsTheBetterAxis) {
     // Equal sigmas share the error.
     depth.sigma_rad = lateral.sigma_rad;
     const ProbeFrame shared = make_probe_frame(depth, lateral);
-    const double error = 90 * kDegree - shared.raw_angle_rad;
+    const double error = 90 * kRadPerDeg - shared.raw_angle_rad;
     EXPECT_NEAR(angle(shared.sensor_from_probe.column(2), depth.direction), error / 2, 1e-12);
     EXPECT_NEAR(angle(shared.sensor_from_probe.column(0), lateral.direction), error / 2, 1e-12);
     // the same sweep twice is not a frame.
@@ -145,8 +144,8 @@ TEST(Direction, WaterTankRecordingHasOneDirection) {
     ASSERT_TRUE(all.determined);
     std::printf(
         "direction (%.3f %.3f %.3f) sigma %.2f degrees, %.0f mm, %.2f mm rms, turn %.2f degrees\n",
-        all.direction.x, all.direction.y, all.direction.z, all.sigma_rad / kDegree, all.length_mm,
-        all.rms_mm, all.turn_rad / kDegree);
+        all.direction.x, all.direction.y, all.direction.z, all.sigma_rad / kRadPerDeg,
+        all.length_mm, all.rms_mm, all.turn_rad / kRadPerDeg);
     EXPECT_GT(all.length_mm, 20);
     // Two halves of the hand-made sweep agree within a few of their sigmas.
     const DirectionFit first = fit_direction(std::span(poses).first(poses.size() / 2));

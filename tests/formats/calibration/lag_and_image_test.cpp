@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "formats/base/constants.h"
+#include "formats/calibration/calibration.h"
 #include "formats/calibration/image_plane.h"
 #include "formats/calibration/lag.h"
-#include "formats/calibration/quality.h"
 #include "support/random.h"
 #include "support/read_recording.h"
 
@@ -70,7 +71,7 @@ TEST(Lag, TroubleHasItsOwnWords) {
         still.value[i] = 5;
         noise.value[i] = 0;
         for (int k = 0; k < 1; ++k) noise.value[i] += std::sin(0.9 * a.time_s[i] * a.time_s[i]);
-        wave.value[i] = std::sin(2 * 3.14159265358979323846 * a.time_s[i] / 0.35);
+        wave.value[i] = std::sin(2 * kPi * a.time_s[i] / 0.35);
     }
     few.time_s = {0, 1, 2};
     few.value = {0, 1, 0};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "formats/calibration/landmarks.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -13,8 +14,6 @@ namespace sonocase {
 namespace {
 
 using testing::Random;
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 bool says(const RigidFit& fit, const std::string& words) {
     if (fit.problem.find(words) != std::string::npos) return true;
@@ -62,8 +61,7 @@ TEST(Landmarks, HalfTurnsAndFlatSetsAreNoSpecialCase) {
     for (int draw = 0; draw < 100; ++draw) {
         Pairs p = pairs(4, 0, random);
         for (Point3& q : p.from) q.z = 0;  // coplanar
-        p.truth.rotation =
-            rotation_about(random.direction(), draw % 2 ? 3.14159265358979323846 : 1e-8);
+        p.truth.rotation = rotation_about(random.direction(), draw % 2 ? kPi : 1e-8);
         for (std::size_t i = 0; i < 4; ++i) p.to[i] = p.truth * p.from[i];
         const RigidFit fit = fit_rigid(p.from, p.to);
         ASSERT_TRUE(fit.determined);
@@ -138,8 +136,7 @@ Surface torso() {
     Surface s;
     for (int i = 0; i <= 60; ++i) {
         for (int j = 0; j < 120; ++j) {
-            const double a = 3.14159265358979323846 * i / 60,
-                         b = 2 * 3.14159265358979323846 * j / 120;
+            const double a = kPi * i / 60, b = 2 * kPi * j / 120;
             const double bulge = 1 + 0.25 * std::exp(-8 * ((a - 1) * (a - 1) + (b - 1) * (b - 1))) +
                                  0.1 * std::cos(a);
             s.points.push_back({160 * bulge * std::sin(a) * std::cos(b),
@@ -184,7 +181,8 @@ TEST(SkinSweep, StartNearbyEndsOnTheTruth) {
     const std::vector<Point3> readings = swept(s, truth, 0.5, random, -400);
     SweepOptions options;
     options.has_start = true;
-    options.start = truth * Rigid{rotation_about(random.direction(), 12 * kDegree), {15, -10, 12}};
+    options.start =
+        truth * Rigid{rotation_about(random.direction(), 12 * kRadPerDeg), {15, -10, 12}};
     const RigidFit fit = fit_skin_sweep(s, readings, options);
     ASSERT_TRUE(fit.determined) << fit.problem;
     for (const Point3& p : {Point3{0, 0, 0}, Point3{0, 60, 100}, Point3{80, 0, -100}}) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "formats/calibration/needle.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -15,8 +16,6 @@ namespace {
 using testing::pivot_recording;
 using testing::PivotMotion;
 using testing::Random;
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 double angle(Vector3 a, Vector3 b) {
     return std::atan2(norm(cross(a, b)), dot(a, b));
@@ -37,7 +36,7 @@ std::vector<std::vector<Pose>> pinholes(const Truth& truth,
         PivotMotion motion;
         motion.tip_mm = truth.tip - depth * truth.direction;
         motion.noise_mm = noise_mm;
-        motion.tilt_rad = tilt_deg * kDegree;
+        motion.tilt_rad = tilt_deg * kRadPerDeg;
         motion.poses = 60;
         out.push_back(pivot_recording(motion, random));
     }
@@ -92,8 +91,8 @@ TEST(Needle, HalfAMillimetreOfNoiseLeavesATenthOfADegree) {
     for (int draw = 0; draw < 100; ++draw) {
         const NeedleFit fit = fit_needle(pinholes(truth, 0.5, random), {.depths_mm = truth.depths});
         ASSERT_TRUE(fit.determined);
-        errors.push_back(angle(fit.direction, truth.direction) / kDegree);
-        paper.push_back(angle(fit.paper_direction, truth.direction) / kDegree);
+        errors.push_back(angle(fit.direction, truth.direction) / kRadPerDeg);
+        paper.push_back(angle(fit.paper_direction, truth.direction) / kRadPerDeg);
         const Vector3 side = any_perpendicular(truth.direction);
         inside += std::abs(dot(fit.direction, side)) <= fit.direction_sigma_rad;
     }
@@ -127,7 +126,7 @@ TEST(Needle, DepthsGivenTheOtherWayRoundTurnTheDirection) {
     truth.tip = {0, 0, -10};  // the shaft passes the sensor: the sign must come from the depths
     truth.direction = {0, 0, 1};
     const NeedleFit fit = fit_needle(pinholes(truth, 0.1, random), {.depths_mm = truth.depths});
-    EXPECT_LT(angle(fit.direction, truth.direction), 0.5 * kDegree);
+    EXPECT_LT(angle(fit.direction, truth.direction), 0.5 * kRadPerDeg);
     EXPECT_LT(norm(fit.tip_mm - truth.tip), 0.5);
 }
 
@@ -149,12 +148,12 @@ TEST(Needle, SpinAgreesWithPinholesOrSaysSo) {
     ASSERT_TRUE(turned.determined) << turned.problem;
     const NeedleAgreement same = compare(holes, turned);
     EXPECT_TRUE(same.agree) << same.sentence;
-    EXPECT_LT(same.angle_rad, 0.2 * kDegree);
+    EXPECT_LT(same.angle_rad, 0.2 * kRadPerDeg);
     Truth bent = truth;
     bent.direction = normalized(truth.direction + Vector3{0.05, 0, 0});
     const NeedleAgreement other = compare(holes, fit_needle_spin(spin(bent, 0.2, 0.002, random)));
     EXPECT_FALSE(other.agree);
-    EXPECT_NEAR(other.angle_rad / kDegree, 2.8, 0.4);
+    EXPECT_NEAR(other.angle_rad / kRadPerDeg, 2.8, 0.4);
     EXPECT_NE(other.sentence.find("disagree"), std::string::npos);
 }
 

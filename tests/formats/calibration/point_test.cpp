@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "formats/calibration/point.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdio>
 
+#include "formats/calibration/least_squares.h"
 #include "formats/calibration/pose_screen.h"
-#include "formats/calibration/solve/least_squares.h"
 #include "support/calibration_motion.h"
 #include "support/read_recording.h"
 
@@ -19,8 +20,6 @@ using testing::pivot_recording;
 using testing::PivotMotion;
 using testing::Random;
 using testing::read_recording;
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 double middle(std::vector<double> v) {
     std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
@@ -203,7 +202,7 @@ TEST(PointCalibration, PaperAndPivotFormGiveOneAnswer) {
 TEST(PointCalibration, ConditionIsThatOfTheWholeSystem) {
     Random random(4);
     PivotMotion motion;
-    motion.tilt_rad = 10 * kDegree;
+    motion.tilt_rad = 10 * kRadPerDeg;
     const std::vector<Pose> poses = pivot_recording(motion, random);
     LeastSquares whole(6);
     for (const Pose& p : poses) {
@@ -256,8 +255,8 @@ TEST(PointCalibration, LittleTiltIsToldByTheSigma) {
     for (double tilt : {60.0, 20.0, 5.0}) {
         Random random(7);
         PivotMotion motion;
-        motion.tilt_rad = tilt * kDegree;
-        motion.twist_rad = tilt * kDegree;
+        motion.tilt_rad = tilt * kRadPerDeg;
+        motion.twist_rad = tilt * kRadPerDeg;
         motion.noise_mm = 0.5;
         int inside = 0;
         double sigma = 0;

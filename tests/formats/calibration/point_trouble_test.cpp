@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "formats/base/constants.h"
 #include "formats/calibration/point.h"
 #include "support/calibration_motion.h"
 
@@ -14,8 +15,6 @@ namespace {
 using testing::pivot_recording;
 using testing::PivotMotion;
 using testing::Random;
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 bool says(const PointFit& fit, const std::string& words) {
     if (fit.problem.find(words) != std::string::npos) return true;
@@ -38,7 +37,7 @@ TEST(PointTrouble, NearSingleAxisIsToldWithItsAxis) {
     std::vector<Pose> poses;
     for (int i = 0; i < 100; ++i) {
         // One axis of the sensor, plus a wobble of one degree.
-        Pose pose = about_pivot(motion, rotation_about(random.direction(), 1 * kDegree) *
+        Pose pose = about_pivot(motion, rotation_about(random.direction(), 1 * kRadPerDeg) *
                                             rotation_about(axis, random.uniform(-0.6, 0.6)));
         for (int c = 0; c < 3; ++c)
             pose.tracker_from_tool.translation[c] += random.uniform(-0.3, 0.3);

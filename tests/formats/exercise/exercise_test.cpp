@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "formats/base/constants.h"
+
 namespace sonocase {
 namespace {
 
@@ -79,7 +81,7 @@ TEST(Exercise, ReadsEveryKey) {
     EXPECT_EQ(e->effects, (std::vector<std::string>{"speckle", "shadow"}));
     EXPECT_EQ(e->no_go.size(), 2u);
     EXPECT_EQ(e->start_beam, (Vector3{0, 0, -1}));
-    EXPECT_NEAR(e->probe.field_of_view_rad, 70 * 3.14159265358979 / 180, 1e-12);
+    EXPECT_NEAR(e->probe.field_of_view_rad, 70 * kRadPerDeg, 1e-12);
     EXPECT_EQ(e->probe.depth_mm, 160);
     EXPECT_EQ(e->needle.bend_max_weight, 0.8);
     ASSERT_EQ(e->targets.size(), 2u);

@@ -12,7 +12,6 @@
 #include <thread>
 
 #include "formats/base/digest.h"
-#include "formats/files/file_digest.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase {

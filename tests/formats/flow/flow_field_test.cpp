@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "formats/flow/flow_field.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -10,17 +11,14 @@
 
 #include "flow_cases.h"
 #include "formats/bundle/codec/flow_codec.h"
-#include "formats/flow/flow_at.h"
-#include "formats/flow/flow_profile.h"
 #include "formats/flow/flow_summary.h"
+#include "formats/flow/flow_velocity.h"
 
 namespace sonocase {
 namespace {
 
 using testing::leg_like_wave;
 using testing::tube;
-
-constexpr double kPi = 3.14159265358979323846;
 
 double integral(const FlowProfile::Row& row) {
     double sum = 0;
@@ -73,8 +71,8 @@ TEST(FlowProfile, AgreesWithWomersleysEquationSolvedByDifferences) {
         for (int k = 0; k < n; ++k) {
             const auto i = static_cast<std::size_t>(k);
             const double r = (k + 0.5) * d, in = k * d, out = (k + 1) * d;
-            const double a = kBloodViscosity_mm2_s * in / (r * d * d),
-                         b = kBloodViscosity_mm2_s * out / (r * d * d);
+            const double a = kBloodViscosityMm2PerS * in / (r * d * d),
+                         b = kBloodViscosityMm2PerS * out / (r * d * d);
             lower[i] = -a;
             upper[i] = k + 1 < n ? -b : 0;
             diagonal[i] = Complex(0, omega) + a + (k + 1 < n ? b : 2 * b);

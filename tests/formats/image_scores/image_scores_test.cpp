@@ -5,8 +5,7 @@
 
 #include <cmath>
 
-#include "formats/image_scores/motion_scores.h"
-#include "formats/image_scores/score_limits.h"
+#include "formats/image_scores/realism_scores.h"
 #include "formats/image_scores/smooth.h"
 #include "support/random.h"
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 
 namespace sonocase {
 namespace {

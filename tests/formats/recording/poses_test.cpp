@@ -6,7 +6,7 @@
 
 #include <filesystem>
 
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "support/paths.h"
 #include "support/random.h"
 

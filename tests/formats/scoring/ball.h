@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "formats/scoring/anatomy.h"
 
 namespace sonocase::testing {
@@ -38,7 +39,7 @@ class BreathingBall final : public Anatomy {
         Point3 middle;
         double period_s = 4;
         Vector3 swing(double time_s) const {
-            return std::sin(2 * 3.14159265358979 * time_s / period_s) * amplitude_mm;
+            return std::sin(2 * kPi * time_s / period_s) * amplitude_mm;
         }
     };
     BreathingBall(const Ball& still, const Motion& motion) : still_(still), motion_(motion) {}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "formats/scoring/image_region.h"
+#include "formats/scoring/sight.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/threads/thread_jobs.h"
+#include "formats/files/thread_jobs.h"
 #include "slow_scores.h"
 #include "support/random.h"
 

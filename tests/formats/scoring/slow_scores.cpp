@@ -2,7 +2,7 @@
 
 #include "slow_scores.h"
 
-#include "formats/scoring/image_region.h"
+#include "formats/scoring/sight.h"
 
 namespace sonocase::testing {
 namespace {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "formats/scoring/tool_track.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +9,6 @@
 
 namespace sonocase {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 std::vector<TrackPoint> random_track(std::uint64_t seed, int n) {
     testing::Random random(seed);

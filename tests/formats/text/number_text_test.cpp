@@ -41,6 +41,11 @@ TEST(NumberText, TextReadsBackAsTheSameDouble) {
     EXPECT_EQ(number_text(0.1), "0.1");
     EXPECT_EQ(number_text(-3.0), "-3");
     EXPECT_EQ(number_text(1.0 / 3, 4), "0.3333");
+    EXPECT_EQ(number_text(1234567, 3), "1.23e+06");
+    EXPECT_EQ(fixed_text(2.0 / 3, 2), "0.67");
+    EXPECT_EQ(fixed_text(-0.5, 0), "-0");
+    EXPECT_EQ(fixed_text(1e300, 1).size(), 303u);
+    EXPECT_EQ(fixed_text(-INFINITY, 1), "-inf");
     testing::Random random(3);
     for (int i = 0; i < 5000; ++i) {
         const double v =

@@ -22,7 +22,7 @@ TEST(BoundaryRecord, RoundTripWithinTheStatedRounding) {
         EXPECT_NEAR(out.distance_vx, in.distance_vx, 0.5 / kBoundaryStepsPerVoxel + 1e-12);
         worst_angle = std::max(worst_angle, std::acos(std::min(1.0, dot(in.normal, out.normal))));
     }
-    EXPECT_LT(worst_angle, 1.0 * 3.14159265358979 / 180);
+    EXPECT_LT(worst_angle, 1.0 * kRadPerDeg);
 }
 
 TEST(BoundaryRecord, DistanceIsClampedNotWrapped) {

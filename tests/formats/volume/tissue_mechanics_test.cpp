@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "formats/volume/tissue_mechanics.h"
+#include "formats/volume/tissue.h"
 
 #include <gtest/gtest.h>
 
@@ -55,10 +55,10 @@ TEST(TissueMechanics, EveryFigureLiesWithinItsLimits) {
                              "urine",        "bile",        "cyst",     "cerebrospinal_fluid",
                              "gas",          "lung",        "bone",     "metal"}) {
         const TissueMechanics m = mechanics_of(tissue(name, TissueKind::soft), "");
-        EXPECT_GE(m.stiffness_kpa, kLeastStiffnessKpa) << name;
-        EXPECT_LE(m.stiffness_kpa, kGreatestStiffnessKpa) << name;
+        EXPECT_GE(m.stiffness_kpa, kMinStiffnessKpa) << name;
+        EXPECT_LE(m.stiffness_kpa, kMaxStiffnessKpa) << name;
         EXPECT_GE(m.puncture_n, 0) << name;
-        EXPECT_LE(m.puncture_n, kGreatestPunctureN) << name;
+        EXPECT_LE(m.puncture_n, kMaxPunctureN) << name;
         EXPECT_FALSE(m.rigid && m.drains) << name;
     }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/aim/aim.h"
+#include "pipeline/check/aim.h"
 
 #include <gtest/gtest.h>
 

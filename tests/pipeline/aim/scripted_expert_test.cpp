@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/aim/scripted_expert.h"
+#include "pipeline/check/scripted_expert.h"
 
 #include <gtest/gtest.h>
 

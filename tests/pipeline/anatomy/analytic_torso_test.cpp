@@ -30,8 +30,7 @@ TEST(AnalyticTorso, SignOfTheDistanceAgreesWithTheLabel) {
         const Point3 p{random.uniform(-160, 160), random.uniform(-110, 110),
                        random.uniform(-140, 140)};
         const int own = analytic_torso_label(p);
-        EXPECT_LE(analytic_torso_signed_distance(own, p), 1e-6)
-            << labels[static_cast<std::size_t>(own)].name;
+        EXPECT_LE(analytic_torso_signed_distance(own, p), 1e-6) << labels[own].name;
         const int other = (own + 7) % static_cast<int>(labels.size());
         EXPECT_GE(analytic_torso_signed_distance(other, p), -1e-6);
     }
@@ -71,14 +70,14 @@ TEST(AnalyticTorso, TrueWarpsAreStrongAndFarFromFolding) {
         if (body.tubes) continue;  // a phantom is its own mannequin, without a warp
         const Registration truth = analytic_torso_truth(1, body);
         const LabelVolume volume = sample_analytic_torso(analytic_torso_grid({12, 12, 12}), body);
-        double least = 1e9, sum = 0;
+        double smallest = 1e9, sum = 0;
         int n = 0;
         for (int k = 0; k < volume.grid.size.z; ++k) {
             for (int j = 0; j < volume.grid.size.y; ++j) {
                 for (int i = 0; i < volume.grid.size.x; ++i) {
                     const Point3 p =
                         volume.grid.point_from_voxel({double(i), double(j), double(k)});
-                    least = std::min(least, determinant(jacobian(truth, p)));
+                    smallest = std::min(smallest, determinant(jacobian(truth, p)));
                     if (volume.voxels[volume.grid.index(i, j, k)] == label_named("skin")) {
                         sum += distance(mannequin_from_ct(truth, p), truth.mannequin_from_ct * p);
                         ++n;
@@ -86,7 +85,7 @@ TEST(AnalyticTorso, TrueWarpsAreStrongAndFarFromFolding) {
                 }
             }
         }
-        EXPECT_GT(least, 0.6);
+        EXPECT_GT(smallest, 0.6);
         EXPECT_NEAR(sum / n, 9, 2);
     }
     EXPECT_FALSE(analytic_body("nobody"));
@@ -101,7 +100,7 @@ TEST(AnalyticTorso, LandmarksLieOnTheSkinAndGoThroughTheKnownMap) {
         ASSERT_EQ(exact.size(), 14u);
         double square = 0;
         for (std::size_t n = 0; n < exact.size(); ++n) {
-            // A millimetre either way along the skin's depth is in and out of the body.
+            // 1 mm in either direction along the normal of the skin is inside and outside the body.
             const Point3 p = exact[n].ct;
             const Vector3 inwards = normalized(Point3{0, 0, p.z} - p);
             EXPECT_NE(analytic_torso_label(p + inwards, body), 0) << name << exact[n].name;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "formats/base/constants.h"
 #include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/parallel.h"
@@ -36,7 +37,7 @@ TEST(BakeStructure, LeavesTheMeanEchoOfEveryLabel) {
     }
     for (const auto& [label, n] : count) {
         // levels are quarter dB: the mean is level to an eighth, and the bar is 0.3
-        EXPECT_NEAR(sum[label] / n, 0, 0.2) << torso().labels[static_cast<std::size_t>(label)].name;
+        EXPECT_NEAR(sum[label] / n, 0, 0.2) << torso().labels[label].name;
     }
 }
 
@@ -136,7 +137,7 @@ TEST(VesselTree, NoneWhereTheLabelsHaveIt) {
     EXPECT_TRUE(r->trees.empty());
 }
 
-// Direction along which offsets change least, by the structure tensor of central differences.
+// The direction in which offsets change the least, by the structure tensor of central differences.
 Vector3 fibre_direction(const LabelVolume& v, const std::vector<std::int8_t>& o, int label) {
     double t[3][3] = {};
     for (int k = 2; k < v.grid.size.z - 2; ++k)
@@ -191,7 +192,7 @@ TEST(MuscleFibres, FollowTheMuscleWithinTenDegrees) {
         auto r = bake_structure(v, built_in_tissues());
         ASSERT_TRUE(r);
         ASSERT_EQ(r->fibres.size(), 1u);
-        const double cosine = std::cos(10 * M_PI / 180);
+        const double cosine = std::cos(10 * kRadPerDeg);
         EXPECT_GT(std::abs(dot(r->fibres[0].axis, axis)), cosine);
         const Vector3 found = fibre_direction(v, dense_from_bricks(r->echo_offset), 2);
         EXPECT_GT(std::abs(dot(found, r->fibres[0].axis)), cosine);

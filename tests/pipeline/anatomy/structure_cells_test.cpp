@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/anatomy/structure_cells.h"
+#include "pipeline/anatomy/bake_structure.h"
 
 #include <gtest/gtest.h>
 

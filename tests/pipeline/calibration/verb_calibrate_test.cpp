@@ -11,7 +11,7 @@
 
 #include "formats/calibration/calibration.h"
 #include "formats/files/atomic_file.h"
-#include "formats/files/calibration_file.h"
+#include "formats/files/load_save.h"
 #include "formats/recording/poses.h"
 #include "support/calibration_motion.h"
 #include "support/paths.h"

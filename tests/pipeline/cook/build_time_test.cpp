@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // How long a build takes is known before it begins.
-#include "pipeline/cook/build_time.h"
+#include "pipeline/cook/case_cost.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "pipeline/recipe/read_recipe.h"
+#include "pipeline/stages/read_recipe.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "pipeline/cook/cook_case.h"
-#include "pipeline/recipe/read_recipe.h"
+#include "pipeline/stages/read_recipe.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::pipeline::testing {

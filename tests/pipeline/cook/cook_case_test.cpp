@@ -12,6 +12,7 @@
 #include "formats/bundle/stage_files.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/export/export_files.h"
+#include "pipeline/stages/roles.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -220,9 +221,9 @@ TEST(CookCase, NotesOnTheCacheAreKeptApartFromTheWarningsOfTheBundle) {
         if (stage.name == "import")
             stage.run = [run = stage.run](StageInputs& inputs, const Progress& progress) {
                 auto value = run(inputs, progress);
-                LabelFile file = value->take<LabelFile>();
+                LabelFile file = value->take(kCtLabels);
                 file.reports[0].warnings = {"a cache of gallstones lies in the label map"};
-                return Result<StageValue>(StageValue::of(std::move(file)));
+                return Result<StageValue>(StageValue::of(kCtLabels, std::move(file)));
             };
     const TemporaryFolder folder;
     CookOptions options;

@@ -8,9 +8,9 @@
 #include "formats/exercise/exercise.h"
 #include "pipeline/export/export_files.h"
 #include "pipeline/export/inspect_case.h"
-#include "pipeline/import/label_map.h"
-#include "pipeline/import/surface/surface_file.h"
-#include "pipeline/pack/exercise_frame.h"
+#include "pipeline/import/mesh/surface_file.h"
+#include "pipeline/import/volume/label_map.h"
+#include "pipeline/stages/exercise_frame.h"
 
 namespace sonocase::pipeline {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // What a case needs of memory is known, and refused in one line, before anything is cooked.
-#include "pipeline/cook/memory_need.h"
+#include "pipeline/cook/case_cost.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 
 #include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/base/memory_limit.h"
-#include "pipeline/recipe/read_recipe.h"
+#include "pipeline/stages/read_recipe.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -104,12 +104,12 @@ TEST(MemoryNeed, CountsARegionRoundALabel) {
 // is what it is given, down to two layers of distances.
 TEST(MemoryNeed, OfALargeMapFollowsTheLimitDownToItsLeast) {
     const std::string map = "name = \"a\"\n[analytic]\nvoxel_mm = 0.7\nslice_mm = 0.7\n";
-    const double all = need_of(map, 1e9).mb, least = need_of(map, 1).mb;
-    EXPECT_LT(least, 0.92 * all);
-    EXPECT_EQ(need_of(map, 0.5 * (all + least)).mb, 0.5 * (all + least));
+    const double all = need_of(map, 1e9).mb, lowest = need_of(map, 1).mb;
+    EXPECT_LT(lowest, 0.92 * all);
+    EXPECT_EQ(need_of(map, 0.5 * (all + lowest)).mb, 0.5 * (all + lowest));
     EXPECT_EQ(need_of(map, all + 1).mb, all);
-    EXPECT_FALSE(check_memory(need_of(map, least - 1), least - 1));
-    EXPECT_TRUE(check_memory(need_of(map, least), least));
+    EXPECT_FALSE(check_memory(need_of(map, lowest - 1), lowest - 1));
+    EXPECT_TRUE(check_memory(need_of(map, lowest), lowest));
 }
 
 TEST(MemoryNeed, TheLowestLimitHoldsWhileItLasts) {

@@ -9,8 +9,7 @@
 #include <set>
 
 #include "formats/text/number_text.h"
-#include "pipeline/cook/digest_memo.h"
-#include "pipeline/cook/input_files.h"
+#include "pipeline/cook/input_digests.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
@@ -93,7 +92,7 @@ TEST(PlanStages, EveryOptionIsInTheKeyOfItsStage) {
     for (const OptionGroup* group : built_in_stages().option_groups())
         for (const Option& option : group->options) {
             const std::vector<EmbeddedExercise> none;
-            // With all stages there.
+            // A recipe that has all stages.
             const auto recipe =
                 parse_recipe(kRecipe + "[smooth]\nmethod = \"joint\"\n", "r.toml", {}, &none);
             ASSERT_TRUE(recipe.has_value());
@@ -105,8 +104,8 @@ TEST(PlanStages, EveryOptionIsInTheKeyOfItsStage) {
                 Recipe other = *recipe;
                 if (!other.settings.set(option.name(), value, "test")) continue;
                 const auto after = keys(other, kInputs);
-                if (option_value(option, other.settings.options(group->name)) ==
-                        option_value(option, recipe->settings.options(group->name)) ||
+                if (option_value(option, other.settings.values(*group)) ==
+                        option_value(option, recipe->settings.values(*group)) ||
                     !after.contains("smooth"))
                     continue;
                 changed = true;
@@ -135,7 +134,7 @@ struct Farm {
         EXPECT_TRUE(plans.has_value()) << plans.error().message();
         return (*plans)[0];
     }
-    // As if the jobs had run.
+    // What the jobs would leave if they had run.
     void finish() const {
         const CasePlan plan = this->plan();
         folder.write("farm/cases/one.sonocase", "bundle");

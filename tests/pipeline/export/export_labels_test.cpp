@@ -9,9 +9,9 @@
 #include <set>
 
 #include "pipeline/export/export_level_sets.h"
-#include "pipeline/export/labels/export_seg_nrrd.h"
-#include "pipeline/export/labels/segmentation_pictures.h"
-#include "pipeline/import/label_map.h"
+#include "pipeline/export/nrrd_file.h"
+#include "pipeline/export/segmentation_pictures.h"
+#include "pipeline/import/volume/label_map.h"
 #include "support/shapes.h"
 
 namespace sonocase::pipeline {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A session's pictures as ultrasound DICOM, read back by another toolkit (DCMTK).
-#include "pipeline/export/dicom/ultrasound_dicom.h"
+#include "pipeline/export/ultrasound_dicom.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "support/run_command.h"
 #include "support/temporary_folder.h"
 

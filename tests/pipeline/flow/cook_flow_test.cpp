@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "pipeline/flow/cook_flow.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -10,15 +11,13 @@
 #include <string>
 
 #include "formats/bundle/codec/flow_codec.h"
-#include "formats/flow/flow_at.h"
 #include "formats/flow/flow_summary.h"
+#include "formats/flow/flow_velocity.h"
 #include "pipeline/flow/flow_reference.h"
 #include "pipeline/flow/vessel_parts.h"
 
 namespace sonocase::pipeline {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // A block of 80 x 80 x 120 mm; inside(p) gives the palette index.
 LabelVolume block(double voxel_mm,
@@ -126,8 +125,8 @@ TEST(CookFlow, AForkConservesFlowAtEveryInstantAndRunsTowardsTheLegs) {
     EXPECT_EQ(field.vessels[0].name, "aorta");
     EXPECT_EQ(field.junctions, 1);
     for (const FlowVessel& v : field.vessels) {
-        const FlowNode &first = field.nodes[static_cast<std::size_t>(v.first_node)],
-                       &last = field.nodes[static_cast<std::size_t>(v.first_node + v.nodes - 1)];
+        const FlowNode &first = field.nodes[v.first_node],
+                       &last = field.nodes[v.first_node + v.nodes - 1];
         EXPECT_GT(first.centre.z, last.centre.z + 30);
         EXPECT_LT(first.direction.z, -0.8);
     }
@@ -145,8 +144,7 @@ TEST(CookFlow, VeinsRunTheOtherWayAndCarryTheSameFlow) {
     int upwards = 0;
     for (const FlowVessel& v : cooked->field.vessels) {
         EXPECT_EQ(v.kind, FlowKind::vein);
-        const FlowNode& middle =
-            cooked->field.nodes[static_cast<std::size_t>(v.first_node + v.nodes / 2)];
+        const FlowNode& middle = cooked->field.nodes[v.first_node + v.nodes / 2];
         upwards += reader.velocity(middle.centre, 0.2, 0.5).z > 0;
         // Through a plane at right angles to the vessel: the star of a reversed vessel is mirrored.
         const Vector3 d = middle.direction, a = any_perpendicular(d), b = cross(d, a);
@@ -264,10 +262,10 @@ TEST(FlowReference, WaveformsHaveTheMeanOneAndThePublishedResistiveIndices) {
         EXPECT_LT(index, row.high);
     }
     // A leg at rest: blood runs back after systole.
-    double least = 0;
+    double lowest = 0;
     for (int p = 0; p < 100; ++p)
-        least = std::min(least, wave_at(outlet_reference(Outlet::leg).artery, p / 100.0));
-    EXPECT_LT(least, -0.5);
+        lowest = std::min(lowest, wave_at(outlet_reference(Outlet::leg).artery, p / 100.0));
+    EXPECT_LT(lowest, -0.5);
 }
 
 TEST(VesselParts, NamesSayWhatFlows) {

@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "formats/text/number_text.h"
-#include "pipeline/import/surface/surface_file.h"
+#include "pipeline/import/mesh/surface_file.h"
 #include "support/random.h"
 #include "support/temporary_folder.h"
 
@@ -137,7 +137,7 @@ TEST(DenseSurface, AMeshIsReducedWithItsErrorSaidAndItsSpecksCounted) {
         EXPECT_EQ(measure(report, "small_parts"), 7);
         // 4^2 / (24 R) on the flat side and ten times that at the tips, where R is 40 mm.
         EXPECT_LT(rms_off_body_mm(*s), 0.05);
-        // The specks were given as well, and are not part of what is left.
+        // The specks were given as well, and have been removed.
         EXPECT_LT(measure(report, "reduction_rms_mm"), 0.1);
         EXPECT_GT(outward_share(*s), 0.999);
         for (const std::string& w : report.warnings)
@@ -185,7 +185,7 @@ TEST(DenseSurface, ANoisyMeshWithASecondLayerIsStillTheBody) {
     EXPECT_LT(measure(report, "reduction_rms_mm"), 0.5);
 }
 
-// Twice the same file: the same surface.
+// The same file twice gives the same surface.
 TEST(DenseSurface, IsTheSameEveryTime) {
     const TemporaryFolder folder;
     write_ply(dense_body(460, 0.2), 1, folder / "body.ply");
@@ -213,7 +213,7 @@ TEST(DenseSurface, AMillionReadingsKeepTheSkinAndLoseThoseInTheAir) {
     ASSERT_TRUE(s) << s.error().message();
     EXPECT_EQ(measure(report, "given_points"), count);
     EXPECT_LT(s->points.size(), 40000u);
-    // Of 2,500 readings in the air nine tenths are alone in their cubes beside full ones.
+    // 90 % of the 2,500 readings in the air are alone in their cubes, beside full ones.
     EXPECT_GT(measure(report, "sparse_points"), 1500);
     const auto far = std::count_if(s->points.begin(), s->points.end(),
                                    [](Point3 p) { return std::abs(off_body_mm(p)) > 8; });

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Folders of DICOM slices: whole ones, and those that an export leaves when something went wrong.
+// Folders of DICOM slices: complete ones, and what a failed export leaves.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
-#include "pipeline/import/label_map.h"
+#include "pipeline/import/volume/label_map.h"
 #include "support/temporary_folder.h"
 #include "three_boxes.h"
 
@@ -32,7 +32,7 @@ class DicomFolder : public ::testing::Test {
     }
     void remove(int k) { std::filesystem::remove(folder_ / ("series/" + name_of(k))); }
     Result<ImportedLabels> imported() const { return import_label_map(folder_ / "series"); }
-    // One line that names the file and says what.
+    // One line that names the file and the fault.
     void expect_refused(const std::string& file, const std::string& what) const {
         const auto result = imported();
         ASSERT_FALSE(result.has_value());
@@ -61,7 +61,7 @@ TEST_F(DicomFolder, IsReadInAnyFileOrder) {
                              [](const std::string& w) { return w.find("DICOM") < w.size(); }));
 }
 
-// Places of slices .7 mm apart are no whole numbers, and scanners round them.
+// Slices 0.7 mm apart do not lie at whole numbers, and scanners round their positions.
 TEST_F(DicomFolder, OfUnroundAndRoundedSpacingIsRead) {
     for (const double spacing : {0.7, 0.703125, 1.0 / 3}) {
         volume_ = testing::sample_in_order(
@@ -158,8 +158,7 @@ TEST_F(DicomFolder, WithASliceOffItsPlaceOrTurnedOrCutOffIsRefused) {
     }
 }
 
-// As a clinic's export: 3,000 slices, one wrong. Every reading of their headers takes about a
-// second.
+// Like a large clinical export: 3,000 slices, one wrong. Reading the headers takes about a second.
 TEST_F(DicomFolder, OfThreeThousandSlicesNamesTheOneThatIsWrong) {
     volume_ = testing::sample_in_order({0, 1, 2}, {false, false, false}, {96, 64, 300},
                                        {12, 8, 0.1}, kCorner, shifted_body);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Bad input to import: one line that names the file, what was found and what to do.
-#include "pipeline/import/label_map.h"
+#include "pipeline/import/volume/label_map.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

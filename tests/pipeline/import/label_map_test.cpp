@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/import/label_map.h"
+#include "pipeline/import/volume/label_map.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -157,7 +157,7 @@ TEST(ImportLabelMap, UnnamedValuesAreKeptAndToldOf) {
     EXPECT_NE(imported->report.warnings[0].find("222"), std::string::npos);
 }
 
-// Left and right are then whatever the reader takes for granted.
+// Left and right are then what the reader assumes.
 TEST(ImportLabelMap, NiftiWithoutOrientationIsReadWithAWarning) {
     const TemporaryFolder folder;
     std::string bytes = testing::nifti_bytes(ras_volume());

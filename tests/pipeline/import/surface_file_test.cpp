@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/import/surface/surface_file.h"
+#include "pipeline/import/mesh/surface_file.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "formats/base/constants.h"
 #include "support/box_mesh.h"
 #include "support/temporary_folder.h"
 
@@ -34,7 +35,7 @@ Mesh ellipsoid() {
     mesh.points.push_back({10, 20, 230});
     for (int r = 1; r < kRings; ++r)
         for (int s = 0; s < kSides; ++s) {
-            const double theta = M_PI * r / kRings, phi = 2 * M_PI * s / kSides;
+            const double theta = kPi * r / kRings, phi = 2 * kPi * s / kSides;
             mesh.points.push_back({10 + 150 * std::sin(theta) * std::cos(phi),
                                    20 + 100 * std::sin(theta) * std::sin(phi),
                                    30 + 200 * std::cos(theta)});

@@ -113,8 +113,7 @@ std::string nifti_bytes(const TinyVolume& volume, const std::string& extension_x
     put(bytes, 72, std::int16_t{8});
     put(bytes, 76, 1.0f);
     for (int axis = 0; axis < 3; ++axis)
-        put(bytes, 80 + 4 * static_cast<std::size_t>(axis),
-            static_cast<float>(norm(volume.columns.column(axis))));
+        put(bytes, 80 + 4 * axis, static_cast<float>(norm(volume.columns.column(axis))));
     put(bytes, 108, 352.0f + static_cast<float>(extension.size()));
     put(bytes, 112, 1.0f);
     bytes[123] = 2;  // mm
@@ -122,11 +121,9 @@ std::string nifti_bytes(const TinyVolume& volume, const std::string& extension_x
     put(bytes, 254, std::int16_t{1});
     for (int row = 0; row < 3; ++row) {
         for (int column = 0; column < 3; ++column)
-            put(bytes,
-                280 + 16 * static_cast<std::size_t>(row) + 4 * static_cast<std::size_t>(column),
+            put(bytes, 280 + 16 * row + 4 * column,
                 static_cast<float>(volume.columns(row, column)));
-        put(bytes, 292 + 16 * static_cast<std::size_t>(row),
-            static_cast<float>(volume.origin[row]));
+        put(bytes, 292 + 16 * row, static_cast<float>(volume.origin[row]));
     }
     std::memcpy(bytes.data() + 344, "n+1", 4);
     if (!extension.empty()) bytes[348] = 1;
@@ -239,10 +236,8 @@ std::string dicom_slice(const TinyVolume& volume,
     bytes += element(0x28, 0x100, "US", us(16)) + element(0x28, 0x101, "US", us(16)) +
              element(0x28, 0x102, "US", us(15)) + element(0x28, 0x103, "US", us(0));
     std::string pixels;
-    const std::size_t slice =
-        static_cast<std::size_t>(volume.size.x) * static_cast<std::size_t>(volume.size.y);
-    for (std::size_t n = 0; n < slice; ++n)
-        pixels += us(volume.voxels[static_cast<std::size_t>(k) * slice + n]);
+    const std::size_t slice = static_cast<std::size_t>(volume.size.x) * volume.size.y;
+    for (std::size_t n = 0; n < slice; ++n) pixels += us(volume.voxels[k * slice + n]);
     return bytes + element(0x7fe0, 0x10, "OW", pixels);
 }
 

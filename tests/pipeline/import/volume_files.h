@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/volume/grid.h"
+#include "formats/volume/label_volume.h"
 
 namespace sonocase::testing {
 
@@ -49,10 +49,10 @@ std::string nrrd_bytes(const TinyVolume& volume,
                        bool gzip = false);
 std::string mha_bytes(const TinyVolume& volume, bool compressed = false);
 std::string gzip_bytes(const std::string& bytes);
-// What a slice's header says beyond its own place.
+// What a slice's header says besides its position.
 struct DicomCounts {
-    int in_acquisition = 0, in_series = 0;  // slices that there are; 0: it does not say
-    double round_to_mm = 0;                 // rounding of the place; 0: none
+    int in_acquisition = 0, in_series = 0;  // number of slices; 0: not given
+    double round_to_mm = 0;                 // rounding of the position; 0: none
 };
 // One slice of an uncompressed DICOM series of unsigned 16-bit values, explicit little-endian.
 std::string dicom_slice(const TinyVolume& volume,

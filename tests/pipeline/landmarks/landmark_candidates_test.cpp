@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/landmarks/landmark_candidates.h"
+#include "pipeline/registration/landmark_candidates.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +10,6 @@
 
 namespace sonocase::pipeline {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Readings of a trunk of 300 x 200 mm from z = 0 to 450, with a navel of 6 mm at (0, front, 170),
 // and of two legs of 150 mm below it; axes: x right, y front, z up.

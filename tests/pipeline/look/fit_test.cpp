@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "look_clip.h"
 #include "pipeline/look/look.h"
 

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "look_clip.h"
 #include "pipeline/look/look.h"
 #include "pipeline/look/look_frames.h"

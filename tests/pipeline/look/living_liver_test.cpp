@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The scores of a living liver: blocks of a real sweep lie inside the limits of
-// formats/image_scores/score_limits.h, and the medians are those found for it by another program.
+// formats/image_scores/realism_scores.h, and the medians are those found for it by another program.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -10,10 +10,9 @@
 #include <filesystem>
 
 #include "formats/files/atomic_file.h"
-#include "formats/image_scores/motion_scores.h"
-#include "formats/image_scores/score_limits.h"
+#include "formats/image_scores/realism_scores.h"
 #include "formats/image_scores/smooth.h"
-#include "pipeline/base/delimited_text.h"
+#include "pipeline/base/text.h"
 #include "pipeline/look/find_scan.h"
 #include "pipeline/look/look.h"
 #include "pipeline/look/look_frames.h"

@@ -7,7 +7,7 @@
 
 #include <cmath>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "formats/text/json_reader.h"
 #include "look_clip.h"
 #include "pipeline/look/look_frames.h"

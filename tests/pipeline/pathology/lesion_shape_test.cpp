@@ -36,7 +36,7 @@ TEST(RoughEllipsoid, AnAlignedOneIsAsLongAsItsAspect) {
     EXPECT_NEAR(oval.radius({0, 0, 1}) / oval.radius({1, 0, 0}), 2, 1e-9);
 }
 
-// A block of label 1 with a rod of label 2 beside the lesion; the rod has to give way whole.
+// A block of label 1 with a rod of label 2 beside the lesion; the rod must be moved as a whole.
 TEST(MassEffect, MovesARodAndKeepsItsVolume) {
     const LabelVolume before = sample_labels(
         cubic_grid(81), 3, [](Point3 p) { return std::hypot(p.x - 14, p.y) < 3 ? 2 : 1; });
@@ -44,8 +44,9 @@ TEST(MassEffect, MovesARodAndKeepsItsVolume) {
     LabelCanvas canvas(before, no_boundary);
     const RoughEllipsoid shape(1, 0, 1, 1);
     const Vector3 centre{40, 40, 40};
-    const double least = push_aside(canvas, {centre, shape.rank_about(centre), 12, 0.8, 2.5, {}});
-    EXPECT_GT(least, 0.05);
+    const double smallest =
+        push_aside(canvas, {centre, shape.rank_about(centre), 12, 0.8, 2.5, {}});
+    EXPECT_GT(smallest, 0.05);
     const auto was = static_cast<double>(testing::count_label(before, 2));
     const auto is = static_cast<double>(testing::count_label(canvas.volume(), 2));
     EXPECT_NEAR(is / was, 1, 0.1);  // it lies where the tissue is pressed most
@@ -61,7 +62,7 @@ TEST(MassEffect, WhatIsFixedStays) {
     LabelCanvas canvas(before, no_boundary);
     const RoughEllipsoid shape(1, 0, 1, 1);
     const Vector3 centre{20, 20, 20};
-    push_aside(canvas, {centre, shape.rank_about(centre), 7, 1, 2.5, Labels{}.set(2)});
+    push_aside(canvas, {centre, shape.rank_about(centre), 7, 1, 2.5, LabelSet{}.set(2)});
     EXPECT_EQ(canvas.volume().voxels, before.voxels);
 }
 
@@ -74,7 +75,7 @@ TEST(LabelCanvas, PaintsABallWithRecordsOnBothSides) {
     const Vector3 centre{16.3, 15.9, 16.1};
     canvas.paint(
         canvas.everything(), [&](Vector3 at) { return norm(at - centre) - 8.0; }, label,
-        Labels{}.set(1));
+        LabelSet{}.set(1));
     const BoundaryBricks boundary = canvas.take_boundary();
     const LabelVolume volume = canvas.take_volume();
     int records = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/pathology/pathology.h"
+#include "pipeline/pathology/place_pathology.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,6 @@
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/pathology/answer_key.h"
-#include "pipeline/pathology/requested_parts.h"
 #include "support/shapes.h"
 
 namespace sonocase::pipeline {

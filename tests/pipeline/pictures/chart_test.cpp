@@ -22,7 +22,7 @@ std::string read_all(const std::string& path) {
 
 ChartSheet sheet() {
     Chart chart{"Error against time", "seconds", "error in mm", true, true, {}};
-    Series front{"front", {}, {}, SeriesLook::line_and_points, {0, 0, 0}, 2};
+    Series front{"front", {}, {}, SeriesStyle::line_and_points, {0, 0, 0}, 2};
     for (int i = 1; i <= 8; ++i) {
         front.x.push_back(0.1 * i * i);
         front.y.push_back(2.0 / i);
@@ -30,7 +30,7 @@ ChartSheet sheet() {
     front.x.push_back(-1);  // no logarithm: left out
     front.y.push_back(NAN);
     chart.series.push_back(front);
-    chart.series.push_back({"paper", {3}, {1.5}, SeriesLook::points, {200, 0, 0}, 4});
+    chart.series.push_back({"paper", {3}, {1.5}, SeriesStyle::points, {200, 0, 0}, 4});
     return {{chart, chart}, 2, 500, 360};
 }
 
@@ -59,12 +59,12 @@ TEST(Chart, SvgHoldsTheTitle) {
 // The names that the trade-off plots show, and longer ones.
 std::vector<LegendItem> six_items() {
     return {
-        {"settings tried", SeriesLook::points, {190, 190, 190, 255}, 2.5},
-        {"Pareto front", SeriesLook::line_and_points, {0, 114, 178, 255}, 2},
-        {"preset draft: 2.0 mm voxels, no residual warp", SeriesLook::points, {9, 9, 9, 255}, 4.5},
-        {"preset standard", SeriesLook::diamonds, {9, 9, 9, 255}, 4.5},
-        {"preset best", SeriesLook::crosses, {9, 9, 9, 255}, 4.5},
-        {"paper", SeriesLook::dashed, {9, 9, 9, 255}, 12}};
+        {"settings tried", SeriesStyle::points, {190, 190, 190, 255}, 2.5},
+        {"Pareto front", SeriesStyle::line_and_points, {0, 114, 178, 255}, 2},
+        {"preset draft: 2.0 mm voxels, no residual warp", SeriesStyle::points, {9, 9, 9, 255}, 4.5},
+        {"preset standard", SeriesStyle::diamonds, {9, 9, 9, 255}, 4.5},
+        {"preset best", SeriesStyle::crosses, {9, 9, 9, 255}, 4.5},
+        {"paper", SeriesStyle::dashed, {9, 9, 9, 255}, 12}};
 }
 
 TEST(ChartLegend, FrameHoldsWordsAndSymbolsAndNothingOverlaps) {
@@ -103,7 +103,7 @@ TEST(ChartLegend, IsDrawnOutsideThePlotWhereItIsLong) {
     one.charts.push_back(sheet().charts[0]);
     one.charts[0].series.clear();
     for (const LegendItem& item : six_items())
-        one.charts[0].series.push_back({item.name, {1, 2, 3}, {3, 2, 1}, item.look});
+        one.charts[0].series.push_back({item.name, {1, 2, 3}, {3, 2, 1}, item.style});
     const std::string path = ::testing::TempDir() + "chart_legend";
     ASSERT_TRUE(write_chart_svg(one, path + ".svg"));
     ASSERT_TRUE(write_chart_png(one, path + ".png"));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/pictures/html_template.h"
+#include "pipeline/pictures/markup.h"
 
 #include <gtest/gtest.h>
 

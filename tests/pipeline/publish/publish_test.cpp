@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/publish/publish.h"
+#include "pipeline/export/publish.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,8 @@
 #include <filesystem>
 
 #include "formats/base/digest.h"
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 #include "formats/files/atomic_file.h"
-#include "pipeline/publish/site_list.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/recipe/read_recipe.h"
+#include "pipeline/stages/read_recipe.h"
 
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ std::string with(const std::string& line) {
 }
 
 const ResampleOptions& resample_of(const Result<Recipe>& recipe) {
-    return recipe->settings.of<ResampleOptions>("resample");
+    return recipe->settings.of<ResampleOptions>();
 }
 
 TEST(Recipe, ReadsInputsLabelsTissuesAndOptions) {

@@ -14,7 +14,7 @@ namespace {
 
 using sonocase::testing::Random;
 
-// A body-sized map: any rigid motion, a quadratic of some cm and a residual of some mm.
+// A body-sized map: any rigid motion, a quadratic of a few cm and a residual of a few mm.
 Registration some_map(std::uint64_t seed, double residual_mm) {
     Random random(seed);
     Registration r;
@@ -33,9 +33,8 @@ Registration some_map(std::uint64_t seed, double residual_mm) {
         r.residual.size = {static_cast<int>(std::ceil(e.x / h)) + 3,
                            static_cast<int>(std::ceil(e.y / h)) + 3,
                            static_cast<int>(std::ceil(e.z / h)) + 3};
-        const std::size_t n = static_cast<std::size_t>(r.residual.size.x) *
-                              static_cast<std::size_t>(r.residual.size.y) *
-                              static_cast<std::size_t>(r.residual.size.z);
+        const std::size_t n =
+            static_cast<std::size_t>(r.residual.size.x) * r.residual.size.y * r.residual.size.z;
         for (std::size_t i = 0; i < n; ++i) {
             r.residual.control_mm.push_back({residual_mm * random.gaussian(),
                                              residual_mm * random.gaussian(),
@@ -88,8 +87,8 @@ TEST(InverseMap, BeyondTheBoxIsOutside) {
     EXPECT_TRUE(std::isnan(back.x));
 }
 
-// y_x = x^2 / 200 - 100 reaches no point with y_x < -100, and every other twice: the box keeps x >
-// 0.
+// y_x = x^2 / 200 - 100 reaches no point with y_x < -100, and every other twice: the box keeps
+// x > 0.
 Registration folding_map() {
     Registration r;
     r.ct_box.include(Point3{0, -100, -100});
@@ -185,8 +184,8 @@ TEST(InverseMap, ShortRowsAreWhole) {
         std::vector<MapStatus> status(x.size(), MapStatus::no_preimage);
         inverse_map.invert_row(y, {1, 0, 0}, count, x.data(), yy.data(), z.data(), status.data());
         for (int i = 0; i < count; ++i) {
-            EXPECT_EQ(status[static_cast<std::size_t>(i)], MapStatus::ok) << count << " " << i;
-            EXPECT_NE(x[static_cast<std::size_t>(i)], -1e9f) << count << " " << i;
+            EXPECT_EQ(status[i], MapStatus::ok) << count << " " << i;
+            EXPECT_NE(x[i], -1e9f) << count << " " << i;
         }
     }
 }

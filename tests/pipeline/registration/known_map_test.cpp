@@ -7,7 +7,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "pipeline/import/label_map.h"
+#include "formats/base/constants.h"
+#include "pipeline/import/volume/label_map.h"
 #include "pipeline/registration/map/inverse_map.h"
 #include "pipeline/registration/register_surfaces.h"
 #include "support/paths.h"
@@ -138,8 +139,9 @@ TEST(KnownMap, TheFrontHalfAloneStaysWithinTwoMillimetres) {
     EXPECT_NE(warnings_of(f.result).find("cover only"), std::string::npos) << warnings_of(f.result);
 }
 
-// A sweep of the front of a body unlike the patient's leaves upside down and slides open. A head
-// direction some 12 degrees off and one point low on the body, touched to 5 mm, settle both.
+// With a sweep of the front of a body unlike the patient's, the map may be upside down or slide
+// along the body. A head direction about 12 degrees off and one landmark low on the body, touched
+// to 5 mm, settle both.
 TEST(KnownMap, HeadDirectionAndALowLandmarkPlaceAFrontSweep) {
     NEEDS_PATIENT();
     for (const std::uint64_t seed : {11, 12, 13, 14}) {
@@ -188,8 +190,8 @@ TEST(KnownMap, GrossOutliersAreLeftOutAndCounted) {
     lifted.lift_off_share = 0.05;
     const Fitted f = fit(5, 9, lifted);
     EXPECT_LT(target_error(f.result.registration, f.truth).mean, 1.2);
-    // Of a hundred expected. What lies less than 8 mm and two deviations off its neighbours' plane,
-    // as beside another lift-off, is left to the robust loss.
+    // About a hundred are expected. Readings less than 8 mm and two deviations off their
+    // neighbours' plane, such as those beside another lift-off, are left to the robust loss.
     EXPECT_GT(measure(f.result, "readings_lifted_off"), 50);
 }
 
@@ -216,7 +218,7 @@ TEST(KnownMap, AHalfTurnAboutAnyAxisIsFound) {
     for (int axis = 0; axis < 3; ++axis) {
         Vector3 a;
         a[axis] = 1;
-        const Rigid turn{rotation_about(a, 3.14159265358979323846), {}};
+        const Rigid turn{rotation_about(a, kPi), {}};
         Surface turned;
         for (std::size_t i = 0; i < patient()->skin.skin.points.size(); i += 9)
             turned.points.push_back(turn * patient()->skin.skin.points[i]);
@@ -287,8 +289,8 @@ TEST(KnownMap, AMapOnTheVergeOfFoldingIsAnsweredByOneThatDoesNot) {
     const Surface sweep = testing::sweep_of(patient()->skin.skin, truth, random);
     const auto result = register_surfaces({patient()->skin, sweep});
     ASSERT_TRUE(result);
-    // Such a map doubles one half of the body and flattens the other: what is asked is an answer
-    // that is whole, lies nearer to the readings than the rigid one and does not fold.
+    // Such a map doubles one half of the body and flattens the other: the result must be
+    // complete, lie nearer to the readings than the rigid one, and not fold.
     EXPECT_GT(result->registration.min_det_jacobian, 0.2);
     EXPECT_LT(result->fit.rms_mm, result->rigid_fit.rms_mm);
     for (Point3 p : patient()->inside)

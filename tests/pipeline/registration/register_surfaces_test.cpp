@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "pipeline/anatomy/analytic_torso.h"
-#include "pipeline/registration/map/fold_proof.h"
+#include "pipeline/registration/map/map_proofs.h"
 #include "support/random.h"
 
 namespace sonocase::pipeline {
@@ -67,8 +67,7 @@ TEST(RegisterSurfaces, RecoversTheAnalyticTorsosKnownWarp) {
     EXPECT_GT(result->registration.min_det_jacobian, 0.2);
 }
 
-// What the outside world and clumsy sweeps bring: numbers or one line, never a crash or a silent
-// guess.
+// Bad input and poor sweeps: results or one line of text, never a crash or a silent guess.
 Surface sweep(int points, std::uint64_t seed) {
     AnalyticMannequinOptions options;
     options.points = points;
@@ -124,8 +123,8 @@ TEST(FoldProof, KnowsTheDeterminantOfAKnownFold) {
     r.ct_box.include(Point3{-95, -100, -100});
     r.ct_box.include(Point3{100, 100, 100});
     const FoldProof proof = prove_no_fold(r);
-    EXPECT_NEAR(proof.least_bound, 0.05, 1e-6);
-    EXPECT_LE(proof.least_bound, proof.least_sample);
+    EXPECT_NEAR(proof.min_bound, 0.05, 1e-6);
+    EXPECT_LE(proof.min_bound, proof.min_sample);
 }
 
 TEST(FoldProof, NeverLiesAboveDenseSamples) {
@@ -149,15 +148,15 @@ TEST(FoldProof, NeverLiesAboveDenseSamples) {
             }
         }
         const FoldProof proof = prove_no_fold(r);
-        double least = 1e9;
+        double smallest = 1e9;
         for (int i = 0; i < 20000; ++i) {
             const Point3 p{random.uniform(-100, 100), random.uniform(-80, 80),
                            random.uniform(-90, 90)};
-            least = std::min(least, determinant(jacobian(r, p)));
+            smallest = std::min(smallest, determinant(jacobian(r, p)));
         }
-        EXPECT_LE(proof.least_bound, least + 1e-9);
-        EXPECT_LE(proof.least_bound, proof.least_sample);
-        EXPECT_GT(proof.least_bound, proof.least_sample - 0.05);  // and is not idle
+        EXPECT_LE(proof.min_bound, smallest + 1e-9);
+        EXPECT_LE(proof.min_bound, proof.min_sample);
+        EXPECT_GT(proof.min_bound, proof.min_sample - 0.05);  // and is not far below it
     }
 }
 

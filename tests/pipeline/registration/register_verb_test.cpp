@@ -9,10 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "formats/files/registration_file.h"
-#include "formats/registration/registration_json.h"
 #include "formats/text/number_text.h"
-#include "pipeline/import/surface/surface_file.h"
+#include "pipeline/import/mesh/surface_file.h"
+#include "pipeline/registration/map/registration.h"
 #include "support/paths.h"
 #include "support/random.h"
 #include "support/run_command.h"

@@ -75,8 +75,8 @@ TEST(SkinSurface, LiesOnTheWallToATenthOfAVoxelAndPointsOutwards) {
         const Vector3 normal = normalized({p.x / (kA * kA), p.y / (kB * kB), 0});
         worst_normal = std::min(worst_normal, dot(normal, result->skin.normals[i]));
     }
-    // A binary mask of 3 mm voxels knows its edge to half a voxel; the mean is free of it. The
-    // Gaussian of 2 mm draws a wall of 67 mm least radius in by sigma^2 / 2R = 0.03 mm.
+    // A binary mask of 3 mm voxels gives its edge to half a voxel; the mean is exact. The
+    // Gaussian of 2 mm pulls a wall whose smallest radius R is 67 mm in by sigma^2 / 2R = 0.03 mm.
     EXPECT_LT(std::abs(sum / static_cast<double>(result->skin.points.size())), 0.1);
     EXPECT_LT(worst, 1.5);
     EXPECT_GT(worst_normal, std::cos(0.5));  // steps of a binary mask, softened

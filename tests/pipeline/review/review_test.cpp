@@ -8,10 +8,8 @@
 
 #include "formats/exercise/metric_table.h"
 #include "formats/files/atomic_file.h"
-#include "formats/files/bundle_file.h"
-#include "formats/files/recording_file.h"
-#include "pipeline/review/review_page.h"
-#include "pipeline/review/review_plots.h"
+#include "formats/files/load_save.h"
+#include "pipeline/review/review.h"
 #include "support/run_command.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"

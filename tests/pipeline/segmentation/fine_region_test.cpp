@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A box of a case cooked on smaller voxels: the same surfaces, nearer to the truth, and nothing
-// changed outside.
+// A box of a case, cooked on smaller voxels: the same surfaces, nearer to the truth, and no change
+// outside the box.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -57,7 +57,7 @@ TEST(CookedRegion, HasTheCasesSurfacesAndLeavesTheCaseAsItIs) {
     const FineRegion& region = *with->region;
     EXPECT_TRUE(check_region(region, 2, "region"));
     const LabelVolume fine = volume_of(region, with->volume.labels);
-    // Where both say the same, and how far surfaces are apart: as measure_boundary_error().
+    // Where both agree, and how far surfaces are apart; see measure_boundary_error().
     std::size_t points = 0, differ = 0, crossings = 0;
     constexpr double kStepMm = 0.37, kSegmentMm = 0.5;
     const Box3& box = region.box;

@@ -3,7 +3,7 @@
 // Grids and registrations that the tests of segmentation share.
 #pragma once
 
-#include "formats/registration/registration.h"
+#include "pipeline/registration/map/registration.h"
 #include "support/shapes.h"
 
 namespace sonocase::testing {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "pipeline/segmentation/level_set_smoothing.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -34,7 +35,7 @@ TEST(LevelSetSmoothing, SphereShrinksToItsEquilibrium) {
     const auto result = level_set_smoothing(sphere(big), options);
     ASSERT_TRUE(result);
     const double volume = static_cast<double>(count_label(result->volume, 1));
-    const double radius = std::cbrt(volume * 3 / (4 * 3.14159265358979));
+    const double radius = std::cbrt(volume * 3 / (4 * kPi));
     // A quarter of a voxel: phi_0 is known to half a voxel only.
     EXPECT_NEAR(radius, expected, 0.25);
 }
@@ -49,10 +50,9 @@ TEST(LevelSetSmoothing, EquilibriumDoesNotDependOnTheVoxel) {
     const auto result = level_set_smoothing(ball, options);
     ASSERT_TRUE(result);
     const auto radius = [](const LabelVolume& volume) {
-        return std::cbrt(8 * static_cast<double>(count_label(volume, 1)) * 3 /
-                         (4 * 3.14159265358979));
+        return std::cbrt(8 * static_cast<double>(count_label(volume, 1)) * 3 / (4 * kPi));
     };
-    // An eighth of a voxel. By curvatures twice as strong it would be 0.9 instead of 0.42.
+    // An eighth of a voxel. With curvatures twice as strong it would be 0.9 instead of 0.42.
     const double shrinkage = 10 - 0.5 * (10 + std::sqrt(100 - 8 / options.k0));
     EXPECT_NEAR(radius(ball) - radius(result->volume), shrinkage, 0.25);
 }
@@ -75,7 +75,7 @@ TEST(LevelSetSmoothing, TubeBelowTheCriticalRadiusDiesAndIsNamed) {
 
 TEST(LevelSetSmoothing, StepAboveTheLimitIsRefused) {
     LevelSetOptions options;
-    options.time_step = 1.01 * greatest_stable_step(options.k0, 1);
+    options.time_step = 1.01 * max_stable_step(options.k0, 1);
     const auto result = level_set_smoothing(sphere(5, 16), options);
     ASSERT_FALSE(result);
     EXPECT_NE(result.error().message().find("limit of stability"), std::string::npos);

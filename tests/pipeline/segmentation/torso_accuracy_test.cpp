@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// How true the surfaces of a cooked torso are: whole organs of the analytic one, through its known
-// warp into voxels of 1 mm, against the closed forms. Asked for are 95th percentiles of 0.15 mm and
-// 8 degrees for organs and 0.3 mm for tubes of 2 mm radius; 5 degrees for the liver's normals from
-// slices of 5 mm; and the class right at 99 % of the points near a surface.
+// Accuracy of the surfaces of a cooked torso: whole organs of the analytic one, through its known
+// warp into voxels of 1 mm, against the closed forms. The targets are 95th percentiles of 0.15 mm
+// and 8 degrees for organs and 0.3 mm for tubes of 2 mm radius; 5 degrees for the liver's normals
+// from slices of 5 mm; and the class right at 99 % of the points near a surface.
 #include <gtest/gtest.h>
 
 #include <bitset>
@@ -18,7 +18,7 @@ namespace {
 using testing::percentile;
 using testing::TorsoBlock;
 
-// Every fourth record is judged: thousands an organ, of which a percentile holds to 2 %.
+// Judges every fourth record: thousands per organ, whose percentiles are known to 2 %.
 constexpr std::size_t kStride = 4;
 
 const TorsoBlock& fine() {
@@ -43,9 +43,9 @@ void expect_within(const Errors& errors, double distance_mm, double normal_deg) 
     EXPECT_LT(percentile(errors.normal_deg, 0.95), normal_deg);
 }
 
-// The pancreas' distance does not reach what is asked: a fifth of its records lie within 2 mm of an
-// edge where a third label meets it, and an edge is drawn rounded over a voxel or two, as one plane
-// a voxel has to. Where two labels meet alone every organ is well within it.
+// The distance of the pancreas misses the target: a fifth of its records lie within 2 mm of an edge
+// where a third label meets it, and one plane per voxel rounds such an edge over a voxel or two.
+// Where only two labels meet, every organ is well within the target.
 TEST(TorsoAccuracy, BoundaryPlanesOfOrgans) {
     const struct {
         const char* name;
@@ -77,9 +77,9 @@ TEST(TorsoAccuracy, BoundaryPlanesOfATubeOfTwoMillimetres) {
     EXPECT_LT(percentile(errors.distance_mm, 0.95), 0.3);
 }
 
-// Points are wrong in a layer as thick as surfaces are off, so that the share depends on what is
-// called near: 98.0 % are right in the voxels that have a record (1.5 voxels), 98.9 % within 3 mm
-// of a surface and 99.1 % within 4 mm.
+// Points are wrong in a layer as thick as the error of the surfaces, so that the share depends on
+// what is called near: 98.0 % are right in the voxels that have a record (1.5 voxels), 98.9 %
+// within 3 mm of a surface and 99.1 % within 4 mm.
 TEST(TorsoAccuracy, ClassNearASurface) {
     const std::uint64_t seed = 31;
     SCOPED_TRACE(seed);
@@ -95,7 +95,7 @@ double rms(const std::vector<double>& values) {
 }
 
 // 8.8 with the walls of the vessels inside the liver; a third of the squares are the artery's of
-// 1.5 mm, of which slices 5 mm apart miss more than they show.
+// 1.5 mm, most of which falls between slices 5 mm apart.
 TEST(TorsoAccuracy, ThickSlicesKeepNormalsAndVessels) {
     Errors errors;
     for (const auto& e : thick().plane_errors(thick().label("liver"), kStride)) errors.add(e);
@@ -111,8 +111,8 @@ TEST(TorsoAccuracy, ThickSlicesKeepNormalsAndVessels) {
 }
 
 // The slope of the liver's voxels (1 and 0) under a Gaussian, at its outermost voxels, in degrees
-// RMS from the true normal. That tells the normal of a smooth wall between two labels and of no
-// other, so that places with a third label in reach are left out, and with `outline` those at
+// RMS from the true normal. This measures the normal only where the wall between two labels is
+// smooth, so that places with a third label in reach are left out, and with `outline` those at
 // vessels too.
 double normal_error_of_voxels(const std::vector<std::uint8_t>& voxels,
                               const std::vector<std::uint8_t>& truth,
@@ -163,14 +163,14 @@ double normal_error_of_voxels(const std::vector<std::uint8_t>& voxels,
     return rms(errors);
 }
 
-// 5 degrees are asked for; at the outline of the liver it is 4.0, where the true voxels themselves
-// are 2.7 off by this measure. With the walls of the vessels inside it 5.9, the true voxels 2.9.
+// The target is 5 degrees. At the outline of the liver the error is 4.0; by the same measure the
+// true voxels themselves are 2.7 off. With the walls of the vessels inside it: 5.9 and 2.9.
 TEST(TorsoAccuracy, ThickSlicesKeepNormalsOfVoxels) {
     const std::vector<std::uint8_t>& voxels = thick().result().volume.voxels;
     const auto truth =
         testing::truth_on(thick().result().volume.grid, thick().registration(), thick().ct_grid(),
                           [](Point3 p) { return analytic_torso_label(p); });
-    EXPECT_LT(normal_error_of_voxels(truth, truth, true), 3);  // else the measure is at fault
+    EXPECT_LT(normal_error_of_voxels(truth, truth, true), 3);  // otherwise the measure is wrong
     EXPECT_LT(normal_error_of_voxels(voxels, truth, true), 5);
     EXPECT_LT(normal_error_of_voxels(voxels, truth, false), 6.2);
 }

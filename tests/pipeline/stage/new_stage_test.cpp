@@ -9,12 +9,12 @@
 
 #include "documents/examples/crop_labels.h"
 #include "formats/bundle/stage_files.h"
-#include "formats/files/stage_file.h"
+#include "formats/files/load_save.h"
 #include "pipeline/cook/cook_case.h"
-#include "pipeline/recipe/read_recipe.h"
 #include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/read_recipe.h"
 #include "pipeline/tradeoff/suites.h"
-#include "pipeline/verbs/stage/stage_verb.h"
+#include "pipeline/verbs/stage_verb.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
@@ -51,7 +51,7 @@ Result<Recipe> recipe_with(const std::string& more, std::vector<std::string> set
 
 double margin_of(const Result<Recipe>& recipe) {
     EXPECT_TRUE(recipe.has_value()) << recipe.error().message();
-    return recipe->settings.of<CropOptions>("crop").margin_mm;
+    return recipe->settings.of<CropOptions>().margin_mm;
 }
 
 TEST(NewStage, OptionsAreSetByTheRecipeAndOnTheCommandLine) {

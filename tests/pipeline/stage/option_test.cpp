@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/stage/option.h"
+#include "pipeline/stages/option.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "pipeline/stage/stage_table.h"
 #include "pipeline/stages/built_in_stages.h"
+#include "pipeline/stages/stage_table.h"
 #include "support/paths.h"
 #include "support/temporary_folder.h"
 
@@ -48,7 +48,7 @@ TEST(Option, TakesItsValuesAndNoOthers) {
                           {2, "8", "9", "8, 16 voxels"},
                           {3, "false", "1", "true or false"},
                           {4, "coarse", "corse", "did you mean 'coarse'?"}}) {
-        const Option& option = group.options[static_cast<std::size_t>(c.option)];
+        const Option& option = group.options[c.option];
         std::any values = group.defaults;
         EXPECT_TRUE(set_option(option, c.good, values, "test").has_value()) << option.key;
         EXPECT_EQ(option_value(option, values), c.good);
@@ -80,7 +80,8 @@ TEST(Option, EverySectionKeyAndFlagStandsOnce) {
             flags.push_back(option.flag);
         }
         std::sort(flags.begin(), flags.end());
-        EXPECT_EQ(std::adjacent_find(flags.begin(), flags.end()), flags.end()) << group->name;
+        EXPECT_EQ(std::adjacent_find(flags.begin(), flags.end()), flags.end())
+            << group->options[0].section;
     }
     for (auto* list : {&sections, &names}) {
         std::sort(list->begin(), list->end());

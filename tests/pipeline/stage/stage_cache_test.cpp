@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/stage/stage_cache.h"
+#include "pipeline/stages/stage_cache.h"
 
 #include <gtest/gtest.h>
 

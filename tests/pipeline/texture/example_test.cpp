@@ -14,9 +14,9 @@
 
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/counter_random.h"
-#include "pipeline/texture/example/prepare_example.h"
-#include "pipeline/texture/example/read_example.h"
-#include "pipeline/texture/example/synthetic_examples.h"
+#include "pipeline/texture/example_image.h"
+#include "pipeline/texture/read_example.h"
+#include "pipeline/texture/synthetic_examples.h"
 #include "pipeline/texture/texture_bank.h"
 #include "pipeline/texture/texture_quality.h"
 #include "support/paths.h"

@@ -10,10 +10,10 @@
 #include "pipeline/base/counter_random.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/base/periodic_volume.h"
-#include "pipeline/texture/example/prepare_example.h"
-#include "pipeline/texture/example/synthetic_examples.h"
+#include "pipeline/texture/example_image.h"
 #include "pipeline/texture/matched_texture.h"
 #include "pipeline/texture/pyramid_texture.h"
+#include "pipeline/texture/synthetic_examples.h"
 #include "pipeline/texture/texture_bank.h"
 #include "pipeline/texture/texture_quality.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/texture/speckle.h"
+#include "pipeline/texture/speckle_volume.h"
 
 #include <gtest/gtest.h>
 
@@ -34,8 +34,7 @@ TEST(Speckle, EnvelopeIsRayleigh) {
 TEST(Speckle, NeighboursAreIndependentAcrossTheFacesToo) {
     const SpeckleVolume s = make_speckle(32, 3);
     const auto at = [&](int x, int y, int z) {
-        return s.voxels[2 * static_cast<std::size_t>((x & 31) + 32 * ((y & 31) + 32 * (z & 31)))] /
-               32.0;
+        return s.voxels[2 * ((x & 31) + 32 * ((y & 31) + 32 * (z & 31)))] / 32.0;
     };
     for (int axis = 0; axis < 3; ++axis) {
         double inner = 0, seam = 0;

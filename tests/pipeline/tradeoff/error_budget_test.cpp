@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/pack/error_budget.h"
+#include "pipeline/export/error_budget.h"
 
 #include <gtest/gtest.h>
 

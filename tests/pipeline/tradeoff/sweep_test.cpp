@@ -6,8 +6,6 @@
 
 #include <cmath>
 
-#include "pipeline/tradeoff/trial_file.h"
-
 namespace sonocase::pipeline {
 namespace {
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/tradeoff/trial.h"
+#include "pipeline/tradeoff/sweep.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "pipeline/tradeoff/trial_file.h"
 #include "support/random.h"
 
 namespace sonocase::pipeline {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/engine/force_watch.h"
+#include "runtime/engine/sensor_watch.h"
 
 #include <gtest/gtest.h>
 

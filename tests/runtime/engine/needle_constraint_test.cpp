@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/engine/needle_constraint.h"
+#include "runtime/engine/needle_state.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "runtime/engine/scan_engine.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -65,7 +66,7 @@ class Engine : public ::testing::Test {
         r.time_s = 0.01 * static_cast<double>(sequence_);
         r.sensor_count = 1;
         r.sensors[0].state = state;
-        r.sensors[0].world_from_sensor = {rotation_about({1, 0, 0}, 3.14159265358979), {0, y, 59}};
+        r.sensors[0].world_from_sensor = {rotation_about({1, 0, 0}, kPi), {0, y, 59}};
         return r;
     }
     CaseBundle bundle_ = sonocase::testing::small_case();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Where the engine says that skin was not fitted.
-#include "runtime/engine/skin_fit.h"
+#include "runtime/engine/skin.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "imaging_support.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
 
@@ -63,7 +63,7 @@ struct BeamBench {
             scene, geometry, tables, noise, press::press_face(exercise.probe),
             RenderContext{workers, serial_jobs(), available_simd_targets().front()});
         frame.row_gain_db = gain;
-        pixels.resize(static_cast<std::size_t>(edge_px) * static_cast<std::size_t>(edge_px));
+        pixels.resize(static_cast<std::size_t>(edge_px) * edge_px);
     }
     void run() { renderer->render(frame, {}, false, false, pixels); }
     // Amplitude after TGC; row: a sample.

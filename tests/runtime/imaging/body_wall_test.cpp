@@ -132,7 +132,7 @@ TEST(BodyWall, SheetsStayInTheTissueWhileTheProbeSlides) {
     EXPECT_LT(other / level, 0.08);
 }
 
-// Living walls: 0.81 at 2.7 mm; ours broke into grains (0.51).
+// Real walls: 0.81 at 2.7 mm. A wall that breaks into grains has 0.51.
 TEST(BodyWall, LinesRunOn) {
     const CaseBundle bundle = plane_wall(1);
     Exercise exercise = phantom_exercise();
@@ -162,8 +162,8 @@ TEST(BodyWall, LinesRunOn) {
     EXPECT_GT(product / square, 0.65);
 }
 
-// Half of a living wall lies above 60 to 75 grey between its lines, an amplitude of 1.2 to 1.4;
-// ours lay between 10 and 30 (0.3). Off the lines: a quarter of the samples.
+// Half of a real wall lies above 60 to 75 grey between its lines, an amplitude of 1.2 to 1.4. Off
+// the lines: a quarter of the samples.
 TEST(BodyWall, TheGroundBetweenLinesIsNoDarkerThanTheLiverBelow) {
     const CaseBundle bundle = plane_wall(1);
     BeamBench b(bundle, phantom_exercise(), "modern", 128);

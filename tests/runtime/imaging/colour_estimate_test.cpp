@@ -8,8 +8,9 @@
 #include <random>
 
 #include "doppler_cases.h"
-#include "formats/flow/flow_at.h"
+#include "formats/base/constants.h"
 #include "formats/flow/flow_field.h"
+#include "formats/flow/flow_velocity.h"
 #include "runtime/imaging/doppler/colour_image.h"
 #include "runtime/imaging/doppler/ensemble_reference.h"
 
@@ -17,8 +18,6 @@ namespace sonocase::runtime::doppler {
 namespace {
 
 using testing::tube_at;
-
-constexpr double kPi = 3.14159265358979323846;
 
 TEST(DopplerMaths, NormalsAndAnglesAreWhatTheySay) {
     double sum = 0, square = 0;

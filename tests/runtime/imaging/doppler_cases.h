@@ -5,9 +5,10 @@
 
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "formats/flow/flow_field.h"
-#include "runtime/imaging/doppler/tissue_place.h"
-#include "runtime/imaging/scan/scan_geometry.h"
+#include "runtime/imaging/core/scan_geometry.h"
+#include "runtime/imaging/doppler/flow_scene.h"
 
 namespace sonocase::runtime::doppler::testing {
 
@@ -15,14 +16,14 @@ class StillTissue final : public TissuePlace {
   public:
     Point3 rest(PlanePoint shown) const override { return pose * Point3{shown.x, 0, shown.z}; }
     Vector3 velocity_mm_s(PlanePoint) const override { return tissue_mm_s; }
-    bool shut(Point3) const override { return all_shut; }
-    bool presses() const override { return all_shut; }
+    bool closed(Point3) const override { return all_closed; }
+    bool presses() const override { return all_closed; }
     bool blocks(PlanePoint shown) const override { return shown.z > bone_z_mm; }
     Rigid mannequin_from_probe() const override { return pose; }
 
     Rigid pose;  // of the probe in the tube's frame
     Vector3 tissue_mm_s;
-    bool all_shut = false;
+    bool all_closed = false;
     double bone_z_mm = 1e9;
 };
 
@@ -44,7 +45,7 @@ inline FlowField tube_at(double depth_mm,
                          double mean_ml_s,
                          float exponent = 2,
                          const FlowWave& wave = {}) {
-    const double a = angle_deg * 3.14159265358979 / 180;
+    const double a = angle_deg * kRadPerDeg;
     const Vector3 d{std::sin(a), 0, -std::cos(a)};
     FlowField field;
     FlowVessel vessel;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "doppler_cases.h"
+#include "formats/base/constants.h"
 #include "formats/flow/flow_field.h"
 #include "runtime/imaging/doppler/colour_image.h"
 #include "runtime/imaging/doppler/ensemble_reference.h"
@@ -18,14 +19,12 @@ namespace {
 using testing::StillTissue;
 using testing::tube_at;
 
-constexpr double kPi = 3.14159265358979323846;
-
 struct Scan {
     explicit Scan(const FlowField& field, double frequency_mhz = 5, int size = 256)
         : scene(field, 60.0 / 70),
           geometry(make_scan_geometry(testing::linear_probe(), 192, 512, size, size)),
           image(scene, geometry, frequency_mhz, 30),
-          grey(static_cast<std::size_t>(size) * static_cast<std::size_t>(size), 20),
+          grey(static_cast<std::size_t>(size) * size, 20),
           overlay(grey.size(), 9) {
         settings.mode = DopplerMode::colour;
         settings.box_left = 0;
@@ -199,9 +198,9 @@ TEST(ColourImage, ShutVeinsAndWhatLiesBehindBoneHaveNoFlow) {
     field.vessels[0].kind = FlowKind::vein;
     Scan scan(field);
     EXPECT_GT(scan.render().shown_cells, 100);
-    scan.tissue.all_shut = true;
+    scan.tissue.all_closed = true;
     EXPECT_EQ(scan.render().blood_cells, 0);
-    scan.tissue.all_shut = false;
+    scan.tissue.all_closed = false;
     scan.tissue.bone_z_mm = 4;
     EXPECT_EQ(scan.render().blood_cells, 0);
     Scan empty(FlowField{});
@@ -266,7 +265,9 @@ TEST(ColourImage, AVeinSlowsDownOnInspirationAndAnArteryDoesNot) {
         const double ratio = mean(1) / mean(0),
                      truth = flow_ml_s(field.vessels[0], 0, 1) / flow_ml_s(field.vessels[0], 0, 0);
         EXPECT_NEAR(ratio, truth, 1e-3);
-        if (share > 0) EXPECT_LT(ratio, 0.7);
+        if (share > 0) {
+            EXPECT_LT(ratio, 0.7);
+        }
     }
 }
 

@@ -17,7 +17,8 @@
 #include <vector>
 
 #include "doppler_cases.h"
-#include "formats/flow/flow_profile.h"
+#include "formats/base/constants.h"
+#include "formats/flow/flow_velocity.h"
 #include "runtime/imaging/doppler/colour_image.h"
 #include "runtime/imaging/doppler/spectral_strip.h"
 
@@ -26,8 +27,6 @@ namespace {
 using namespace sonocase;
 using namespace sonocase::runtime;
 using namespace sonocase::runtime::doppler;
-
-constexpr double kPi = 3.14159265358979323846;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

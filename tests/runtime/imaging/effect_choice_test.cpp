@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/imaging/formation/effect_choice.h"
+#include "runtime/imaging/core/effect_table.h"
 
 #include <gtest/gtest.h>
 
 #include "imaging_support.h"
-#include "runtime/imaging/paper/paper_effects.h"
+#include "runtime/imaging/paper/paper_model.h"
 #include "runtime/imaging/physical/model/physical_effects.h"
 
 namespace sonocase::runtime {

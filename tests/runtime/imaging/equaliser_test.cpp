@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Gain that a machine evens out across its beams.
-#include "runtime/imaging/physical/fast/equaliser_rows.h"
+#include "runtime/imaging/physical/fast/cell_rows.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "cell_bench.h"
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 
 namespace sonocase::runtime {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/imaging/accuracy/governor.h"
+#include "runtime/imaging/core/governor.h"
 
 #include <gtest/gtest.h>
 

@@ -31,7 +31,7 @@ std::vector<std::uint8_t> picture(const CaseBundle& bundle,
     auto renderer = Renderer::create(bundle, exercise, options);
     EXPECT_TRUE(renderer.has_value());
     std::vector<std::uint8_t> pixels(static_cast<std::size_t>(options.width_px) *
-                                     static_cast<std::size_t>(options.height_px));
+                                     options.height_px);
     EXPECT_NE(renderer->render(input, pixels), FrameStatus::held_bad_pose);
     return pixels;
 }

@@ -25,11 +25,11 @@ inline const CaseBundle& phantom() {
     return bundle;
 }
 
-// The fan of the living liver's sweep that realism is judged by (docs/realism.md).
+// The fan of the sweep over a real liver from which the limits of realism come (docs/realism.md).
 inline Exercise sweep_exercise() {
     Exercise e = phantom_exercise();
     e.probe.radius_mm = 50.6;
-    e.probe.field_of_view_rad = 60.2 * 3.14159265358979 / 180;
+    e.probe.field_of_view_rad = 60.2 * kRadPerDeg;
     e.probe.depth_mm = 180;
     e.probe.frequency_mhz = 3.5;
     e.probe.focus_mm = 90;
@@ -61,9 +61,8 @@ inline std::vector<std::uint8_t> draw(const Exercise& exercise,
                                       const CaseBundle& bundle = phantom()) {
     auto renderer = Renderer::create(bundle, exercise, options);
     EXPECT_TRUE(renderer.has_value());
-    std::vector<std::uint8_t> pixels(
-        static_cast<std::size_t>(options.width_px) * static_cast<std::size_t>(options.height_px),
-        77);
+    std::vector<std::uint8_t> pixels(static_cast<std::size_t>(options.width_px) * options.height_px,
+                                     77);
     EXPECT_EQ(renderer->render(input, pixels), FrameStatus::rendered);
     return pixels;
 }

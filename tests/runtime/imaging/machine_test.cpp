@@ -6,7 +6,7 @@
 
 #include <functional>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "imaging_support.h"
 
 namespace sonocase::runtime {
@@ -27,14 +27,14 @@ void expect_agreement(const Exercise& exercise,
                       RenderOptions options,
                       const std::string& what,
                       const CaseBundle& bundle = phantom(),
-                      double most_bias = 0.1) {
+                      double max_bias = 0.1) {
     const FrameInput input = needle_input();
     const auto fast = draw(exercise, options, input, bundle);
     options.kind = RendererKind::reference;
     const Difference d = compare(fast, draw(exercise, options, input, bundle));
     std::printf("%-24s mean %.3f bias %+.3f worst %d\n", what.c_str(), d.mean, d.bias, d.worst);
     EXPECT_LT(d.mean, 0.35) << what;
-    EXPECT_LT(std::abs(d.bias), most_bias) << what;
+    EXPECT_LT(std::abs(d.bias), max_bias) << what;
     options.kind = RendererKind::fast;
     for (const std::string& simd : simd_targets()) {
         options.simd = simd;
@@ -254,8 +254,8 @@ TEST(MachineInTheRenderer, BlackIsBlackWhereNoiseIsRejected) {
     for (const std::uint8_t p : pixels) ASSERT_TRUE(p == 0 || p == 9) << int(p);
 }
 
-// Looks are nearly independent; since they share the weights of some three columns within a point
-// spread, sixteen act as about four.
+// The speckle fields of `looks` are nearly independent. Since they share the weights of some three
+// columns within a point spread, sixteen act as about four.
 TEST(MachineInTheRenderer, MoreLooksAreSmoother) {
     PhantomOptions o;
     o.ribs = o.gas = o.vessels = o.kidney = o.layers = o.structure = false;

@@ -2,13 +2,13 @@
 
 // A bundle that is unpacked as frames need it shows what a complete bundle shows, wherever the
 // probe is and whatever moves.
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 
 #include <gtest/gtest.h>
 
 #include <thread>
 
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "imaging_support.h"
 #include "support/temporary_folder.h"
 

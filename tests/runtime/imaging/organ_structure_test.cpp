@@ -76,7 +76,7 @@ TEST(Streaks, AreAsManyAsTheirDensitySays) {
     const Exercise exercise = block_exercise();
     BlockBench b(liver_block(), exercise);
     const std::vector<float> gaps(192, 0.0f);
-    std::vector<Streak> out(kMostStreaks);
+    std::vector<Streak> out(kMaxStreaks);
     double found = 0;
     int frames = 0;
     const auto count = [&](const Matrix3& rotation, Vector3 at) {
@@ -128,10 +128,10 @@ TEST(Streaks, AreAsManyAsTheirDensitySays) {
 TEST(PortalTracts, StandInPairsAndCrowd) {
     BlockBench b(liver_block(), block_exercise());
     const std::vector<float> gaps(192, 0.0f);
-    std::vector<Streak> out(kMostStreaks);
+    std::vector<Streak> out(kMaxStreaks);
     const PlateKind& kind = plate_kind(b.tables.frequency_mhz);
     int walls = 0, pairs = 0, close = 0, frames = 0;
-    double most_slope = 0;
+    double max_slope = 0;
     for (double y = -18; y <= 18; y += 9) {
         for (double x = -24; x <= 24; x += 12, ++frames) {
             b.frame.volume_from_probe.translation = {x, y, 0};
@@ -140,7 +140,7 @@ TEST(PortalTracts, StandInPairsAndCrowd) {
                 const Streak& s = out[static_cast<std::size_t>(i)];
                 if (!s.tract) continue;
                 ++walls;
-                most_slope = std::max(most_slope, std::abs(s.normal.x));
+                max_slope = std::max(max_slope, std::abs(s.normal.x));
                 bool pair = false;
                 for (int j = 0; j < n; ++j) {
                     const Streak& t = out[static_cast<std::size_t>(j)];
@@ -163,7 +163,7 @@ TEST(PortalTracts, StandInPairsAndCrowd) {
     EXPECT_LT(per_cm2, 2.5);
     // A piece at the picture's edge can have lost one wall.
     EXPECT_GT(pairs, 0.9 * walls);
-    EXPECT_LT(most_slope, kind.face_sin);
+    EXPECT_LT(max_slope, kind.face_sin);
     EXPECT_GT(static_cast<double>(close) / walls, 1.2 * by_chance);
 }
 
@@ -171,7 +171,7 @@ TEST(PortalTracts, StandInPairsAndCrowd) {
 TEST(PortalTracts, FadeAsThePlaneMovesAcross) {
     BlockBench b(liver_block(), block_exercise());
     const std::vector<float> gaps(192, 0.0f);
-    std::vector<Streak> out(kMostStreaks);
+    std::vector<Streak> out(kMaxStreaks);
     const double full = plate_kind(b.tables.frequency_mhz).amplitude * b.tables.streak_scale;
     std::vector<std::pair<double, double>> before;  // place along the face, level
     double most = 0, steps = 0;
@@ -241,7 +241,7 @@ TEST(Parenchyma, DrawsTheNoiseOfAnOrganInPlaceOfTheBakedOne) {
 TEST(Streaks, StayWhereTheyAreInTheTissue) {
     BlockBench b(liver_block(), block_exercise());
     const std::vector<float> gaps(192, 0.0f);
-    std::vector<Streak> here(kMostStreaks), there(kMostStreaks);
+    std::vector<Streak> here(kMaxStreaks), there(kMaxStreaks);
     const int n = find_streaks(b.scene, b.geometry, b.tables, b.frame, nullptr, gaps, here);
     b.frame.volume_from_probe.translation = {3, 0, 0};
     const int m = find_streaks(b.scene, b.geometry, b.tables, b.frame, nullptr, gaps, there);
@@ -284,8 +284,8 @@ TEST(Diaphragm, IsASoftLineAtAnySlopeWithBlackBehind) {
         exercise.probe.depth_mm = 110;
         BlockBench b(bundle, exercise);
         // Attenuation ends what lies behind: the liver's own is left out of the measure.
-        for (AcousticProperties& look : b.scene.looks) {
-            if (look.kind == TissueKind::soft) look.attenuation = 0;
+        for (AcousticProperties& acoustics : b.scene.acoustics) {
+            if (acoustics.kind == TissueKind::soft) acoustics.attenuation = 0;
         }
         b.frame.effects.diaphragm = b.frame.effects.gas_ring_down = b.frame.effects.speckle = true;
         b.run();

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "imaging_support.h"
 
 namespace sonocase::runtime {

@@ -104,7 +104,7 @@ TEST(PressedFrame, LiftedTheFrameOfBeforeComesBackByteForByte) {
             ASSERT_TRUE(renderer.has_value());
             const auto frame = [&](double mm) {
                 std::vector<std::uint8_t> pixels(static_cast<std::size_t>(options.width_px) *
-                                                 static_cast<std::size_t>(options.height_px));
+                                                 options.height_px);
                 renderer->render(pressed_input(mm), pixels);
                 return pixels;
             };
@@ -169,7 +169,7 @@ TEST(PressedFrame, TheVeinClosesAndTheArteryStaysRound) {
     for (const double mm : {-1.0, 4.0, 8.0, 12.0, 18.0}) {
         renderer->render(pressed_input(mm), pixels);
         const auto layout = renderer->layout();
-        // Of the vessels as the field says: places of the picture whose tissue is one.
+        // Area of the vessels according to the field: places of the picture whose tissue is one.
         int expected_vein = 0, expected_artery = 0;
         const Rigid& pose = renderer->shown_pose();
         for (int y = 0; y < 400; ++y)
@@ -179,10 +179,11 @@ TEST(PressedFrame, TheVeinClosesAndTheArteryStaysRound) {
                 if (p.z < 0 || p.z > 50 || std::abs(p.x) > 20) continue;
                 const Point3 rest = renderer->at_rest(pose * p);
                 const std::uint8_t label = shape.label(rest);
-                if (label == PressedBlock::vein_label && !renderer->shut(rest)) ++expected_vein;
+                if (label == PressedBlock::vein_label && !renderer->closed(rest)) ++expected_vein;
                 if (label == PressedBlock::artery_label) ++expected_artery;
             }
-        const Point3 vein = renderer->now_at(shape.vein), artery = renderer->now_at(shape.artery);
+        const Point3 vein = renderer->current_position(shape.vein),
+                     artery = renderer->current_position(shape.artery);
         const auto at = [&](Point3 p) { return Point3{p.x, 0, p.z - mm}; };
         const int vein_pixels = dark_pixels(pixels, layout, at(vein), 6.2, 400),
                   artery_pixels = dark_pixels(pixels, layout, at(artery), 5.5, 400);

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "pressed_block.h"
-#include "runtime/needle/needle_shift.h"
+#include "runtime/imaging/core/needle_shift.h"
 
 namespace sonocase::runtime {
 namespace {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The scores of realism on pictures that the player shows, with the machines that it shows them
-// with. Limits are those of a living liver (formats/image_scores/score_limits.h); a test of
+// with. Limits are those of a living liver (formats/image_scores/realism_scores.h); a test of
 // sonocase look holds the real frames to the same limits with the same functions. A phantom has no
 // streaks, wall or diaphragm: what they decide is judged on whole cases (docs/realism.md).
 #include <cstdio>
 
-#include "formats/image_scores/motion_scores.h"
-#include "formats/image_scores/score_limits.h"
+#include "formats/image_scores/realism_scores.h"
 #include "formats/image_scores/smooth.h"
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "imaging_support.h"
 
 namespace sonocase::runtime {

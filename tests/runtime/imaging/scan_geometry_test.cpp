@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/imaging/scan/scan_geometry.h"
+#include "runtime/imaging/core/scan_geometry.h"
 
 #include <gtest/gtest.h>
 

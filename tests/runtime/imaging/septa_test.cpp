@@ -36,13 +36,13 @@ Exercise fine_exercise() {
 
 std::vector<Streak> plates(BlockBench& b, const BreathingField* breathing = nullptr) {
     const std::vector<float> gaps(192, 0.0f);
-    std::vector<Streak> out(kMostStreaks);
+    std::vector<Streak> out(kMaxStreaks);
     out.resize(static_cast<std::size_t>(
         find_streaks(b.scene, b.geometry, b.tables, b.frame, breathing, gaps, out)));
     return out;
 }
 
-// Of `here`, inside the picture by a margin: the share that `there` shows at move(place).
+// The share of `here`, inside the picture by a margin, that `there` shows at move(place).
 template <class Move>
 double share_found(const std::vector<Streak>& here,
                    const std::vector<Streak>& there,
@@ -98,7 +98,7 @@ TEST(Septa, StayInTheTissueWhileTheProbeTurnsSlidesAndTilts) {
     BlockBench b(fat_over_liver(), fine_exercise());
     const std::vector<Streak> still = plates(b);
     // Five degrees in the plane, about the face's middle.
-    const double angle = 5 * 3.14159265358979 / 180, c = std::cos(angle), s = std::sin(angle);
+    const double angle = 5 * kRadPerDeg, c = std::cos(angle), s = std::sin(angle);
     b.frame.volume_from_probe.rotation = rotation_about({0, 1, 0}, angle);
     const auto turned = [&](PlanePoint p) -> PlanePoint {
         return {c * p.x - s * p.z, s * p.x + c * p.z};
@@ -106,7 +106,7 @@ TEST(Septa, StayInTheTissueWhileTheProbeTurnsSlidesAndTilts) {
     // Plates near the limit of what faces the beam come and go.
     EXPECT_GT(share_found(still, plates(b), 1e-6, turned), 0.75);
     // Two degrees across the slice: 0.7 mm at 20 mm, a part of the slice.
-    b.frame.volume_from_probe.rotation = rotation_about({1, 0, 0}, 2 * 3.14159265358979 / 180);
+    b.frame.volume_from_probe.rotation = rotation_about({1, 0, 0}, 2 * kRadPerDeg);
     const auto same = [](PlanePoint p) { return p; };
     EXPECT_GT(share_found(still, plates(b), 0.2, same), 0.6);
     // A slice further none are the same.
@@ -126,14 +126,13 @@ TEST(Septa, BreatheWithTheTissue) {
     EXPECT_GT(share_found(rest, plates(b, &field), 0.3, moved), 0.8);
 }
 
-std::vector<LobuleWall> walls_of_block(Vector3 skin, Vector3 beam, double most_sin) {
+std::vector<LobuleWall> walls_of_block(Vector3 skin, Vector3 beam, double max_sin) {
     std::vector<LobuleWall> all;
-    std::array<LobuleWall, kMostLobuleWalls> walls;
+    std::array<LobuleWall, kMaxLobuleWalls> walls;
     for (int k = -4; k < 4; ++k) {
         for (int j = -4; j < 4; ++j) {
             for (int i = -4; i < 4; ++i) {
-                const int n =
-                    find_lobule_walls({i, j, k}, 4, {}, {skin, beam, most_sin, {}}, walls);
+                const int n = find_lobule_walls({i, j, k}, 4, {}, {skin, beam, max_sin, {}}, walls);
                 all.insert(all.end(), walls.begin(), walls.begin() + n);
             }
         }
@@ -141,7 +140,7 @@ std::vector<LobuleWall> walls_of_block(Vector3 skin, Vector3 beam, double most_s
     return all;
 }
 
-// Of rays from places near the block's middle, the share that a plate stops within reach_mm.
+// The share of the rays from places near the block's middle that a plate stops within reach_mm.
 double share_stopped(const std::vector<LobuleWall>& walls, double reach_mm) {
     int rays = 0, stopped = 0;
     for (int n = 0; n < 2000; ++n) {
@@ -231,7 +230,7 @@ TEST(Septa, MuscleShowsLongLinesAlongItsFibresAndDashesAtASlant) {
     const Vector3 other = cross(fibres, side);
     double along_mm = 0, across_mm = 0, slant_mm = 0;
     const int along = seen(fibres, side, along_mm), across = seen(other, side, across_mm);
-    const double angle = 35 * 3.14159265358979 / 180;
+    const double angle = 35 * kRadPerDeg;
     const Vector3 beam = std::cos(angle) * side + std::sin(angle) * fibres;
     const int slant = seen(std::cos(angle) * fibres - std::sin(angle) * side, beam, slant_mm);
     std::printf("perimysium: along %d of %.1f mm, across %d of %.1f mm, slanted %d of %.1f mm\n",
@@ -283,9 +282,9 @@ TEST(Septa, MuscleAndFatAreGroundBetweenPlatesWhereTheMachineShowsThem) {
     EXPECT_EQ(coarse.fine.frames[fat].cube, kSeptaCube);
     EXPECT_EQ(fine.fine.frames[fat].cube, kFineFatCube);
     EXPECT_EQ(fine.fine.frames[liver].cube, coarse.fine.frames[liver].cube);
-    EXPECT_TRUE(coarse.structure_most_db.empty());
-    EXPECT_EQ(fine.structure_most_db[fat], 0);
-    EXPECT_GT(fine.structure_most_db[liver], 30);
+    EXPECT_TRUE(coarse.max_structure_db.empty());
+    EXPECT_EQ(fine.max_structure_db[fat], 0);
+    EXPECT_GT(fine.max_structure_db[liver], 30);
     EXPECT_LT(fine.roughness_mm, coarse.roughness_mm);
     EXPECT_TRUE(fine.has_septa);
 }

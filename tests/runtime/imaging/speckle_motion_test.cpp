@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Speckle that moves with the tissue. Limits are those of a living liver's sweep (docs/realism.md):
-// correlation of 48 x 48 pixels of detail against movement of the scan plane.
+// Speckle that moves with the tissue. The limits come from a sweep over a real liver
+// (docs/realism.md): correlation of 48 x 48 pixels of detail against movement of the scan plane.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 #include <cmath>
 #include <optional>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 #include "imaging_support.h"
 
 namespace sonocase::runtime {
@@ -143,7 +143,7 @@ Rigid moved(const Rigid& pose, Vector3 by_mm) {
 }
 
 Rigid turned(Vector3 axis, double degrees) {
-    return {rotation_about(normalized(axis), degrees * 3.14159265358979 / 180), {0, 0, 0}};
+    return {rotation_about(normalized(axis), degrees * kRadPerDeg), {0, 0, 0}};
 }
 
 TEST(SpeckleMotion, AcrossTheSliceItFadesAsALivingLiverDoes) {
@@ -199,7 +199,8 @@ TEST(SpeckleMotion, ASlowTurnNeverJumps) {
         Plane before = sweep.detail({});
         for (double degrees = 0.25; degrees <= 45; degrees += 0.25) {
             Plane now = sweep.detail(turned(axis, degrees));
-            // Of a tilt about the face's own line, 35 to 60 mm deep: 0.15 to 0.26 mm a step.
+            // A tilt about the face's own line moves tissue at 35 to 60 mm by 0.15 to 0.26 mm a
+            // step.
             steps.push_back(sweep.correlation(before, now, 35, 60));
             before = std::move(now);
         }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Adaptive speckle reduction: smooth regions beside busy ones, each in its place in the tissue.
-#include "runtime/imaging/physical/fast/contrast_rows.h"
+#include "runtime/imaging/physical/fast/cell_rows.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "cell_bench.h"
-#include "formats/machine/machine_toml.h"
+#include "formats/machine/machine.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -65,8 +65,8 @@ TEST(SpeckleReduction, ContrastFollowsTheNoiseFromItsDepthOnAndWithinLimits) {
     }
     for (const float noise : {-40.0f, 40.0f}) {
         b.run(1, noise);
-        EXPECT_NEAR(1 + b.contrast.change_row(deep)[100],
-                    noise < 0 ? kLeastContrast : kMostContrast, 1e-6);
+        EXPECT_NEAR(1 + b.contrast.change_row(deep)[100], noise < 0 ? kMinContrast : kMaxContrast,
+                    1e-6);
     }
 }
 

@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "doppler_cases.h"
-#include "formats/flow/flow_at.h"
+#include "formats/base/constants.h"
+#include "formats/flow/flow_velocity.h"
 #include "runtime/imaging/doppler/m_mode.h"
 #include "runtime/imaging/doppler/spectral_strip.h"
 
@@ -16,8 +17,6 @@ namespace {
 
 using testing::StillTissue;
 using testing::tube_at;
-
-constexpr double kPi = 3.14159265358979323846;
 
 struct Trace {
     Trace(const FlowField& field, double angle, double scale_cm_s, double gate_mm = 3)
@@ -96,8 +95,8 @@ TEST(SpectralStrip, VolumeFlowIsTrueWithTheTrueSectionAndWrongWithACircleForAnEl
         const double ml_s = 0.15 * kPi * radius * radius;
         Trace trace(tube_at(30, 60, radius, ml_s), 60, 80, 4 * radius);
         const SpectralMeasures m = trace.run();
-        EXPECT_TRUE(trace.strip.look().spans);
-        EXPECT_NEAR(trace.strip.look().angle_deg, 60, 0.5);
+        EXPECT_TRUE(trace.strip.gate().spans);
+        EXPECT_NEAR(trace.strip.gate().angle_deg, 60, 0.5);
         EXPECT_NEAR(m.flow_true_area_ml_min / (60 * ml_s), 1, 0.05);
         EXPECT_NEAR(m.diameter_mm, 2 * radius, 0.25);
         EXPECT_NEAR(m.flow_ml_min / (60 * ml_s), 1, 0.1);
@@ -151,11 +150,11 @@ TEST(SpectralGate, HardPlaces) {
     FlowField field = tube_at(30, 90, 4, 3);
     Trace across(field, 60, 80);
     across.run(1);
-    EXPECT_NEAR(across.strip.look().angle_deg, 90, 0.5);
-    EXPECT_TRUE(across.strip.look().blood);
+    EXPECT_NEAR(across.strip.gate().angle_deg, 90, 0.5);
+    EXPECT_TRUE(across.strip.gate().blood);
     across.settings.gate_depth_mm = 50;  // beside the vessel
     across.run(1);
-    EXPECT_FALSE(across.strip.look().blood);
+    EXPECT_FALSE(across.strip.gate().blood);
     EXPECT_EQ(across.strip.measures().psv_cm_s, 0);
     // Two vessels in one gate.
     const FlowField second = tube_at(36, 90, 1.5, 1);
@@ -164,14 +163,14 @@ TEST(SpectralGate, HardPlaces) {
     field.nodes.insert(field.nodes.end(), second.nodes.begin(), second.nodes.end());
     Trace both(field, 60, 80, 14);
     both.run(0.2);
-    EXPECT_TRUE(both.strip.look().two_vessels);
-    Trace shut(tube_at(30, 60, 4, 3), 60, 80);
-    shut.tissue.bone_z_mm = 20;
-    shut.run(0.2);
-    EXPECT_FALSE(shut.strip.look().blood);
+    EXPECT_TRUE(both.strip.gate().two_vessels);
+    Trace closed(tube_at(30, 60, 4, 3), 60, 80);
+    closed.tissue.bone_z_mm = 20;
+    closed.run(0.2);
+    EXPECT_FALSE(closed.strip.gate().blood);
     Trace nothing(FlowField{}, 60, 80);
     nothing.run(0.2);
-    EXPECT_FALSE(nothing.strip.look().blood);
+    EXPECT_FALSE(nothing.strip.gate().blood);
 }
 
 TEST(SpectralStrip, ReplaysToTheSameLinesWhateverTheFrameRate) {

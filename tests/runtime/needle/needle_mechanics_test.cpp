@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "runtime/needle/needle_puncture.h"
-#include "runtime/needle/needle_shift.h"
+#include "formats/base/constants.h"
+#include "runtime/engine/needle_puncture.h"
+#include "runtime/imaging/core/needle_shift.h"
 #include "support/random.h"
 
 namespace sonocase::testing {
@@ -32,7 +33,7 @@ double determinant(double tent_mm, double drag_mm, Point3 p) {
     return determinant(jacobian);
 }
 
-double least_determinant(double tent_mm, double drag_mm) {
+double min_determinant(double tent_mm, double drag_mm) {
     double least = 1e9;
     for (double z = -14; z <= 12; z += 0.05)
         for (const double rho : {0.0, 0.2, 0.5, 0.9, 1.3, 2.0, 4.0})
@@ -85,14 +86,14 @@ TEST(NeedleShift, ItFoldsWhereTheClosedFormSays) {
     for (const auto& zone : {kTentZone, kDragZone}) {
         const double limit = root_e * zone.length_mm;
         const auto least = [&](double strength) {
-            return zone.width_mm == kTentZone.width_mm ? least_determinant(strength, 0)
-                                                       : least_determinant(0, strength);
+            return zone.width_mm == kTentZone.width_mm ? min_determinant(strength, 0)
+                                                       : min_determinant(0, strength);
         };
         EXPECT_GT(least(0.98 * limit), 0);
         EXPECT_LT(least(1.03 * limit), 0);
         EXPECT_GT(least(0.5 * limit), 0.7);
     }
-    EXPECT_GT(least_determinant(kMostTent_mm, kMostDrag_mm), 0.5);
+    EXPECT_GT(min_determinant(kMaxTentMm, kMaxDragMm), 0.5);
 }
 
 struct Boundary {
@@ -177,14 +178,14 @@ TEST(NeedlePuncture, WallsDentAndGiveWayInTheirOrder) {
     EXPECT_NE(into.find("puncture 4"), std::string::npos) << into;
     EXPECT_EQ(needle.tip_layer(), kVeinLayer);
     // The wall gave way where its force says: F = 4 pi (E / 3) w d, in muscle 0.251 N/mm.
-    const double dent = 0.4 / (4 * 3.14159265358979 * 15e-3 / 3 * 4);
+    const double dent = 0.4 / (4 * kPi * 15e-3 / 3 * 4);
     const std::size_t at = into.find("puncture 4 at ");
     EXPECT_NEAR(std::stod(into.substr(at + 14)), 18 + dent, 0.1) << into;
     const std::string out = follow(needle, track, line(23, 30, 0.1));
     EXPECT_EQ(count_of(out, "posterior"), 1) << out;
     const std::string bone = follow(needle, track, line(30, 60, 0.1));
     EXPECT_EQ(count_of(bone, "stopped"), 1) << bone;
-    EXPECT_LE(needle.tent_mm(), kMostTent_mm);
+    EXPECT_LE(needle.tent_mm(), kMaxTentMm);
 }
 
 TEST(NeedlePuncture, AClosedVeinIsPuncturedThroughBothWallsAtOnce) {

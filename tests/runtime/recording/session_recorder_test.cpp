@@ -12,7 +12,7 @@
 #include <filesystem>
 #include <thread>
 
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "support/random.h"
 #include "support/temporary_folder.h"
 

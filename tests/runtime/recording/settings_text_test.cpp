@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/recording/settings_text.h"
+#include "runtime/recording/session_words.h"
 
 #include <gtest/gtest.h>
 

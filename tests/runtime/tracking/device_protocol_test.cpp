@@ -6,10 +6,10 @@
 #include <cstring>
 #include <string>
 
-#include "runtime/tracking/usb/byte_fields.h"
-#include "runtime/tracking/usb/guidance_protocol.h"
-#include "runtime/tracking/usb/liberty_protocol.h"
-#include "runtime/tracking/usb/viper_protocol.h"
+#include "runtime/tracking/devices/byte_stream.h"
+#include "runtime/tracking/devices/guidance_protocol.h"
+#include "runtime/tracking/devices/liberty_protocol.h"
+#include "runtime/tracking/devices/viper_protocol.h"
 #include "support/random.h"
 
 namespace sonocase::runtime {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/tracking/factory/make_tracker.h"
+#include "runtime/tracking/devices/make_tracker.h"
 
 #include <gtest/gtest.h>
 

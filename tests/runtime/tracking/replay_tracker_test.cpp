@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "runtime/tracking/factory/make_tracker.h"
-#include "runtime/tracking/paced_tracker.h"
+#include "runtime/tracking/devices/make_tracker.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::runtime {

@@ -2,14 +2,14 @@
 
 // The WebSocket by itself, byte after byte, and the pose server against a client of this test and a
 // hostile one. tests/runtime/web has node's and Chromium's own clients.
-#include "runtime/tracking/websocket/websocket.h"
+#include "runtime/tracking/devices/websocket.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cstring>
 
-#include "runtime/tracking/websocket/pose_server.h"
+#include "runtime/tracking/devices/pose_server.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -154,7 +154,7 @@ TEST(PoseServer, SendsTheNewestPoseToThoseWhoKnowTheToken) {
     EXPECT_TRUE(stranger.read_until("403 Forbidden"));
     EXPECT_FALSE(stranger.read_until("probe"));
     good.send(request("/?token=abc"));
-    // The pose of before comes at once, and then each new one.
+    // The newest pose comes at once, and then each new one.
     EXPECT_TRUE(
         good.read_until("{\"time_s\":1.500000,\"probe\":[1,0,0,7,0,1,0,0,0,0,1,0,0,0,0,1],"
                         "\"needle\":null}"));

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "formats/attempt/draw_attempt.h"
+#include "formats/scoring/draw_attempt.h"
 #include "runtime/web/page_json.h"
 #include "runtime/web/warm_up.h"
 #include "support/small_case.h"
@@ -51,7 +51,7 @@ TEST(PagePlayer, a_kept_picture_is_rendered_again_to_the_same_pixels) {
     ASSERT_EQ(player->kept(), 10);
     for (int back : {0, 3, 9}) {
         player->frame_again(back, {});
-        EXPECT_EQ(copy(player->pixels()), shown[static_cast<std::size_t>(9 - back)]) << back;
+        EXPECT_EQ(copy(player->pixels()), shown[9 - back]) << back;
         EXPECT_NEAR(player->kept_age_s(back), 0.1 * back, 1e-12);
     }
 }

@@ -18,13 +18,12 @@
 
 #include "formats/base/digest.h"
 #include "formats/exercise/case_exercises.h"
-#include "formats/files/bundle_file.h"
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "formats/recording/session.h"
 #include "formats/scoring/session_score.h"
 #include "runtime/engine/scan_engine.h"
-#include "runtime/imaging/doppler/doppler_colours.h"
-#include "runtime/imaging/doppler/view/doppler_view.h"
+#include "runtime/imaging/doppler/doppler_picture.h"
+#include "runtime/imaging/doppler/doppler_view.h"
 
 namespace {
 
@@ -57,8 +56,7 @@ int frames(const CaseBundle& bundle,
     options.render.simd = simd;
     Result<ScanEngine> engine = ScanEngine::create(bundle, exercise, options);
     if (!engine) return fail(engine.error());
-    std::vector<std::uint8_t> pixels(static_cast<std::size_t>(side) *
-                                     static_cast<std::size_t>(side));
+    std::vector<std::uint8_t> pixels(static_cast<std::size_t>(side) * side);
     std::printf("[");
     const char* between = "";
     for (const SessionSample& sample : session.samples) {
@@ -109,7 +107,7 @@ int doppler_frames(const CaseBundle& bundle,
     if (!engine) return fail(engine.error());
     auto view = DopplerView::create(bundle, engine->exercise(), engine->render_options());
     if (!view) return fail(view.error());
-    const auto count = static_cast<std::size_t>(side) * static_cast<std::size_t>(side);
+    const auto count = static_cast<std::size_t>(side) * side;
     std::vector<std::uint8_t> pixels(count),
         strip(static_cast<std::size_t>(kStripWidth) * kStripHeight);
     const Matrix3 turn = Matrix3::from_columns({0, 1, 0}, {-1, 0, 0}, {0, 0, 1});

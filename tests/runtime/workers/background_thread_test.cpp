@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/workers/background_thread.h"
+#include "runtime/workers/thread_host.h"
 
 #include <gtest/gtest.h>
 
@@ -12,14 +12,14 @@ namespace {
 
 struct Work {
     std::atomic<int> calls{0};
-    std::atomic<int> inside{0}, most_inside{0};
+    std::atomic<int> inside{0}, max_inside{0};
     std::thread::id thread;
 
     static void run(void* self) {
         Work& w = *static_cast<Work*>(self);
         w.thread = std::this_thread::get_id();
         const int now = ++w.inside;
-        if (now > w.most_inside) w.most_inside = now;
+        if (now > w.max_inside) w.max_inside = now;
         --w.inside;
         ++w.calls;
     }
@@ -45,7 +45,7 @@ TEST(BackgroundThread, RunsOneCallAtATime) {
     for (int wake = 0; wake < 1000; ++wake) background.wake();
     while (work.calls == 0) std::this_thread::yield();
     background.stop();
-    EXPECT_EQ(work.most_inside, 1);
+    EXPECT_EQ(work.max_inside, 1);
     EXPECT_LE(work.calls, 1000);
 }
 

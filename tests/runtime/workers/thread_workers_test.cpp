@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/workers/thread_workers.h"
+#include "runtime/workers/thread_host.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A stretch of one block of beams on its way through the stages of beam_sampler.cpp. Each stage is
-// one loop over the rows, so that the look-ups of many rows overlap and a stage that a stretch does
-// not need costs one test.
+// one loop over the rows, so that the look-ups of many rows overlap, and a stage that a stretch
+// does not need costs one test.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct ChunkRows {
 
 struct BeamChunk {
     int first = 0, rows = 0;  // samples
-    int beam = 0;             // of the block: the vector's first
+    int beam = 0;             // first beam of the vector within the block
 
     ChunkRows<float> x, y, z;              // place in voxels
     ChunkRows<float> off_x, off_y, off_z;  // from the centre of the voxel looked up
@@ -32,16 +32,16 @@ struct BeamChunk {
     ChunkRows<std::int32_t> entry;         // the brick's label word
     ChunkRows<std::int32_t> echo_word;     // the brick's echo word
     // First the index of the voxel's value in its pool, then the value.
-    ChunkRows<std::int32_t> label;   // also index of a target's look
+    ChunkRows<std::int32_t> label;   // of the tissue or the target
     ChunkRows<std::int32_t> record;  // of the voxel's surface; kNoBoundary: none
-    // Of stretches that meet the fine region:
-    ChunkRows<float> step_mm;           // of the record's distance
-    ChunkRows<float> least_mm;          // distance at rest that the surface has at least
+    // Filled in where the stretch meets the fine region:
+    ChunkRows<float> step_mm;           // unit of the record's distance
+    ChunkRows<float> min_mm;            // the surface lies at least this far off, at rest
     ChunkRows<std::int32_t> structure;  // baked echo offset, 1/16 dB
-    ChunkRows<std::int32_t> look;
-    ChunkRows<float> echo_re, echo_im;  // of surfaces
+    ChunkRows<std::int32_t> acoustics;  // packed: see physical_kernels.h
+    ChunkRows<float> echo_re, echo_im;  // echo of surfaces
     ChunkRows<float> edge_loss;         // log2 of amplitude per mm
-    ChunkRows<float> facing;            // of the surface that was met, 1 where there is none
+    ChunkRows<float> facing;            // mirror factor of the surface that was met, 1: none
 
     // What the stretch holds.
     bool pooled = false;       // bricks of more than one label

@@ -2,7 +2,7 @@
 
 // Effects attenuation, bone_tail and gas_ring_down: the light that remains on each beam, and the
 // tails behind bone and gas.
-#include "runtime/imaging/simd/simd_math-inl.h"
+#include "runtime/imaging/core/simd_math-inl.h"
 //
 #include "runtime/imaging/physical/fast/beam_chunk.h"
 #include "runtime/imaging/physical/model/gas_faces.h"
@@ -25,13 +25,13 @@ struct BeamLight {
     V light;  // one way there and back; 0 once dead
     V bone, bone_slow, bone_floor, gas;
     V lit;                   // the last light well before a face of gas
-    V reverb, period, next;  // amplitude of the next line, mm between lines, depth of the next
+    V reverb, period, next;  // next line: its amplitude, mm to the line after it, its depth
     I before, before_that;   // kinds of the two samples above
     V clutter;               // power
     int tail_from = 0;
 };
 
-// A tail that nobody sees ends before it and its square are denormal numbers.
+// A tail too faint to be seen ends before it and its square become denormal numbers.
 template <class D, class V>
 HWY_INLINE V faded(D d, V tail, float keep) {
     const auto left = hn::Mul(tail, hn::Set(d, keep));
@@ -73,7 +73,7 @@ HWY_INLINE hn::Vec<D> tail_power(D d, const PhysicalBlock& b, int k, BeamLight<D
     return power;
 }
 
-// Gas lights its tail and its lines where `lit`.
+// Starts the tail and the lines of gas where `lit`.
 template <class D, class V, class M>
 HWY_INLINE void light_gas(D d, M lit, V light_and_gain, V facing, V depth, BeamLight<D>& t) {
     using namespace physical;
@@ -87,8 +87,8 @@ HWY_INLINE void light_gas(D d, M lit, V light_and_gain, V facing, V depth, BeamL
     t.next = hn::IfThenElse(brighter, hn::Add(depth, depth), t.next);
 }
 
-// The same for the frame's faces of gas (model/gas_faces.h): the light shortly before the face,
-// and a direction that neighbouring beams share. Behind the diaphragm it is black.
+// Starts them at the frame's faces of gas (model/gas_faces.h), with the light shortly before the
+// face and a direction that neighbouring beams share. Behind the diaphragm it is black.
 template <class D>
 HWY_INLINE void light_face(D d, const PhysicalBlock& b, int beam, int k, BeamLight<D>& t) {
     using namespace physical;
@@ -106,8 +106,8 @@ HWY_INLINE void light_face(D d, const PhysicalBlock& b, int beam, int k, BeamLig
     light_gas(d, hn::AndNot(dome, meets), t.lit, facing, face, t);
 }
 
-// A face of bone or gas lights its tails; gas only from its second sample on, since a single one
-// belongs to a neighbour that the random look-up hit. above_mm: depth of the sample above.
+// Starts the tails of a face of bone or gas; gas counts from its second sample on, since a single
+// one belongs to a neighbour that the random look-up hit. above_mm: depth of the sample above.
 template <class D, class V, class I>
 HWY_INLINE void light_tails(D d,
                             const PhysicalBlock& b,
@@ -143,7 +143,7 @@ HWY_INLINE void light_tails(D d,
     }
 }
 
-// Effect diaphragm: light stays until its line is drawn, and then there is none.
+// Effect diaphragm: the light stays until the line is drawn, and is gone behind it.
 template <class D, class V>
 HWY_INLINE V behind_dome(D d, const PhysicalBlock& b, int beam, int k, V left) {
     const auto past = hn::Sub(hn::Set(d, b.r[k]), hn::LoadU(d, b.dome_mm + beam));
@@ -152,7 +152,7 @@ HWY_INLINE V behind_dome(D d, const PhysicalBlock& b, int beam, int k, V left) {
     return hn::IfThenElse(near, hn::IfThenElseZero(hn::Lt(past, reach), hn::Set(d, 1.0f)), left);
 }
 
-// Reverberation between the layers below what is bright: each sample leaves a part of its power.
+// Reverberation between layers, below what is bright: each sample leaves a part of its power.
 template <class D>
 HWY_INLINE void add_clutter(
     D d, const PhysicalBlock& b, std::ptrdiff_t at, int k, BeamLight<D>& t) {
@@ -172,7 +172,7 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& block, const BeamChunk& c, 
     const PhysicalBlock b = block;
     const hn::RebindToSigned<D> di;
     const auto zero = hn::Zero(d);
-    const auto least = hn::Set(d, b.dead_light);
+    const auto min_light = hn::Set(d, b.dead_light);
     const auto kind_bits = hn::Set(di, 7 << 16);
     const float* dim = b.attenuation ? b.dim : b.dim_off;
     const auto uniform = hn::Set(d, dim[c.label.row(0)[0]]);
@@ -180,7 +180,7 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& block, const BeamChunk& c, 
     for (int row = 0; row < c.rows; ++row) {
         const int k = c.first + row;
         const std::ptrdiff_t out = static_cast<std::ptrdiff_t>(k) * b.stride + c.beam;
-        const auto alive = hn::Ge(t.light, least);
+        const auto alive = hn::Ge(t.light, min_light);
         t.light = hn::IfThenElseZero(alive, t.light);
         if (!hn::AllTrue(d, alive)) {
             const auto lit = hn::RebindMask(di, alive);
@@ -193,7 +193,7 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& block, const BeamChunk& c, 
         if (b.face_mm != nullptr) light_face(d, b, c.beam, k, t);
         if (b.clutter != nullptr) add_clutter(d, b, out, k, t);
         if constexpr (kTails) {
-            const auto kind = hn::And(hn::Load(di, c.look.row(row)), kind_bits);
+            const auto kind = hn::And(hn::Load(di, c.acoustics.row(row)), kind_bits);
             fade_tails(d, b, t);
             const auto facing = c.surfaces ? hn::Load(d, c.facing.row(row)) : hn::Set(d, 1.0f);
             light_tails(d, b, hn::Mul(t.light, hn::Set(d, b.gain[k])), facing, kind,
@@ -212,7 +212,7 @@ HWY_INLINE void light_rows(D d, const PhysicalBlock& block, const BeamChunk& c, 
         t.light = hn::Mul(t.light, left);
     }
     if constexpr (!kTails)
-        t.before_that = t.before = hn::And(hn::Load(di, c.look.row(c.rows - 1)), kind_bits);
+        t.before_that = t.before = hn::And(hn::Load(di, c.acoustics.row(c.rows - 1)), kind_bits);
 }
 
 // kHard: the scene contains bone or gas.
@@ -236,7 +236,7 @@ HWY_NOINLINE void light_chunk(D d, const PhysicalBlock& b, const BeamChunk& c, B
     }
 }
 
-// From sample `first` on, all beams are dead: only their tails continue.
+// All beams are dead from sample `first` on: only their tails continue.
 template <class D>
 HWY_INLINE void dark_rows(D d, const PhysicalBlock& b, int beam, int first, BeamLight<D>& t) {
     const hn::RebindToSigned<D> di;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effects elevation and slice: where in the slab each sample of a stretch lies, and the label of
-// the voxel there.
-#include "runtime/imaging/physical/fast/beam_voxel-inl.h"
-#include "runtime/imaging/physical/fast/beam_walk-inl.h"
-//
+// Effects contact, deformation, breathing, elevation and slice: where the samples of a vector of
+// beams lie, in voxels or in cells of scatterers, and the label of the voxel there. Included once
+// per instruction set.
+#include "runtime/imaging/core/simd_math-inl.h"
 #include "runtime/imaging/physical/fast/beam_chunk.h"
+#include "runtime/imaging/physical/fast/physical_kernels.h"
+#include "runtime/imaging/physical/model/brick_table.h"
 
 #if defined(SONOCASE_BEAM_PLACE_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SONOCASE_BEAM_PLACE_INL_H
@@ -17,13 +18,131 @@
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 
-// A jumping probe finds nothing in the cache, and a look-up that waits holds up all that follow:
-// each stage prefetches the lines that a later one will read.
+template <class D>
+struct BeamPoint {
+    hn::Vec<D> x, y, z;
+};
+
+// Weight of the breathing shift at a row: between the nodes of its field.
+template <class D>
+HWY_INLINE hn::Vec<D> breathing_weight(D d, const PhysicalBlock& b, int beam, int k) {
+    const float* node = b.breathing + (k / kBreathingNode) * b.lines + beam;
+    const auto w0 = hn::LoadU(d, node), w1 = hn::LoadU(d, node + b.lines);
+    const auto part = hn::Set(d, static_cast<float>(k % kBreathingNode) / kBreathingNode);
+    return hn::Add(w0, hn::Mul(hn::Sub(w1, w0), part));
+}
+
+// Places along a vector of beams: origin + s * per_mm, where s counts from the probe's face and the
+// gap to the skin is closed; then to where pressed tissue lies at rest; less the breathing shift.
+template <class D>
+struct BeamWalk {
+    hn::Vec<D> ox, oy, oz, vx, vy, vz, gap;
+    const float* shift;     // of breathing at weight 1
+    const float* sideways;  // row of numbers per mm beside the beam
+
+    HWY_INLINE BeamPoint<D> at(D d, const PhysicalBlock& b, int beam, int k) const {
+        auto s = hn::Add(hn::Set(d, b.r[k]), hn::Mul(gap, hn::Set(d, b.contact[k])));
+        if (b.press != nullptr) s = hn::Add(s, hn::Load(d, b.press->along_row(k) + beam));
+        BeamPoint<D> p{hn::Add(ox, hn::Mul(vx, s)), hn::Add(oy, hn::Mul(vy, s)),
+                       hn::Add(oz, hn::Mul(vz, s))};
+        if (b.press != nullptr) {
+            const auto side = hn::Load(d, b.press->side_row(k) + beam);
+            p.x = hn::Add(p.x, hn::Mul(side, hn::LoadU(d, sideways)));
+            p.y = hn::Add(p.y, hn::Mul(side, hn::LoadU(d, sideways + b.lines)));
+            p.z = hn::Add(p.z, hn::Mul(side, hn::LoadU(d, sideways + 2 * b.lines)));
+        }
+        if (b.breathing != nullptr) {
+            const auto w = breathing_weight(d, b, beam, k);
+            p.x = hn::Sub(p.x, hn::Mul(w, hn::Set(d, shift[0])));
+            p.y = hn::Sub(p.y, hn::Mul(w, hn::Set(d, shift[1])));
+            p.z = hn::Sub(p.z, hn::Mul(w, hn::Set(d, shift[2])));
+        }
+        return p;
+    }
+};
+
+// beam: first beam of the vector. origin, per_mm: rows of the block's numbers per beam.
+template <class D>
+HWY_INLINE BeamWalk<D> beam_walk(
+    D d, const PhysicalBlock& b, int beam, int origin, int per_mm, const float* shift) {
+    const auto number = [&](int row)
+                            HWY_ATTR { return hn::LoadU(d, b.beams + row * b.lines + beam); };
+    return {number(origin),
+            number(origin + 1),
+            number(origin + 2),
+            number(per_mm),
+            number(per_mm + 1),
+            number(per_mm + 2),
+            number(kGap),
+            shift,
+            b.beams + (per_mm + kSideways) * b.lines + beam};
+}
+
+template <class DI>
+struct VoxelAddress {
+    hn::Vec<DI> brick;  // index of the brick's first table word; 0 outside the volume
+    hn::Vec<DI> cell;   // voxel within the brick
+    hn::Mask<DI> inside;
+};
+
+// Address of the voxel (i, j, l). b: PhysicalBlock or PhysicalRegion, which describes the table.
+template <class DI, class Table>
+HWY_INLINE VoxelAddress<DI> voxel_address(
+    DI di, const Table& b, hn::Vec<DI> i, hn::Vec<DI> j, hn::Vec<DI> l) {
+    const hn::RebindToUnsigned<DI> du;
+    const auto below = [&](auto index, int size) HWY_ATTR {
+        return hn::Lt(hn::BitCast(du, index), hn::Set(du, static_cast<std::uint32_t>(size)));
+    };
+    const auto inside = hn::RebindMask(
+        di, hn::And(below(i, b.size.x), hn::And(below(j, b.size.y), below(l, b.size.z))));
+    const int edge_log2 = b.block_log2;  // of a block of bricks
+    const auto in_block = hn::Set(di, (1 << edge_log2) - 1), three = hn::Set(di, 3);
+    const auto bi = hn::ShiftRight<2>(i), bj = hn::ShiftRight<2>(j), bl = hn::ShiftRight<2>(l);
+    const auto along = [&](auto p) HWY_ATTR { return hn::ShiftRightSame(p, edge_log2); };
+    const auto block = hn::Add(along(bi), hn::Add(hn::Mul(along(bj), hn::Set(di, b.blocks_x)),
+                                                  hn::Mul(along(bl), hn::Set(di, b.blocks_xy))));
+    // Base of the block, then the layer's, the row's and the brick's place in it.
+    const auto shifted = [&](auto base, auto place)
+                             HWY_ATTR { return hn::Or(hn::ShiftLeftSame(base, edge_log2), place); };
+    const auto number =
+        shifted(shifted(shifted(block, hn::And(bl, in_block)), hn::And(bj, in_block)),
+                hn::And(bi, in_block));
+    return {hn::ShiftLeft<2>(hn::IfThenElseZero(inside, number)),
+            hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
+                                             hn::ShiftLeft<4>(hn::And(l, three)))),
+            inside};
+}
+
+// Label of the voxel nearest to a place; 0, the outside, beyond the volume.
+template <class D>
+HWY_INLINE hn::Vec<hn::RebindToSigned<D>> nearest_label(
+    D d, const PhysicalBlock& b, hn::Vec<D> x, hn::Vec<D> y, hn::Vec<D> z) {
+    const hn::RebindToSigned<D> di;
+    const auto index = [&](auto p) HWY_ATTR {
+        return hn::Sub(rounded_bits(d, p), hn::Set(di, kRoundingBits));
+    };
+    const auto at = voxel_address(di, b, index(x), index(y), index(z));
+    const auto entry = hn::IfThenElse(at.inside, hn::GatherIndex(di, b.table, at.brick),
+                                      hn::Set(di, static_cast<std::int32_t>(kUniformBrick)));
+    const auto uniform = hn::Lt(entry, hn::Zero(di));
+    auto label = entry;
+    if (!hn::AllTrue(di, uniform)) {
+        const auto voxel =
+            hn::Or(hn::ShiftLeft<6>(hn::And(entry, hn::Set(di, 0x01FFFFFF))), at.cell);
+        label = hn::IfThenElse(uniform, entry,
+                               pool_byte(di, b.labels, hn::IfThenZeroElse(uniform, voxel)));
+    }
+    return hn::And(label, hn::Set(di, 0xFF));
+}
+
+// Prefetches the lines that a later stage will read. A jumping probe finds nothing in the cache,
+// and a look-up that waits holds up all that follow.
 template <class T>
 HWY_INLINE void fetch_lanes(const T* pool, const std::int32_t* at, int lanes) {
     for (int lane = 0; lane < lanes; ++lane) hwy::Prefetch(pool + at[lane]);
 }
 
+// Where each sample of a stretch lies in the slab, and the voxel that is looked up for it.
 template <class D>
 HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& block, BeamChunk& c) {
     const PhysicalBlock b = block;
@@ -69,7 +188,7 @@ HWY_NOINLINE void place_chunk(D d, const PhysicalBlock& block, BeamChunk& c) {
     }
 }
 
-// The words of each sample's brick, and the index of its voxel in the pools.
+// Reads the words of each sample's brick, and the index of its voxel in the pools.
 template <class D>
 HWY_NOINLINE void entry_chunk(D d, const PhysicalBlock& block, BeamChunk& c) {
     const PhysicalBlock b = block;

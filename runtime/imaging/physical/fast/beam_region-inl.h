@@ -2,8 +2,8 @@
 
 // The fine region (model/region_look_up.h): samples in its box take labels and records from its
 // smaller voxels, before surfaces are worked out.
+#include "runtime/imaging/core/simd_math-inl.h"
 #include "runtime/imaging/physical/fast/beam_place-inl.h"
-#include "runtime/imaging/simd/simd_math-inl.h"
 //
 #include "formats/volume/boundary_record.h"
 #include "runtime/imaging/physical/fast/beam_chunk.h"
@@ -18,7 +18,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 
-// Lanes of a row whose bricks the region may say something else about.
+// Lanes of a row in whose bricks the region may hold something else.
 template <class D>
 HWY_INLINE hn::Mask<hn::RebindToSigned<D>> is_marked(D, const BeamChunk& c, int row) {
     const hn::RebindToSigned<D> di;
@@ -38,8 +38,8 @@ HWY_INLINE hn::Mask<D> in_region(D d, const PhysicalRegion& g, const BeamChunk& 
                    hn::And(between(c.y.row(row), 1), between(c.z.row(row), 2)));
 }
 
-// A row's voxels of the region, at the random step that the case's own look-up took, in as many of
-// its voxels.
+// The voxels of the region for a row. They are looked up at the random step of the case's look-up,
+// as many voxels wide.
 template <class D>
 struct RegionRow {
     hn::Vec<D> place[3], centre[3];  // voxels of the region; centre with kRoundingShift
@@ -106,7 +106,7 @@ HWY_INLINE auto region_record(D,
     return hn::IfThenElse(bounded, hn::GatherIndex(di, g.boundary, voxel), none);
 }
 
-// A row of which some voxels of the region hold a surface, or another label than the case's.
+// Takes over a row where some voxels of the region hold a surface, or another label than the case.
 template <class D>
 HWY_INLINE void take_from_region(D d,
                                  const PhysicalBlock& b,
@@ -130,8 +130,8 @@ HWY_INLINE void take_from_region(D d,
               c.record.row(row));
     hn::Store(hn::IfThenElse(r.use, label, own), di, c.label.row(row));
     if (hn::AllFalse(di, near)) return;
-    hn::Store(hn::IfThenElse(near_f, hn::Set(d, -1e9f), hn::Load(d, c.least_mm.row(row))), d,
-              c.least_mm.row(row));
+    hn::Store(hn::IfThenElse(near_f, hn::Set(d, -1e9f), hn::Load(d, c.min_mm.row(row))), d,
+              c.min_mm.row(row));
     hn::Store(hn::IfThenElse(near_f, hn::Set(d, g.step_mm), hn::Load(d, c.step_mm.row(row))), d,
               c.step_mm.row(row));
     float* off[3] = {c.off_x.row(row), c.off_y.row(row), c.off_z.row(row)};
@@ -142,8 +142,8 @@ HWY_INLINE void take_from_region(D d,
     }
 }
 
-// After record_chunk(), before surface_chunk(). True: the stretch meets the region; records are
-// then filled in for all its samples. Costs a test of each brick's word otherwise.
+// Comes after record_chunk() and before surface_chunk(). True: the stretch meets the region, and
+// records are filled in for all its samples. Otherwise it costs a test of each brick's word.
 template <class D>
 HWY_NOINLINE bool region_chunk(D d, const PhysicalBlock& b, const PhysicalRegion& g, BeamChunk& c) {
     const hn::RebindToSigned<D> di;
@@ -160,7 +160,7 @@ HWY_NOINLINE bool region_chunk(D d, const PhysicalBlock& b, const PhysicalRegion
     HWY_ALIGN std::int32_t lines[kBeamBlock];
     for (int row = 0; row < c.rows; ++row) {
         hn::Store(case_step, d, c.step_mm.row(row));
-        hn::Store(hn::Set(d, -1e9f), d, c.least_mm.row(row));
+        hn::Store(hn::Set(d, -1e9f), d, c.min_mm.row(row));
         if (!c.bounded) hn::Store(none, di, c.record.row(row));
         const auto marked = is_marked(d, c, row);
         if (hn::AllFalse(di, marked)) continue;
@@ -176,9 +176,9 @@ HWY_NOINLINE bool region_chunk(D d, const PhysicalBlock& b, const PhysicalRegion
         RegionRow<D>& r = rows[row];
         r.entry = hn::IfThenElse(r.use, hn::GatherIndex(di, g.table, r.at.brick),
                                  hn::Set(di, static_cast<std::int32_t>(kUniformBrick)));
-        // Where the region's voxel holds no surface, the case's stays in front.
+        // Where the region's voxel holds no surface, the case's surface must not be passed.
         hn::Store(hn::IfThenElse(hn::RebindMask(d, r.use), hn::Zero(d), hn::Set(d, -1e9f)), d,
-                  c.least_mm.row(row));
+                  c.min_mm.row(row));
         const auto bounded = hn::And(r.use, hn::TestBit(r.entry, flag));
         const auto same =
             hn::And(hn::Lt(r.entry, hn::Zero(di)),

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The first pass of model `physical`: down a block of beams, stretch by stretch.
 #include "runtime/imaging/physical/fast/beam_sampler.h"
 
 #include <algorithm>
@@ -12,17 +11,14 @@
 #include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-//
-#include "runtime/imaging/physical/fast/beam_dome-inl.h"
+// These come after Highway's: they are included again for each instruction set.
+#include "runtime/imaging/core/needle_chord-inl.h"
 #include "runtime/imaging/physical/fast/beam_light-inl.h"
 #include "runtime/imaging/physical/fast/beam_place-inl.h"
-#include "runtime/imaging/physical/fast/beam_press-inl.h"
 #include "runtime/imaging/physical/fast/beam_region-inl.h"
 #include "runtime/imaging/physical/fast/beam_scatter-inl.h"
-#include "runtime/imaging/physical/fast/beam_streak-inl.h"
+#include "runtime/imaging/physical/fast/beam_structures-inl.h"
 #include "runtime/imaging/physical/fast/beam_surface-inl.h"
-#include "runtime/imaging/physical/fast/beam_target-inl.h"
-#include "runtime/imaging/physical/fast/beam_wall-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
@@ -42,19 +38,19 @@ void sample_beams_as(PhysicalBlock& b) {
         c.beam = v;
         const auto air = hn::Lt(hn::LoadU(d, b.beams + kGap * b.lines + v), zero);
         const auto edge = hn::LoadU(d, b.beams + kEdge * b.lines + v);
-        BeamLight<D> light{hn::IfThenZeroElse(air, edge),
-                           zero,
-                           zero,
-                           zero,
-                           zero,
-                           zero,
-                           zero,
-                           zero,
-                           zero,
-                           hn::Zero(di),
-                           hn::Zero(di),
-                           zero,
-                           b.samples};
+        BeamLight<D> light{.light = hn::IfThenZeroElse(air, edge),
+                           .bone = zero,
+                           .bone_slow = zero,
+                           .bone_floor = zero,
+                           .gas = zero,
+                           .lit = zero,
+                           .reverb = zero,
+                           .period = zero,
+                           .next = zero,
+                           .before = hn::Zero(di),
+                           .before_that = hn::Zero(di),
+                           .clutter = zero,
+                           .tail_from = b.samples};
         for (int k = 0; k < b.samples; k += kChunkRows) {
             if (!b.keep_all && hn::AllTrue(d, hn::Lt(light.light, hn::Set(d, b.dead_light)))) {
                 dark_rows(d, b, v, k, light);
@@ -77,7 +73,7 @@ void sample_beams_as(PhysicalBlock& b) {
             b.boundary_met = b.boundary_met || c.surfaces;
             b.refraction_met = b.refraction_met || c.refracts;
             if (b.target_count > 0 && target_chunk(d, b, c)) b.target_met = true;
-            look_chunk(d, b, c);
+            acoustics_chunk(d, b, c);
             c.offsets = b.structure;
             if (b.structure) structure_chunk(d, b, c);
             if (b.fine != nullptr && c.fine) fine_chunk(d, b, c);
@@ -95,12 +91,74 @@ void sample_beams_as(PhysicalBlock& b) {
     for (int v = 0; v < kBeamBlock; v += lanes) {
         for (int k = b.tail_from; k < from[v]; ++k)
             std::memset(b.tail + static_cast<std::ptrdiff_t>(k) * b.stride + v, 0,
-                        sizeof(float) * static_cast<std::size_t>(lanes));
+                        sizeof(float) * lanes);
     }
 }
 
 void sample_beams(PhysicalBlock& b) {
     b.hard_scene ? sample_beams_as<true>(b) : sample_beams_as<false>(b);
+}
+
+// Effect needle: the mirror, the shadow and the tail of the shaft.
+void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int row_end) {
+    using namespace physical;
+    const hn::CappedTag<float, kBeamBlock> d;
+    const hn::RebindToSigned<decltype(d)> di;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+    const float diameter = 2 * n.radius;
+    const float decay = std::exp(-b.step_mm / static_cast<float>(kNeedleTailMm));
+    const float dim = static_cast<float>(kNeedleShadowLog2) * std::min(b.step_mm / diameter, 1.0f);
+    for (int v = 0; v < kBeamBlock; v += lanes) {
+        const auto ox = hn::LoadU(d, n.origin_x + v), oz = hn::LoadU(d, n.origin_z + v);
+        const auto dx = hn::LoadU(d, n.direction_x + v), dz = hn::LoadU(d, n.direction_z + v);
+        const auto cosine = hn::Add(hn::Mul(hn::Set(d, n.ax), dx), hn::Mul(hn::Set(d, n.az), dz));
+        const auto sine2 = hn::Max(hn::Sub(one, hn::Mul(cosine, cosine)), zero);
+        const auto sine4 = hn::Mul(sine2, sine2);
+        const auto mirror = hn::Mul(hn::Mul(sine4, sine4), sine4);  // sine^12
+        auto tail = zero, shade = zero;
+        for (int k = row_begin; k < b.samples; ++k) {
+            const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * b.stride + v;
+            tail = hn::Mul(tail, hn::Set(d, decay));
+            const auto light = hn::LoadU(d, b.light + at);
+            if (k < row_end) {
+                const auto r = hn::Set(d, b.r[k]);
+                const auto chord =
+                    needle_chord(d, n, hn::Add(ox, hn::Mul(r, dx)), hn::Add(oz, hn::Mul(r, dz)));
+                const auto seen = hn::Min(
+                    hn::IfThenElseZero(chord.hit, hn::Div(chord.length_mm, hn::Set(d, diameter))),
+                    one);
+                const auto glint = hn::Mul(
+                    hn::Set(d, 0.25f),
+                    hn::Max(hn::Sub(one, hn::Mul(chord.from_tip_mm,
+                                                 hn::Set(d, static_cast<float>(1 / kTipGlintMm)))),
+                            zero));
+                const auto rough = hn::Set(d, static_cast<float>(kNeedleDiffuse));
+                const auto bright =
+                    hn::Add(hn::Add(rough, hn::Mul(hn::Sub(one, rough), mirror)), glint);
+                const auto strength = hn::Mul(seen, hn::Set(d, static_cast<float>(kNeedleGain)));
+                const auto mirrored =
+                    hn::Mul(hn::Mul(strength, bright), hn::Set(d, b.interface_scale[k]));
+                for (int look = 0; look < b.looks_at[k]; ++look) {
+                    std::int32_t* echoes = b.echoes + look * b.look_stride + at;
+                    const auto echo = hn::LoadU(di, echoes);
+                    hn::StoreU(pack_echo(d, hn::Add(echo_real(d, echo), mirrored),
+                                         echo_imaginary(d, echo)),
+                               di, echoes);
+                }
+                tail = hn::Max(tail,
+                               hn::Mul(hn::Mul(strength, hn::Add(rough, mirror)),
+                                       hn::Mul(light, hn::Set(d, static_cast<float>(kNeedleTail) *
+                                                                     b.gain[k]))));
+                shade = hn::Sub(shade, hn::Mul(seen, hn::Set(d, dim)));
+            }
+            hn::StoreU(hn::Mul(light, exp2_fading(d, shade)), d, b.light + at);
+            const auto power = hn::Mul(tail, tail);
+            hn::StoreU(k >= b.tail_from ? hn::Add(hn::LoadU(d, b.tail + at), power) : power, d,
+                       b.tail + at);
+        }
+    }
+    b.tail_from = std::min(b.tail_from, row_begin);
 }
 
 }  // namespace sonocase::runtime::HWY_NAMESPACE
@@ -110,9 +168,15 @@ HWY_AFTER_NAMESPACE();
 namespace sonocase::runtime {
 
 HWY_EXPORT(sample_beams);
+HWY_EXPORT(needle_physical);
 
 void sample_beam_block(SimdTarget simd, PhysicalBlock& block) {
     HWY_DISPATCH_TABLE(sample_beams)[simd.index](block);
+}
+
+void draw_physical_needle(
+    SimdTarget simd, PhysicalBlock& block, const NeedleRow& needle, int row_begin, int row_end) {
+    HWY_DISPATCH_TABLE(needle_physical)[simd.index](block, needle, row_begin, row_end);
 }
 
 }  // namespace sonocase::runtime

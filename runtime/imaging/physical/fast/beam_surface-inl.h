@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Effects boundaries, pulsation, interfaces and edge_shadow: on which side of the plane in its
-// voxel a sample lies, and what the surface itself reflects and takes away.
-#include "runtime/imaging/physical/fast/beam_press-inl.h"
-#include "runtime/imaging/simd/simd_math-inl.h"
-//
+// Surfaces of a stretch of beams. Effect deformation: surfaces that turn with pressed tissue, and
+// collapsed lumens; beam_place-inl.h shifts the positions. Effects boundaries, pulsation,
+// interfaces and edge_shadow: on which side of the plane in its voxel a sample lies, and what the
+// surface itself reflects and takes away. Effect targets: the exercise's balls and ellipsoids,
+// over the anatomy.
 #include "formats/volume/boundary_record.h"
+#include "runtime/imaging/core/simd_math-inl.h"
 #include "runtime/imaging/physical/fast/beam_chunk.h"
+#include "runtime/imaging/physical/model/physical_frame.h"
+#include "runtime/imaging/press/press_view-inl.h"
 
 #if defined(SONOCASE_BEAM_SURFACE_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SONOCASE_BEAM_SURFACE_INL_H
@@ -17,6 +20,58 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class D>
+HWY_INLINE void press_stretch(D d, const PhysicalBlock& b, const BeamChunk& c) {
+    press::HWY_NAMESPACE::press_chunk(d, *b.press_view, b.first_beam, c.beam, c.first, c.rows,
+                                      *b.press);
+}
+
+// physical::press_surface() in lanes. nx, ny, nz: unit normal at rest; k: sample.
+template <class D, class V>
+HWY_INLINE void press_surface(
+    D d, const PhysicalBlock& b, int beam, int k, V nx, V ny, V nz, V& cosine, V& distance_mm) {
+    const auto along_axes = [&](int row, float scale) HWY_ATTR {
+        const float* axis = b.beams + row * b.lines + beam;
+        const auto sum = hn::Add(hn::Mul(nx, hn::LoadU(d, axis)),
+                                 hn::Add(hn::Mul(ny, hn::LoadU(d, axis + b.lines)),
+                                         hn::Mul(nz, hn::LoadU(d, axis + 2 * b.lines))));
+        return hn::Mul(sum, hn::Set(d, scale));
+    };
+    const auto one = hn::Set(d, 1.0f);
+    const auto along = along_axes(kBeam, 1),
+               beside = along_axes(kSideways + kVoxelPerMm, b.voxel_mm);
+    const float* here = b.press->along_row(k) + beam;
+    const auto deeper = hn::Sub(hn::Load(d, here), hn::Load(d, here - press::kPressBeams));
+    const auto rise = hn::Add(one, hn::Mul(deeper, hn::Set(d, 1 / b.step_mm)));
+    const auto steep = hn::Mul(along, rise);
+    const auto tilt = press::HWY_NAMESPACE::press_tilt(d, *b.press_view, b.first_beam + beam, k);
+    const auto tilted = hn::Add(beside, hn::Mul(along, tilt));
+    const auto square = [&](auto x) HWY_ATTR { return hn::Mul(x, x); };
+    const auto left = hn::Max(hn::Sub(hn::Sub(one, square(along)), square(beside)), hn::Zero(d));
+    const auto length2 =
+        hn::Min(hn::Max(hn::Add(left, hn::Add(square(steep), square(tilted))),
+                        hn::Set(d, static_cast<float>(physical::kMinSlope * physical::kMinSlope))),
+                hn::Set(d, static_cast<float>(physical::kMaxSlope * physical::kMaxSlope)));
+    const auto per_length = hn::Div(one, hn::Sqrt(length2));
+    cosine = hn::Min(hn::Abs(hn::Mul(steep, per_length)), one);
+    distance_mm = hn::Mul(distance_mm, per_length);
+}
+
+// A collapsed lumen shows the tissue around it.
+template <class D>
+HWY_NOINLINE void close_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
+    const hn::RebindToSigned<D> di;
+    for (int row = 0; row < c.rows; ++row) {
+        const auto closed = hn::Load(di, b.press->closed + row * press::kPressBeams + c.beam);
+        const auto is_closed = hn::Gt(closed, hn::Zero(di));
+        if (hn::AllFalse(di, is_closed)) continue;
+        const auto label = hn::Load(di, c.label.row(row));
+        const auto wall = hn::GatherIndex(di, b.closed_label, label);
+        hn::Store(hn::IfThenElse(is_closed, wall, label), di, c.label.row(row));
+    }
+}
 
 // Roughness and glint of surfaces at a row's samples; see PhysicalTextures::rough.
 template <class D>
@@ -60,7 +115,7 @@ HWY_INLINE void clear_surface_row(D d, BeamChunk& c, int row) {
     hn::Store(hn::Set(d, 1.0f), d, c.facing.row(row));
 }
 
-// The records of the voxels that are looked up.
+// Reads the records of the voxels that are looked up.
 template <class D>
 HWY_NOINLINE void record_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
     const hn::RebindToSigned<D> di;
@@ -73,6 +128,8 @@ HWY_NOINLINE void record_chunk(D, const PhysicalBlock& b, BeamChunk& c) {
     }
 }
 
+// The label of each sample by the side of the surface that it lies on, and the echo, the loss and
+// the facing of that surface.
 template <class D>
 HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     const hn::RebindToSigned<D> di;
@@ -111,7 +168,7 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
         auto plane = hn::Add(hn::Mul(hn::ConvertTo(d, steps),
                                      c.regional ? hn::Load(d, c.step_mm.row(row)) : step_mm),
                              hn::Mul(hn::Mul(along_normal, inverse), hn::Set(d, b.voxel_mm)));
-        if (c.regional) plane = hn::Max(plane, hn::Load(d, c.least_mm.row(row)));
+        if (c.regional) plane = hn::Max(plane, hn::Load(d, c.min_mm.row(row)));
         const auto shift = hn::Mul(signed_byte<0>(d, rough), rough_mm);
         const auto lower = hn::RebindMask(d, hn::Lt(own, second));
         auto distance = hn::Add(plane, hn::IfThenElse(lower, shift, hn::Neg(shift)));
@@ -170,6 +227,106 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
         }
         hn::Store(loss, d, c.edge_loss.row(row));
     }
+}
+
+// How samples lie about the surface of a target: half the gradient of the quadratic form that rises
+// outwards, its length, and the distance to the surface in mm, to first order.
+template <class V>
+struct AboutTarget {
+    V x, y, z, length, distance_mm;
+};
+
+// f: offset from the centre, mm; away: its length.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE AboutTarget<V> about_target(D d, const PhysicalTarget& t, V fx, V fy, V fz, V away) {
+    if (t.round) return {fx, fy, fz, away, hn::Sub(away, hn::Set(d, t.radius_mm))};
+    const auto row = [&](int a, int b, int c) HWY_ATTR {
+        return hn::Add(
+            hn::Add(hn::Mul(hn::Set(d, t.shape[a]), fx), hn::Mul(hn::Set(d, t.shape[b]), fy)),
+            hn::Mul(hn::Set(d, t.shape[c]), fz));
+    };
+    const auto x = row(0, 3, 4), y = row(3, 1, 5), z = row(4, 5, 2);
+    const auto tiny = hn::Set(d, 1e-3f);
+    const auto rank = hn::Sqrt(hn::Add(hn::Add(hn::Mul(fx, x), hn::Mul(fy, y)), hn::Mul(fz, z)));
+    const auto length =
+        hn::Max(hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z))), tiny);
+    return {x, y, z, length,
+            hn::Mul(hn::Sub(rank, hn::Set(d, t.radius_mm)), hn::Div(hn::Max(rank, tiny), length))};
+}
+
+template <class D>
+HWY_INLINE void target_row(
+    D d, const PhysicalBlock& b, const PhysicalTarget& ball, BeamChunk& c, int row, bool& met) {
+    const hn::RebindToSigned<D> di;
+    const int v = c.beam;
+    const auto mm = hn::Set(d, b.voxel_mm), zero = hn::Zero(d);
+    const auto from = [&](const float* p, float centre) HWY_ATTR {
+        return hn::Mul(hn::Sub(hn::Load(d, p), hn::Set(d, centre)), mm);
+    };
+    const auto fx = from(c.x.row(row), ball.x), fy = from(c.y.row(row), ball.y),
+               fz = from(c.z.row(row), ball.z);
+    const auto away = hn::Sqrt(hn::Add(hn::Add(hn::Mul(fx, fx), hn::Mul(fy, fy)), hn::Mul(fz, fz)));
+    const auto reach = hn::Set(d, static_cast<float>(physical::kTargetReachMm));
+    if (hn::AllFalse(d, hn::Le(hn::Sub(away, hn::Set(d, ball.reach_mm)), reach))) return;
+    const auto about = about_target(d, ball, fx, fy, fz, away);
+    auto distance = about.distance_mm;
+    const auto reached = hn::Le(distance, reach);
+    const auto own = hn::Load(di, c.label.row(row));
+    const auto kind =
+        hn::And(hn::ShiftRight<16>(hn::GatherIndex(di, b.acoustics, own)), hn::Set(di, 7));
+    // A ball replaces soft tissue, and also an earlier ball, which lies in soft tissue.
+    const auto soft = hn::Or(hn::Eq(kind, hn::Set(di, static_cast<std::int32_t>(kPackedSoft))),
+                             hn::Gt(own, hn::Set(di, b.label_count - 1)));
+    const auto close = hn::And(reached, hn::RebindMask(d, soft));
+    if (hn::AllFalse(d, close)) return;
+    met = true;
+    if (!c.surfaces) {
+        c.surfaces = true;
+        for (int r = 0; r < c.rows; ++r) clear_surface_row(d, c, r);
+    }
+    const auto rough = rough_at(d, b, c, row);
+    distance =
+        hn::Add(distance, hn::Mul(signed_byte<0>(d, rough), hn::Set(d, b.roughness_mm / 32)));
+    const auto at = [&](int axis)
+                        HWY_ATTR { return hn::LoadU(d, b.beams + (kBeam + axis) * b.lines + v); };
+    const auto cosine =
+        hn::Div(hn::Abs(hn::Add(hn::Add(hn::Mul(about.x, at(0)), hn::Mul(about.y, at(1))),
+                                hn::Mul(about.z, at(2)))),
+                hn::Max(about.length, hn::Set(d, 1e-3f)));
+    const auto within = hn::RebindMask(di, hn::And(close, hn::Lt(distance, zero)));
+    hn::Store(hn::IfThenElse(within, hn::Set(di, ball.acoustics), own), di, c.label.row(row));
+    if (b.interfaces) {
+        const auto u = hn::Mul(distance, hn::Set(d, 1 / 0.16f));
+        const auto c2 = hn::Mul(cosine, cosine);
+        const auto mirror = hn::Add(hn::Mul(hn::Set(d, 0.08f), cosine),
+                                    hn::Mul(hn::Set(d, 0.92f), hn::Mul(hn::Mul(c2, c2), c2)));
+        const auto glint = hn::Mul(signed_byte<1>(d, rough), hn::Set(d, 1.0f / 32));
+        const auto profile =
+            exp2_fading(d, hn::Add(glint, hn::Mul(hn::Mul(u, u), hn::Set(d, -0.72134752f))));
+        const auto echo = hn::IfThenElseZero(
+            close, hn::Mul(hn::Mul(profile, mirror),
+                           hn::Set(d, ball.wall * b.interface_scale[c.first + row] / 127)));
+        float *re = c.echo_re.row(row), *im = c.echo_im.row(row);
+        hn::Store(hn::Add(hn::Load(d, re), hn::Mul(echo, signed_byte<2>(d, rough))), d, re);
+        hn::Store(hn::Add(hn::Load(d, im), hn::Mul(echo, signed_byte<3>(d, rough))), d, im);
+    }
+    if (b.edge_shadow && ball.fluid) {
+        float* loss = c.edge_loss.row(row);
+        hn::Store(
+            hn::Add(hn::Load(d, loss), hn::IfThenElseZero(close, graze_loss(d, cosine, distance))),
+            d, loss);
+        c.refracts = true;
+    }
+}
+
+// Returns whether a target shows in the stretch.
+template <class D>
+HWY_NOINLINE bool target_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
+    bool met = false;
+    for (int t = 0; t < b.target_count; ++t) {
+        for (int row = 0; row < c.rows; ++row) target_row(d, b, b.targets[t], c, row, met);
+    }
+    return met;
 }
 
 }  // namespace sonocase::runtime::HWY_NAMESPACE

@@ -5,14 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "node_lattice.cpp"
-#include <hwy/foreach_target.h>
-#include <hwy/highway.h>
-//
-#include "runtime/imaging/physical/fast/beam_voxel-inl.h"
 #include "runtime/imaging/physical/model/gas_faces.h"
 #include "runtime/imaging/physical/model/wall_sheets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "node_lattice.cpp"
+#include <hwy/cache_control.h>
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// These come after Highway's: they are included again for each instruction set.
+#include "runtime/imaging/physical/fast/beam_place-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
@@ -29,7 +31,7 @@ HWY_INLINE hn::Vec<hn::RebindToSigned<D>> kind_at(D d, const FaceSearch& s, cons
                            nearest_label(d, *s.block, p.x, p.y, p.z));
 }
 
-// A vector of nodes' beams, from v on: down to the first two nodes of gas.
+// Follows a vector of nodes' beams, from v on, down to the first two nodes of gas.
 template <class D>
 HWY_INLINE void search_vector(D d, FaceSearch& s, int v) {
     const hn::RebindToSigned<D> di;
@@ -94,7 +96,7 @@ void find_block(FaceSearch& s) {
 }
 
 // The four numbers of a cell side by side, so that compilers use vectors of four. Eight cells are
-// blended: distances by their places, noises by smooth steps of them.
+// blended: distances linearly, noises by smooth steps.
 struct Layers {
     float of[4];
 };
@@ -144,7 +146,7 @@ void layers_of_block(const LayerSearch& s) {
             s.depth[at] = p[0] * (1 / kMm) + wave;
             s.above[at] = p[1] * (1 / kMm) + wave + s.own_wave_mm * (p[3] * (1 / kNoise));
             s.strength[at] =
-                std::min(s.strength_db * (p[3] * (1 / kNoise)), static_cast<float>(kWallMostDb));
+                std::min(s.strength_db * (p[3] * (1 / kNoise)), static_cast<float>(kMaxWallDb));
         }
     }
 }
@@ -198,10 +200,9 @@ void NodeLattice::create(const ScanGeometry& g, const physical::Tables& tables) 
     rows = g.samples / spacing.samples + 2;
     for (int row = 0; row < rows; ++row)
         contact.push_back(static_cast<float>(std::exp(-spacing.r_mm(row) / physical::kGapReachMm)));
-    const auto beams = static_cast<std::size_t>(stride);
-    for (auto& axis : origin) axis.assign(beams, 0.0f);
-    for (auto& axis : per_mm) axis.assign(beams, 0.0f);
-    gap.assign(beams, -1.0f);  // nodes that fill up a block: air
+    for (auto& axis : origin) axis.assign(stride, 0.0f);
+    for (auto& axis : per_mm) axis.assign(stride, 0.0f);
+    gap.assign(stride, -1.0f);  // nodes that only fill up a block count as air
     for (auto* axis : {&x, &y, &z}) axis->assign(at(rows, 0) + kRowSlack, 0.0f);
 }
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Model `physical`, vectorised across beams: beams into the anatomy, filters across and along them,
-// compression, scan conversion. Every arithmetic step is one rounding of single precision in a
-// fixed order, or integer: the same pixels on every instruction set and thread count. Agrees with
-// physical_reference.h to within rounding. Cost: about 1.5 ms per frame of 192 x 512 samples and
-// 512 x 512 pixels on one thread.
+// Model `physical`, vectorised across beams, in three passes over the beams and a scan conversion.
+// First, beams into the anatomy, block by block: echoes, light and tails of every sample. Second,
+// row by row: the point spread across and along the beams, noise, and the envelope's power. Third:
+// haze, equalisation, compression and post-filter, to grey.
+//
+// Every arithmetic step is one rounding of single precision in a fixed order, or integer: the same
+// pixels on every instruction set and thread count. Agrees with physical_reference.h to within
+// rounding. Cost: about 1.5 ms per frame of 192 x 512 samples and 512 x 512 pixels on one thread.
 #pragma once
 
 #include <algorithm>
@@ -12,9 +15,8 @@
 #include <span>
 #include <vector>
 
-#include "runtime/imaging/formation/render_context.h"
-#include "runtime/imaging/physical/fast/contrast_rows.h"
-#include "runtime/imaging/physical/fast/equaliser_rows.h"
+#include "runtime/imaging/core/image_formation.h"
+#include "runtime/imaging/physical/fast/cell_rows.h"
 #include "runtime/imaging/physical/fast/node_lattice.h"
 #include "runtime/imaging/physical/fast/physical_kernels.h"
 #include "runtime/imaging/physical/model/gas_faces.h"
@@ -43,25 +45,25 @@ class PhysicalFast {
                 bool keep_all,
                 std::span<std::uint8_t> pixels);
 
-    // Of the last frame.
+    // Times of the last frame, and what it met.
     const PassTimes& pass_ms() const { return pass_ms_; }
     const PhysicalMet& met() const { return met_; }
-    // Of the last frame, in beam space: the envelope's power in a row of samples (# scanlines), and
-    // the grey of a sample.
+    // The last frame in beam space: the envelope's power in a row of samples (# scanlines), and the
+    // grey of a sample.
     const float* power_row(int sample) const;
     int shade(int sample, int line) const;
 
   private:
+    // First pass. first: first beam of a block of beams, or first node of a block of nodes.
     void find_contact(const PhysicalFrame& frame);
-    // first: of a block of beams.
     void place_beams(const PhysicalFrame& frame, int first);
     void weigh_breathing(const PhysicalFrame& frame, const BreathingField& breathing, int first);
-    void choose_looks(const PhysicalFrame& frame);
+    void choose_acoustics(const PhysicalFrame& frame);
     void choose_targets(const PhysicalFrame& frame, bool keep_all);
     void set_poses(const PhysicalFrame& frame, PhysicalBlock& block) const;
     void set_tables(const PhysicalFrame& frame, PhysicalBlock& block) const;
     PhysicalBlock block_of_frame(const PhysicalFrame& frame, bool keep_all) const;
-    int choose_streaks(int first, std::span<PhysicalStreak> out) const;  // of a block of beams
+    int choose_streaks(int first, std::span<PhysicalStreak> out) const;
     void prepare_nodes(const physical::Tables& tables);
     void place_nodes(const PhysicalFrame& frame, bool breathes, int first);
     void press_nodes(int first, int end);
@@ -70,13 +72,15 @@ class PhysicalFast {
     void show_faces(int line, PhysicalBlock& block) const;
     int wall_node_rows() const { return wall_.rows / wall_.every + 2; }
     void place_wall(bool keep_all, int first, PhysicalWall& wall);
-    // Returns the time of the needle, ms.
+    // Returns the time that the needle took, ms.
     double sample_beams(const PhysicalFrame& frame, const BreathingField& breathing, bool keep_all);
     void mirror_row(float* row, int reach) const;
     void mirror_rows(float* plane, int reach) const;
     void spread_light();
     void join_tails();
     void meet_machine(const PhysicalFrame& frame);
+
+    // Second and third pass.
     void filter_rows(const PhysicalFrame& frame);
     void fill_row_task(const PhysicalFrame& frame, int sample, PhysicalRowTask& task) const;
     void spread_haze(int cell_row, float level, const float* envelope);
@@ -98,12 +102,13 @@ class PhysicalFast {
     int lines_ = 0, stride_ = 0, pair_stride_ = 0, cells_k_ = 0, cells_l_ = 0;
 
     PhysicalRegion region_;
-    std::vector<std::int32_t> looks_, looks_wall_, frame_looks_,
-        pairs_word_;  // packed: see physical_kernels.h
+    // Packed: see physical_kernels.h. Acoustics without effect wall, with it, and as the frame's
+    // effects want them.
+    std::vector<std::int32_t> acoustics_, acoustics_wall_, frame_acoustics_, pairs_word_;
     std::vector<float> r_, contact_, elevation_, interface_scale_, gain_;
     std::vector<float> elevation_off_, fine_frames_;
-    std::vector<std::int32_t> structure_most_, structure_dead_;
-    std::vector<float> dim_, dim_off_;  // per look: light that one sample leaves
+    std::vector<std::int32_t> max_structure_, structure_dead_;
+    std::vector<float> dim_, dim_off_;  // per label: light that one sample leaves
     std::vector<PhysicalTarget> targets_, near_targets_;
     std::vector<std::uint32_t> elevation_start_, lookup_start_, clutter_start_, haze_start_,
         noise_start_;
@@ -114,24 +119,24 @@ class PhysicalFast {
     NodeLattice nodes_;
     std::vector<physical::FaceNode> faces_of_nodes_;
     std::vector<std::int32_t> node_kinds_;  // per label: see node_lattice.h
-    std::vector<int> node_of_;              // per beam: the node before it, and its part
-    std::vector<float> node_part_;
+    std::vector<int> node_of_;              // per beam: the node before it
+    std::vector<float> node_part_;          // per beam: its part of the way to the next node
     physical::GasFaces faces_;
     bool faces_found_ = false, wall_shows_ = false;
-    PhysicalWall wall_;                      // what all blocks share
+    PhysicalWall wall_;                      // the part that all blocks share
     std::vector<float> layer_nodes_;         // depth, above, strength at nodes of beams
     std::vector<float> wall_nodes_;          // the same at every beam
     std::vector<std::uint8_t> wall_active_;  // per block and row of nodes
     std::vector<float> raw_gaps_, gaps_, beams_, breathing_;
-    physical::SpeckleSlice slice_;  // of the frame
+    physical::SpeckleSlice slice_;  // the frame's
     std::vector<float> per_spacing_, per_spacing_thin_, speckle_level_, speckle_level_bare_;
     std::vector<int> looks_drawn_;
-    std::vector<float> planes_;       // holds the four below, samples x stride each
+    std::vector<float> planes_;       // holds the planes below, samples x stride each
     std::int32_t* echoes_ = nullptr;  // one plane per look
     std::ptrdiff_t look_stride_ = 0;
     float *light_ = nullptr, *tail_ = nullptr, *power_ = nullptr;
     float* clutter_ = nullptr;                             // null: the machine has none
-    std::vector<std::int32_t> tail_from_, own_tail_from_;  // per block; before join_tails()
+    std::vector<std::int32_t> tail_from_, own_tail_from_;  // per block; own: before join_tails()
     std::vector<float> work_, ring_;                       // per thread
     std::vector<int> next_row_;  // per thread: the row that its ring is ready for
     CellRows cells_;

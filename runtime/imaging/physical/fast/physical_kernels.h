@@ -6,15 +6,15 @@
 #include <cstdint>
 
 #include "formats/base/geometry.h"
-#include "runtime/imaging/needle/needle_strip.h"
+#include "runtime/imaging/core/needle_chord.h"
 #include "runtime/imaging/physical/model/physical_model.h"
-#include "runtime/imaging/physical/model/speckle.h"
+#include "runtime/imaging/physical/model/speckle_slice.h"
 #include "runtime/imaging/press/press_view.h"
 
 namespace sonocase::runtime {
 
-// A label's acoustic properties in one word, its "look": attenuation (bits 0-15, log2 of amplitude
-// per mm there and back, 1/4096), kind (16-18), fine structure (19), echo (20-31, signed, 1/16 dB).
+// A label's acoustic properties in one word: attenuation (bits 0-15, log2 of amplitude per mm there
+// and back, 1/4096), kind (16-18), fine structure (19), echo (20-31, signed, 1/16 dB).
 enum PackedKind : std::uint32_t {
     kPackedOutside,
     kPackedSoft,
@@ -23,7 +23,7 @@ enum PackedKind : std::uint32_t {
     kPackedBone
 };
 
-inline constexpr int kLookFine = 1 << 19;
+inline constexpr int kFineStructureBit = 1 << 19;
 
 // A pair's echo in one word: log2 of the amplitude (bits 0-11, 1/128, + 2048; 0: none), one over
 // the thickness (12-19, 1/32 per mm), hard (20), refracts (21), own label pulses (22), second label
@@ -31,7 +31,7 @@ inline constexpr int kLookFine = 1 << 19;
 inline constexpr int kPairHard = 1 << 20, kPairRefracts = 1 << 21, kPairOwnPulse = 1 << 22,
                      kPairSecondPulse = 1 << 23;
 
-// Rows of per-beam numbers, `lines` apart.
+// Rows of numbers per beam, `lines` apart.
 enum BeamNumber {
     kVoxelOrigin = 0,
     kVoxelPerMm = 3,
@@ -40,7 +40,8 @@ enum BeamNumber {
     kEdge = 10,           // amplitude that the beam's contact leaves
     kSpeckleOrigin = 11,  // height, u, v; then the same per mm; kSpeckleSides times
     kSpecklePerMm = kSpeckleOrigin + 3,
-    // The rows per mm once more, per mm beside the beam: kSideways rows further. Where pressed.
+    // Each row per mm along the beam has one per mm beside it, kSideways rows further. Filled in
+    // where tissue is pressed.
     kSideways = kSpeckleOrigin + 6 * physical::kSpeckleSides,
     kBeamNumbers = 2 * kSideways
 };
@@ -48,9 +49,9 @@ enum BeamNumber {
 inline constexpr int kRowSlack = 64;   // behind rows and buffers: lanes of the widest vector
 inline constexpr int kRowMargin = 16;  // before and behind a row of floats; >= kMaxLateral and 6
 
-inline constexpr int kWorkRows = 4;  // of a thread, for the passes over rows
+inline constexpr int kWorkRows = 4;  // work rows of a thread, for the passes over rows
 
-inline constexpr int kBreathingNode = 16;  // samples between nodes of the weight
+inline constexpr int kBreathingNode = 16;  // samples between nodes of the breathing weight
 
 // Effect wall: distances at nodes, `lines` of the block apart, and the tables of sheets.
 struct PhysicalWall {
@@ -58,10 +59,10 @@ struct PhysicalWall {
     const std::uint8_t* active = nullptr;  // per row of nodes: something shows below it
     const float *outer = nullptr, *inner = nullptr;
     int outer_size = 0, inner_size = 0;
-    int every = 1, rows = 0;        // samples between nodes; samples that can show a sheet
-    float per_row = 1, per_mm = 1;  // one over samples, and over mm, between nodes
-    float ground = 0;               // of the ground between sheets, 1/16 dB
-    std::int32_t structure = 64;    // most of coarse structure, 1/16 dB
+    int every = 1, rows = 0;          // samples between nodes; samples that can show a sheet
+    float per_row = 1, per_mm = 1;    // one over samples, and over mm, between nodes
+    float ground = 0;                 // level of the ground between sheets, 1/16 dB
+    std::int32_t max_structure = 64;  // limit of coarse structure, 1/16 dB
 };
 
 // Effect streaks: a plate, see model/streak_plates.h.
@@ -79,31 +80,31 @@ struct PhysicalTarget {
     float x = 0, y = 0, z = 0, radius_mm = 0;  // centre in voxels
     float reach_mm = 0;
     bool round = true;
-    float shape[6] = {};    // xx, yy, zz, xy, xz, yz
-    std::int32_t look = 0;  // index
+    float shape[6] = {};         // xx, yy, zz, xy, xz, yz
+    std::int32_t acoustics = 0;  // index; it follows those of the labels
     float wall = 0;
     bool fluid = false;
 };
 
-// physical::SpeckleSide without what is worked out per beam.
+// The part of physical::SpeckleSide that is not worked out per beam.
 struct SpeckleCut {
     float u_per_height = 0, v_per_height = 0, per_normal = 1;
     std::uint32_t base = 0;
-    std::int32_t until = 65536;  // of the patch's draw
-    float shift[3] = {0, 0, 0};  // of breathing at weight 1: height, u, v
+    std::int32_t until = 65536;  // patches whose draw is below this take it
+    float shift[3] = {0, 0, 0};  // breathing shift at weight 1: height, u, v
 };
 
-inline constexpr int kFineNumbers = 11;  // of a label's frame
+inline constexpr int kFineNumbers = 11;  // numbers of a label's frame
 
-// The fine region: see model/region_look_up.h. Its tables as in PhysicalBlock.
+// The fine region: see model/region_look_up.h. Its tables are like those of PhysicalBlock.
 struct PhysicalRegion {
     const std::int32_t *table = nullptr, *labels = nullptr, *boundary = nullptr;
     Int3 size;
     int blocks_x = 0, blocks_xy = 0, block_log2 = 3;
-    float lower[3] = {0, 0, 0}, upper[3] = {0, 0, 0};  // of the box, voxels of the case
-    float per_voxel = 1,
-          voxel_size = 1;        // voxels of it in one of the case, and the other way round
-    float first[3] = {0, 0, 0};  // its voxel coordinates of the case's voxel (0, 0, 0)
+    float lower[3] = {0, 0, 0}, upper[3] = {0, 0, 0};  // its box, in voxels of the case
+    float per_voxel = 1;                               // its voxels per voxel of the case
+    float voxel_size = 1;                              // voxels of the case per voxel of it
+    float first[3] = {0, 0, 0};  // where the case's voxel (0, 0, 0) lies, in its voxels
     float step_mm = 0;           // 1/48 of its voxels
 };
 
@@ -123,19 +124,19 @@ struct PhysicalBlock {
 
     // Effect deformation; null: nothing is pressed.
     const press::PressView* press_view = nullptr;
-    press::PressChunk* press = nullptr;          // of the stretch; null: nothing moves in it
-    const std::int32_t* closed_label = nullptr;  // per label: what a shut lumen shows
-    int first_beam = 0;                          // of the block
+    press::PressChunk* press = nullptr;          // the stretch's; null: nothing moves in it
+    const std::int32_t* closed_label = nullptr;  // per label: what is shown of it when collapsed
+    int first_beam = 0;                          // first beam of the block
 
     const std::int32_t *table = nullptr, *labels = nullptr, *echo = nullptr, *boundary = nullptr;
-    const std::int32_t *looks = nullptr, *pairs = nullptr, *rough = nullptr;
-    const std::int8_t* fine = nullptr;             // null: off. Six cubes
-    const std::int32_t* structure_dead = nullptr;  // per label, 1/16 dB; null: none
-    const std::int32_t* structure_most = nullptr;  // per label, 1/16 dB; null: no limit
+    const std::int32_t *acoustics = nullptr, *pairs = nullptr, *rough = nullptr;  // packed
+    const std::int8_t* fine = nullptr;             // six cubes; null: off
+    const std::int32_t* structure_dead = nullptr;  // per label: dead zone, 1/16 dB; null: none
+    const std::int32_t* max_structure = nullptr;   // per label, 1/16 dB; null: no limit
     const float* fine_frames = nullptr;      // per label: rows of the frame, offset and last layer
     const PhysicalRegion* region = nullptr;  // null: the case has none
     const PhysicalWall* wall = nullptr;      // null: off
-    const float* face_mm = nullptr;          // per beam, of gas; null: not known
+    const float* face_mm = nullptr;          // per beam: face of gas; null: not known
     const float *face_peak = nullptr, *cosine = nullptr;
     const float* dome_mm = nullptr;  // null: none
     float dome_scale = 1;
@@ -152,14 +153,14 @@ struct PhysicalBlock {
     float patch_per_voxel = 1;
     const float* per_spacing = nullptr;  // per row: one over the distance of a column's scatterers
     const float* speckle_level = nullptr;            // per row: makes the filtered field's power 1
-    const int* looks_at = nullptr;                   // per row: fields that are drawn
+    const int* looks_at = nullptr;                   // per row: number of looks that are drawn
     std::ptrdiff_t look_stride = 0;                  // from one look's echoes to the next's
-    const float *dim = nullptr, *dim_off = nullptr;  // per look: light that one sample leaves
+    const float *dim = nullptr, *dim_off = nullptr;  // per label: light that one sample leaves
     float dead_light = 0;
     struct {
         float bone = 0, bone_slow = 0, bone_floor = 0, gas = 0;
-    } decay;                 // of the tails, per sample
-    float reverb_mm = 0.5f;  // half the width of a line
+    } decay;                 // what a sample leaves of the tails
+    float reverb_mm = 0.5f;  // half the width of a line of reverberation
     float voxel_mm = 1, rough_per_voxel = 2, roughness_mm = 0.28f, step_mm = 0.3f;
     bool structure = true, speckled = true, interfaces = true, edge_shadow = true,
          attenuation = true;
@@ -167,8 +168,8 @@ struct PhysicalBlock {
     bool keep_all = false;
     bool hard_scene = true;  // some label is bone or gas
 
-    // At the block's first beam. Echoes are complex amplitudes: the upper halves of two floats (8
-    // bits of precision each) in one word, real part on top, so that a frame fits in the
+    // These point to the block's first beam. Echoes are complex amplitudes: the upper halves of two
+    // floats (8 bits of precision each) in one word, real part on top, so that a frame fits in the
     // second-level cache.
     std::int32_t* echoes = nullptr;
     float *light = nullptr, *tail = nullptr;
@@ -188,18 +189,19 @@ struct PhysicalRowTask {
     const float* lateral = nullptr;  // centre tap
     int reach = 0;
     bool point_spread = true;
-    // With margins.
+    // Work rows with margins.
     float *work_re = nullptr, *work_im = nullptr, *work_light = nullptr, *work_clutter = nullptr;
-    float *out_re = nullptr, *out_im = nullptr;  // of the first look
+    float *out_re = nullptr, *out_im = nullptr;  // for the first look
     int looks = 1;
-    std::ptrdiff_t look_stride = 0, out_stride = 0;  // of echoes and of `out`
+    std::ptrdiff_t look_stride = 0, out_stride = 0;  // from look to look: of echoes, of `out`
 
-    float inverse_gain = 1, near_field = 0, noise = 0;  // of the first look, for all
-    const float* tail = nullptr;                        // null: none
-    const std::int32_t* tail_from = nullptr;            // per block
+    // Noise is added to the first look, as much as all looks together have.
+    float inverse_gain = 1, near_field = 0, noise = 0;
+    const float* tail = nullptr;              // null: none
+    const std::int32_t* tail_from = nullptr;  // per block
     int sample = 0;
     const float* clutter = nullptr;  // power, with margins; null: none
-    int clutter_reach = 0;           // beams to each side of its mean
+    int clutter_reach = 0;           // its mean takes this many beams to each side
     float clutter_drawn = 1;         // share of it that varies
     const std::int8_t *clutter_re = nullptr, *clutter_im = nullptr;
     int noise_rows = 0;  // 0: none
@@ -231,7 +233,7 @@ struct PhysicalPowerTask {
     float steady = 0;                // power that the looks leave of the near field's ringing
     const float* clutter = nullptr;  // null: none
     int clutter_reach = 0;
-    float clutter_steady = 0;  // its share
+    float clutter_steady = 0;  // share of it that does not vary
     float* work_clutter = nullptr;
     float* envelope_sum = nullptr;  // the envelope is added to it; null: not needed
     float* power = nullptr;
@@ -250,11 +252,11 @@ struct PhysicalGreyTask {
     // Effect speckle_reduction: log2 of power about which detail changes, contrast - 1; null: none.
     const float *middle_above = nullptr, *middle_below = nullptr;
     const float *change_above = nullptr, *change_below = nullptr;
-    float even_mix = 0;                  // the lower row's part, of these and of the gain
+    float even_mix = 0;                  // the lower row's part, for these and for the gain
     const std::int8_t* grain = nullptr;  // null: none
-    float grain_log2 = 0;                // of power, per step of the draw
-    // Logarithm: grey = offset + per_log2 log2(power). Otherwise floor plus 2 to that power, and
-    // above the knee less steep.
+    float grain_log2 = 0;                // log2 of power per step of the draw
+    // Logarithm: grey = offset + per_log2 log2(power). Otherwise grey is the floor plus 2 to that
+    // power, and rises less steeply above the knee.
     float offset = 0, per_log2 = 0, low = 0;
     bool logarithm = true;
     float floor = 0, knee = 255, knee_slope = 1;

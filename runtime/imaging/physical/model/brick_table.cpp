@@ -10,15 +10,15 @@
 #include <sys/mman.h>
 #endif
 
-#include "runtime/imaging/host/parallel_halves.h"
+#include "runtime/imaging/core/host.h"
 
 namespace sonocase::runtime {
 namespace {
 
-constexpr std::size_t kMostBlocks = 4096;  // every frame looks at each of them
+constexpr std::size_t kMaxBlocks = 4096;  // every frame looks at each of them
 
-// Whether the system shall use pages of 2 MB. They help a jumping probe, which reads all over the
-// table; where few blocks are filled in, they cost memory and time at the start.
+// Tells the system whether to use pages of 2 MB. They help a jumping probe, which reads all over
+// the table; where few blocks are filled in, they cost memory and time at the start.
 void use_large_pages(void* memory, std::size_t bytes, bool large) {
 #ifdef __linux__
     constexpr std::size_t kPage = 4096;
@@ -49,11 +49,10 @@ Result<BrickTable> BrickTable::create(const BrickVolume<std::uint8_t>& labels,
     const auto count = [&] {
         const auto parts = [&](int n) { return (n + (1 << t.edge_log2_) - 1) >> t.edge_log2_; };
         t.blocks_ = {parts(t.bricks_.x), parts(t.bricks_.y), parts(t.bricks_.z)};
-        return static_cast<std::size_t>(t.blocks_.x) * static_cast<std::size_t>(t.blocks_.y) *
-               static_cast<std::size_t>(t.blocks_.z);
+        return static_cast<std::size_t>(t.blocks_.x) * t.blocks_.y * t.blocks_.z;
     };
     t.left_ = count();
-    while (t.left_ > kMostBlocks && t.edge_log2_ < 8) {
+    while (t.left_ > kMaxBlocks && t.edge_log2_ < 8) {
         ++t.edge_log2_;
         t.left_ = count();
     }
@@ -77,17 +76,15 @@ Result<BrickTable> BrickTable::create(const BrickVolume<std::uint8_t>& labels,
 
 void BrickTable::load_all(JobRunner& jobs) {
     use_large_pages(words_.get(), bytes_, true);
-    const std::size_t layer =
-        static_cast<std::size_t>(blocks_.x) * static_cast<std::size_t>(blocks_.y);
-    parallel_halves(jobs, static_cast<std::size_t>(blocks_.z),
-                    [&](std::size_t, std::size_t begin, std::size_t end) {
-                        std::size_t block = begin * layer;
-                        for (int z = static_cast<int>(begin); z < static_cast<int>(end); ++z) {
-                            for (int y = 0; y < blocks_.y; ++y) {
-                                for (int x = 0; x < blocks_.x; ++x) fill({x, y, z}, block++);
-                            }
-                        }
-                    });
+    const std::size_t layer = static_cast<std::size_t>(blocks_.x) * blocks_.y;
+    parallel_halves(jobs, blocks_.z, [&](std::size_t, std::size_t begin, std::size_t end) {
+        std::size_t block = begin * layer;
+        for (int z = static_cast<int>(begin); z < static_cast<int>(end); ++z) {
+            for (int y = 0; y < blocks_.y; ++y) {
+                for (int x = 0; x < blocks_.x; ++x) fill({x, y, z}, block++);
+            }
+        }
+    });
     std::fill(is_loaded_.begin(), is_loaded_.end(), std::uint8_t{1});
     left_ = 0;
 }
@@ -100,15 +97,12 @@ void BrickTable::fill(Int3 block, std::size_t number) noexcept {
     for (int k = 0; k < std::min(edge, bricks_.z - first.z); ++k) {
         for (int j = 0; j < std::min(edge, bricks_.y - first.y); ++j) {
             const std::size_t brick =
-                static_cast<std::size_t>(first.x) +
-                static_cast<std::size_t>(bricks_.x) *
-                    (static_cast<std::size_t>(first.y + j) +
-                     static_cast<std::size_t>(bricks_.y) * static_cast<std::size_t>(first.z + k));
+                first.x +
+                bricks_.x * (first.y + j + bricks_.y * static_cast<std::size_t>(first.z + k));
             const std::size_t row = (number << 3 * edge_log2_) +
                                     (static_cast<std::size_t>(j + (k << edge_log2_)) << edge_log2_);
             std::uint32_t* to = words_.get() + kWords * row;
-            for (std::size_t b = brick; b < brick + static_cast<std::size_t>(columns);
-                 ++b, to += kWords) {
+            for (std::size_t b = brick; b < brick + columns; ++b, to += kWords) {
                 const std::uint32_t label = labels_->table[b];
                 to[0] = label & kUniformBrick
                             ? kUniformBrick | labels_->uniform[label & ~kUniformBrick]
@@ -125,7 +119,7 @@ void BrickTable::fill(Int3 block, std::size_t number) noexcept {
                 }
                 if (!has_boundary_) continue;
                 const std::uint32_t e = boundary_->table[b];
-                // A uniform record would be the same plane in 64 voxels: no surface does that.
+                // A uniform record would be the same plane in 64 voxels, which no surface is.
                 if (e & kUniformBrick) continue;
                 to[2] = e;
                 to[0] |= kBoundaryFlag;

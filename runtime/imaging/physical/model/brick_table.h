@@ -2,7 +2,7 @@
 
 // The brick tables of a bundle's volumes side by side, so that one cache line holds all words of a
 // brick, and ordered block by block, so that the bricks of a frame lie close together. Blocks are
-// filled in as frames need them: a fine torso has ten million bricks and a frame meets few.
+// filled in when frames need them: a fine torso has ten million bricks and a frame meets few.
 #pragma once
 
 #include <cstdint>
@@ -17,13 +17,13 @@
 
 namespace sonocase::runtime {
 
-// In a brick's label word: it holds surfaces.
+// Bit of a brick's label word: the brick holds surfaces.
 inline constexpr std::uint32_t kBoundaryFlag = 0x40000000u;
 
-// In a brick's label word: the fine region may say something else than the brick.
+// Bit of a brick's label word: the fine region may hold something else than the brick.
 inline constexpr std::uint32_t kRegionFlag = 0x20000000u;
 
-// Bricks of a box of a volume, x fastest.
+// Marks of the bricks in a box of a volume, x fastest.
 struct BrickMarks {
     Int3 lower{0, 0, 0}, size{0, 0, 0};  // bricks
     std::vector<std::uint8_t> marked;    // # product of size; 1: marked
@@ -32,10 +32,7 @@ struct BrickMarks {
         const Int3 b{brick.x - lower.x, brick.y - lower.y, brick.z - lower.z};
         if (b.x < 0 || b.y < 0 || b.z < 0 || b.x >= size.x || b.y >= size.y || b.z >= size.z)
             return false;
-        return marked[static_cast<std::size_t>(b.x) +
-                      static_cast<std::size_t>(size.x) *
-                          (static_cast<std::size_t>(b.y) +
-                           static_cast<std::size_t>(size.y) * static_cast<std::size_t>(b.z))] != 0;
+        return marked[b.x + size.x * (b.y + size.y * static_cast<std::size_t>(b.z))] != 0;
     }
 };
 
@@ -46,12 +43,13 @@ class BrickTable {
     BrickTable() = default;
     // Nothing is filled in yet. The bundle must outlive the table. Error: too little memory.
     static Result<BrickTable> create(const CaseBundle& bundle);
-    // The same of volumes that must outlive it. echo, boundary: null or empty where there are none.
+    // Makes the table from volumes, which must outlive it. echo, boundary: null or empty where
+    // there are none.
     static Result<BrickTable> create(const BrickVolume<std::uint8_t>& labels,
                                      const BrickVolume<std::int8_t>* echo,
                                      const BrickVolume<std::uint32_t>* boundary);
 
-    // Bricks whose label words shall have kRegionFlag. Before anything is filled in.
+    // Sets kRegionFlag in the label words of these bricks. Call it before anything is filled in.
     void mark(BrickMarks marks) { marks_ = std::move(marks); }
 
     // Word w of brick (x, y, z) is data()[kWords * ((block << 3 * edge_log2()) + brick) + w];
@@ -60,8 +58,8 @@ class BrickTable {
     // where the brick holds no interface. Bricks of a block that is not filled in, and beyond the
     // volume, hold 0.
     const std::uint32_t* data() const { return words_.get(); }
-    int edge_log2() const { return edge_log2_; }           // of a block, in bricks
-    int edge() const { return kBrickEdge << edge_log2_; }  // of a block, in voxels
+    int edge_log2() const { return edge_log2_; }           // log2 of a block's edge in bricks
+    int edge() const { return kBrickEdge << edge_log2_; }  // a block's edge in voxels
     Int3 blocks() const { return blocks_; }
     bool has_echo() const { return has_echo_; }
     bool has_boundary() const { return has_boundary_; }

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/imaging/host/parallel_halves.h"
+#include "runtime/imaging/core/host.h"
 #include "runtime/imaging/physical/model/physical_model.h"
 
 namespace sonocase::runtime {
@@ -87,7 +87,7 @@ Kinds kinds_of_labels(const CaseBundle& bundle) {
                 std::vector<bool>(bundle.labels.size(), false)};
     for (std::size_t l = 1; l < bundle.labels.size(); ++l) {
         if (tissue_of[l] < 0) continue;
-        const std::string& tissue = bundle.tissues[static_cast<std::size_t>(tissue_of[l])].name;
+        const std::string& tissue = bundle.tissues[tissue_of[l]].name;
         kinds.cube[l] = tissue == "muscle"      ? kFibres
                         : tissue == "fat"       ? kSepta
                         : is_parenchyma(tissue) ? kParenchymaCube
@@ -108,28 +108,24 @@ LabelMoments moments_of_labels(const CaseBundle& bundle, const Kinds& kinds, Job
     const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
     const Int3 n = brick_count(labels.size);
     std::vector<std::vector<Moments>> parts(2, std::vector<Moments>(bundle.labels.size()));
-    parallel_halves(
-        jobs, static_cast<std::size_t>(n.z),
-        [&](std::size_t half, std::size_t begin, std::size_t end) {
-            std::vector<Moments>& moments = parts[half];
-            const auto row = static_cast<std::size_t>(n.x),
-                       layer = row * static_cast<std::size_t>(n.y);
-            for (std::size_t index = begin * layer; index < end * layer; ++index) {
-                const std::uint32_t entry = labels.table[index];
-                const std::size_t label =
-                    entry & kUniformBrick
-                        ? labels.uniform[entry & ~kUniformBrick]
-                        : labels.pool[static_cast<std::size_t>(entry) * kBrickVoxels + 42];
-                if (kinds.cube[label] != kFibres && kinds.cube[label] != kNerveCube &&
-                    !kinds.spine[label])
-                    continue;
-                const std::size_t i = index % row, j = index % layer / row, k = index / layer;
-                add(moments[label],
-                    Vector3{4.0 * static_cast<double>(i), 4.0 * static_cast<double>(j),
-                            4.0 * static_cast<double>(k)});
-            }
-        });
-    // Sums of whole numbers: the same however they are divided.
+    parallel_halves(jobs, n.z, [&](std::size_t half, std::size_t begin, std::size_t end) {
+        std::vector<Moments>& moments = parts[half];
+        const std::size_t row = n.x, layer = row * n.y;
+        for (std::size_t index = begin * layer; index < end * layer; ++index) {
+            const std::uint32_t entry = labels.table[index];
+            const std::size_t label =
+                entry & kUniformBrick
+                    ? labels.uniform[entry & ~kUniformBrick]
+                    : labels.pool[static_cast<std::size_t>(entry) * kBrickVoxels + 42];
+            if (kinds.cube[label] != kFibres && kinds.cube[label] != kNerveCube &&
+                !kinds.spine[label])
+                continue;
+            const std::size_t i = index % row, j = index % layer / row, k = index / layer;
+            add(moments[label], Vector3{4.0 * static_cast<double>(i), 4.0 * static_cast<double>(j),
+                                        4.0 * static_cast<double>(k)});
+        }
+    });
+    // These are sums of whole numbers, which do not depend on how they are divided.
     LabelMoments sums{std::vector<Moments>(bundle.labels.size()), {}};
     for (const std::vector<Moments>& part : parts) {
         for (std::size_t l = 0; l < part.size(); ++l)
@@ -138,7 +134,8 @@ LabelMoments moments_of_labels(const CaseBundle& bundle, const Kinds& kinds, Job
     return sums;
 }
 
-// The same grain in all directions, about axes that no organ or probe is likely to follow.
+// Parenchyma has the same grain in all directions, about axes that no organ or probe is likely to
+// follow.
 FineFrame frame_of_parenchyma(double voxel_mm) {
     FineFrame frame;
     frame.cube = kParenchymaCube;
@@ -146,7 +143,7 @@ FineFrame frame_of_parenchyma(double voxel_mm) {
         rotation_about(normalized(Vector3{0.36, 0.48, 0.8}), 0.7) * rotation_about({0, 0, 1}, 0.55);
     for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 3; ++c)
-            frame.cube_from_voxel[static_cast<std::size_t>(3 * r + c)] =
+            frame.cube_from_voxel[3 * r + c] =
                 static_cast<float>(voxel_mm / kParenchymaMm * turn(r, c));
     }
     return frame;
@@ -170,8 +167,7 @@ FineFrame frame_along(Vector3 along, int cube, double voxel_mm) {
                                       (voxel_mm / across_mm) * b};
     for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 3; ++c)
-            frame.cube_from_voxel[static_cast<std::size_t>(3 * r + c)] =
-                static_cast<float>(rows[static_cast<std::size_t>(r)][c]);
+            frame.cube_from_voxel[3 * r + c] = static_cast<float>(rows[r][c]);
     }
     return frame;
 }

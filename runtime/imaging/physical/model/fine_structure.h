@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Structure finer than a voxel: fibres of muscle and septa of fat, as two periodic cubes of echo
-// offsets (PhysicalTextures::fine) that each label reads in its own frame. A muscle's fibres follow
-// its long axis, found from the voxels themselves; those of a muscle that wraps the body run along
-// the spine, which lies in the sheet. Lobules of fat are flat: they are stretched along the spine,
-// which the skin follows.
+// Structure finer than a voxel: fibres of muscle, septa of fat, parenchyma and nerves, as periodic
+// cubes of echo offsets (PhysicalTextures::fine) that each label reads in its own frame. A muscle's
+// fibres follow its long axis, found from the voxels themselves; those of a muscle that wraps the
+// body run along the spine, which lies in the sheet. Lobules of fat are flat: they are stretched
+// along the spine, which the skin follows.
 #pragma once
 
 #include <array>
@@ -33,7 +33,7 @@ inline bool is_muscle_cube(int cube) {
 inline bool is_fat_cube(int cube) {
     return cube == physical::kSeptaCube || cube == physical::kFineFatCube;
 }
-// Muscle and fat as the ground between plates (kFineMuscleCube, kFineFatCube).
+// Turns muscle and fat into the ground between plates (kFineMuscleCube, kFineFatCube).
 FineStructure ground_of(FineStructure structure);
 
 // Cost: one pass over the brick table, in two jobs.

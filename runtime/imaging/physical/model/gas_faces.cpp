@@ -10,7 +10,7 @@ bool joined(const FaceNode& a, const FaceNode& b) {
            std::abs(a.depth_mm - b.depth_mm) < static_cast<float>(kFaceJoinMm);
 }
 
-// Neighbours of one face, 1 2 1.
+// Filters neighbours of one face by 1 2 1.
 void smooth(std::span<FaceNode> nodes) {
     FaceNode before = nodes.front();
     for (std::size_t n = 0; n < nodes.size(); ++n) {
@@ -47,15 +47,15 @@ FaceNode find_face(const PhysicalScene& s,
     };
     const auto label_of = [&](double r) {
         const Point3 v = voxel_at(r);
-        return static_cast<std::size_t>(label_at(s, static_cast<int>(std::nearbyint(v.x)),
-                                                 static_cast<int>(std::nearbyint(v.y)),
-                                                 static_cast<int>(std::nearbyint(v.z))));
+        return label_at(s, static_cast<int>(std::nearbyint(v.x)),
+                        static_cast<int>(std::nearbyint(v.y)),
+                        static_cast<int>(std::nearbyint(v.z)));
     };
-    const auto is_gas = [&](std::size_t label) { return s.looks[label].kind == TissueKind::gas; };
-    bool organ = false;  // met on the way
+    const auto is_gas = [&](int label) { return s.acoustics[label].kind == TissueKind::gas; };
+    bool organ = false;  // was met on the way
     for (int row = 1; nodes.r_mm(row + 1) < g.depth_mm; ++row) {
-        const std::size_t label = label_of(nodes.r_mm(row));
-        if (s.looks[label].kind == TissueKind::bone) return {};
+        const int label = label_of(nodes.r_mm(row));
+        if (s.acoustics[label].kind == TissueKind::bone) return {};
         organ = organ || s.fine.frames[label].cube == kParenchymaCube;
         if (!is_gas(label) || !is_gas(label_of(nodes.r_mm(row + 1)))) continue;
         double before = nodes.r_mm(row - 1), behind = nodes.r_mm(row);
@@ -78,11 +78,10 @@ void join_faces(const ScanGeometry& g,
     for (int pass = 0; pass < 3; ++pass) smooth(nodes);
     faces.any_dome = false;
     for (std::size_t l = 0; l < faces.depth_mm.size(); ++l) {
-        const auto line = static_cast<int>(std::min(l, static_cast<std::size_t>(g.scanlines - 1)));
+        const int line = std::min(static_cast<int>(l), g.scanlines - 1);
         const int n = spacing.node_of(line);
         const float part = spacing.part(line);
-        const FaceNode &a = nodes[static_cast<std::size_t>(n)],
-                       &b = nodes[static_cast<std::size_t>(n) + 1];
+        const FaceNode &a = nodes[n], &b = nodes[n + 1];
         const bool between = joined(a, b);
         const FaceNode& nearest = part < 0.5f ? a : b;
         const float depth =

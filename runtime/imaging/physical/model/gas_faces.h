@@ -1,15 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Where a frame's beams first meet gas, smoothed over neighbouring beams, so that what a face of
-// gas draws is as smooth as the face: lines behind it (effect gas_ring_down), and the diaphragm
-// between an organ and the lung (effect diaphragm).
-//
-// Diaphragm, at distance q from it (negative before it), times Row::interface_scale:
-//     peak (exp(-(q / s)^2 / 2) + 0.12 exp(-|q| / 3.5 mm)),  s = 1.2 mm before, 1.5 mm behind
-//     peak = kDomeAmplitude (0.4 + 0.6 cos^2) 10^(2.5 dB strength / 20)
-// kDomeShare of it is added to the surfaces' echo, times Tables::dome_scale, and kDomeShare to the
-// scatterers'. Light is kept
-// for kDomeReachMm behind it and then gone: black. Source: recipe 10 of the living sweep.
+// Where a frame's beams first meet gas (effects gas_ring_down and diaphragm), and the lattice of
+// beams and samples on which this and other smooth things are worked out.
 #pragma once
 
 #include <algorithm>
@@ -17,16 +9,57 @@
 #include <span>
 #include <vector>
 
-#include "runtime/imaging/physical/model/node_spacing.h"
 #include "runtime/imaging/physical/model/physical_frame.h"
+#include "runtime/imaging/physical/model/physical_tables.h"
 
 namespace sonocase::runtime::physical {
 
+inline constexpr int kMaxNodeSamples = 32;
+
+// The lattice of a frame's beams on which smooth things are worked out (the faces of gas, the
+// layers of the wall), linear in between: every few beams and the last one, every few samples.
+struct NodeSpacing {
+    int beams = 4, samples = 8;
+    int scanlines = 192;
+    double step_mm = 0.3;
+
+    int nodes() const { return std::max((scanlines - 2) / beams + 2, 2); }
+    int line(int node) const { return std::min(node * beams, scanlines - 1); }
+    double r_mm(int row) const { return (row * samples + 0.5) * step_mm; }
+    // The node before a beam, and the beam's part of the way to the next.
+    int node_of(int line) const { return std::min(line / beams, nodes() - 2); }
+    float part(int line_number) const {
+        const int node = node_of(line_number), from = line(node), to = line(node + 1);
+        return to > from ? std::min(static_cast<float>(line_number - from) /
+                                        static_cast<float>(to - from),
+                                    1.0f)
+                         : 0;
+    }
+};
+
+// Where there are few beams, they are far apart and each is a node.
+inline NodeSpacing node_spacing(const ScanGeometry& g, const Tables& t) {
+    return {g.scanlines < 88 ? 1 : 4,
+            std::clamp(static_cast<int>(t.wall.node_mm / g.step_mm), 1, kMaxNodeSamples),
+            g.scanlines, g.step_mm};
+}
+
+// Faces of gas are smoothed over neighbouring beams, so that what a face draws is as smooth as the
+// face: lines behind it (effect gas_ring_down), and the diaphragm between an organ and the lung
+// (effect diaphragm).
+//
+// Diaphragm, at distance q from it (negative before it), times Row::interface_scale:
+//     peak (exp(-(q / s)^2 / 2) + 0.12 exp(-|q| / 3.5 mm)),  s = 1.2 mm before, 1.5 mm behind
+//     peak = kDomeAmplitude (0.4 + 0.6 cos^2) 10^(2.5 dB strength / 20)
+// kDomeShare of it is added to the surfaces' echo, times Tables::dome_scale, and kDomeShare to the
+// scatterers'. Light is kept for kDomeReachMm behind it and then gone: black. The figures are
+// fitted to a tracked sweep of a living liver (docs/realism.md).
+
 inline constexpr float kNoFace = 1e9f;
-inline constexpr int kFaceHalvings = 4;    // of the stretch between two nodes
+inline constexpr int kFaceHalvings = 4;    // halvings of the stretch between two nodes
 inline constexpr double kFaceJoinMm = 12;  // neighbours further apart are two faces
-inline constexpr double kDomeFromMm = 25;  // nearer to the face lung lies under the wall
-inline constexpr double kFaceLightMm = 2;  // the light that a face gets: so far before it
+inline constexpr double kDomeFromMm = 25;  // lung nearer to the probe lies under the wall
+inline constexpr double kFaceLightMm = 2;  // a face gets the light this far before it
 inline constexpr double kDomeAmplitude = 3.6, kDomeStrengthDb = 2.5, kDomeShare = 0.55;
 inline constexpr double kDomeBeforeMm = 1.2, kDomeBehindMm = 1.5;
 inline constexpr double kDomeTail = 0.12, kDomeTailMm = 3.5;
@@ -36,21 +69,21 @@ inline constexpr double kDomeGasDb = 8;  // scatterers of the lung count as thos
 // One beam's face: depth along the beam (kNoFace: none).
 struct FaceNode {
     float depth_mm = kNoFace;
-    float peak = 0;  // of the diaphragm, before the cosine; 0: another face of gas
+    float peak = 0;  // peak of the diaphragm, before the cosine; 0: another face of gas
 };
 
 // Per beam, # lines.
 struct GasFaces {
     std::vector<float> depth_mm;       // kNoFace: none
-    std::vector<float> dome_mm, peak;  // of the diaphragm; kNoFace, 0: none
-    std::vector<float> cosine;         // of the beam to the face, in the plane
+    std::vector<float> dome_mm, peak;  // depth and peak of the diaphragm; kNoFace, 0: none
+    std::vector<float> cosine;         // of the angle between beam and face, in the plane
     bool any_dome = false;
 };
 
-// The face of beam nodes.line(node). Two neighbouring nodes of gas along the beam make a face, so
-// that gas thinner than their distance, at most 2.5 mm, may be missed; bone before it hides it.
-// gap_mm: of the beam; negative: air. Plain and exact; physical/fast/node_lattice.h searches
-// sixteen at once.
+// Finds the face of beam nodes.line(node). Two neighbouring nodes of gas along the beam make a
+// face, so that gas thinner than their distance, at most 2.5 mm, may be missed; bone before it
+// hides it. gap_mm: gap of the beam; negative: air. Plain and exact; physical/fast/node_lattice.h
+// searches sixteen at once.
 FaceNode find_face(const PhysicalScene& scene,
                    const ScanGeometry& geometry,
                    const NodeSpacing& nodes,
@@ -58,7 +91,7 @@ FaceNode find_face(const PhysicalScene& scene,
                    const BreathingField* breathing,
                    double gap_mm,
                    int node);
-// Peak of the diaphragm at a place of it, before the cosine.
+// Peak of the diaphragm at one of its places, before the cosine.
 float dome_peak(const PhysicalScene& scene, Point3 voxel);
 
 // faces: # spacing.nodes(), changed. Fills every beam that `out` has room for.

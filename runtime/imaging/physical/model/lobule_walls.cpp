@@ -6,18 +6,15 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/imaging/physical/model/cell_hash.h"
-
 namespace sonocase::runtime::physical {
 namespace {
 
-constexpr double kMostMm = 5;  // of a wall, from the middle of its seeds and along it
-constexpr double kLeastMm = 1;
-constexpr double kShiftMm =
-    2;  // by which walls are off the middle of their seeds, at most; few are further
+constexpr double kMaxMm = 5;    // half extent of a wall, from the middle of its seeds
+constexpr double kMinMm = 1;    // smaller walls are left out
+constexpr double kShiftMm = 2;  // walls are this far off the middle of their seeds; few are further
 
-// The other cells: those that share a face, an edge, a corner with it; the first hold the walls
-// that most often end a line. Padded.
+// The other cells: those that share a face, an edge or a corner with the cell, first those whose
+// walls most often end a line. Padded.
 constexpr std::size_t kOthers = 26, kLanes = 4, kPlanes = 28;
 constexpr std::array<std::uint8_t, kOthers> kPlace{4,  10, 12, 14, 16, 22, 1, 3, 5, 7,  9,  11, 15,
                                                    17, 19, 21, 23, 25, 0,  2, 6, 8, 18, 20, 24, 26};
@@ -35,7 +32,7 @@ struct Seed {
     std::uint32_t draw;
 };
 
-// Seeds around a cell: what their cells' hashes begin with, by the step along each axis.
+// Seeds around a cell: the beginnings of their cells' hashes, by the step along each axis.
 struct Seeds {
     Int3 cell;
     double cell_mm;
@@ -53,9 +50,7 @@ struct Seeds {
     }
     Seed at(int place) const {
         const int i = place % 3, j = place / 3 % 3, k = place / 9;
-        const std::uint32_t of_cell =
-            hash32(x[static_cast<std::size_t>(i)] ^ y[static_cast<std::size_t>(j)] ^
-                   z[static_cast<std::size_t>(k)]);
+        const std::uint32_t of_cell = hash32(x[i] ^ y[j] ^ z[k]);
         const std::uint32_t h = hash32(of_cell + 977);
         const auto part = [&](int shift) { return (h >> shift & 0x3FF) / 1024.0; };
         return {corner + cell_mm * Vector3{cell.x + i - 1 + part(0), cell.y + j - 1 + part(10),
@@ -67,10 +62,10 @@ struct Seeds {
 // The planes halfway between a cell's own seed and the others, in the order of kPlace. A normal of
 // zero bounds nothing.
 struct Planes {
-    std::array<double, kPlanes> x, y, z;     // a place on it
+    std::array<double, kPlanes> x, y, z;     // a place on the plane
     std::array<double, kPlanes> nx, ny, nz;  // normal
     std::array<std::uint32_t, kOthers> draw;
-    std::array<std::uint8_t, kPlanes> meets;  // what is looked for may be there
+    std::array<std::uint8_t, kPlanes> meets;  // the view may show it
 
     Planes(const Seeds& seeds,
            const Seed& own,
@@ -89,7 +84,7 @@ struct Planes {
             y[m] = own.at.y;
             z[m] = own.at.z;
         }
-        const double least = 1 - view.most_sin * view.most_sin;
+        const double min_cos2 = 1 - view.max_sin * view.max_sin;
         for (std::size_t m = 0; m < kPlanes; ++m) {
             const double ax = x[m] - own.at.x, ay = y[m] - own.at.y, az = z[m] - own.at.z;
             const double up = kUp * (ax * view.skin.x + ay * view.skin.y + az * view.skin.z);
@@ -104,7 +99,7 @@ struct Planes {
             const double off = view.off_mm + ((x[m] - centre.x) * view.across.x +
                                               (y[m] - centre.y) * view.across.y +
                                               (z[m] - centre.z) * view.across.z);
-            meets[m] = static_cast<std::uint8_t>((facing * facing > least * size) &
+            meets[m] = static_cast<std::uint8_t>((facing * facing > min_cos2 * size) &
                                                  (std::abs(off) <= reach_mm));
         }
     }
@@ -114,13 +109,13 @@ struct Planes {
         nz[m] = normal.z;
     }
 
-    // Where the line from `from` along `to` (unit) lies on the own seed's side of all planes,
-    // within kMostMm. False: nowhere; most often, the nearest planes tell. Few branches, since
-    // nobody could foretell them.
+    // Finds where the line from `from` along `to` (unit) lies on the own seed's side of all planes,
+    // within kMaxMm. False: nowhere, which the nearest planes mostly decide. It has few branches,
+    // since a processor could not predict them.
     bool clip(Point3 from, Vector3 to, double& begin, double& end) const {
-        std::array<double, kLanes> least, most;
-        least.fill(-kMostMm);
-        most.fill(kMostMm);
+        std::array<double, kLanes> low, high;
+        low.fill(-kMaxMm);
+        high.fill(kMaxMm);
         for (std::size_t first = 0; first < kPlanes; first += kLanes) {
             for (std::size_t lane = 0; lane < kLanes; ++lane) {
                 // (from + t to - place) . normal < 0
@@ -130,22 +125,22 @@ struct Planes {
                 const double slope = to.x * nx[m] + to.y * ny[m] + to.z * nz[m];
                 const bool rises = slope > 1e-9, falls = slope < -1e-9;
                 const double across = -past / (rises || falls ? slope : 1);
-                // Along a plane, on its other side: nowhere.
-                const double nowhere = past > 0 ? -kMostMm : kMostMm;
+                // A line along a plane, on its other side, lies nowhere.
+                const double nowhere = past > 0 ? -kMaxMm : kMaxMm;
                 const double above = rises   ? across
-                                     : falls ? kMostMm
+                                     : falls ? kMaxMm
                                              : nowhere,
-                             below = falls ? across : -kMostMm;
-                most[lane] = above < most[lane] ? above : most[lane];
-                least[lane] = below > least[lane] ? below : least[lane];
+                             below = falls ? across : -kMaxMm;
+                high[lane] = above < high[lane] ? above : high[lane];
+                low[lane] = below > low[lane] ? below : low[lane];
             }
             if (first % (2 * kLanes) != kLanes) continue;
-            begin = std::max(std::max(least[0], least[1]), std::max(least[2], least[3]));
-            end = std::min(std::min(most[0], most[1]), std::min(most[2], most[3]));
+            begin = std::max(std::max(low[0], low[1]), std::max(low[2], low[3]));
+            end = std::min(std::min(high[0], high[1]), std::min(high[2], high[3]));
             if (!(begin < end)) return false;
         }
-        begin = std::max(std::max(least[0], least[1]), std::max(least[2], least[3]));
-        end = std::min(std::min(most[0], most[1]), std::min(most[2], most[3]));
+        begin = std::max(std::max(low[0], low[1]), std::max(low[2], low[3]));
+        end = std::min(std::min(high[0], high[1]), std::min(high[2], high[3]));
         return begin < end;
     }
 };
@@ -156,7 +151,7 @@ int find_lobule_walls(Int3 cell,
                       double cell_mm,
                       Point3 corner,
                       const LobuleView& view,
-                      std::span<LobuleWall, kMostLobuleWalls> out) {
+                      std::span<LobuleWall, kMaxLobuleWalls> out) {
     // A wall's middle is no further from the cell's own than this.
     const double reach_mm = view.reach_mm + kShiftMm;
     if (std::abs(view.off_mm) > reach_mm + 1.5 * cell_mm) return 0;
@@ -168,7 +163,7 @@ int find_lobule_walls(Int3 cell,
     int found = 0;
     for (std::size_t place = kOwn + 1; place < kOther.size(); ++place) {
         const std::size_t m = kOther[place];
-        if (!planes.meets[m]) continue;  // most are turned away, or off the picture's plane
+        if (!planes.meets[m]) continue;  // most are turned away or off the picture's plane
         const Vector3 normal{planes.nx[m], planes.ny[m], planes.nz[m]};
         Point3 middle{planes.x[m], planes.y[m], planes.z[m]};
         // The wall's middle, first along the skin, then at right angles to that.
@@ -178,7 +173,7 @@ int find_lobule_walls(Int3 cell,
                                                                           : Vector3{0, 1, 0});
         along = normalized(along);
         const Vector3 across = normalized(cross(normal, along));
-        planes.set_normal(m, {});  // which holds the line
+        planes.set_normal(m, {});  // this plane holds the line, so it must not bound it
         double begin = 0, end = 0, length = 0;
         bool shows = planes.clip(middle, along, begin, end);
         if (shows) {
@@ -190,9 +185,8 @@ int find_lobule_walls(Int3 cell,
         if (!shows) continue;
         middle = middle + 0.5 * (begin + end) * across;
         length = std::sqrt(length * (end - begin));
-        if (length < kLeastMm) continue;
-        out[static_cast<std::size_t>(found++)] = {middle, normal, length,
-                                                  hash32(own.draw ^ planes.draw[m])};
+        if (length < kMinMm) continue;
+        out[found++] = {middle, normal, length, hash32(own.draw ^ planes.draw[m])};
     }
     return found;
 }

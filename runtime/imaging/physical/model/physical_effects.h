@@ -4,7 +4,7 @@
 // does, docs/extending.md how to add one.
 #pragma once
 
-#include "runtime/imaging/formation/effect_table.h"
+#include "runtime/imaging/core/effect_table.h"
 
 namespace sonocase::runtime {
 
@@ -61,7 +61,7 @@ struct PhysicalMet {
     bool needle_given = false;  // there is a needle to draw
     bool needle = false;        // it shows in the slab
     int beams_in_contact = 0;
-    // What the machine has.
+    // Which of these the machine has.
     bool edge_contact = false, compounding = false, receiver_noise = false, blending = false,
          reverberation = false, side_lobes = false, equalisation = false, speckle_reduction = false,
          binomial = false, sharpening = false, logarithm = false;
@@ -82,7 +82,7 @@ inline const char* nothing_hard(const PhysicalMet& m) {
 inline const char* only_if(bool machine_has_it) {
     return machine_has_it ? "" : "the machine has none";
 }
-// A structure: what the machine does not show at all, and why there is none in a frame.
+// Why a structure is not shown: the machine shows none, or there is none in the frame.
 inline const char* structure_if(bool machine_shows_it, bool met, const char* none) {
     return !machine_shows_it ? "the machine shows none" : met ? "" : none;
 }

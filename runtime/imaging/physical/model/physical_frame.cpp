@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/imaging/press/skin_plane.h"
+#include "runtime/imaging/press/press_bundle.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -28,17 +28,16 @@ std::vector<std::int8_t> smoothed_tile(std::span<const double> levels,
                                  : 1.0f);
         power += taps.back() * taps.back();
     }
-    std::vector<std::int8_t> out(kNoiseTile + static_cast<std::size_t>(overhang));
+    std::vector<std::int8_t> out(kNoiseTile + overhang);
     for (std::uint32_t i = 0; i < kNoiseTile; ++i) {
         float sum = 0;
         for (int j = -reach; j <= reach; ++j) {
-            sum += taps[static_cast<std::size_t>(j + reach)] *
+            sum += taps[j + reach] *
                    static_cast<float>(raw[(i + static_cast<std::uint32_t>(j)) & (kNoiseTile - 1)]);
         }
         out[i] = to_byte(static_cast<double>(sum) / std::sqrt(static_cast<double>(power)));
     }
-    for (int i = 0; i < overhang; ++i)
-        out[kNoiseTile + static_cast<std::size_t>(i)] = out[static_cast<std::size_t>(i)];
+    for (int i = 0; i < overhang; ++i) out[kNoiseTile + i] = out[i];
     return out;
 }
 
@@ -55,7 +54,7 @@ PhysicalNoise make_physical_noise(std::span<const double> levels,
 void press_gaps(const press::PressField& field, const ScanGeometry& g, std::span<float> gaps) {
     if (!field.state().pressed) return;
     for (int l = 0; l < g.scanlines; ++l) {
-        float& gap = gaps[static_cast<std::size_t>(l)];
+        float& gap = gaps[l];
         if (gap < 0) continue;
         const double lateral =
             press::follows_columns(g) ? press::lateral_of_line(g, l) : g.beam_origin(l).x;
@@ -66,7 +65,7 @@ void press_gaps(const press::PressField& field, const ScanGeometry& g, std::span
 namespace {
 
 ScanGeometry::Beam beam_of(const ScanGeometry& g, int line) {
-    if (line < g.scanlines) return g.beams[static_cast<std::size_t>(line)];
+    if (line < g.scanlines) return g.beams[line];
     return {g.beam_origin(line), g.beam_direction(line)};
 }
 
@@ -103,26 +102,26 @@ void find_gaps(const PhysicalScene& scene,
                int first,
                int last,
                std::span<float> raw) {
-    // Nearest integer of a number below 1e5: cheaper than a call of floor().
+    // Nearest integer of a number below 1e5; cheaper than a call of floor().
     const auto nearest = [](double v) {
         constexpr int kShift = 1 << 18;
         return static_cast<int>(v + (kShift + 0.5)) - kShift;
     };
-    const double most_mm = g.fan ? physical::kMaxGapMm : physical::kMaxFlatGapMm;
+    const double max_mm = g.fan ? physical::kMaxGapMm : physical::kMaxFlatGapMm;
     for (int l = first; l < last; ++l) {
-        float& gap = raw[static_cast<std::size_t>(l)];
+        float& gap = raw[l];
         gap = -1;
-        const auto& [o, d] = g.beams[static_cast<std::size_t>(l)];
+        const auto& [o, d] = g.beams[l];
         const Point3 p = scene.grid.voxel_from_point(frame.volume_from_probe * Point3{o.x, 0, o.z});
         const Vector3 v = (physical::kGapStepMm / scene.voxel_mm) *
                           (frame.volume_from_probe.rotation * Vector3{d.x, 0, d.z});
         if (!(std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5 && std::abs(p.z) < 1e5)) continue;
-        for (int step = 0; step * physical::kGapStepMm <= most_mm; ++step) {
+        for (int step = 0; step * physical::kGapStepMm <= max_mm; ++step) {
             const Point3 q = p + static_cast<double>(step) * v;
             const int label = label_at(scene, nearest(q.x), nearest(q.y), nearest(q.z));
             if (label == 0) continue;
             const double steps = std::max(step + press::steps_to_skin(*scene.bundle, q, v), 0.0);
-            gap = static_cast<float>(std::min(steps * physical::kGapStepMm, most_mm));
+            gap = static_cast<float>(std::min(steps * physical::kGapStepMm, max_mm));
             break;
         }
     }
@@ -133,18 +132,18 @@ int smooth_gaps(const ScanGeometry& g, std::span<const float> raw, std::span<flo
     const int reach = std::max(g.fan ? 0 : static_cast<int>(physical::kGapMeanMm / g.line_step), 4);
     int touching = 0;
     for (int l = 0; l < scanlines; ++l) {
-        gaps[static_cast<std::size_t>(l)] = -1;
-        if (raw[static_cast<std::size_t>(l)] < 0) continue;
+        gaps[l] = -1;
+        if (raw[l] < 0) continue;
         ++touching;
         float sum = 0;
         int n = 0;
         for (int j = std::max(l - reach, 0); j <= std::min(l + reach, scanlines - 1); ++j) {
-            const float gap = raw[static_cast<std::size_t>(j)];
+            const float gap = raw[j];
             if (gap < 0) continue;
             sum += gap;
             ++n;
         }
-        gaps[static_cast<std::size_t>(l)] = sum / static_cast<float>(n);
+        gaps[l] = sum / static_cast<float>(n);
     }
     return touching;
 }

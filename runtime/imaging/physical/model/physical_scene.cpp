@@ -10,7 +10,7 @@
 #include "runtime/imaging/physical/model/physical_model.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
 #include "runtime/imaging/physical/model/wall_sheets.h"
-#include "runtime/imaging/press/closed_label.h"
+#include "runtime/imaging/press/press_bundle.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -36,8 +36,9 @@ bool is_parenchyma(const Tissue& t) {
     return t.name == "liver" || t.name == "spleen" || t.name == "kidney_cortex";
 }
 
-// The wall of a vessel in an organ: portal veins and arteries lie in connective tissue; hepatic
-// veins and the cava have none that shows (recipe 11 of the living sweep).
+// Adds the wall of a vessel in an organ: portal veins and arteries lie in connective tissue;
+// hepatic veins and the cava have no wall that shows in a tracked sweep of a living liver
+// (docs/realism.md).
 void line_vessel(const std::string& vessel, PairEcho& e) {
     if (contains(vessel, "portal") || is_artery(vessel)) {
         e.amplitude = kVesselWall;
@@ -79,7 +80,7 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
     return e;
 }
 
-// What lines an organ against its surroundings and its vessels.
+// Adds what lines an organ against its surroundings and its vessels.
 void add_lining(const Label& la, const Tissue& a, const Label& lb, const Tissue& b, PairEcho& e) {
     if (a.kind == TissueKind::outside || b.kind == TissueKind::outside) return;
     const bool fluid = a.kind == TissueKind::fluid || b.kind == TissueKind::fluid;
@@ -88,22 +89,22 @@ void add_lining(const Label& la, const Tissue& a, const Label& lb, const Tissue&
     // An organ's capsule, and the peritoneum on it.
     if (is_parenchyma(a) != is_parenchyma(b) && !e.hard && !fluid) {
         e.split_mm = kCapsuleMm;
-        e.amplitude = std::min(kCapsuleGain * e.amplitude, kCapsuleMost);
-        // What moves an organ against the wall: the diaphragm, or a fascia.
+        e.amplitude = std::min(kCapsuleGain * e.amplitude, kMaxCapsule);
+        // Between an organ and the wall lies the diaphragm, or a fascia.
         if (is_muscle(a) || is_muscle(b)) e.amplitude = std::max(e.amplitude, kCapsuleOnMuscle);
     }
 }
 
-// A fine pulse shows the dermis as sheets of its own (wall_sheets.h); the lower face of a label of
-// whole voxels is no mirror.
+// Weakens the faces of the skin: a fine pulse shows the dermis as sheets of its own
+// (wall_sheets.h), and the lower face of a label of whole voxels is not a mirror.
 void soften_skin(const Tissue& a, const Tissue& b, PairEcho& e) {
     constexpr double kSkinFace = 0.25;
     if (a.name == "skin" || b.name == "skin") e.amplitude *= kSkinFace;
 }
 
-// What a target that shows is made of.
+// What a visible target is made of.
 struct TargetTissue {
-    AcousticProperties look{-8, 0.6, TissueKind::soft};
+    AcousticProperties acoustics{-8, 0.6, TissueKind::soft};
     double wall = 0.5;
 };
 
@@ -125,7 +126,7 @@ TargetTissue tissue_of_target(TargetLook look) {
 }
 
 void add_ball(const Target& t, double radius_mm, const TargetTissue& tissue, PhysicalScene& s) {
-    if (!(radius_mm > 0) || s.targets.size() >= kMaxTargets || s.looks.size() >= 255) return;
+    if (!(radius_mm > 0) || s.targets.size() >= kMaxTargets || s.acoustics.size() >= 255) return;
     TargetBall ball;
     ball.centre_vx = s.grid.voxel_from_point(t.centre);
     ball.radius_mm = radius_mm;
@@ -136,15 +137,15 @@ void add_ball(const Target& t, double radius_mm, const TargetTissue& tissue, Phy
         const Vector3 squares{1 / (l.x * l.x), 1 / (l.y * l.y), 1 / (l.z * l.z)};
         ball.shape = t.axes.axes * Matrix3::diagonal(squares) * transpose(t.axes.axes);
     }
-    ball.look = static_cast<int>(s.looks.size());
+    ball.acoustics = static_cast<int>(s.acoustics.size());
     ball.wall = tissue.wall;
-    ball.fluid = tissue.look.kind == TissueKind::fluid;
-    s.looks.push_back(tissue.look);
+    ball.fluid = tissue.acoustics.kind == TissueKind::fluid;
+    s.acoustics.push_back(tissue.acoustics);
     s.targets.push_back(ball);
 }
 
-// From the outermost shell to the core. A shell thinner than kThinShellMm is left to the echo of
-// the surface.
+// Adds the parts of each target, from the outermost shell to the core. A shell thinner than
+// kThinShellMm is left to the echo of the surface.
 void add_targets(const std::vector<Target>& targets, PhysicalScene& s) {
     constexpr double kThinShellMm = 0.75;
     for (const Target& t : targets) {
@@ -164,7 +165,7 @@ void add_targets(const std::vector<Target>& targets, PhysicalScene& s) {
     }
 }
 
-// Acoustic properties of labels and targets, and the echoes between labels.
+// Adds the acoustic properties of labels and targets, and the echoes between labels.
 void add_tissues(const CaseBundle& bundle,
                  const std::vector<Target>& targets,
                  const PhysicalSceneOptions& options,
@@ -172,28 +173,29 @@ void add_tissues(const CaseBundle& bundle,
     const std::vector<int> tissue_of = tissue_of_label(bundle);
     const Tissue nothing{};
     const auto tissue = [&](std::size_t l) -> const Tissue& {
-        return tissue_of[l] >= 0 ? bundle.tissues[static_cast<std::size_t>(tissue_of[l])] : nothing;
+        return tissue_of[l] >= 0 ? bundle.tissues[tissue_of[l]] : nothing;
     };
     const std::size_t count = bundle.labels.size();
     for (std::size_t l = 0; l < count; ++l) {
         const Tissue& t = tissue(l);
         const auto measured = options.tissue_db.find(bundle.labels[l].name);
-        s.looks.push_back({measured != options.tissue_db.end() ? measured->second : t.echo_db,
-                           t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind,
-                           t.name == "skin"  ? kWallSkinDb
-                           : t.name == "fat" ? kWallFatDb
-                                             : 0});
+        s.acoustics.push_back({measured != options.tissue_db.end() ? measured->second : t.echo_db,
+                               t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind,
+                               t.name == "skin"  ? kWallSkinDb
+                               : t.name == "fat" ? kWallFatDb
+                                                 : 0});
     }
-    s.has_hard = std::any_of(s.looks.begin(), s.looks.end(), [](const AcousticProperties& l) {
-        return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
-    });
+    s.has_hard =
+        std::any_of(s.acoustics.begin(), s.acoustics.end(), [](const AcousticProperties& l) {
+            return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
+        });
     for (std::size_t l = 0; l < count; ++l) {
         s.is_lung.push_back(tissue(l).name == "lung");
-        s.has_gas = s.has_gas || s.looks[l].kind == TissueKind::gas;
+        s.has_gas = s.has_gas || s.acoustics[l].kind == TissueKind::gas;
     }
     add_targets(targets, s);
-    for (AcousticProperties& look : s.looks) {
-        if (look.kind == TissueKind::fluid) look.attenuation += kFluidSteepening;
+    for (AcousticProperties& a : s.acoustics) {
+        if (a.kind == TissueKind::fluid) a.attenuation += kFluidSteepening;
     }
     s.pairs.resize(count * count);
     for (std::size_t a = 0; a < count; ++a) {
@@ -208,15 +210,15 @@ void add_tissues(const CaseBundle& bundle,
     }
 }
 
-// What the pipeline bakes into an organ: noise of its own, vessels far beyond it. A kidney's
-// pyramids are little more than its noise, which therefore stays.
+// The pipeline bakes noise into an organ, and vessels far above that noise. A kidney's pyramids are
+// little more than its noise, which therefore stays.
 void add_dead_zones(const CaseBundle& bundle, PhysicalScene& s) {
     constexpr double kDeviations = 3;
     const std::vector<int> tissue_of = tissue_of_label(bundle);
     s.structure_dead_db.assign(bundle.labels.size(), 0.0);
     for (std::size_t l = 1; l < bundle.labels.size(); ++l) {
         if (s.fine.frames[l].cube != kParenchymaCube) continue;
-        const Tissue& tissue = bundle.tissues[static_cast<std::size_t>(tissue_of[l])];
+        const Tissue& tissue = bundle.tissues[tissue_of[l]];
         if (tissue.name != "kidney_cortex")
             s.structure_dead_db[l] = kDeviations * tissue.structure_db;
     }
@@ -237,14 +239,12 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
         return Error{"the bundle holds no label volume", "", "build the case again"};
     }
     add_tissues(bundle, targets, options, s);
-    Result<BrickTable> words = BrickTable::create(bundle);
-    if (!words) return words.error();
-    s.words = std::move(*words);
+    SONOCASE_TRY(BrickTable words, BrickTable::create(bundle));
+    s.words = std::move(words);
     if (bundle.region) s.words.mark(marks_of_region(bundle));
     if (view.blocks() == nullptr) s.words.load_all(jobs);
-    Result<RegionLookUp> region = make_region_look_up(bundle, jobs);
-    if (!region) return region.error();
-    s.region = std::move(*region);
+    SONOCASE_TRY(RegionLookUp region, make_region_look_up(bundle, jobs));
+    s.region = std::move(region);
     s.textures = options.textures ? options.textures
                                   : std::make_shared<const PhysicalTextures>(physical_textures());
     if (options.fine) s.roughness_mm = kFineRoughnessMm;
@@ -253,8 +253,8 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
         s.fine = ground_of(std::move(s.fine));
         constexpr double kNoLimit = 127;
         for (const FineFrame& f : s.fine.frames)
-            s.structure_most_db.push_back(is_muscle_cube(f.cube) || is_fat_cube(f.cube) ? 0
-                                                                                        : kNoLimit);
+            s.max_structure_db.push_back(is_muscle_cube(f.cube) || is_fat_cube(f.cube) ? 0
+                                                                                       : kNoLimit);
     }
     s.has_parenchyma = std::any_of(s.fine.frames.begin(), s.fine.frames.end(),
                                    [](const FineFrame& f) { return f.cube == kParenchymaCube; });

@@ -12,7 +12,7 @@
 
 #include "formats/base/jobs.h"
 #include "formats/base/result.h"
-#include "formats/bundle/streamed_bundle.h"
+#include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "formats/machine/machine.h"
 #include "runtime/imaging/physical/model/brick_table.h"
@@ -27,7 +27,7 @@ namespace sonocase::runtime {
 // The echo of the surface between two labels.
 struct PairEcho {
     double amplitude = 0;   // 60 R^0.85; 0: none
-    double sigma_mm = 0.2;  // of the reflecting layer
+    double sigma_mm = 0.2;  // deviation of the reflecting layer
     double split_mm = 0;    // > 0: two layers, this far to either side of the surface
     bool hard = false;      // bone or gas on one side
     bool refracts = false;  // fluid on one side
@@ -46,16 +46,16 @@ struct AcousticProperties {
 struct TargetBall {
     Point3 centre_vx;  // voxel coordinates
     double radius_mm = 5;
-    double reach_mm = 5;  // of the longest axis
+    double reach_mm = 5;  // half the longest axis
     bool round = true;    // shape is the identity
     Matrix3 shape;        // symmetric
-    int look = 0;         // index into looks
+    int acoustics = 0;    // index into PhysicalScene::acoustics
     double wall = 0;      // amplitude of its surface
     bool fluid = false;
 };
 
 // Cells of the plates of organs (plate_kind()) from the volume's corner on, x fastest: 1 where the
-// middle of one lies in parenchyma. Empty: none does, or the machine shows no plates.
+// middle of a cell lies in parenchyma. Empty: none does, or the machine shows no plates.
 struct PlateCells {
     Int3 size{0, 0, 0};
     std::vector<std::uint8_t> holds;
@@ -65,29 +65,29 @@ struct PhysicalScene {
     const CaseBundle* bundle = nullptr;
     Grid grid;
     double voxel_mm = 1;
-    double roughness_mm = physical::kRoughnessMm;  // of surfaces, deviation
+    double roughness_mm = physical::kRoughnessMm;  // deviation of surfaces
 
-    // Complete where the bundle is; otherwise a frame asks for what it reads.
+    // Complete where the bundle is complete; otherwise each frame loads what it reads.
     BrickTable words;
-    RegionLookUp region;                     // on smaller voxels; complete from the start
-    std::vector<AcousticProperties> looks;   // # labels, then one per target
-    std::vector<std::int32_t> closed_label;  // 256: what is shown of a lumen that is shut
-    std::vector<PairEcho> pairs;             // # labels^2, [own * # labels + second]
-    std::vector<bool> is_lung;               // # labels
-    bool has_gas = false;                    // some label is gas or lung
+    RegionLookUp region;                        // on smaller voxels; complete from the start
+    std::vector<AcousticProperties> acoustics;  // # labels, then one per target
+    std::vector<std::int32_t> closed_label;     // 256: label that is shown of a collapsed lumen
+    std::vector<PairEcho> pairs;                // # labels^2, [own * # labels + second]
+    std::vector<bool> is_lung;                  // # labels
+    bool has_gas = false;                       // some label is gas or lung
     bool has_hard = true;  // some label is bone or gas; if none, their kernels are left out
 
     std::shared_ptr<const PhysicalTextures> textures;
     FineStructure fine;
-    // Most that a baked offset adds, dB, # labels: plates draw the septa of muscle and fat, which
-    // voxels show as grains. Empty: no limit.
-    std::vector<double> structure_most_db;
-    // A baked offset of an organ as small as this is its own noise, which the cube of parenchyma
-    // draws while that effect is on, and is left out; a larger one loses so much. dB, # labels.
-    // Empty: none.
+    // Limit of a baked offset, dB, # labels: plates draw the septa of muscle and fat, which voxels
+    // show as grains. Empty: no limit.
+    std::vector<double> max_structure_db;
+    // Dead zone of a baked offset, dB, # labels. An offset of an organ as small as this is noise,
+    // which the cube of parenchyma draws while that effect is on, and is left out; a larger one is
+    // reduced by it. Empty: none.
     std::vector<double> structure_dead_db;
     bool has_parenchyma = false;  // some label has its cube
-    PlateCells plate_cells;       // of effect streaks
+    PlateCells plate_cells;       // for effect streaks
     bool has_septa = false;       // some label is fat or muscle
     TissueLayers layers;
 
@@ -99,16 +99,16 @@ struct PhysicalScene {
 struct PhysicalSceneOptions {
     JobRunner* jobs = nullptr;                         // null: one job after the other
     std::shared_ptr<const PhysicalTextures> textures;  // null: made here
-    std::map<std::string, double> tissue_db;           // of labels, instead of the bundle's own
-    MachineStructures structures;                      // that the machine shows
+    std::map<std::string, double> tissue_db;           // echo of labels, instead of the bundle's
+    MachineStructures structures;                      // structures that the machine shows
     bool fine = false;                                 // physical::shows_fine()
     bool speckle_reduction = true;                     // whether the machine has it
 };
 
-// targets: of the exercise, with its findings; those that only mark a place do not show in the
-// tissue. Of two that overlap the later one shows.
-// The bundle must outlive the scene. Errors: a bundle without labels; too little memory
-// for the tables. Cost: some tens of ms for a torso at 1 mm.
+// targets: those of the exercise, with its findings; those that only mark a place do not show in
+// the tissue. Where two overlap, the later one shows. The bundle must outlive the scene. Errors: a
+// bundle without labels; too little memory for the tables. Cost: some tens of ms for a torso at 1
+// mm.
 Result<PhysicalScene> make_physical_scene(CaseView view,
                                           const std::vector<Target>& targets = {},
                                           const PhysicalSceneOptions& options = {});

@@ -5,19 +5,20 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/machine/machine_toml.h"
+#include "formats/base/constants.h"
+#include "formats/machine/machine.h"
 
 namespace sonocase::runtime::physical {
 namespace {
 
-constexpr double kSigmaPerFwhm = 1 / 2.3548200450309493;
-constexpr double kLayerMm = 0.18;      // deviation of a reflecting layer, about
+constexpr double kSigmaPerFwhm = 1 / kFullWidthPerSigma;
+constexpr double kLayerMm = 0.18;      // typical deviation of a reflecting layer
 constexpr double kPhaseLoss = 0.75;    // measured on the rough face of bone
-constexpr double kCellMm = 0.66;       // edge of the scatterers' lattice at 3.5 MHz,
-constexpr double kCellPerStep = 1.25;  // and at least of a sample
-constexpr int kSkirtReach = 6;         // beams: what lies further out shows nowhere
+constexpr double kCellMm = 0.66;       // edge of the scatterers' lattice at 3.5 MHz
+constexpr double kCellPerStep = 1.25;  // the edge is at least this many samples long
+constexpr int kSkirtReach = 6;         // beams; what lies further out does not show
 
-// Deviation that is left to the taps: the blend of the scatterers is a part of the point spread.
+// Deviation that the taps must add: the blend of the scatterers is a part of the point spread.
 double rest_of(double fwhm_mm, double cell_mm) {
     const double sigma = fwhm_mm * kSigmaPerFwhm;
     return std::sqrt(std::max(sigma * sigma - kSpeckleVariance * cell_mm * cell_mm, 0.0));
@@ -25,14 +26,14 @@ double rest_of(double fwhm_mm, double cell_mm) {
 
 // Gaussian taps of unit power; returns the reach.
 template <std::size_t kSize>
-int gaussian(double sigma, int most, std::array<float, kSize>& taps) {
+int gaussian(double sigma, int max_reach, std::array<float, kSize>& taps) {
     const int centre = static_cast<int>(kSize) / 2;
-    const int reach = std::clamp(static_cast<int>(std::ceil(2.3 * sigma)), 0, most);
+    const int reach = std::clamp(static_cast<int>(std::ceil(2.3 * sigma)), 0, max_reach);
     double power = 0;
     std::array<double, kSize> exact{};
     for (int i = -reach; i <= reach; ++i) {
         const double v = sigma > 0 ? std::exp(-0.5 * i * i / (sigma * sigma)) : 1;
-        exact[static_cast<std::size_t>(centre + i)] = v;
+        exact[centre + i] = v;
         power += v * v;
     }
     for (std::size_t i = 0; i < kSize; ++i)
@@ -67,7 +68,8 @@ double sum(const auto& taps) {
     return s;
 }
 
-// Peak that taps make of a Gaussian layer of height 1. step: between taps, deviations of the layer.
+// Peak of a Gaussian layer of height 1 after the taps. step: between taps, in deviations of the
+// layer.
 double peak_of_layer(const auto& taps, double step) {
     double peak = 0;
     const double centre = 0.5 * (static_cast<double>(taps.size()) - 1);
@@ -78,7 +80,7 @@ double peak_of_layer(const auto& taps, double step) {
     return peak;
 }
 
-// Power that taps make of the scatterers' field, per its own. step: between taps, cells.
+// Power of the scatterers' field after the taps, relative to before. step: between taps, in cells.
 double power_of_taps(const auto& taps, double step) {
     double power = 0;
     for (std::size_t i = 0; i < taps.size(); ++i) {
@@ -116,7 +118,8 @@ double lateral_width(
                : 1.25 * wavelength * std::max(2.0, r / 14) * grown(probe.focus_mm, 25);
 }
 
-// Looks pass from the near number to the other one by one, over a quarter to each side.
+// The number of looks goes from the near one to the other step by step, over a quarter of near_mm
+// to each side.
 int looks_at(const MachineLooks& looks, double r) {
     const double from = 0.75 * looks.near_mm, to = 1.25 * looks.near_mm;
     const double part = to > from ? std::clamp((r - from) / (to - from), 0.0, 1.0) : 1;
@@ -152,21 +155,20 @@ double tgc_db(const MachineGain& gain, bool fan, double frequency_mhz, double r)
            std::clamp((r - gain.far_from_mm) / 10 * gain.far_db_per_cm, 0.0, gain.far_limit_db);
 }
 
-// Amplitude of each beam: the outer ones touch badly.
+// Amplitude of each beam: the outer beams have bad contact.
 std::vector<double> edge_contact(const MachineContact& contact, int scanlines) {
-    std::vector<double> edge(static_cast<std::size_t>(scanlines), 1.0);
+    std::vector<double> edge(scanlines, 1.0);
     const double reach = contact.edge_fraction * scanlines;
     for (int l = 0; l < scanlines; ++l) {
         const double from_edge = std::min(l, scanlines - 1 - l) + 0.5;
         if (from_edge < reach)
-            edge[static_cast<std::size_t>(l)] =
-                std::pow(10.0, -contact.edge_db * (1 - from_edge / reach) / 20);
+            edge[l] = std::pow(10.0, -contact.edge_db * (1 - from_edge / reach) / 20);
     }
     return edge;
 }
 
-// The deviation that light gains from a sample to the next, so that at kPenumbraMm it is that of an
-// aperture, evenly wide. Beams of a fan are as far apart as on the face, or, from a small face,
+// Sets the spread of light from a sample to the next, so that at kPenumbraMm its deviation is that
+// of an even aperture. The pitch of a fan's beams is that on its face or, for a small face, that
 // halfway down.
 void set_spread(const ScanGeometry& g, double aperture_mm, Tables& t) {
     const double pitch =
@@ -174,12 +176,12 @@ void set_spread(const ScanGeometry& g, double aperture_mm, Tables& t) {
     const double beams = aperture_mm / pitch;
     const double variance = beams * beams / 12 * g.step_mm / kPenumbraMm;
     if (!(variance > 0)) return;
-    constexpr double kMostShare = 0.2;
+    constexpr double kMaxShare = 0.2;
     const auto share = [&] { return 0.5 * variance / (t.spread_beams * t.spread_beams); };
     do {
         ++t.spread_beams;
-    } while (share() > kMostShare && t.spread_beams < kMaxSpread);
-    t.spread_share = std::min(share(), kMostShare);
+    } while (share() > kMaxShare && t.spread_beams < kMaxSpread);
+    t.spread_share = std::min(share(), kMaxShare);
 }
 
 void set_frame_tables(const ScanGeometry& g, Tables& t) {
@@ -192,9 +194,7 @@ void set_frame_tables(const ScanGeometry& g, Tables& t) {
     double sum = 0;
     for (const double w : m.persistence) sum += w;
     t.persistence[0] = 1;
-    for (int i = 0; i < t.persisted && sum > 0; ++i)
-        t.persistence[static_cast<std::size_t>(i)] =
-            m.persistence[static_cast<std::size_t>(i)] / sum;
+    for (int i = 0; i < t.persisted && sum > 0; ++i) t.persistence[i] = m.persistence[i] / sum;
 }
 
 }  // namespace
@@ -209,13 +209,14 @@ Machine default_machine(const Probe& probe) {
 }
 
 int samples_along(const Probe& probe, const Machine& machine) {
-    constexpr int kLeast = 384, kMost = 512, kStretch = 32;
-    // Fewer than two: what a picture loses of its detail, .12 of a grey level, cannot be seen.
+    constexpr int kMin = 384, kMax = 512, kStretch = 32;
+    // With fewer than two samples per width a picture loses 0.12 of a grey level of its detail,
+    // which cannot be seen.
     constexpr double kSamplesPerWidth = 1.85;
     const double width_mm = axial_width(machine.beam, frequency_of(machine.beam, probe));
     const double needed = kSamplesPerWidth * probe.depth_mm / width_mm;
-    const long stretches = std::lround(std::clamp(needed, 1.0, double{kMost}) / kStretch);
-    return std::max(static_cast<int>(stretches) * kStretch, kLeast);
+    const long stretches = std::lround(std::clamp(needed, 1.0, double{kMax}) / kStretch);
+    return std::max(static_cast<int>(stretches) * kStretch, kMin);
 }
 
 Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometry& g) {
@@ -232,8 +233,8 @@ Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometr
                          kCellPerStep * g.step_mm);
     t.axial_reach = gaussian(rest_of(axial_fwhm, t.cell_mm) / g.step_mm, kMaxAxial, t.axial);
     const double axial_power = power_of_taps(t.axial, g.step_mm / t.cell_mm);
-    // Peaks of interfaces as if all of the point spread were in the taps, which would also average
-    // their phases.
+    // Peaks of interfaces are scaled as if all of the point spread were in the taps, which would
+    // also average their phases.
     std::array<float, 2 * kMaxAxial + 1> whole{};
     gaussian(axial_fwhm * kSigmaPerFwhm / g.step_mm, kMaxAxial, whole);
     const double peak = kPhaseLoss * peak_of_layer(whole, g.step_mm / kLayerMm) /
@@ -241,7 +242,7 @@ Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometr
                         peak_of_layer(t.axial, g.step_mm / blurred_mm(t, kLayerMm));
     set_frame_tables(g, t);
 
-    // What brings the peak of a smooth layer of that deviation, times interface_scale, to 1.
+    // Factor that brings the peak of a smooth layer of that deviation, times interface_scale, to 1.
     const auto layer_scale = [&](double sigma_mm) {
         return 1 / (peak * peak_of_layer(t.axial, g.step_mm / sigma_mm));
     };
@@ -251,9 +252,9 @@ Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometr
     t.streak_scale = layer_scale(t.streak_mm);
     t.dome_scale = layer_scale(kDomeMm);
 
-    t.rows.resize(static_cast<std::size_t>(g.samples));
+    t.rows.resize(g.samples);
     for (int k = 0; k < g.samples; ++k) {
-        Row& row = t.rows[static_cast<std::size_t>(k)];
+        Row& row = t.rows[k];
         const double r = (k + 0.5) * g.step_mm;
         row.r_mm = r;
         const double gain_db = tgc_db(machine.gain, g.fan, frequency, r);
@@ -282,10 +283,10 @@ Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometr
         t.looks = std::max(t.looks, row.looks);
     }
     for (int k = 0; k < g.samples; ++k) {
-        int& drawn = t.rows[static_cast<std::size_t>(k)].looks_drawn;
+        int& drawn = t.rows[k].looks_drawn;
         for (int j = std::max(k - t.axial_reach, 0);
              j <= std::min(k + t.axial_reach, g.samples - 1); ++j)
-            drawn = std::max(drawn, t.rows[static_cast<std::size_t>(j)].looks);
+            drawn = std::max(drawn, t.rows[j].looks);
     }
     return t;
 }

@@ -5,10 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/imaging/noise/noise.h"
-#include "runtime/imaging/noise/periodic_noise.h"
+#include "runtime/imaging/core/noise.h"
+#include "runtime/imaging/core/simd_target.h"
 #include "runtime/imaging/physical/model/physical_model.h"
-#include "runtime/imaging/simd/gather_slack.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -21,7 +20,7 @@ std::uint32_t signed_byte(double v) {
            0xFFu;
 }
 
-constexpr double kGlintMean = 0.156;  // mean amplitude as of a glint of deviation 0.75
+constexpr double kGlintMean = 0.156;  // gives the mean amplitude of a glint of deviation 0.75
 
 std::vector<std::uint32_t> make_rough_surfaces() {
     const RawVector<float> rough = smooth_periodic_noise(kRoughEdge, 2, 11),
@@ -40,18 +39,18 @@ std::vector<std::uint32_t> make_rough_surfaces() {
 }
 
 // Offsets of mean power 1, in quarter dB. Powers are taken from a table: steps of 1/64 dB from
-// kLeast on.
+// kMin on.
 void store(const RawVector<float>& db, std::int8_t* out) {
-    constexpr float kLeast = -8, kMost = 24, kSteps = 64;
-    std::vector<std::uint32_t> met(static_cast<std::size_t>((kMost - kLeast) * kSteps) + 1);
+    constexpr float kMin = -8, kMax = 24, kSteps = 64;
+    std::vector<std::uint32_t> met(static_cast<std::size_t>((kMax - kMin) * kSteps) + 1);
     for (const float v : db)
-        ++met[static_cast<std::size_t>((std::clamp(v, kLeast, kMost) - kLeast) * kSteps + 0.5f)];
+        ++met[static_cast<std::size_t>((std::clamp(v, kMin, kMax) - kMin) * kSteps + 0.5f)];
     double power = 0;
     for (std::size_t i = 0; i < met.size(); ++i)
-        power += met[i] * std::pow(10.0, (kLeast + static_cast<double>(i) / kSteps) / 10);
+        power += met[i] * std::pow(10.0, (kMin + static_cast<double>(i) / kSteps) / 10);
     const auto mean = static_cast<float>(10 * std::log10(power / static_cast<double>(db.size())));
     for (std::size_t i = 0; i < db.size(); ++i) {
-        constexpr float kAbove = 127.5f;  // makes the number positive, so that the cast rounds it
+        constexpr float kAbove = 127.5f;  // makes the number positive, so that the cast rounds
         const float quarters = std::clamp(4 * (db[i] - mean), -127.0f, 127.0f);
         const auto at = static_cast<int>(i);
         constexpr int kIn = kFineEdge - 1;
@@ -60,8 +59,9 @@ void store(const RawVector<float>& db, std::int8_t* out) {
     }
 }
 
-// Echo of parenchyma at middle scale: 2 dB over 6 mm, 0.6 dB over 1.3 mm whose depth itself
-// varies over 6 mm, and shading of 3.2 dB over 26 mm (recipe 7 of the living sweep).
+// Echo of parenchyma at middle scale: 2 dB over 6 mm, 0.6 dB over 1.3 mm whose depth itself varies
+// over 6 mm, and shading of 3.2 dB over 26 mm, fitted to a tracked sweep of a living liver
+// (docs/realism.md).
 void make_parenchyma(std::int8_t* out) {
     const RawVector<float> fine = smooth_periodic_noise(kFineEdge, 0, 31),
                            depth = smooth_periodic_noise(kFineEdge, 2, 32),
@@ -87,7 +87,7 @@ void make_nerve(std::int8_t* out) {
             static_cast<int>(c % kCells) * kNerveBundle + static_cast<int>(h & 7),
             static_cast<int>(c / kCells) * kNerveBundle + static_cast<int>(h >> 8 & 7));
     }
-    RawVector<float> db(static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge);
+    RawVector<float> db(kFineEdge * kFineEdge * kFineEdge);
     for (int v = 0; v < kFineEdge; ++v) {
         for (int u = 0; u < kFineEdge; ++u) {
             double nearest = 1e9, next = 1e9;
@@ -99,15 +99,14 @@ void make_nerve(std::int8_t* out) {
             }
             const auto sheath = static_cast<float>(std::clamp(1.6 - (next - nearest), 0.0, 1.0));
             for (int along = 0; along < kFineEdge; ++along)
-                db[static_cast<std::size_t>(along + kFineEdge * (u + kFineEdge * v))] =
-                    -6 + 15 * sheath;
+                db[along + kFineEdge * (u + kFineEdge * v)] = -6 + 15 * sheath;
         }
     }
     store(db, out);
 }
 
 std::vector<std::int8_t> make_cubes() {
-    const std::size_t cube = static_cast<std::size_t>(kFineEdge) * kFineEdge * kFineEdge;
+    const std::size_t cube = kFineEdge * kFineEdge * kFineEdge;
     std::vector<std::int8_t> cubes(6 * cube + kGatherSlack);
     const RawVector<float> a = smooth_periodic_noise(kFineEdge, 2, 21),
                            b = smooth_periodic_noise(kFineEdge, 5, 22),
@@ -120,7 +119,7 @@ std::vector<std::int8_t> make_cubes() {
     // Septa: thin sheets where a smooth field crosses zero, torn here and there. Those that show
     // as lines are sheets of the wall (wall_sheets.h); these are faint.
     for (std::size_t i = 0; i < cube; ++i) {
-        constexpr float kNothing = 20;  // exp(-20) shows nowhere
+        constexpr float kNothing = 20;  // exp(-20) does not show
         const float off = b[i] / 0.11f, square = off * off;
         db[i] = -4;
         if (square < kNothing)

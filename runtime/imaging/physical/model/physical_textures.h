@@ -13,11 +13,11 @@ namespace sonocase::runtime {
 namespace physical {
 
 // Place of a voxel in a cube of kFineEdge^3: blocks of 4 x 4 x 4, a cache line each, so that a
-// slice in any direction meets few lines. along: of the strands; slowest, so that the first layers
-// of a cube lie together.
+// slice in any direction meets few lines. along: index along the strands, which varies slowest, so
+// that the first layers of a cube lie together.
 inline std::size_t fine_index(int along, int i, int j) {
     const int in_block = (i & 3) | (j & 3) << 2 | (along & 3) << 4;
-    return static_cast<std::size_t>(in_block | (i & ~3) << 4 | (j & ~3) << 8 | (along & ~3) << 12);
+    return in_block | (i & ~3) << 4 | (j & ~3) << 8 | (along & ~3) << 12;
 }
 
 }  // namespace physical

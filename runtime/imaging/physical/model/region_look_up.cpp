@@ -20,15 +20,12 @@ RegionPlace region_place(const FineRegion& region, const Grid& case_grid) {
 
 namespace {
 
-// Voxels that a look-up's random step stays within along each axis (two steps of kLookupJitter at
-// the 4 deviations that noise has at most, at right angles), and with it rounding.
+// Limits, in voxels along each axis, of a look-up's random step (two steps of kLookupJitter at
+// right angles, at the 4 deviations that noise has at most), and of the step with rounding.
 constexpr double kStepVx = 2.3, kLookUpVx = 2.8;
 
 std::size_t brick_number(Int3 bricks, Int3 b) {
-    return static_cast<std::size_t>(b.x) +
-           static_cast<std::size_t>(bricks.x) *
-               (static_cast<std::size_t>(b.y) +
-                static_cast<std::size_t>(bricks.y) * static_cast<std::size_t>(b.z));
+    return b.x + bricks.x * (b.y + bricks.y * static_cast<std::size_t>(b.z));
 }
 
 // The label of a brick that holds nothing else; negative where it holds more, or a surface.
@@ -105,10 +102,9 @@ Result<RegionLookUp> make_region_look_up(const CaseBundle& bundle, JobRunner& jo
     RegionLookUp out;
     if (!bundle.region) return out;
     const FineRegion& region = *bundle.region;
-    auto words = BrickTable::create(region.label_bricks, nullptr, &region.boundary);
-    if (!words) return words.error();
+    SONOCASE_TRY(auto words, BrickTable::create(region.label_bricks, nullptr, &region.boundary));
     out.region = &region;
-    out.words = std::move(*words);
+    out.words = std::move(words);
     out.words.load_all(jobs);
     out.place = region_place(region, bundle.grid);
     return out;

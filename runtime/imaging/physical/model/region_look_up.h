@@ -3,13 +3,13 @@
 // The part of a case that is given on smaller voxels (formats/volume/fine_region.h), laid out for
 // the frame loop.
 //
-// A sample whose point, before its random step, lies in the region's box takes its label from
-// there, and the surface from there too where the voxel holds one. Farther from a surface than the
-// region's records reach, the case's own record stays, if it begins at the same label, with a
-// distance of 0 at least: surfaces are then drawn equally wide on both sides of the border, and
-// roughness and pulse move them as far. Everything else (echo offsets, contact,
-// sheets of the wall, streaks, the diaphragm) comes from the case's own volume everywhere, so that
-// nothing but the place of surfaces can differ at the border.
+// A sample whose point, before its random step, lies in the region's box takes its label from the
+// region, and its surface too where the voxel holds one. Farther from a surface than the region's
+// records reach, the case's own record stays, if it begins at the same label, with a distance of at
+// least 0: surfaces are then drawn equally wide on both sides of the border, and roughness and
+// pulse move them equally far. Everything else (echo offsets, contact, sheets of the wall,
+// streaks, the diaphragm) comes from the case's own volume everywhere, so that only the place of
+// surfaces can differ at the border.
 #pragma once
 
 #include "formats/base/jobs.h"
@@ -43,8 +43,8 @@ struct RegionLookUp {
     RegionPlace place;
 };
 
-// The case's bricks in which a look-up can find something else in the region than in the case
-// alone, with room for the random steps; all others are one label without a surface in both. Cost:
+// Marks the case's bricks in which a look-up can find something else in the region than in the
+// case, with room for the random steps; all others are one label without a surface in both. Cost:
 // 30 ms for a region of 20 million voxels.
 BrickMarks marks_of_region(const CaseBundle& bundle);
 

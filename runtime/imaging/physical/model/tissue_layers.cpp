@@ -3,21 +3,189 @@
 #include "runtime/imaging/physical/model/tissue_layers.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <string_view>
+#include <vector>
 
-#include "formats/base/raw_vector.h"
-#include "runtime/imaging/host/parallel_halves.h"
-#include "runtime/imaging/noise/periodic_noise.h"
-#include "runtime/imaging/physical/model/cell_distance.h"
+#include "formats/base/geometry.h"
+#include "formats/base/memory.h"
+#include "runtime/imaging/core/host.h"
+#include "runtime/imaging/core/noise.h"
 
 namespace sonocase::runtime {
 namespace {
 
+constexpr double kCellMm = 6;
+
+using CellField = std::vector<float>;  // # Cells::count(), x fastest
+
+struct Cells {
+    Int3 size{0, 0, 0};
+    int edge = 1;  // voxels
+    double mm = kCellMm;
+
+    std::size_t count() const { return static_cast<std::size_t>(size.x) * size.y * size.z; }
+    std::ptrdiff_t stride(int axis) const {
+        return axis == 0 ? 1 : axis == 1 ? size.x : static_cast<std::ptrdiff_t>(size.x) * size.y;
+    }
+};
+
+// Solves |grad u| = 1 (Godunov's upwind scheme) for one cell from its smallest neighbours.
+float upwind(float a, float b, float c, float h) {
+    if (a > b) std::swap(a, b);
+    if (b > c) std::swap(b, c);
+    if (a > b) std::swap(a, b);
+    float u = a + h;
+    if (u <= b) return u;
+    u = 0.5f * (a + b + std::sqrt(std::max(2 * h * h - (a - b) * (a - b), 0.0f)));
+    if (u <= c) return u;
+    const float s = a + b + c;
+    return (s + std::sqrt(std::max(s * s - 3 * (a * a + b * b + c * c - h * h), 0.0f))) / 3;
+}
+
+// Fast sweeping (Zhao 2005): eight orders of the cells, each of which follows the characteristics
+// of one octant. Cells that are not open keep their value.
+void march(const Cells& c, const std::vector<std::uint8_t>& open, CellField& u) {
+    const auto h = static_cast<float>(c.mm);
+    constexpr auto kFar = static_cast<float>(kLayerFarMm);
+    const std::ptrdiff_t sy = c.stride(1), sz = c.stride(2);
+    const CellField beyond(c.size.x, kFar);  // a row outside the volume
+    // Per row: where the open cells begin and end.
+    std::vector<std::array<int, 2>> open_in(c.size.y * c.size.z);
+    for (std::size_t row = 0; row < open_in.size(); ++row) {
+        const std::uint8_t* p = open.data() + row * c.size.x;
+        int begin = 0, end = c.size.x;
+        while (begin < end && !p[begin]) ++begin;
+        while (end > begin && !p[end - 1]) --end;
+        open_in[row] = {begin, end};
+    }
+    bool changed = true;  // when one order changes nothing, the next ones will not either
+    for (int order = 0; order < 8 && changed; ++order) {
+        changed = false;
+        const auto index = [&](int i, int axis) {
+            return order >> axis & 1 ? c.size[axis] - 1 - i : i;
+        };
+        for (int k0 = 0; k0 < c.size.z; ++k0) {
+            const int k = index(k0, 2);
+            for (int j0 = 0; j0 < c.size.y; ++j0) {
+                const int j = index(j0, 1);
+                const auto [begin, end] = open_in[k * c.size.y + j];
+                const std::ptrdiff_t first = j * sy + k * sz;
+                float* row = u.data() + first;
+                const std::uint8_t* open_row = open.data() + first;
+                const float *before_y = j > 0 ? row - sy : beyond.data(),
+                            *after_y = j < c.size.y - 1 ? row + sy : beyond.data(),
+                            *before_z = k > 0 ? row - sz : beyond.data(),
+                            *after_z = k < c.size.z - 1 ? row + sz : beyond.data();
+                for (int n = 0; n < end - begin; ++n) {
+                    const int i = order & 1 ? end - 1 - n : begin + n;
+                    if (!open_row[i]) continue;
+                    const float x =
+                        std::min(i > 0 ? row[i - 1] : kFar, i < c.size.x - 1 ? row[i + 1] : kFar);
+                    const float y = std::min(before_y[i], after_y[i]);
+                    const float z = std::min(before_z[i], after_z[i]);
+                    // A front that comes from farther away does not bring the cell nearer.
+                    if (std::min({x, y, z}) >= row[i]) continue;
+                    const float nearer = upwind(x, y, z, h);
+                    if (nearer >= row[i]) continue;
+                    row[i] = nearer;
+                    changed = true;
+                }
+            }
+        }
+    }
+}
+
+// True if the share is all or nothing, and that of the neighbours is the same.
+bool is_flat(const Cells& c, const CellField& share, std::size_t at, Int3 cell) {
+    const float* p = share.data() + at;
+    if (*p != 0 && *p != 1) return false;
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::ptrdiff_t step = c.stride(axis);
+        if (cell[axis] > 0 && p[-step] != *p) return false;
+        if (cell[axis] + 1 < c.size[axis] && p[step] != *p) return false;
+    }
+    return true;
+}
+
+// The mean of three neighbours along each axis; the border repeats.
+void smooth_cells(const Cells& c, CellField& f) {
+    const std::size_t width = c.size.x;
+    const auto mean = [](float a, float b, float c3) { return (a + b + c3) * (1 / 3.0f); };
+    CellField before(width), here(width);  // rows as they were
+    for (std::size_t row = 0; row < f.size(); row += width) {
+        float* p = f.data() + row;
+        std::copy(p, p + width, here.begin());
+        for (std::size_t i = 0; i < width; ++i)
+            p[i] = mean(here[i > 0 ? i - 1 : 0], here[i], here[std::min(i + 1, width - 1)]);
+    }
+    // Row by row along y, then along z; each row needs the one before it as it was.
+    for (const int axis : {1, 2}) {
+        const int lines = axis == 1 ? c.size.z : c.size.y;
+        for (int line = 0; line < lines; ++line) {
+            float* p = f.data() + line * c.stride(3 - axis);
+            for (int n = 0; n < c.size[axis]; ++n, p += c.stride(axis)) {
+                const float* after = n + 1 < c.size[axis] ? p + c.stride(axis) : p;
+                std::copy(p, p + width, here.begin());
+                if (n == 0) before = here;
+                for (std::size_t i = 0; i < width; ++i) p[i] = mean(before[i], here[i], after[i]);
+                std::swap(before, here);
+            }
+        }
+    }
+}
+
+// Distance into the side where `share` is large, mm, smoothed; on the other side the negative
+// distance down to -kLayerBandMm. share: smoothed. wanted: share of the body, outside which
+// distances do not matter; null: everywhere. Cost: 12 ms for a torso.
+CellField distance_into(const Cells& c, const CellField& share, const CellField* wanted) {
+    CellField u(share.size());
+    std::vector<std::uint8_t> open(share.size(), 0);
+    constexpr auto kFar = static_cast<float>(kLayerFarMm), kBand = static_cast<float>(kLayerBandMm);
+    const auto mm = static_cast<float>(c.mm);
+    std::size_t at = 0;
+    for (int k = 0; k < c.size.z; ++k) {
+        for (int j = 0; j < c.size.y; ++j) {
+            for (int i = 0; i < c.size.x; ++i, ++at) {
+                const float s = share[at];
+                u[at] = s >= 0.5f ? kFar : -kBand;
+                if (is_flat(c, share, at, {i, j, k})) {  // most cells: far from the surface
+                    open[at] = s >= 0.5f && (wanted == nullptr || (*wanted)[at] > 0.05f);
+                    continue;
+                }
+                const auto slope = [&](int n, int axis) {
+                    const int last = c.size[axis] - 1;
+                    const float* p = share.data() + at;
+                    const std::ptrdiff_t step = c.stride(axis);
+                    return (p[n < last ? step : 0] - p[n > 0 ? -step : 0]) /
+                           (mm * static_cast<float>((n < last) + (n > 0) > 0 ? (n < last) + (n > 0)
+                                                                             : 1));
+                };
+                const float gx = slope(i, 0), gy = slope(j, 1), gz = slope(k, 2);
+                const float steep = std::sqrt(gx * gx + gy * gy + gz * gz);
+                const float level = (s - 0.5f) / std::max(steep, 1e-6f);
+                if (std::abs(level) < mm) {
+                    u[at] = level;  // near the surface the share itself is the distance
+                } else if (s >= 0.5f) {
+                    open[at] = wanted == nullptr || (*wanted)[at] > 0.05f;
+                } else {
+                    u[at] = std::max(level, -kBand);
+                }
+            }
+        }
+    }
+    march(c, open, u);
+    smooth_cells(c, u);
+    return u;
+}
+
 constexpr int kNoiseEdge = 64;
 constexpr double kDistanceUnit = TissueLayers::kDistanceUnit, kNoiseUnit = TissueLayers::kNoiseUnit;
 
-// Tissue of the wall, and what runs through it: everything else is an organ.
+// True unless the tissue belongs to the wall, or to what runs through it.
 bool is_organ(const Label& label, const Tissue& tissue) {
     constexpr std::array<std::string_view, 9> kWall{
         "skin", "fat", "muscle", "tendon", "fascia", "nerve", "soft_tissue", "cartilage", "blood"};
@@ -33,15 +201,16 @@ std::vector<std::uint8_t> kinds_of_labels(const CaseBundle& bundle) {
     for (std::size_t l = 1; l < bundle.labels.size() && l < kinds.size(); ++l) {
         kinds[l] = 5;
         if (tissue_of[l] < 0) continue;
-        const Tissue& tissue = bundle.tissues[static_cast<std::size_t>(tissue_of[l])];
+        const Tissue& tissue = bundle.tissues[tissue_of[l]];
         if (is_organ(bundle.labels[l], tissue)) kinds[l] = 3;
         if (tissue.name == "blood") kinds[l] = 1;
     }
     return kinds;
 }
 
-// Where the voxels lie in bricks that stand for the cells along one axis, `samples` for each cell.
-// `brick` is a place in the table and `inside` one in a brick, each by the axis' own stride.
+// The voxels that stand for the cells along one axis, `samples` per cell, and where they lie in the
+// bricks: `brick` is the part of the place in the table and `inside` that in the brick which the
+// axis adds.
 struct Sample {
     std::uint32_t brick = 0, inside = 0;
 };
@@ -56,7 +225,7 @@ Samples samples_of(const BrickVolume<std::uint8_t>& labels, const Cells& c, int 
         for (int n = 0; n < samples * c.size[axis]; ++n) {
             const int in_cell = c.edge * (2 * (n % samples) + 1) / (2 * samples);
             const int voxel = std::min(n / samples * c.edge + in_cell, labels.size[axis] - 1);
-            out[static_cast<std::size_t>(axis)].push_back(
+            out[axis].push_back(
                 {static_cast<std::uint32_t>(voxel / kBrickEdge * brick_stride[axis]),
                  static_cast<std::uint32_t>(voxel % kBrickEdge * inside_stride[axis])});
         }
@@ -64,8 +233,8 @@ Samples samples_of(const BrickVolume<std::uint8_t>& labels, const Cells& c, int 
     return out;
 }
 
-// Shares of body, organ and wall in each cell: from eight of its voxels, and from 64 where those
-// differ.
+// Finds the shares of body, organ and wall in each cell, from eight of its voxels, and from 64
+// where those differ.
 void find_shares(const CaseBundle& bundle,
                  const Cells& c,
                  JobRunner& jobs,
@@ -85,9 +254,8 @@ void find_shares(const CaseBundle& bundle,
                                                          x.inside + y.inside + z.inside]];
     };
     const auto shares_of = [&](const Samples& places, int samples, int i, int j, int k) {
-        const Sample *x = &places[0][static_cast<std::size_t>(samples * i)],
-                     *y = &places[1][static_cast<std::size_t>(samples * j)],
-                     *z = &places[2][static_cast<std::size_t>(samples * k)];
+        const Sample *x = &places[0][samples * i], *y = &places[1][samples * j],
+                     *z = &places[2][samples * k];
         int inside = 0, organs = 0, walls = 0;
         for (int w = 0; w < samples; ++w) {
             for (int v = 0; v < samples; ++v) {
@@ -104,26 +272,25 @@ void find_shares(const CaseBundle& bundle,
                       unit * static_cast<float>(walls)};
     };
     const auto mixed = [](float share) { return share > 0 && share < 1; };
-    parallel_halves(jobs, static_cast<std::size_t>(c.size.z),
-                    [&](std::size_t, std::size_t begin, std::size_t end) {
-                        std::size_t at = begin * static_cast<std::size_t>(c.stride(2));
-                        for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
-                            for (int j = 0; j < c.size.y; ++j) {
-                                for (int i = 0; i < c.size.x; ++i, ++at) {
-                                    Shares s = shares_of(few, 2, i, j, k);
-                                    if (mixed(s.body) || mixed(s.organ) || mixed(s.wall))
-                                        s = shares_of(many, 4, i, j, k);
-                                    body[at] = s.body;
-                                    organ[at] = s.organ;
-                                    wall[at] = s.wall;
-                                }
-                            }
-                        }
-                    });
+    parallel_halves(jobs, c.size.z, [&](std::size_t, std::size_t begin, std::size_t end) {
+        std::size_t at = begin * c.stride(2);
+        for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
+            for (int j = 0; j < c.size.y; ++j) {
+                for (int i = 0; i < c.size.x; ++i, ++at) {
+                    Shares s = shares_of(few, 2, i, j, k);
+                    if (mixed(s.body) || mixed(s.organ) || mixed(s.wall))
+                        s = shares_of(many, 4, i, j, k);
+                    body[at] = s.body;
+                    organ[at] = s.organ;
+                    wall[at] = s.wall;
+                }
+            }
+        }
+    });
 }
 
-// Fat and vessels between organs are no wall: cells above the organs that are not connected with
-// the outside count as organ.
+// Fat and vessels between organs do not belong to the wall: cells above the organs that are not
+// connected with the outside count as organ.
 void keep_what_reaches_out(const Cells& c, const CellField& body, CellField& above) {
     std::vector<std::uint8_t> met(above.size(), 0);
     std::vector<std::size_t> front;
@@ -141,8 +308,7 @@ void keep_what_reaches_out(const Cells& c, const CellField& body, CellField& abo
         front.pop_back();
         std::size_t rest = at;
         for (int axis = 0; axis < 3; ++axis) {
-            const auto n = static_cast<std::size_t>(c.size[axis]);
-            const auto step = static_cast<std::size_t>(c.stride(axis));
+            const std::size_t n = c.size[axis], step = c.stride(axis);
             const std::size_t i = rest % n;
             rest /= n;
             if (i > 0) visit(at - step);
@@ -154,7 +320,7 @@ void keep_what_reaches_out(const Cells& c, const CellField& body, CellField& abo
     }
 }
 
-// To the nearest, halves away from zero.
+// Rounds to the nearest, halves away from zero.
 std::int16_t packed(float value, double unit) {
     const double scaled = std::clamp(static_cast<double>(value) * unit, -32767.0, 32767.0);
     return static_cast<std::int16_t>(scaled + std::copysign(0.5, scaled));
@@ -171,13 +337,13 @@ TissueLayers::Around TissueLayers::around(Point3 voxel) const noexcept {
     int i = 0, j = 0, k = 0;
     const float x = place(voxel.x, size_.x, i), y = place(voxel.y, size_.y, j),
                 z = place(voxel.z, size_.z, k);
-    return {cells_.data() + (static_cast<std::ptrdiff_t>(k) * size_.y + j) * size_.x + i,
-            size_.x > 1 ? 1 : 0,
-            size_.y > 1 ? size_.x : 0,
-            size_.z > 1 ? static_cast<std::ptrdiff_t>(size_.x) * size_.y : 0,
-            x,
-            y,
-            z};
+    return {.lowest = cells_.data() + (static_cast<std::ptrdiff_t>(k) * size_.y + j) * size_.x + i,
+            .sx = size_.x > 1 ? 1 : 0,
+            .sy = size_.y > 1 ? size_.x : 0,
+            .sz = size_.z > 1 ? static_cast<std::ptrdiff_t>(size_.x) * size_.y : 0,
+            .x = x,
+            .y = y,
+            .z = z};
 }
 
 LayerPoint TissueLayers::at(Point3 voxel) const noexcept {
@@ -217,7 +383,8 @@ TissueLayers make_tissue_layers(const CaseBundle& bundle, JobRunner& jobs) {
     CellField body(c.count()), organ(c.count()), wall(c.count());
     find_shares(bundle, c, jobs, body, organ, wall);
     for (CellField* share : {&body, &organ, &wall}) smooth_cells(c, *share);
-    // Above the organs: the share of what is not organ; outside of the body too.
+    // From here on `organ` is the share above the organs, that is of what is not organ, also
+    // outside the body.
     for (std::size_t at = 0; at < organ.size(); ++at) {
         const float known = organ[at] + wall[at] + (1 - body[at]);
         organ[at] = known > 0.05f ? 1 - organ[at] / known : 0;
@@ -242,8 +409,8 @@ TissueLayers make_tissue_layers(const CaseBundle& bundle, JobRunner& jobs) {
     for (int k = 0; k < c.size.z; ++k) {
         for (int j = 0; j < c.size.y; ++j) {
             for (int i = 0; i < c.size.x; ++i, ++at) {
-                const std::size_t n = static_cast<std::size_t>(
-                    i % kNoiseEdge + kNoiseEdge * (j % kNoiseEdge + kNoiseEdge * (k % kNoiseEdge)));
+                const int n =
+                    i % kNoiseEdge + kNoiseEdge * (j % kNoiseEdge + kNoiseEdge * (k % kNoiseEdge));
                 layers.cells_[at] = {packed(depth[at], kDistanceUnit),
                                      packed(above[at], kDistanceUnit), packed(wave[n], kNoiseUnit),
                                      packed(strength[n], kNoiseUnit)};

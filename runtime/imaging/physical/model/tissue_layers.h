@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Where the layers of the body wall run: two smooth distances on a coarse grid, from which sheets
-// that the label volume does not show get places that belong to the tissue.
+// Where the layers of the body wall run: two smooth distances on a coarse grid. They give sheets
+// that the label volume does not show a place that belongs to the tissue.
 #pragma once
 
 #include <array>
@@ -14,27 +14,27 @@
 
 namespace sonocase::runtime {
 
-// At a point: mm below the skin (negative outside), mm outside the organs (negative inside), and
-// two noises of unit deviation: the wave of a sheet (correlated over 8 mm) and its strength (5 mm).
+// What is known at a point: mm below the skin (negative outside), mm outside the organs (negative
+// inside), and two noises of unit deviation: the wave of a sheet (correlated over 8 mm) and its
+// strength (5 mm).
 struct LayerPoint {
     double depth = 0, above_organs = 0, wave = 0, strength = 0;
 };
 
-// Distances beyond kLayerFarMm are cut there; those on the other side of a surface at
-// -kLayerBandMm.
+// Distances are clamped to [-kLayerBandMm, kLayerFarMm].
 inline constexpr double kLayerFarMm = 60, kLayerBandMm = 8;
 
 class TissueLayers {
   public:
     bool empty() const { return cells_.empty(); }
 
-    // Between the centres of cells of about 6 mm, linear; the nearest cell beyond the volume.
-    // Neither allocates nor throws. Cost: 15 ns.
+    // Interpolates between the centres of cells of about 6 mm; takes the nearest cell beyond the
+    // volume. Neither allocates nor throws. Cost: 15 ns.
     LayerPoint at(Point3 voxel) const noexcept;
     double depth_at(Point3 voxel) const noexcept;  // at().depth alone, for half the cost
 
-    // What at() reads, for vectorised look-ups: per cell depth and above_organs in 1 /
-    // kDistanceUnit mm, wave and strength in 1 / kNoiseUnit, side by side; x fastest.
+    // What at() reads, for vectorised look-ups. Per cell, side by side: depth and above_organs in
+    // 1 / kDistanceUnit mm, wave and strength in 1 / kNoiseUnit; x fastest.
     static constexpr double kDistanceUnit = 256, kNoiseUnit = 4096;
     const std::int16_t* cells() const { return cells_.front().data(); }
     Int3 size() const { return size_; }
@@ -63,10 +63,10 @@ class TissueLayers {
     std::vector<std::array<std::int16_t, 4>> cells_;
 };
 
-// Surfaces are smoothed over 18 mm: the skin, and the hull of the organs (soft tissue that is not
-// wall, bile, urine, gas and lung). Where both are plane the distances are exact to
-// about a millimetre, and along them even.
-// A bundle whose every label is outside gives layers without depth. Cost: 25 ms for a torso.
+// Two surfaces are smoothed over 18 mm: the skin, and the hull of the organs (soft tissue that is
+// not wall, bile, urine, gas and lung). Where they are plane, the distances are exact to about a
+// millimetre and smooth along them. A bundle whose labels are all outside gives layers without
+// depth. Cost: 25 ms for a torso.
 TissueLayers make_tissue_layers(const CaseBundle& bundle, JobRunner& jobs);
 
 }  // namespace sonocase::runtime

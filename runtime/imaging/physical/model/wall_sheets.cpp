@@ -6,14 +6,16 @@
 #include <cstdint>
 #include <span>
 
-#include "runtime/imaging/noise/noise.h"
+#include "formats/base/constants.h"
+#include "runtime/imaging/core/noise.h"
 
 namespace sonocase::runtime::physical {
 namespace {
 
 struct Sheet {
-    double at_mm, db, width_mm;  // over liver; full width at half height in the picture at 3.5 MHz
-    double double_mm = 0;        // > 0: a second sheet, so much deeper, kDoubleDb weaker
+    // db: over liver; width_mm: full width at half height in the picture at 3.5 MHz.
+    double at_mm, db, width_mm;
+    double double_mm = 0;  // > 0: a second sheet, this much deeper, kDoubleDb weaker
 };
 
 constexpr double kDoubleDb = -4;
@@ -33,7 +35,7 @@ constexpr double kLamellaDb = 4.5, kLamellaSpreadDb = 10;
 constexpr double kLamellaApartMm = 0.7, kLamellaApartSpreadMm = 1.2;
 constexpr double kLamellaMm = 0.75, kLamellaSpreadMm = 0.4;
 
-// What a pulse of a third of the length shows: septa of fat and fasciae, thin and many.
+// Sheets that a pulse of a third of the length shows: septa of fat and fasciae, thin and many.
 constexpr Sheet kOuterFine[] = {
     {0.5, 12, 0.9},
     {9.5, 14, 1, 1.1},
@@ -48,7 +50,7 @@ constexpr Sheet kInnerFine[] = {
 constexpr double kFineMhz = 6;
 constexpr int kNoLimitDb = 100;
 
-// Faint sheets from the first to beyond the last of `sheets`.
+// Adds faint sheets from the first to beyond the last of `sheets`.
 void add_lamellae(std::span<const Sheet> sheets, std::vector<Sheet>& out) {
     std::uint32_t drawn = 71 * static_cast<std::uint32_t>(sheets.size());
     const auto uniform = [&] { return (hash32(++drawn) >> 8) / 16777216.0; };
@@ -75,10 +77,9 @@ std::vector<float> table_of(std::span<const Sheet> sheets,
     std::vector<float> table(static_cast<std::size_t>((last + kWallBeforeMm) * kWallSteps), 0.0f);
     const auto add = [&](double at_mm, double db, double width_mm) {
         // The picture shows the sheet and the pulse together.
-        constexpr double kFwhmPerSigma = 2.3548200450309493;
         const double seen = width_mm * scale;
         const double own = std::max(seen * seen - axial_mm * axial_mm, 0.09 * seen * seen);
-        const double sigma = std::sqrt(own) / kFwhmPerSigma;
+        const double sigma = std::sqrt(own) / kFullWidthPerSigma;
         const double amplitude = std::pow(10.0, db / 20) * layer_scale(sigma);
         for (std::size_t i = 0; i < table.size(); ++i) {
             const double u = (static_cast<double>(i) / kWallSteps - kWallBeforeMm - at_mm) / sigma;
@@ -108,7 +109,7 @@ WallTables make_wall_tables(double frequency_mhz,
         t.outer = table(kOuterFine);
         t.inner = table(kInnerFine);
         t.wave_mm = 0.15;
-        t.structure_db = kNoLimitDb;
+        t.max_structure_db = kNoLimitDb;
         t.strength_db = 12;
         t.node_mm = 1.25;
     } else {
@@ -117,7 +118,7 @@ WallTables make_wall_tables(double frequency_mhz,
         t.wave_mm = 0.25;
         t.own_wave_mm = 0.4;
         t.ground_db = 15;
-        t.structure_db = -7;
+        t.max_structure_db = -7;
         t.strength_db = 4;
     }
     return t;

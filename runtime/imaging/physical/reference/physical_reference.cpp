@@ -1,30 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "runtime/imaging/physical/reference/physical_reference.h"
-#include "runtime/imaging/physical/model/equaliser.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
+#include "runtime/imaging/physical/model/cell_effects.h"
 #include "runtime/imaging/physical/reference/reference_beams.h"
-#include "runtime/imaging/physical/reference/reference_contrast.h"
-#include "runtime/imaging/physical/reference/reference_equaliser.h"
+#include "runtime/imaging/physical/reference/reference_cells.h"
 
 namespace sonocase::runtime {
 namespace {
 
 using namespace physical;
 
-// Beyond the outermost beams their neighbours repeat, mirrored.
+// Mirrors an index beyond the outermost beams.
 int reflect(int l, int n) {
     if (l < 0) l = -1 - l;
     if (l >= n) l = 2 * n - 1 - l;
     return std::clamp(l, 0, n - 1);
 }
 
-// work(k, l) for every sample.
+// Calls work(k, l) for every sample.
 template <class Work>
 void for_samples(const ReferenceInput& in, const Work& work) {
     for (int k = 0; k < in.geometry.samples; ++k) {
@@ -39,12 +38,11 @@ double seen_by_aperture(const ReferenceInput& in, const Plane& plane, int k, int
                                            3 / 15.0, 2 / 15.0, 1 / 15.0};
     double smooth = 0;
     for (int j = -3; j <= 3; ++j)
-        smooth += kBoxes[static_cast<std::size_t>(j + 3)] *
-                  plane[in.at(k, reflect(l + 2 * j, in.geometry.scanlines))];
+        smooth += kBoxes[j + 3] * plane[in.at(k, reflect(l + 2 * j, in.geometry.scanlines))];
     return smooth;
 }
 
-// Light that remains of the light above it, after neighbouring beams have shared that.
+// The light that remains after neighbouring beams have shared the light above.
 Plane spread_light(const ReferenceInput& in, const Plane& light) {
     const int beams = in.tables.spread_beams, lines = in.geometry.scanlines;
     if (beams == 0) return light;
@@ -56,7 +54,7 @@ Plane spread_light(const ReferenceInput& in, const Plane& light) {
             const double above = (1 - 2 * share) * out[in.at(k - 1, l)] +
                                  share * (out[in.at(k - 1, reflect(l - beams, lines))] +
                                           out[in.at(k - 1, reflect(l + beams, lines))]);
-            const bool lit = was > 0 && above > kLeastLight;
+            const bool lit = was > 0 && above > kMinLight;
             out[in.at(k, l)] = lit ? above * (light[in.at(k, l)] / was) : 0;
         }
     }
@@ -82,8 +80,7 @@ void spread_across(const ReferenceInput& in, ComplexPlane& echoes) {
         const Row& row = in.row(k);
         double re = 0, im = 0;
         for (int j = -row.reach; j <= row.reach; ++j) {
-            const double tap =
-                static_cast<double>(row.lateral[static_cast<std::size_t>(kMaxLateral + j)]);
+            const double tap = static_cast<double>(row.lateral[kMaxLateral + j]);
             const std::size_t at = in.at(k, reflect(l + j, in.geometry.scanlines));
             re += tap * from.re[at];
             im += tap * from.im[at];
@@ -93,8 +90,8 @@ void spread_across(const ReferenceInput& in, ComplexPlane& echoes) {
     });
 }
 
-// Tails, ringing and reverberation: echoes of their own, before the point spread and the gain. One
-// look carries them for all.
+// Adds tails, ringing and reverberation: echoes of their own, before the point spread and the gain.
+// One look carries them for all.
 void add_clutter_noise(const ReferenceInput& in,
                        const Plane& tail,
                        const Plane& clutter,
@@ -111,7 +108,8 @@ void add_clutter_noise(const ReferenceInput& in,
     });
 }
 
-// Electronic noise, each beam's own: before the gain and its filter, in one look for all.
+// Adds electronic noise, which each beam has of its own: before the gain and its filter, in one
+// look for all.
 void add_electronic_noise(const ReferenceInput& in, ComplexPlane& echoes) {
     const PhysicalEffects& on = in.frame.effects;
     if (!on.noise || !has_noise(in.tables)) return;
@@ -119,8 +117,7 @@ void add_electronic_noise(const ReferenceInput& in, ComplexPlane& echoes) {
         const Row& row = in.row(k);
         double n_re = 0, n_im = 0;
         for (int j = 0; j < (on.persistence ? in.tables.persisted : 1); ++j) {
-            const double w =
-                on.persistence ? in.tables.persistence[static_cast<std::size_t>(j)] : 1;
+            const double w = on.persistence ? in.tables.persistence[j] : 1;
             const std::uint32_t number = in.frame.frame - static_cast<std::uint32_t>(j);
             n_re += w * in.draw(in.noise.fine, NoiseUse::electronic_re, number, k, l);
             n_im += w * in.draw(in.noise.fine, NoiseUse::electronic_im, number, k, l);
@@ -141,8 +138,7 @@ Plane envelope_power(const ReferenceInput& in, const ComplexPlane& echoes) {
             re = im = 0;
             for (int j = -in.tables.axial_reach; j <= in.tables.axial_reach; ++j) {
                 if (k + j < 0 || k + j >= in.geometry.samples) continue;
-                const double tap =
-                    static_cast<double>(in.tables.axial[static_cast<std::size_t>(kMaxAxial + j)]);
+                const double tap = static_cast<double>(in.tables.axial[kMaxAxial + j]);
                 re += tap * echoes.re[in.at(k + j, l)];
                 im += tap * echoes.im[in.at(k + j, l)];
             }
@@ -165,7 +161,7 @@ Plane mean_clutter(const ReferenceInput& in, const Plane& clutter) {
     return mean;
 }
 
-// What the looks leave of the face's ringing and of reverberation: steady power.
+// Adds the steady power that the looks leave of the face's ringing and of reverberation.
 void add_steady(const ReferenceInput& in, const Plane& clutter, Plane& power) {
     for_samples(in, [&](int k, int l) {
         const Row& row = in.row(k);
@@ -174,7 +170,7 @@ void add_steady(const ReferenceInput& in, const Plane& clutter, Plane& power) {
     });
 }
 
-// Looks are detected and averaged.
+// Adds a look to the mean of the detected looks.
 void add_look(const ReferenceInput& in, int look, const Plane& of_look, Plane& power) {
     for_samples(in, [&](int k, int l) {
         const int looks = in.row(k).looks;
@@ -182,16 +178,16 @@ void add_look(const ReferenceInput& in, int look, const Plane& of_look, Plane& p
     });
 }
 
-// Side lobes and reverberation: the mean envelope nearby, some decibels below.
+// Haze of side lobes: the mean envelope nearby, some decibels below.
 class Haze {
   public:
     Haze(const ReferenceInput& in, const Plane& power)
         : cells_k_((in.geometry.samples + kHazeCell - 1) / kHazeCell),
           cells_l_((in.geometry.scanlines + kHazeCell - 1) / kHazeCell),
-          wide_(static_cast<std::size_t>(cells_k_ * cells_l_)) {
+          wide_(cells_k_ * cells_l_) {
         Plane sum(wide_.size(), 0.0), number(wide_.size(), 0.0);
         for_samples(in, [&](int k, int l) {
-            const std::size_t cell = at(k / kHazeCell, l / kHazeCell);
+            const int cell = at(k / kHazeCell, l / kHazeCell);
             sum[cell] += std::sqrt(power[in.at(k, l)]);
             number[cell] += 1;
         });
@@ -222,7 +218,7 @@ class Haze {
     }
 
   private:
-    std::size_t at(int ck, int cl) const { return static_cast<std::size_t>(ck * cells_l_ + cl); }
+    int at(int ck, int cl) const { return ck * cells_l_ + cl; }
 
     int cells_k_, cells_l_;
     Plane wide_;
@@ -270,7 +266,7 @@ Plane grey_of(const ReferenceInput& in, const Plane& power) {
         const double own_db =
             grain_db > 0 ? grain_db * in.draw(in.noise.white, NoiseUse::grain, 0, k, l) : 0;
         const double db = 10 * std::log10(power[in.at(k, l)] + 1e-12) + own_db + in.row(k).unit_db +
-                          static_cast<double>(in.frame.row_gain_db[static_cast<std::size_t>(k)]);
+                          static_cast<double>(in.frame.row_gain_db[k]);
         double g = line.of_unit + line.per_db * db;
         if (!logarithm) {
             g = map.floor + std::exp2(std::min(g, 12.0));
@@ -309,8 +305,8 @@ void convert(const ReferenceInput& in, const Plane& shade, std::span<std::uint8_
                     (shade[in.at(k1, l)] * (1 - (line - l)) + shade[in.at(k1, l1)] * (line - l)) *
                         (sample - k);
             }
-            pixels[static_cast<std::size_t>(r) * static_cast<std::size_t>(g.width_px) +
-                   static_cast<std::size_t>(c)] = static_cast<std::uint8_t>(std::lround(value));
+            pixels[static_cast<std::size_t>(r) * g.width_px + static_cast<std::size_t>(c)] =
+                static_cast<std::uint8_t>(std::lround(value));
         }
     }
 }
@@ -328,7 +324,7 @@ void render_physical_reference(const PhysicalScene& scene,
     const Plane clutter = mean_clutter(in, beams.clutter), light = spread_light(in, beams.light);
     Plane power(in.count(), 0.0);
     for (int look = 0; look < tables.looks; ++look) {
-        ComplexPlane echoes = light_echoes(in, light, beams.looks[static_cast<std::size_t>(look)]);
+        ComplexPlane echoes = light_echoes(in, light, beams.looks[look]);
         if (look == 0) add_clutter_noise(in, beams.tail, clutter, echoes);
         if (frame.effects.point_spread) spread_across(in, echoes);
         if (look == 0) add_electronic_noise(in, echoes);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The slow, obvious renderer of model `physical`: doubles, one sample after the other, the formula
-// beside each line. It defines what the fast renderer has to show. Cost: some 100 ns per sample and
-// effect; memory for a dozen planes of samples.
+// The slow, obvious renderer of model `physical`: double precision, one sample after the other,
+// each line the formula itself. It defines what the fast renderer has to show. Cost: some 100 ns
+// per sample and effect; memory for a dozen planes of samples.
 #pragma once
 
 #include <cstdint>

@@ -8,10 +8,7 @@
 
 #include "runtime/imaging/physical/model/gas_faces.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
-#include "runtime/imaging/physical/reference/reference_press.h"
-#include "runtime/imaging/physical/reference/reference_speckle.h"
-#include "runtime/imaging/physical/reference/reference_surface.h"
-#include "runtime/imaging/physical/reference/reference_wall.h"
+#include "runtime/imaging/physical/reference/reference_tissue.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -20,13 +17,13 @@ using namespace physical;
 
 // What one beam carries down from sample to sample.
 struct BeamLight {
-    double log2_light = 0;    // left after the tissue, there and back
-    double needle_light = 0;  // log2 left after the needle
+    double log2_light = 0;    // log2 of the light left after the tissue, there and back
+    double needle_light = 0;  // log2 of the light left after the needle
     double bone = 0, bone_slow = 0, bone_floor = 0, gas = 0, needle_tail = 0;  // tails, amplitudes
     double lit = 0;                           // the last light well before a face of gas
     double reverb = 0, period = 0, next = 0;  // next line: amplitude, mm between lines, its depth
     double clutter = 0;                       // power
-    TissueKind before = TissueKind::soft, before_that = TissueKind::soft;  // of the samples above
+    TissueKind before = TissueKind::soft, before_that = TissueKind::soft;  // two samples above
 
     void fade(double step_mm) {
         bone *= std::exp(-step_mm / kBoneTailMm);
@@ -42,8 +39,8 @@ struct Face {
     double depth_mm = static_cast<double>(kNoFace), dome_mm = depth_mm, peak = 0, cosine = 1;
 };
 
-// A face of bone lights its tails; one of gas does so from the second sample on, since a single
-// sample of gas is a neighbour's that the random look-up brought.
+// Starts the tails of a face of bone or gas. Gas counts from its second sample on, since a single
+// one belongs to a neighbour that the random look-up hit.
 void light_tails(
     const ReferenceInput& in, TissueKind kind, const Face& face, const Sample& p, BeamLight& t) {
     const double here = p.here, gain = p.row.gain;
@@ -53,7 +50,7 @@ void light_tails(
                                kBoneTailSlow * kBoneTail * kMaxReflection * p.facing * here * gain);
         t.bone_floor = std::max(t.bone_floor, kBoneFloor * std::min(here * gain, 1.0));
     }
-    // The frame's face, if it is known: with the light shortly before it.
+    // The frame's face, if it is known, gets the light shortly before it.
     const bool known =
         in.scene.has_gas && (in.frame.effects.diaphragm || in.frame.effects.gas_ring_down);
     if (p.row.r_mm < face.depth_mm - kFaceLightMm) t.lit = here * gain;
@@ -128,7 +125,7 @@ class Beams {
   public:
     explicit Beams(const ReferenceInput& input)
         : in_(input),
-          gaps_(static_cast<std::size_t>(input.geometry.scanlines), 0.0f),
+          gaps_(input.geometry.scanlines, 0.0f),
           slice_(speckle_slice(input.frame.volume_from_probe.rotation * Vector3{0, 1, 0},
                                input.tables.cell_mm)) {
         const PhysicalFrame& f = in_.frame;
@@ -142,12 +139,12 @@ class Beams {
             breathing_ = BreathingField(*in_.scene.bundle);
         if (in_.scene.has_gas && (f.effects.diaphragm || f.effects.gas_ring_down)) {
             const NodeSpacing spacing = node_spacing(in_.geometry, in_.tables);
-            std::vector<FaceNode> nodes(static_cast<std::size_t>(spacing.nodes()));
+            std::vector<FaceNode> nodes(spacing.nodes());
             for (int n = 0; n < spacing.nodes(); ++n) {
-                FaceNode& node = nodes[static_cast<std::size_t>(n)];
-                node = find_face(
-                    in_.scene, in_.geometry, spacing, f, breathing_.empty() ? nullptr : &breathing_,
-                    static_cast<double>(gaps_[static_cast<std::size_t>(spacing.line(n))]), n);
+                FaceNode& node = nodes[n];
+                node = find_face(in_.scene, in_.geometry, spacing, f,
+                                 breathing_.empty() ? nullptr : &breathing_,
+                                 static_cast<double>(gaps_[spacing.line(n)]), n);
                 if (!f.effects.diaphragm) node.peak = 0;
             }
             for (auto* per_beam : {&faces_.depth_mm, &faces_.dome_mm, &faces_.peak, &faces_.cosine})
@@ -176,26 +173,24 @@ class Beams {
         const Vector3 beam = in_.frame.volume_from_probe.rotation * Vector3{d.x, 0, d.z};
         BeamLight t;
         const Face face = face_of(l);
-        if (in_.frame.effects.contact)
-            t.log2_light = std::log2(in_.tables.edge[static_cast<std::size_t>(l)]);
+        if (in_.frame.effects.contact) t.log2_light = std::log2(in_.tables.edge[l]);
         for (int k = 0; k < g.samples; ++k) {
             const std::size_t at = in_.at(k, l);
             t.fade(g.step_mm);
-            if (gaps_[static_cast<std::size_t>(l)] < 0) {  // air: nothing comes back
+            if (gaps_[l] < 0) {  // nothing comes back from air
                 out.light[at] = 0;
                 continue;
             }
             Sample p = place_sample(k, l, beam);
             if (in_.frame.effects.targets) find_target(in_, p);
-            const AcousticProperties& look =
-                in_.scene.looks[static_cast<std::size_t>(p.look_index)];
+            const AcousticProperties& acoustics = in_.scene.acoustics[p.acoustics_index];
             const double past = in_.row(k).r_mm - face.dome_mm;
             const bool dome = past > -1;
             const double line = dome_echo(face, past);
-            const WallEcho wall = meet_wall(k, l, look);
-            echo_of_tissue(look, wall, line, p);
+            const WallEcho wall = meet_wall(k, l, acoustics);
+            echo_of_tissue(acoustics, wall, line, p);
             p.re += p.row.interface_scale * wall.amplitude;
-            if (look.kind == TissueKind::soft) meet_streaks(o, d, p);
+            if (acoustics.kind == TissueKind::soft) meet_streaks(o, d, p);
             meet_surface(in_, beam, p);
             if (in_.frame.effects.targets) meet_targets(in_, beam, p);
             if (std::abs(past) < kDomeReachMm) {
@@ -209,7 +204,7 @@ class Beams {
             add_clutter(in_, p, t);
             out.clutter[at] = t.clutter;
             if (dome) p.loss = past < kDomeReachMm ? 0 : 1e9;
-            light_tails(in_, look.kind, face, p, t);
+            light_tails(in_, acoustics.kind, face, p, t);
             meet_needle(in_, o, d, p, t);
             for (std::size_t i = 0; i < out.looks.size(); ++i) {
                 out.looks[i].re[at] = p.re + p.field_re[i];
@@ -225,7 +220,7 @@ class Beams {
     // The point that beam l shows at depth r, in the middle of the slab.
     Point3 point_at(int l, double r_mm) const {
         const PhysicalFrame& f = in_.frame;
-        const double gap = static_cast<double>(gaps_[static_cast<std::size_t>(l)]);
+        const double gap = static_cast<double>(gaps_[l]);
         const Point3 x =
             point_on_beam(in_.geometry, f, l, r_mm, gap * std::exp(-r_mm / kGapReachMm));
         return breathing_.empty() ? x : x - breathing_.weight(x) * f.motion.breathing_mm;
@@ -233,13 +228,11 @@ class Beams {
 
     Face face_of(int l) const {
         if (faces_.depth_mm.empty()) return {};
-        const auto at = [&](const std::vector<float>& v) {
-            return static_cast<double>(v[static_cast<std::size_t>(l)]);
-        };
+        const auto at = [&](const std::vector<float>& v) { return static_cast<double>(v[l]); };
         return {at(faces_.depth_mm), at(faces_.dome_mm), at(faces_.peak), at(faces_.cosine)};
     }
 
-    // The diaphragm's line, past mm behind it along the beam: the scatterers' share.
+    // The scatterers' share of the diaphragm's line, `past` mm behind it along the beam.
     static double dome_echo(const Face& face, double past) {
         if (std::abs(past) >= kDomeReachMm) return 0;
         const double q = past * face.cosine;
@@ -249,10 +242,10 @@ class Beams {
                 kDomeTail * std::exp(-std::abs(q) / kDomeTailMm));
     }
 
-    // Plates that face the beam, in soft tissue.
+    // Adds plates that face the beam, in soft tissue.
     void meet_streaks(PlanePoint o, PlanePoint d, Sample& p) const {
         for (int n = 0; n < streak_count_; ++n) {
-            const Streak& s = streaks_[static_cast<std::size_t>(n)];
+            const Streak& s = streaks_[n];
             const double x = o.x + p.row.r_mm * d.x - s.centre.x,
                          z = o.z + p.row.r_mm * d.z - s.centre.z;
             const double along = 2 * (x * s.normal.z - z * s.normal.x) / s.length_mm;
@@ -263,12 +256,12 @@ class Beams {
         }
     }
 
-    // Sheets of the wall, in soft tissue.
-    WallEcho meet_wall(int k, int l, const AcousticProperties& look) const {
+    // Echo of the sheets of the wall, in soft tissue.
+    WallEcho meet_wall(int k, int l, const AcousticProperties& acoustics) const {
         const double step = in_.geometry.step_mm;
         const int every = std::clamp(static_cast<int>(in_.tables.wall.node_mm / step), 1, 32);
         const int rows = static_cast<int>(kWallDepthMm / step) / every * every;
-        if (!in_.frame.effects.wall || look.kind != TissueKind::soft || k >= rows ||
+        if (!in_.frame.effects.wall || acoustics.kind != TissueKind::soft || k >= rows ||
             in_.scene.layers.empty())
             return {};
         const double half = 0.5 * every * step;
@@ -297,43 +290,43 @@ class Beams {
                                                          (jitter2 * sideways + jitter * beam));
         p.place = place_at(s, f, p.v, p.looked_up);
         if (f.press != nullptr) press_place(in_, k, l, beam, p.place);
-        p.look_index = p.place.label;
+        p.acoustics_index = p.place.label;
         return p;
     }
 
-    // Echo and attenuation of the tissue itself.
-    // dome: what the diaphragm adds to the scatterers, amplitude.
-    void echo_of_tissue(const AcousticProperties& look,
+    // Echo and attenuation of the tissue itself. dome: amplitude that the diaphragm adds to the
+    // scatterers.
+    void echo_of_tissue(const AcousticProperties& acoustics,
                         const WallEcho& wall,
                         double dome,
                         Sample& p) const {
         const PhysicalEffects& on = in_.frame.effects;
-        double echo_db = look.echo_db + (on.wall ? look.wall_db : 0);
-        if (p.look_index == p.place.label) {
+        double echo_db = acoustics.echo_db + (on.wall ? acoustics.wall_db : 0);
+        if (p.acoustics_index == p.place.label) {
             double structure = fine_offset_db(
                 in_.scene, on, p.place.label,
                 in_.scene.grid.voxel_from_point(in_.scene.grid.origin_mm + p.from_origin));
             if (on.structure) {
                 double baked = echo_offset_db(in_.scene, p.looked_up);
-                const std::vector<double>& most = in_.scene.structure_most_db;
-                if (!most.empty())
-                    baked = std::min(baked, most[static_cast<std::size_t>(p.place.label)]);
+                const std::vector<double>& limit = in_.scene.max_structure_db;
+                if (!limit.empty()) baked = std::min(baked, limit[p.place.label]);
                 const std::vector<double>& dead = in_.scene.structure_dead_db;
                 if (on.parenchyma && !dead.empty()) {
-                    const double own = dead[static_cast<std::size_t>(p.place.label)];
+                    const double own = dead[p.place.label];
                     baked -= std::clamp(baked, -own, own);
                 }
                 structure += baked;
             }
             if (wall.in_wall)
-                structure = std::min(structure, static_cast<double>(in_.tables.wall.structure_db));
+                structure =
+                    std::min(structure, static_cast<double>(in_.tables.wall.max_structure_db));
             echo_db += structure + wall.ground_db;
         }
         if (dome > 0)
-            echo_db +=
-                kDbPerLog2 * std::log2(1 + dome) + (look.kind == TissueKind::gas ? kDomeGasDb : 0);
+            echo_db += kDbPerLog2 * std::log2(1 + dome) +
+                       (acoustics.kind == TissueKind::gas ? kDomeGasDb : 0);
         const double amplitude =
-            look.kind == TissueKind::outside ? 0 : std::exp2(echo_db / kDbPerLog2);
+            acoustics.kind == TissueKind::outside ? 0 : std::exp2(echo_db / kDbPerLog2);
         p.field_re.fill(amplitude);
         if (on.speckle) {
             const SpeckleSample field =
@@ -345,7 +338,7 @@ class Beams {
                 p.field_im[i] = level * field.im[i];
             }
         }
-        p.loss = on.attenuation ? look.attenuation * in_.tables.frequency_mhz *
+        p.loss = on.attenuation ? acoustics.attenuation * in_.tables.frequency_mhz *
                                       in_.geometry.step_mm * 0.1 * 2 / kDbPerLog2
                                 : 0;
     }
@@ -353,7 +346,7 @@ class Beams {
     const ReferenceInput& in_;
     std::vector<float> gaps_;  // # scanlines; negative: air
     BreathingField breathing_;
-    std::vector<Streak> streaks_ = std::vector<Streak>(kMostStreaks);
+    std::vector<Streak> streaks_ = std::vector<Streak>(kMaxStreaks);
     int streak_count_ = 0;
     GasFaces faces_;
     const SpeckleSlice slice_;
@@ -364,9 +357,8 @@ class Beams {
 BeamSamples reference_beams(const ReferenceInput& input) {
     const std::size_t count = input.count();
     const std::vector<double> dark(count, 0.0);
-    BeamSamples out{
-        std::vector<ComplexPlane>(static_cast<std::size_t>(input.tables.looks), {dark, dark}),
-        std::vector<double>(count, 1.0), dark, dark, CellPlane(input)};
+    BeamSamples out{std::vector<ComplexPlane>(input.tables.looks, {dark, dark}),
+                    std::vector<double>(count, 1.0), dark, dark, CellPlane(input)};
     const Beams beams(input);
     for (int l = 0; l < input.geometry.scanlines; ++l) {
         beams.trace(l, out);

@@ -21,7 +21,7 @@ struct BeamSamples {
     std::vector<double> light;        // amplitude that is left, there and back
     std::vector<double> tail;         // power behind bone, gas and needle
     std::vector<double> clutter;      // power of the reverberation
-    CellPlane noise;                  // of the tissue, for speckle_reduction
+    CellPlane noise;                  // noise of the tissue, for speckle_reduction
 };
 
 BeamSamples reference_beams(const ReferenceInput& input);

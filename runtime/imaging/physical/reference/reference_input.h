@@ -16,17 +16,15 @@ struct ReferenceInput {
 
     // Sample k of beam l in a plane of # samples x scanlines, row by row.
     std::size_t at(int k, int l) const {
-        return static_cast<std::size_t>(k) * static_cast<std::size_t>(geometry.scanlines) +
-               static_cast<std::size_t>(l);
+        return static_cast<std::size_t>(k) * geometry.scanlines + l;
     }
     std::size_t count() const {
-        return static_cast<std::size_t>(geometry.samples) *
-               static_cast<std::size_t>(geometry.scanlines);
+        return static_cast<std::size_t>(geometry.samples) * geometry.scanlines;
     }
-    const physical::Row& row(int k) const { return tables.rows[static_cast<std::size_t>(k)]; }
+    const physical::Row& row(int k) const { return tables.rows[k]; }
 
-    // Noise of unit deviation for beam l in a row of a tile. number: of the frame; 0 where the
-    // noise belongs to the scene and not to the frame.
+    // Noise of unit deviation for beam l in a row of a tile. number: the frame's; 0 where the noise
+    // belongs to the scene and not to the frame.
     double draw(const std::vector<std::int8_t>& tile,
                 NoiseUse use,
                 std::uint32_t number,

@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <vector>
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_ui_parts {
 namespace {
 
 struct Drawing {
@@ -146,4 +146,4 @@ void draw_icon(ImDrawList* draw, Icon icon, float x, float y, float side, unsign
     }
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_ui_parts

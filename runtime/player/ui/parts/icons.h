@@ -5,7 +5,7 @@
 
 struct ImDrawList;
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_ui_parts {
 
 enum class Icon {
     none,
@@ -70,4 +70,4 @@ enum class Icon {
 // runtime/display/theme.h.
 void draw_icon(ImDrawList* draw, Icon icon, float x, float y, float side, unsigned packed);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_ui_parts

@@ -9,7 +9,7 @@
 
 #include "runtime/player/words/words.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_ui_parts {
 
 std::string text(const char* format, double value) {
     char line[64];
@@ -82,6 +82,13 @@ bool coloured_button(unsigned packed, const char* words, float width) {
     return clicked;
 }
 
+std::string clock_words(double seconds) {
+    char words[32];
+    const int whole = static_cast<int>(seconds);
+    std::snprintf(words, sizeof words, "%d:%02d", whole / 60, whole % 60);
+    return words;
+}
+
 bool begin_dialog(const char* title, bool& open, float width, float height, float scale) {
     const ImGuiIO& io = ImGui::GetIO();
     ImGui::SetNextWindowPos({0.5f * io.DisplaySize.x, 0.5f * io.DisplaySize.y}, ImGuiCond_Appearing,
@@ -103,4 +110,4 @@ void end_dialog() {
     ImGui::PopStyleVar(2);
 }
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_ui_parts

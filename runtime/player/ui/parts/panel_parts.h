@@ -8,7 +8,7 @@
 
 #include "runtime/display/theme.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_ui_parts {
 
 void heading(const char* words);
 void small_dim(const char* words);
@@ -31,10 +31,12 @@ bool coloured_button(unsigned packed, const char* words, float width);
 
 // printf of one number.
 std::string text(const char* format, double value);
+// Minutes and seconds: "1:05".
+std::string clock_words(double seconds);
 
 // A window over the page, first shown in its middle, with a title bar that can close it. True if
 // its content is to be drawn. end_dialog() follows in either case.
 bool begin_dialog(const char* title, bool& open, float width, float height, float scale);
 void end_dialog();
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_ui_parts

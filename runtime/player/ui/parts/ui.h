@@ -14,15 +14,15 @@
 #include <vector>
 
 #include "runtime/display/theme.h"
-#include "runtime/player/ui/layout/box.h"
 #include "runtime/player/ui/parts/icons.h"
+#include "runtime/player/ui/parts/layout.h"
 
-namespace sonocase::runtime {
+namespace sonocase::runtime::inline player_ui_parts {
 
 enum class Type { small, body, bold, heading, large, title };
 enum class Align { left, centre, right };
 
-struct Look {
+struct ButtonStyle {
     Icon icon = Icon::none;
     bool primary = false;  // the one filled button of a page
     bool chosen = false;   // a bar at the bottom, and bold
@@ -31,8 +31,8 @@ struct Look {
     bool link = false;   // words in the accent colour, no fill
     bool tile = false;   // icon above small words
     bool left = false;   // words at the left edge
-    // Words of the users' own (names, titles), which may be too long: an ellipsis stands for the
-    // rest, and the whole is the tooltip.
+    // The words are the user's own (a name, a title) and may be too long: an ellipsis then stands
+    // for the rest, and the tooltip shows the whole.
     bool may_cut = false;
     const char* key = "";  // shown as a key cap; empty: none
     const char* tip = "";  // tooltip; empty: none
@@ -82,7 +82,7 @@ class Ui {
     void unclip();
 
     // One line in the middle of the box's height. Too long: cut, with an ellipsis, and the whole as
-    // a tooltip; may_cut says that this is no fault.
+    // a tooltip; with may_cut that is not a fault.
     void text(const Box& box,
               const std::string& words,
               Type type,
@@ -101,7 +101,10 @@ class Ui {
     float paragraph_height(float width, const std::string& words, Type type) const;
 
     // Controls. True: pressed, on release inside or by Enter.
-    bool button(const char* id, const Box& box, const std::string& words, const Look& look = {});
+    bool button(const char* id,
+                const Box& box,
+                const std::string& words,
+                const ButtonStyle& style = {});
     // A name, minus, a value and plus. Held, it repeats. -1, 0 or 1.
     int stepper(const char* id,
                 const Box& box,
@@ -143,8 +146,8 @@ class Ui {
              const std::string& value,
              unsigned packed = colour::kText);
     void tooltip(const std::string& words);
-    // Moves `scroll` in [0, most] with the wheel over the box, and shows where it is.
-    void scroll_by_wheel(const Box& box, double& scroll, double most);
+    // Moves `scroll` in [0, max] with the wheel over the box, and shows where it is.
+    void scroll_by_wheel(const Box& box, double& scroll, double max);
 
     // The focus that Tab moves.
     bool has_focus() const { return focus_ != 0; }
@@ -161,7 +164,10 @@ class Ui {
     };
     Press press(const char* id, const Box& box, bool enabled, const char* tip);
     void note(DrawnBox::Kind kind, const Box& box, const std::string& name, bool cut = false);
-    void draw_button(const Box& box, const std::string& words, const Look& look, const Press& now);
+    void draw_button(const Box& box,
+                     const std::string& words,
+                     const ButtonStyle& style,
+                     const Press& now);
     void show_tip(unsigned id, bool hovered, bool focused, const std::string& words);
 
     float scale_ = 1;
@@ -184,4 +190,4 @@ class Ui {
 // The button that leaves a page, cut from the left of its bar. True if it was pressed.
 bool back_button(Ui& ui, Box& bar, const char* id, const std::string& words, const char* tip);
 
-}  // namespace sonocase::runtime
+}  // namespace sonocase::runtime::inline player_ui_parts

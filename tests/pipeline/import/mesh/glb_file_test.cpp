@@ -57,7 +57,7 @@ TEST(GlbFile, RefusesWhatItCannotRead) {
     EXPECT_NE(refusal(glb_of({{"a", nan, ""}})).find("not a number"), std::string::npos);
 }
 
-// One byte at a time of the description: a message or a result, never more.
+// Changes the description byte by byte: each time there is a message or a result, never a crash.
 TEST(GlbFile, SurvivesChangedBytes) {
     const auto whole = glb_of({{"a", ball_mesh({0, 0, 0}, 1, 4), ""}});
     int refused = 0;

@@ -30,7 +30,7 @@ class MeshFolder : public ::testing::Test {
     }
     void TearDown() override { fs::remove_all(folder_); }
 
-    // In metres, as GLB has it.
+    // GLB is in metres.
     void write(const std::string& file, std::vector<GlbNode> nodes) {
         for (GlbNode& node : nodes)
             for (Point3& p : node.surface.points) p = {p.x / 1000, p.y / 1000, p.z / 1000};
@@ -170,7 +170,7 @@ TEST(BodyRules, ArmsEndAtTheArmpit) {
                 trunk += std::abs(p.x) < 120;
             }
     EXPECT_LE(farthest, 122);           // the trunk and 3 mm, in voxels of 4
-    EXPECT_EQ(trunk, 60u * 34u * 70u);  // of which nothing is lost
+    EXPECT_EQ(trunk, 60u * 34u * 70u);  // all of it
 }
 
 }  // namespace

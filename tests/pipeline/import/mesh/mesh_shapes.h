@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/constants.h"
 #include "formats/volume/surface.h"
 
 namespace sonocase::testing {
@@ -15,12 +16,11 @@ namespace sonocase::testing {
 // A ball of latitude rings; inwards: turned inside out.
 inline Surface ball_mesh(Point3 centre, double radius_mm, int rings = 24, bool inwards = false) {
     Surface s;
-    const double pi = 3.14159265358979;
     const int around = 2 * rings;
     s.points.push_back(centre + Vector3{0, 0, radius_mm});
     for (int r = 1; r < rings; ++r)
         for (int a = 0; a < around; ++a) {
-            const double t = pi * r / rings, p = 2 * pi * a / around;
+            const double t = kPi * r / rings, p = 2 * kPi * a / around;
             s.points.push_back(centre + radius_mm * Vector3{std::sin(t) * std::cos(p),
                                                             std::sin(t) * std::sin(p),
                                                             std::cos(t)});

@@ -2,12 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include "formats/base/constants.h"
 #include "pipeline/base/counter_random.h"
-#include "pipeline/import/mesh/fill_lumen.h"
 #include "pipeline/import/mesh/mend_mesh.h"
 #include "pipeline/import/mesh/mesh_shapes.h"
-#include "pipeline/import/mesh/winding_number.h"
-#include "pipeline/import/mesh/winding_voxels.h"
+#include "pipeline/import/mesh/solid_voxels.h"
 #include "support/shapes.h"
 
 namespace sonocase::pipeline {
@@ -15,8 +14,6 @@ namespace {
 
 using testing::ball_mesh;
 using testing::without_top;
-
-constexpr double kPi = 3.14159265358979;
 
 Surface together(Surface a, const Surface& b) {
     const auto base = static_cast<std::uint32_t>(a.points.size());
@@ -27,7 +24,7 @@ Surface together(Surface a, const Surface& b) {
 }
 
 TEST(MendMesh, WeldsPatchesAndTurnsThemOutwards) {
-    // Every triangle with corners of its own: a soup.
+    // Every triangle has its own corners.
     const Surface ball = ball_mesh({3, 4, 5}, 20, 24, true);
     Surface soup;
     for (const auto& t : ball.triangles) {
@@ -53,7 +50,7 @@ TEST(MendMesh, CapsAnOpeningAndTellsItsLength) {
     EXPECT_GT(solid.triangles.size(), bowl.triangles.size());
 }
 
-// A part is as cheap beside a large one as alone: a table cleared for every part would take hours.
+// A small part costs the same beside a large one as alone; a table cleared per part takes hours.
 TEST(MendMesh, TakesNoLongerForEachOfManyParts) {
     Surface scan = ball_mesh({0, 0, 0}, 100, 300);
     const auto corners = static_cast<std::uint32_t>(scan.points.size());

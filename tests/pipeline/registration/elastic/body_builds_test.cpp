@@ -10,13 +10,13 @@
 #include <optional>
 #include <tuple>
 
-#include "formats/registration/registration_json.h"
+#include "formats/base/constants.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/import/label_map.h"
-#include "pipeline/import/surface/surface_file.h"
-#include "pipeline/registration/map/fold_proof.h"
+#include "pipeline/import/mesh/surface_file.h"
+#include "pipeline/import/volume/label_map.h"
 #include "pipeline/registration/map/inverse_map.h"
-#include "pipeline/registration/map/one_to_one_proof.h"
+#include "pipeline/registration/map/map_proofs.h"
+#include "pipeline/registration/map/registration.h"
 #include "support/fit_report.h"
 #include "support/paths.h"
 #include "support/torso_builds.h"
@@ -42,8 +42,8 @@ RegisterOptions hints(const BuiltMannequin& mannequin) {
     return options;
 }
 
-// Of the true surface within 20 mm of a reading: distances to the mapped skin, at its 95th
-// percentile. Where the patient ends nothing can be compared.
+// 95th percentile of the distances from the true surface to the mapped skin, within 20 mm of a
+// reading. Where the patient ends nothing can be compared.
 double rim_error_mm(const BuiltMannequin& mannequin, const RegisterResult& result) {
     const SkinSurfaceResult& skin = torso_patient().skin;
     const Surface mapped = mapped_skin(skin.skin, result.registration, Point3{});
@@ -86,7 +86,7 @@ TEST_P(BodyBuilds, AreReachedAndOrgansKept) {
         joint_change(result->organs, "bones", [](std::string_view t) { return t == "bone"; });
     EXPECT_NEAR(bones.volume_ratio, 1, 0.08);
     EXPECT_NE(note(*result, "path"), "quadratic");
-    // The inverse closes the loop.
+    // The inverse leads back.
     const InverseMap inverse_map(result->registration);
     Random random(5);
     for (int n = 0; n < 500; ++n) {
@@ -250,8 +250,8 @@ TEST(SharedPair, KeepsTheResidualWarpAndTheElasticOneIsCloser) {
     EXPECT_GT(measure(*elastic, "least_minor"), 0);
 }
 
-// A hidden quadratic keeps the map of before, even where it changes organs by more than a body of
-// another build would.
+// For a hidden quadratic the residual warp is kept, even where it changes organs by more than a
+// body of another build would.
 TEST(SharedPair, AKnownQuadraticIsNotTakenForAnotherBuild) {
     if (!shared_labels()) GTEST_SKIP() << "no " SONOCASE_DATA;
     const LabelVolume& labels = shared_labels()->labels;
@@ -278,7 +278,7 @@ TEST(OneToOneProof, ASpiralPassesTheFoldProofAndFailsThisOne) {
     grid.spacing_mm = 10;
     grid.origin_mm = spiral.ct_box.lower;
     grid.size = {43, 15, 15};
-    const double turn = 2 * 3.14159265358979 * 1.2 / 400;
+    const double turn = 2 * kPi * 1.2 / 400;
     for (int k = 0; k < grid.size.z; ++k) {
         for (int j = 0; j < grid.size.y; ++j) {
             for (int i = 0; i < grid.size.x; ++i) {
@@ -291,11 +291,11 @@ TEST(OneToOneProof, ASpiralPassesTheFoldProofAndFailsThisOne) {
         }
     }
     const FoldProof fold = prove_no_fold(spiral);
-    EXPECT_GT(fold.least_bound, 0.2);
+    EXPECT_GT(fold.min_bound, 0.2);
     const OneToOneProof proof = prove_one_to_one(spiral);
     EXPECT_FALSE(proof.proven());
-    EXPECT_LE(proof.least_minor(), 0);
-    // And rightly: two places have one image.
+    EXPECT_LE(proof.min_minor(), 0);
+    // Correct: two places have one image.
     const InverseMap inverse_map(spiral);
     Point3 back;
     const Point3 place{-190, 0, 0};
@@ -324,8 +324,8 @@ TEST(OneToOneProof, NeverLiesAboveASampleOfTheMinors) {
                 {2 * random.gaussian(), 2 * random.gaussian(), 2 * random.gaussian()});
         const OneToOneProof proof = prove_one_to_one(r);
         EXPECT_TRUE(proof.proven());
-        // Any two points: what the proof promises.
-        double least = 1e9;
+        // The proof holds for any two points.
+        double smallest = 1e9;
         for (int n = 0; n < 20000; ++n) {
             const auto place = [&] {
                 return Point3{random.uniform(-100, 100), random.uniform(-80, 80),
@@ -333,13 +333,13 @@ TEST(OneToOneProof, NeverLiesAboveASampleOfTheMinors) {
             };
             const Point3 a = place(), b = place();
             const Vector3 image = mannequin_from_ct(r, a) - mannequin_from_ct(r, b);
-            least = std::min(least, dot(image, pose.rotation * (a - b)) / dot(a - b, a - b));
+            smallest = std::min(smallest, dot(image, pose.rotation * (a - b)) / dot(a - b, a - b));
         }
-        // The mean Jacobian's rotation is that of the pose to some hundredths.
-        EXPECT_GT(least, 0);
+        // The mean Jacobian's rotation is that of the pose within a few hundredths.
+        EXPECT_GT(smallest, 0);
         for (std::size_t m = 0; m < 3; ++m) {
-            EXPECT_LE(proof.least_bound[m], proof.least_sample[m] + 1e-12);
-            EXPECT_GT(proof.least_bound[m], proof.least_sample[m] - 0.1);  // and is not idle
+            EXPECT_LE(proof.min_bound[m], proof.min_sample[m] + 1e-12);
+            EXPECT_GT(proof.min_bound[m], proof.min_sample[m] - 0.1);  // and is not far below it
         }
     }
 }

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The parts of the elastic warp against what they must be: slopes against the B-spline itself, the
-// transpose against the definition of one, the energy against closed forms and its own differences.
+// The parts of the elastic warp: slopes against the B-spline itself, the transpose against its
+// definition, the energy against closed forms and its own differences.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "formats/base/constants.h"
+#include "pipeline/registration/elastic/elastic_rows.h"
 #include "pipeline/registration/elastic/elastic_strain.h"
-#include "pipeline/registration/elastic/natural_log.h"
 #include "pipeline/registration/elastic/organ_change.h"
-#include "pipeline/registration/elastic/rim_patch.h"
 #include "pipeline/registration/elastic/spline_lattice.h"
 #include "support/random.h"
 
@@ -68,7 +68,7 @@ TEST(SplineLattice, SlopesAreThoseOfTheDisplacement) {
             for (int i = 0; i < size.x; ++i, ++n) {
                 const Matrix3 m = displacement_jacobian(grid, lattice.place(i, j, k));
                 for (int r = 0; r < 3; ++r) {
-                    // Single precision of values of some 5 / 30.
+                    // Single precision of values of about 5 / 30.
                     EXPECT_NEAR(static_cast<double>(slopes.x[n][r]), m(r, 0), 2e-6);
                     EXPECT_NEAR(static_cast<double>(slopes.y[n][r]), m(r, 1), 2e-6);
                     EXPECT_NEAR(static_cast<double>(slopes.z[n][r]), m(r, 2), 2e-6);
@@ -150,7 +150,7 @@ TEST(ElasticStrain, ATurnCostsNothingAndAScalingWhatTheFormulaSays) {
         if (det < 0.6) expected += 30 * std::pow(std::log(det / 0.6), 2);
         const ElasticStrain::Value value = still(strain, lattice);
         EXPECT_NEAR(value.energy_mm2, expected, 1e-5 * (1 + expected)) << s;
-        EXPECT_NEAR(value.least_det, det, 1e-6);
+        EXPECT_NEAR(value.min_det, det, 1e-6);
     }
 }
 
@@ -225,7 +225,7 @@ TEST(RimPatches, ACylinderGoesOnBeyondItsLastReading) {
     Surface readings;
     Random random(7);
     for (int n = 0; n < 1500; ++n) {
-        const double angle = random.uniform(0, 3.14159265358979), z = random.uniform(-150, 150);
+        const double angle = random.uniform(0, kPi), z = random.uniform(-150, 150);
         readings.points.push_back({130 * std::cos(angle), 130 * std::sin(angle), z});
     }
     const auto target = prepare_target(readings);
@@ -239,11 +239,11 @@ TEST(RimPatches, ACylinderGoesOnBeyondItsLastReading) {
             const double angle = -20.0 / 130;
             const Point3 beyond = Point3{side * 130 * std::cos(angle), 130 * std::sin(angle), z} -
                                   (target->origin - Point3{});
-            const auto foot = patches.foot(target->index.nearest(beyond), beyond);
-            found += foot.found;
-            if (foot.found) {
+            const auto nearest = patches.nearest_point(target->index.nearest(beyond), beyond);
+            found += nearest.found;
+            if (nearest.found) {
                 // The readings nearest to the edge lie up to 10 mm inside it.
-                EXPECT_LT(std::abs(foot.gap_mm), 0.9);
+                EXPECT_LT(std::abs(nearest.gap_mm), 0.9);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 // Bodies that are not the patient's in other ways than build: bent, with one arm, pregnant, of
 // another length, with organs that were not labelled. Each ends with a proven map that is close, or
-// with the sentence that says why not.
+// with the reason why not.
 #include <gtest/gtest.h>
 
 #include <algorithm>

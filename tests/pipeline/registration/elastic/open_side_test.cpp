@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Which side of a sweep is open, and what follows for the pose.
-#include "pipeline/registration/open_side.h"
+#include "pipeline/registration/fit/open_side.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -16,14 +17,12 @@ namespace {
 
 using namespace sonocase::testing;
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
-
 TEST(OpenSide, OfHalfAndWholeCylinders) {
     Random random(1);
-    for (const double from : {0.0, -3.14159265358979}) {
+    for (const double from : {0.0, -kPi}) {
         Surface tube;
         for (int n = 0; n < 1500; ++n) {
-            const double angle = random.uniform(from, 3.14159265358979);
+            const double angle = random.uniform(from, kPi);
             tube.points.push_back(
                 {150 * std::cos(angle), 110 * std::sin(angle), random.uniform(-180, 180)});
         }
@@ -35,7 +34,7 @@ TEST(OpenSide, OfHalfAndWholeCylinders) {
             if (from == 0) {
                 EXPECT_GT(side.size, 0.3);
                 EXPECT_TRUE(side.open());
-                EXPECT_GT(dot(side.direction, {0, -1, 0}), std::cos(15 * kDegree));
+                EXPECT_GT(dot(side.direction, {0, -1, 0}), std::cos(15 * kRadPerDeg));
             } else {
                 EXPECT_LT(side.size, 0.1);
                 EXPECT_EQ(side.weight_mm2(), 0);
@@ -82,7 +81,7 @@ TEST(OpenSide, TwentyOpenSweepsAreReadWithinFifteenDegreesAndClosedOnesNotAtAll)
             const auto target = prepare_target(open.sweep);
             ASSERT_TRUE(target);
             const OpenSide side = find_open_side(*target, open.head);
-            right += side.open() && dot(side.direction, open.back) > std::cos(15 * kDegree);
+            right += side.open() && dot(side.direction, open.back) > std::cos(15 * kRadPerDeg);
             plan.least_front = -2;
             const auto closed = prepare_target(built_mannequin(build, seed, plan).sweep);
             ASSERT_TRUE(closed);

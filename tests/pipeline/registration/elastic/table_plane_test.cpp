@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A table that was read with the mannequin: found, left out of the fit, and what it is good for.
-#include "pipeline/registration/matching/table_plane.h"
+// A table that was read with the mannequin is found, left out of the fit, and used as a hint.
+#include "pipeline/registration/fit/table_plane.h"
+#include "formats/base/constants.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/registration/open_side.h"
+#include "pipeline/registration/fit/open_side.h"
 #include "pipeline/registration/register_surfaces.h"
 #include "support/torso_builds.h"
 
@@ -16,8 +17,6 @@ namespace sonocase::pipeline {
 namespace {
 
 using namespace sonocase::testing;
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 // A mannequin on a table that touches its back, read beside the body.
 struct OnTable {
@@ -62,7 +61,7 @@ TEST(TablePlane, IsFoundAmongFewAndManyReadingsWithinADegreeAndTwoMillimetres) {
                 ASSERT_TRUE(table.found);
                 // 12 readings with a noise of 0.7 mm leave the normal uncertain by a third of a
                 // degree.
-                EXPECT_GT(dot(table.normal, -m.back), std::cos(1 * kDegree));
+                EXPECT_GT(dot(table.normal, -m.back), std::cos(1 * kRadPerDeg));
                 EXPECT_LT(std::abs(dot(table.normal, lying.place - table.place)), 2);
                 long taken = 0;
                 for (std::size_t i = 0; i < table.on_table.size(); ++i) {
@@ -72,7 +71,7 @@ TEST(TablePlane, IsFoundAmongFewAndManyReadingsWithinADegreeAndTwoMillimetres) {
                         taken += table.on_table[i];
                     }
                 }
-                // Where the back touches the table, a reading is either's.
+                // Where the back touches the table, a reading may belong to either.
                 EXPECT_LE(taken, 4);
             }
         }

@@ -66,7 +66,7 @@ double compare_parts(const LabelVolume& volume, const LabelSet& labels, Int3 edg
     const VoxelBox box = distance.distance(labels, &whole, &scratch);
     EXPECT_EQ(whole.size(), box.count());
     std::size_t compared = 0, differ = 0;
-    float most = 0;
+    float largest = 0;
     for (int z = 0; z < box.size.z; z += edge.z) {
         for (int y = 0; y < box.size.y; y += edge.y) {
             for (int x = 0; x < box.size.x; x += edge.x) {
@@ -84,7 +84,7 @@ double compare_parts(const LabelVolume& volume, const LabelSet& labels, Int3 edg
                             const float other = whole[box.index(x + i, y + j, z + k)];
                             ++compared;
                             differ += piece[n] != other;
-                            most = std::max(most, std::abs(piece[n] - other));
+                            largest = std::max(largest, std::abs(piece[n] - other));
                         }
                     }
                 }
@@ -92,8 +92,8 @@ double compare_parts(const LabelVolume& volume, const LabelSet& labels, Int3 edg
         }
     }
     EXPECT_EQ(compared, box.count());
-    // A stray more or less changes the width of smoothing around it, and that a little.
-    EXPECT_LT(most, 0.3 * volume.grid.spacing_mm.x);
+    // One stray voxel more or less slightly changes the width of smoothing around it.
+    EXPECT_LT(largest, 0.3 * volume.grid.spacing_mm.x);
     return static_cast<double>(differ) / static_cast<double>(compared);
 }
 
@@ -112,7 +112,7 @@ TEST(LabelDistance, ColumnsOfThickSlicesAreTheWholeCutUp) {
 }
 
 TEST(LabelDistance, SmoothStructuresAreTheSameToTheLastBit) {
-    // A ball has no strays but for none at all: nothing depends on where a part ends.
+    // A ball has no stray voxels, so nothing depends on where a part ends.
     Grid grid = cubic_grid(120);
     const LabelVolume volume = sample_labels(grid, 2, [](Point3 p) {
         return norm(p - Point3{3, 1, -2}) < 38 ? 1 : 0;

@@ -68,9 +68,8 @@ TEST(SignedDistance, SliceModeNeverLooksAtAnotherSlice) {
         signed_distance(slice, 1, {{0, 0, 0}, slice.grid.size}, 4.0, {true, true, true}, &alone);
         for (std::size_t v = 0; v < 144; ++v) {
             // Half a voxel is the mean spacing of the axes measured: 7/3 against 1.
-            const float shift =
-                volume.voxels[static_cast<std::size_t>(k) * 144 + v] == 1 ? -1.f : 1.f;
-            const float a = phi[static_cast<std::size_t>(k) * 144 + v] * shift;
+            const float shift = volume.voxels[k * 144 + v] == 1 ? -1.f : 1.f;
+            const float a = phi[k * 144 + v] * shift;
             const float b = alone[v] * shift + static_cast<float>(0.5 * (7.0 / 3 - 1));
             ASSERT_NEAR(a, std::min(b, 4.0f), 1e-5) << k << " " << v;
         }

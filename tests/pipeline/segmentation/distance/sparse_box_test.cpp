@@ -11,8 +11,8 @@
 namespace sonocase::pipeline {
 namespace {
 
-// Two balls that touch, a sheet one voxel thick and single voxels, in a box that reaches over the
-// border of no run and of several.
+// Two balls that touch, a sheet one voxel thick and single voxels, in a box that crosses the
+// borders of several runs, or of none.
 LabelVolume scene(Int3 size, Vector3 spacing_mm) {
     LabelVolume volume;
     volume.grid.size = size;
@@ -125,7 +125,7 @@ TEST(SparseBox, PartsAreCutOutAtAnyNode) {
     EXPECT_TRUE(same(plain(again), all));
 }
 
-// What is needed is what it would be if all were.
+// The part that is computed is the same as if everything were.
 TEST(SparseBox, NeededBlocksHoldWhatTheWholeHolds) {
     const Int3 size{90, 50, 60};
     const LabelVolume volume = scene(size, {1, 1, 1});

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Short cuts of the label field, which must not change its answers.
+// Shortcuts of the label field, which must not change its results.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "pipeline/segmentation/field/label_field.h"
 #include "pipeline/segmentation/known_maps.h"
+#include "pipeline/segmentation/label_field.h"
 #include "support/random.h"
 #include "support/shapes.h"
 

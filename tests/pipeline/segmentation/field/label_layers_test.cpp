@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Distances that come and go by layers give what distances that stay do, bit for bit.
+// Distances made and dropped layer by layer give the same as distances that are kept, bit for bit.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "pipeline/segmentation/field/label_field.h"
-#include "pipeline/segmentation/field/sampled_field.h"
-#include "pipeline/segmentation/field/volume_correction.h"
+#include "pipeline/segmentation/label_field.h"
+#include "pipeline/segmentation/sampled_field.h"
+#include "pipeline/segmentation/volume_correction.h"
 #include "support/random.h"
 
 namespace sonocase::pipeline {
@@ -16,7 +16,7 @@ namespace {
 using sonocase::testing::Random;
 
 // A body 300 slices long: three layers of blocks. A vessel winds through all of it, balls lie on
-// the borders of layers at slices 128 and 256, and one voxel of a label of its own is lost by
+// the borders of layers at slices 128 and 256, and one voxel with its own label is lost by
 // sampling.
 LabelVolume long_body() {
     LabelVolume ct;
@@ -50,10 +50,10 @@ struct Sampled {
 Sampled sample(const LabelVolume& ct,
                std::size_t held_mb,
                double turn_rad,
-               std::size_t most_float_nodes = LabelFieldOptions{}.most_float_nodes) {
+               std::size_t max_float_nodes = LabelFieldOptions{}.max_float_nodes) {
     LabelFieldOptions options;
     options.held_mb = held_mb;
-    options.most_float_nodes = most_float_nodes;
+    options.max_float_nodes = max_float_nodes;
     LabelField field(ct, options);
     EXPECT_EQ(field.layer_count(), 3);
     EXPECT_EQ(field.holds_all(), held_mb > 0);
@@ -103,7 +103,7 @@ TEST(LabelLayers, GiveTheSameBytesAsAllDistancesAtOnce) {
     }
 }
 
-// 16-bit numbers: whatever the layers, and next to what floats give.
+// 16-bit numbers give the same whatever the layers, and nearly the same as floats.
 TEST(LabelLayers, HalvedNumbersGiveTheSameSurfaces) {
     const LabelVolume ct = long_body();
     const Sampled floats = sample(ct, LabelFieldOptions::kAll, 0.3);

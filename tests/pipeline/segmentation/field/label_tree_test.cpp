@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/segmentation/distance/signed_distance.h"
-#include "pipeline/segmentation/field/label_tree.h"
+#include "pipeline/segmentation/label_tree.h"
 #include "support/shapes.h"
 
 namespace sonocase::pipeline {
@@ -41,7 +41,7 @@ TEST(LabelTree, OnlyTheLabelBetweenTouchingOrgansNeedsItsOwnDistance) {
     EXPECT_EQ(tree.between, (std::vector<bool>{false, false, false, true, false, false, false}));
 }
 
-// The claim behind the sum of distances, on the distances as measured and whatever the tree.
+// The claim behind the sum of distances, tested on measured distances, whatever the tree.
 TEST(LabelTree, TheSumIsLeastForTheLabelOfEveryVoxel) {
     const LabelVolume volume = body();
     const LabelTree tree = nest_labels(volume);
@@ -54,15 +54,15 @@ TEST(LabelTree, TheSumIsLeastForTheLabelOfEveryVoxel) {
     }
     for (std::size_t v = 0; v < volume.voxels.size(); ++v) {
         std::size_t best = 0;
-        double least = 1e9;
+        double lowest = 1e9;
         for (std::size_t l = 0; l < n; ++l) {
             if (tree.parent[l] == LabelTree::kAbsent) continue;
             double score = 0;
             for (std::size_t e = 0; e < n; ++e) {
                 if (!phi[e].empty() && tree.members[e][l]) score += phi[e][v];
             }
-            if (score < least) {
-                least = score;
+            if (score < lowest) {
+                lowest = score;
                 best = l;
             }
         }

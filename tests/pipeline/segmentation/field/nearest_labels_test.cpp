@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The grid of cooked labels, and nearest-neighbour resampling into it.
-#include "pipeline/segmentation/field/nearest_labels.h"
+#include "pipeline/segmentation/nearest_labels.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "pipeline/segmentation/field/cooked_grid.h"
+#include "pipeline/segmentation/cooked_grid.h"
 #include "pipeline/segmentation/known_maps.h"
 #include "support/random.h"
 #include "support/shapes.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/segmentation/field/volume_correction.h"
+#include "pipeline/segmentation/volume_correction.h"
 
 #include <gtest/gtest.h>
 
@@ -46,7 +46,7 @@ TEST(VolumeCorrection, OneNodeInFourGivesTheSameOffsets) {
     VolumeCorrectionOptions options;
     const auto weight = [](Point3 p) { return 1 + 0.2 * std::cos(0.05 * p.x); };
     const VolumeCorrectionReport expected = correct_volumes(&all, weight, options);
-    options.most_read_nodes = 0;
+    options.max_read_nodes = 0;
     const VolumeCorrectionReport report = correct_volumes(&some, weight, options);
     for (std::size_t l = 0; l < 5; ++l) {
         EXPECT_DOUBLE_EQ(report.target_mm3[l], expected.target_mm3[l]) << l;

@@ -5,19 +5,19 @@
 #include <cmath>
 
 #include "pipeline/base/counter_random.h"
-#include "pipeline/texture/spectrum/autocorrelation.h"
-#include "pipeline/texture/spectrum/fourier.h"
+#include "pipeline/texture/autocorrelation.h"
+#include "pipeline/texture/fourier.h"
 
 namespace sonocase::pipeline {
 namespace {
 
 TEST(Fourier, CubeReturnsAndFindsASingleWave) {
     const int n = 16;
-    std::vector<std::complex<float>> cube(static_cast<std::size_t>(n * n * n));
+    std::vector<std::complex<float>> cube(n * n * n);
     for (int z = 0; z < n; ++z)
         for (int y = 0; y < n; ++y)
             for (int x = 0; x < n; ++x)
-                cube[static_cast<std::size_t>(x + n * (y + n * z))] =
+                cube[x + n * (y + n * z)] =
                     static_cast<float>(std::cos(2 * M_PI * (2 * x + 3 * y + 5 * z) / n));
     const auto before = cube;
     fourier_cube(cube, n, false);
@@ -25,8 +25,7 @@ TEST(Fourier, CubeReturnsAndFindsASingleWave) {
         for (int y = 0; y < n; ++y)
             for (int x = 0; x < n; ++x) {
                 const bool peak = (x == 2 && y == 3 && z == 5) || (x == 14 && y == 13 && z == 11);
-                EXPECT_NEAR(std::abs(cube[static_cast<std::size_t>(x + n * (y + n * z))]),
-                            peak ? n * n * n / 2 : 0,
+                EXPECT_NEAR(std::abs(cube[x + n * (y + n * z)]), peak ? n * n * n / 2 : 0,
                             2e-3);  // 4096 terms of 1e-7
             }
     fourier_cube(cube, n, true);

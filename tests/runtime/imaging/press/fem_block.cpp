@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "formats/volume/tissue_mechanics.h"
-#include "runtime/imaging/simd/simd_target.h"
+#include "formats/volume/tissue.h"
+#include "runtime/imaging/core/simd_target.h"
 
 namespace sonocase::testing {
 namespace {
@@ -22,7 +22,7 @@ using runtime::press::BeamPoint;
 using runtime::press::PressTissue;
 using Json = nlohmann::json;
 
-constexpr double kUnderFace_mm = 40, kOffPlane_mm = 10;
+constexpr double kUnderFaceMm = 40, kOffPlaneMm = 10;
 
 struct Nrrd {
     std::vector<int> sizes;
@@ -75,7 +75,7 @@ Result<Nrrd> read_nrrd(const std::string& path, std::size_t bytes_per_value) {
     return out;
 }
 
-// By the names of docs/deformation.md; a material may also be an object with figures of its own.
+// Materials have the names of docs/deformation.md; one may also be an object with its own figures.
 PressTissue tissue_of(const Json& material, std::string& name) {
     name = material.is_string() ? material.get<std::string>() : material.value("name", "");
     Tissue tissue;
@@ -130,7 +130,7 @@ double quad_area(const std::array<Point3, 4>& p) {
     return std::abs(twice) / 2;
 }
 
-// Of the elements of a material in the scan plane, over that at rest.
+// The area of the elements of a material in the scan plane, over that at rest.
 double fem_area(const FemBlock& block, const FemState& state, int material) {
     const int j = block.middle_row();
     double area = 0, rest = 0;
@@ -154,11 +154,11 @@ double shown_area(const FemBlock& block,
                   double pressed_mm,
                   const runtime::press::PressField& field,
                   int material) {
-    constexpr double kStep_mm = 0.2;
+    constexpr double kStepMm = 0.2;
     double shown = 0, rest = 0;
     const double half = block.face.half_width_mm;
-    for (double x = -half + kStep_mm / 2; x < half; x += kStep_mm)
-        for (double z = kStep_mm / 2; z < 55; z += kStep_mm) {
+    for (double x = -half + kStepMm / 2; x < half; x += kStepMm)
+        for (double z = kStepMm / 2; z < 55; z += kStepMm) {
             const Point3 p = field.pull_back({x, 0, z});
             shown += block.material({p.x, 1e-6, p.z + pressed_mm}) == material;
             rest += block.material({x, 1e-6, z}) == material;
@@ -251,7 +251,7 @@ BlockError compare(const FemBlock& block,
                                   block.origin_mm.y + j * block.spacing_mm.y,
                                   block.origin_mm.z + k * block.spacing_mm.z};
                 if (std::abs(rest.x) > block.face.half_width_mm + 1e-6 ||
-                    rest.z > kUnderFace_mm + 1e-6)
+                    rest.z > kUnderFaceMm + 1e-6)
                     continue;
                 // Nodes in the air have no displacement; one corner in the body is enough.
                 bool body = false;
@@ -277,7 +277,7 @@ BlockError compare(const FemBlock& block,
     out.mean_mm = mean_of(errors);
     std::sort(errors.begin(), errors.end());
     if (!errors.empty()) out.p95_mm = errors[errors.size() * 95 / 100];
-    const int off = block.middle_row() + static_cast<int>(kOffPlane_mm / block.spacing_mm.y);
+    const int off = block.middle_row() + static_cast<int>(kOffPlaneMm / block.spacing_mm.y);
     double unused = 0;
     if (off < block.nodes.y) out.off_plane_mean_mm = mean_of(errors_at(off, unused));
     if (block.vein >= 0) {

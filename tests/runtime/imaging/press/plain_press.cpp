@@ -171,7 +171,7 @@ void PlainPress::bulge() {
     std::vector<std::array<double, kColumns>> e(kBulgeRows);
     for (int i = 0; i < kColumns; ++i)
         for (int m = 0; m < kBulgeRows; ++m) {
-            const double r = m * kBulgeStep_mm;
+            const double r = m * kBulgeStepMm;
             for (int j = 0; j < kFineRows; ++j)
                 if (r >= edge_[at(i)][at(j)] && r < edge_[at(i)][at(j + 1)])
                     e[at(m)][at(i)] =
@@ -190,12 +190,12 @@ void PlainPress::bulge() {
     for (int i = 0; i < kColumns; ++i) {
         std::vector<double> column;
         for (const auto& row : e) column.push_back(row[at(i)]);
-        column = smooth(std::move(column), kBulgeStep_mm, kBulgeAxial_mm);
+        column = smooth(std::move(column), kBulgeStepMm, kBulgeAxialMm);
         for (int m = 0; m < kBulgeRows; ++m) e[at(m)][at(i)] = column[at(m)];
     }
     const double h = column_width_mm(face_);
     for (auto& row : e) {
-        const std::vector<double> mean = smooth({row.begin(), row.end()}, h, kBulgeLateral_mm);
+        const std::vector<double> mean = smooth({row.begin(), row.end()}, h, kBulgeLateralMm);
         double sum = 0;
         for (int i = 0; i < kColumns; ++i) {
             const double grows = (row[at(i)] - mean[at(i)]) * h;
@@ -226,7 +226,7 @@ BeamPoint PlainPress::pull_back(BeamPoint pressed) const {
     const double column = std::clamp(
         pressed.lateral_mm / column_width_mm(face_) + (kColumns - 1) / 2.0, 0.0, kColumns - 1.0);
     const int i = std::min(static_cast<int>(column), kColumns - 2);
-    const double row = std::clamp(pressed.depth_mm / kBulgeStep_mm, 0.0, kBulgeRows - 1.0);
+    const double row = std::clamp(pressed.depth_mm / kBulgeStepMm, 0.0, kBulgeRows - 1.0);
     const int m = std::min(static_cast<int>(row), kBulgeRows - 2);
     const auto along = [&](int n) {
         return mix(sideways_[at(n)][at(i)], sideways_[at(n)][at(i + 1)], column - i);

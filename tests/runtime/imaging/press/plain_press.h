@@ -42,7 +42,7 @@ class PlainPress {
     Columns<kRows> stress_{};  // kPa
     Columns<kFineRows> stretch_{};
     Columns<kFineRows + 1> edge_{};  // depth from the face of each part's upper edge
-    static constexpr double kBulgeStep_mm = 0.25;
+    static constexpr double kBulgeStepMm = 0.25;
     static constexpr int kBulgeRows = 289;  // 72 mm
     std::vector<std::array<double, kColumns>> sideways_;
     double force_n_ = 0;

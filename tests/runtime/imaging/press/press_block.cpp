@@ -61,7 +61,7 @@ sonocase::Result<nlohmann::ordered_json> errors_of(
                                  {"fem_vein_area", area(e.fem_vein_area)},
                                  {"fem_artery_area", area(e.fem_artery_area)},
                                  {"fem_force_n", e.fem_force_n},
-                                 {"least_determinant", field.state().least_determinant}});
+                                 {"min_determinant", field.state().min_determinant}});
     }
     return out;
 }

@@ -53,7 +53,7 @@ TEST(PressBundle, LooksUpTheVoxelsOwnLabelsAlongAnyLine) {
         const Rigid pose = random.rigid(40);
         const PressScene scene = body.scene(pose);
         std::vector<PressLine> lines;
-        for (int l = 0; l <= n % kMostPressLines; ++l)
+        for (int l = 0; l <= n % kMaxPressLines; ++l)
             lines.push_back({random.point(60), random.direction()});
         const std::array<float, 5> depth{-30, -1, 0, 12.5f, 71};
         std::vector<std::uint8_t> found(depth.size() * lines.size());

@@ -47,9 +47,9 @@ TEST(PressField, AThousandRandomTissuesDoNotFoldAndTheFaceIsWhereItIs) {
         const Body body = random_body(random);
         if (!press(field, body)) continue;
         const PressState& state = field.state();
-        EXPECT_GT(state.least_determinant, 0.01f) << n;
+        EXPECT_GT(state.min_determinant, 0.01f) << n;
         EXPECT_TRUE(std::isfinite(state.force_n)) << n;
-        least = std::min(least, double{state.least_determinant});
+        least = std::min(least, double{state.min_determinant});
         const PressSamples& s = field.samples();
         for (int i = 0; i < kColumns; ++i) {
             const auto at = static_cast<std::size_t>(i);
@@ -61,7 +61,7 @@ TEST(PressField, AThousandRandomTissuesDoNotFoldAndTheFaceIsWhereItIs) {
                 << n << " " << i;
             for (int j = 0; j < kFineRows; ++j) ASSERT_GT(field.columns().stretch.row(j)[i], 0);
         }
-        // By differences, at places between the nodes.
+        // The determinant by differences, at places between the nodes.
         for (int place = 0; place < 20; ++place) {
             const Point3 p{random.uniform(-19, 19), 0, random.uniform(0.1, 65)};
             constexpr double kStep = 1e-4;
@@ -72,7 +72,7 @@ TEST(PressField, AThousandRandomTissuesDoNotFoldAndTheFaceIsWhereItIs) {
         }
     }
     EXPECT_GT(least, 0.01);
-    RecordProperty("least_determinant_thousandths", static_cast<int>(1000 * least));
+    RecordProperty("min_determinant_thousandths", static_cast<int>(1000 * least));
 }
 
 TEST(PressField, EveryInstructionSetGivesTheSameBits) {
@@ -185,7 +185,7 @@ TEST(PressField, AFaceFarInsideTheBodyIsStopped) {
         EXPECT_TRUE(press(field, body));
         EXPECT_TRUE(field.state().out_of_reach);
         EXPECT_NEAR(field.state().deepest_mm, 30, 1e-3);
-        EXPECT_GT(field.state().least_determinant, 0.01f);
+        EXPECT_GT(field.state().min_determinant, 0.01f);
         EXPECT_TRUE(std::isfinite(field.state().force_n));
     }
 }
@@ -213,7 +213,7 @@ TEST(PressField, AirPocketsYieldAsGasDoes) {
     body.lumps.push_back({{0, 0, 15}, 4, kAir, false});
     PressField field({});
     EXPECT_TRUE(press(field, body));
-    EXPECT_GT(field.state().least_determinant, 0.01f);
+    EXPECT_GT(field.state().min_determinant, 0.01f);
     EXPECT_GT(field.state().force_n, 0);
 }
 
@@ -307,7 +307,7 @@ TEST(PressField, ACurvedFacePressesAlongItsBeams) {
     Body body;
     body.pressed_mm = 8;
     EXPECT_TRUE(press(field, body));
-    EXPECT_GT(field.state().least_determinant, 0.01f);
+    EXPECT_GT(field.state().min_determinant, 0.01f);
     // The skin has moved to the face along the beams.
     for (double lateral = -14; lateral <= 14; lateral += 3.5) {
         const Point3 on_face = probe_point(face, {lateral, 0}, 0);

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "pressed_block.h"
-#include "runtime/needle/needle_shift.h"
+#include "runtime/imaging/core/needle_shift.h"
 #include "truth_support.h"
 
 namespace sonocase::runtime {
@@ -35,7 +35,7 @@ TEST(TruthPressed, LabelsAreThoseOfThePlacesThatTheFieldPullsBack) {
                 Planes planes(options);
                 const FrameInput input = pressed_input(mm);
                 const FrameTruth& facts = truth.render(input, planes.spans());
-                renderer->settle(input);
+                renderer->press_probe(input);
                 EXPECT_EQ(facts.press.force_n, renderer->press().force_n);
                 EXPECT_GT(facts.press.force_n, 0.5);
                 EXPECT_TRUE(facts.mannequin_from_probe == renderer->shown_pose());
@@ -48,7 +48,7 @@ TEST(TruthPressed, LabelsAreThoseOfThePlacesThatTheFieldPullsBack) {
                         if (depth_along(exercise.probe, x, z) < 0.5 || z > 45) continue;
                         const Point3 now = renderer->shown_pose() * Point3{x, 0, z};
                         const Point3 rest = renderer->at_rest(now);
-                        if (renderer->shut(rest)) continue;
+                        if (renderer->closed(rest)) continue;
                         const int label = planes.labels[planes.at(column, row)];
                         ++compared;
                         wrong += label != shape.label(rest);
@@ -135,8 +135,8 @@ TEST(TruthPressed, TargetsAndTheTipAreWhereTissueIsNow) {
     auto renderer = Renderer::create(pressed_block(), exercise, options);
     ASSERT_TRUE(renderer);
     FrameInput input = pressed_input(8, 0.01);
-    renderer->settle(input);
-    const Point3 now = renderer->now_at(exercise.targets[0].centre);
+    renderer->press_probe(input);
+    const Point3 now = renderer->current_position(exercise.targets[0].centre);
     EXPECT_GT(now.z, PressedBlock().vein.z + 1);
     input.needle.tip = now;
     const FrameTruth& facts = truth.render(input, {});

@@ -18,14 +18,13 @@ namespace sonocase::runtime {
 struct Planes {
     explicit Planes(const RenderOptions& o)
         : width(o.width_px),
-          labels(static_cast<std::size_t>(o.width_px) * static_cast<std::size_t>(o.height_px), 77),
+          labels(static_cast<std::size_t>(o.width_px) * o.height_px, 77),
           needle(labels.size(), 77),
           shadowed(labels.size(), 77),
           depth(labels.size(), -77.0f) {}
     TruthPlanes spans() { return {labels, needle, shadowed, depth}; }
     std::size_t at(int column, int row) const {
-        return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
-               static_cast<std::size_t>(column);
+        return static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
     }
     bool operator==(const Planes& o) const {
         // Bit by bit: NaN equals itself.

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <optional>
 
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "formats/scoring/anatomy.h"
 #include "support/temporary_folder.h"
 #include "truth_support.h"

@@ -47,51 +47,54 @@ std::unique_ptr<OpenCase> small_open_case() {
 // An attempt that runs, without a window.
 struct Running {
     testing::TemporaryFolder folder;
-    App app;
+    PlayerState player;
+    CaseState loaded;
+    ScanState scan;
     Running() {
-        app.loaded.open = small_open_case();
+        loaded.open = small_open_case();
         EngineOptions options;
         options.render.width_px = options.render.height_px = 64;
         options.render.model = ImageModel::paper;
-        auto engine = ScanEngine::create(app.loaded.open->bundle, app.loaded.exercise(), options);
-        auto run = SessionRun::start(folder / "s.igs.mha", *app.loaded.open, *engine, "", "", 0);
-        app.scan.attempt =
-            std::make_shared<Attempt>(*app.loaded.open, app.loaded.exercise(), std::move(*run));
+        auto engine = ScanEngine::create(loaded.open->bundle, loaded.exercise(), options);
+        auto run = SessionRun::start(folder / "s.igs.mha", *loaded.open, *engine, "", "", 0);
+        scan.training.attempt =
+            std::make_shared<Attempt>(*loaded.open, loaded.exercise(), std::move(*run));
     }
 };
 
 TEST(LeavingAnAttempt, IsAskedAboutOnceAndTheAnswerHoldsForFourSeconds) {
     Running running;
-    App& app = running.app;
-    app.player.now_s = 10;
-    EXPECT_FALSE(may_leave_attempt(app, "F5"));
-    ASSERT_EQ(app.view.notices.standing().size(), 1u);
-    EXPECT_NE(app.view.notices.standing()[0].text.find("F5"), std::string::npos);
-    app.player.now_s = 12;
-    EXPECT_TRUE(may_leave_attempt(app, "F5"));
-    EXPECT_FALSE(may_leave_attempt(app, "Ctrl + Q"));  // another key is another question
-    app.player.now_s = 30;
-    EXPECT_FALSE(may_leave_attempt(app, "F5"));
-    app.scan.attempt.reset();
-    EXPECT_TRUE(may_leave_attempt(app, "F5"));  // nothing to lose
+    auto& [folder, player, loaded, scan] = running;
+    player.now_s = 10;
+    EXPECT_FALSE(may_leave_attempt(player, scan.training, "F5"));
+    ASSERT_EQ(player.notices.standing().size(), 1u);
+    EXPECT_NE(player.notices.standing()[0].text.find("F5"), std::string::npos);
+    player.now_s = 12;
+    EXPECT_TRUE(may_leave_attempt(player, scan.training, "F5"));
+    EXPECT_FALSE(
+        may_leave_attempt(player, scan.training, "Ctrl + Q"));  // another key is another question
+    player.now_s = 30;
+    EXPECT_FALSE(may_leave_attempt(player, scan.training, "F5"));
+    scan.training.attempt.reset();
+    EXPECT_TRUE(may_leave_attempt(player, scan.training, "F5"));  // nothing to lose
 }
 
 TEST(Hints, ComeOneByOneThenTheTargetsAndNeverInAnExam) {
     Running running;
-    App& app = running.app;
-    const Exercise& exercise = app.loaded.exercise();
+    auto& [folder, player, loaded, scan] = running;
+    const Exercise& exercise = loaded.exercise();
     for (int shown = 0; shown <= 3; ++shown) {
-        EXPECT_EQ(app.scan.hints_shown, shown);
-        EXPECT_EQ(shows_targets(app.scan, exercise), shown == 3);
-        show_next_hint(app);
+        EXPECT_EQ(scan.training.hints_shown, shown);
+        EXPECT_EQ(shows_targets(scan, exercise), shown == 3);
+        show_next_hint(player.notices, loaded, scan.training);
     }
-    EXPECT_EQ(app.scan.hints_shown, 3);
-    app.scan.hints_shown = 0;
-    app.loaded.open->exercises[0].mode = ExerciseMode::exam;
-    for (int i = 0; i < 5; ++i) show_next_hint(app);
-    EXPECT_FALSE(shows_targets(app.scan, exercise));
-    app.scan.attempt.reset();
-    EXPECT_TRUE(shows_targets(app.scan, exercise));  // free scanning
+    EXPECT_EQ(scan.training.hints_shown, 3);
+    scan.training.hints_shown = 0;
+    loaded.open->exercises[0].mode = ExerciseMode::exam;
+    for (int i = 0; i < 5; ++i) show_next_hint(player.notices, loaded, scan.training);
+    EXPECT_FALSE(shows_targets(scan, exercise));
+    scan.training.attempt.reset();
+    EXPECT_TRUE(shows_targets(scan, exercise));  // free scanning
 }
 
 TEST(SavingCalibrations, WithNothingCalibratedKeepsWhatWasSaved) {
@@ -147,23 +150,23 @@ TEST(ChangingTheTracker, ForgetsWhatTheOneBeforeReported) {
 }
 
 TEST(Cine, StepsThroughTheKeptFramesAndPlaysInARing) {
-    ScanState scan;
-    step_cine(scan, 1, 3);
-    EXPECT_TRUE(scan.controls.frozen);
-    EXPECT_EQ(scan.controls.cine_back, 1);
-    step_cine(scan, 5, 3);
-    EXPECT_EQ(scan.controls.cine_back, 2);
-    scan.cine.playing = true;
+    Console console;
+    step_cine(console, 1, 3);
+    EXPECT_TRUE(console.controls.frozen);
+    EXPECT_EQ(console.controls.cine_back, 1);
+    step_cine(console, 5, 3);
+    EXPECT_EQ(console.controls.cine_back, 2);
+    console.cine.playing = true;
     for (int expected : {1, 0, 2}) {
-        scan.cine.last_step_s = 0;
-        advance_cine(scan, 3, 1);
-        EXPECT_EQ(scan.controls.cine_back, expected);
+        console.cine.last_step_s = 0;
+        advance_cine(console, 3, 1);
+        EXPECT_EQ(console.controls.cine_back, expected);
     }
-    advance_cine(scan, 3, 1 + 0.5 / kCineRate);  // before the next frame's time
-    EXPECT_EQ(scan.controls.cine_back, 2);
-    set_frozen(scan, false);
-    EXPECT_EQ(scan.controls.cine_back, 0);
-    EXPECT_FALSE(scan.cine.playing);
+    advance_cine(console, 3, 1 + 0.5 / kCineRate);  // before the next frame's time
+    EXPECT_EQ(console.controls.cine_back, 2);
+    set_frozen(console, false);
+    EXPECT_EQ(console.controls.cine_back, 0);
+    EXPECT_FALSE(console.cine.playing);
 }
 
 }  // namespace

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/kept/bundle_list.h"
+#include "runtime/player/app/case_cards.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdlib>
 
-#include "runtime/player/app/kept/user_folders.h"
+#include "runtime/player/app/settings.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::runtime {
@@ -64,7 +64,7 @@ TEST(Bundles, TheLastOpenedComesFirstAndTwelveAreKept) {
     std::vector<std::string> recent;
     for (int i = 0; i < 14; ++i) remember_bundle("/" + std::to_string(i), recent);
     remember_bundle("/5", recent);
-    ASSERT_EQ(recent.size(), kMostRecent);
+    ASSERT_EQ(recent.size(), kMaxRecent);
     EXPECT_EQ(recent[0], "/5");
     EXPECT_EQ(recent[1], "/13");
     EXPECT_EQ(std::count(recent.begin(), recent.end(), "/5"), 1);

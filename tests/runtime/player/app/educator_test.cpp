@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "formats/files/bundle_file.h"
-#include "runtime/player/app/educator/new_target.h"
-#include "runtime/player/app/kept/class_records.h"
-#include "runtime/player/app/replay_path.h"
+#include "formats/files/load_save.h"
+#include "runtime/player/app/attempt_steps.h"
+#include "runtime/player/app/class_records.h"
+#include "runtime/player/app/own_exercises.h"
 #include "runtime/player/session/open_case.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"

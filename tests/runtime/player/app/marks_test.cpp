@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Pass marks that an educator changes: the exercise is the same but for them.
-#include "runtime/player/app/educator/marks.h"
+#include "runtime/player/app/own_exercises.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>
 
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "runtime/player/app/sound_steps.h"
 #include "runtime/player/session/open_case.h"
 #include "support/small_case.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/scan/measurements.h"
+#include "runtime/player/app/picture_marks.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/scan/picture_marks.h"
+#include "runtime/player/app/picture_marks.h"
 
 #include <gtest/gtest.h>
 
@@ -41,7 +41,7 @@ TEST(PictureMarks, WordsAreKeptUpToEight) {
         std::snprintf(marks.words, sizeof marks.words, "%d", i);
         add_label(marks);
     }
-    ASSERT_EQ(marks.labels.size(), kMostLabels);
+    ASSERT_EQ(marks.labels.size(), kMaxLabels);
     EXPECT_EQ(marks.labels.front().words, "2");
     EXPECT_EQ(marks.labels.back().x_mm, 9);
     add_label(marks);  // nothing was typed

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/scan/picture_pace.h"
+#include "runtime/player/app/picture_pace.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/kept/reliability.h"
+#include "runtime/player/app/class_records.h"
 
 #include <gtest/gtest.h>
 

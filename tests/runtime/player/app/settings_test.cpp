@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/kept/settings.h"
+#include "runtime/player/app/settings.h"
 
 #include <gtest/gtest.h>
 

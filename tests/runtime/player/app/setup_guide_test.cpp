@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/set_up/setup_guide.h"
+#include "runtime/player/app/setup_guide.h"
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ class User {
                          world_from_needle * inverse(sensor_from_needle)};
         for (int i = 0; i < 2; ++i) {
             for (int a = 0; a < 3; ++a) poses[i].translation[a] += 0.1 * random_.gaussian();
-            reading.sensors[static_cast<std::size_t>(i)] = {SensorState::ok, poses[i], 1.0f, 0};
+            reading.sensors[i] = {SensorState::ok, poses[i], 1.0f, 0};
         }
         guide_.observe(reading, {}, reading.time_s);
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // "What am I looking at", against what is known of the small case: a vessel across muscle.
-#include "runtime/player/app/truth/tissue_names.h"
+#include "runtime/player/app/tissue_names.h"
 
 #include <gtest/gtest.h>
 
@@ -13,11 +13,11 @@
 namespace sonocase::runtime {
 namespace {
 
-struct Look {
+struct Scene {
     CaseBundle bundle = testing::small_case();
     RenderOptions options;
     FrameInput input;
-    Look() {
+    Scene() {
         options.model = ImageModel::paper;
         options.width_px = 200;
         options.height_px = 160;
@@ -29,35 +29,36 @@ struct Look {
 };
 
 TEST(TissueNames, SayWhatAPixelShows) {
-    Look look;
-    auto names = TissueNames::create(look.bundle, testing::small_exercise(), look.options);
+    Scene scene;
+    auto names = TissueNames::create(scene.bundle, testing::small_exercise(), scene.options);
     ASSERT_TRUE(names) << names.error().message();
-    const auto renderer = Renderer::create(look.bundle, testing::small_exercise(), look.options);
+    const auto renderer = Renderer::create(scene.bundle, testing::small_exercise(), scene.options);
     ASSERT_TRUE(renderer);
     const Renderer::Layout layout = renderer->layout();
     const auto at = [&](double x_mm, double z_mm) {
-        return names->at(look.input, static_cast<int>(layout.origin_x_px + x_mm / layout.mm_per_px),
+        return names->at(scene.input,
+                         static_cast<int>(layout.origin_x_px + x_mm / layout.mm_per_px),
                          static_cast<int>(layout.origin_y_px + z_mm / layout.mm_per_px));
     };
     EXPECT_EQ(at(0, 35), "Vessel");  // its middle: 25 mm above the axis, 60 less 25 deep
     EXPECT_EQ(at(0, 20), "Muscle");
     EXPECT_EQ(at(0, 50), "Muscle");
-    EXPECT_EQ(names->at(look.input, 0, 0), "");  // beside the sector
-    EXPECT_EQ(names->at(look.input, -1, 5), "");
-    EXPECT_EQ(names->at(look.input, 5, 160), "");
+    EXPECT_EQ(names->at(scene.input, 0, 0), "");  // beside the sector
+    EXPECT_EQ(names->at(scene.input, -1, 5), "");
+    EXPECT_EQ(names->at(scene.input, 5, 160), "");
 }
 
 TEST(TissueNames, OutlineTheVesselAndNameBoth) {
-    Look look;
-    auto names = TissueNames::create(look.bundle, testing::small_exercise(), look.options);
+    Scene scene;
+    auto names = TissueNames::create(scene.bundle, testing::small_exercise(), scene.options);
     ASSERT_TRUE(names);
     std::vector<std::uint8_t> rgb(3 * 200 * 160, 7);
-    const std::vector<TissueName> found = names->outline(look.input, rgb);
+    const std::vector<TissueName> found = names->outline(scene.input, rgb);
     ASSERT_EQ(found.size(), 2u);
     EXPECT_EQ(found[0].words, "Muscle");
     EXPECT_EQ(found[1].words, "Vessel");
     for (const TissueName& name : found)
-        EXPECT_EQ(names->at(look.input, static_cast<int>(name.column), static_cast<int>(name.row)),
+        EXPECT_EQ(names->at(scene.input, static_cast<int>(name.column), static_cast<int>(name.row)),
                   name.words);
     // A circle of 6 mm radius: some 2 pi r / pixel edge pixels, no more than twice that.
     const auto white = std::count(rgb.begin(), rgb.end(), 255) / 3;

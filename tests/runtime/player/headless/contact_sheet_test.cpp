@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/headless/contact_sheet.h"
+#include "runtime/player/headless/frame_files.h"
 
 #include <gtest/gtest.h>
 #include <png.h>

@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "formats/base/constants.h"
 #include "formats/bundle/case_bundle.h"
 #include "formats/calibration/calibration.h"
-#include "formats/files/bundle_file.h"
-#include "formats/files/calibration_file.h"
+#include "formats/files/load_save.h"
 #include "formats/recording/poses.h"
 #include "support/paths.h"
 #include "support/run_command.h"
@@ -119,8 +119,7 @@ TEST_F(Headless, ReplaysEveryRowInOrderAndAppliesCalibrations) {
         pose.frame = i;
         pose.timestamp_s = 100 + i / 20.0;
         pose.ok = true;
-        pose.tracker_from_tool = {rotation_about({1, 0, 0}, 3.14159265358979),
-                                  {0, -20.0 + 10 * i, 59}};
+        pose.tracker_from_tool = {rotation_about({1, 0, 0}, kPi), {0, -20.0 + 10 * i, 59}};
         bare.push_back(pose);
         Rigid scaled = pose.tracker_from_tool;
         scaled.translation = scale * scaled.translation;

@@ -5,8 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "runtime/player/session/clock.h"
-#include "runtime/player/session/session_replay.h"
-#include "runtime/recording/settings_text.h"
+#include "runtime/recording/session_words.h"
 #include "runtime/tracking/replay_tracker.h"
 #include "support/random.h"
 #include "support/small_case.h"
@@ -97,9 +96,9 @@ TEST(SessionRun, AReplayGivesTheSamePixelsToTheLastBit) {
         const double now_s = tracker.recorded_time_s(i);
         TrackerReading reading;
         if (tracker.poll(now_s, reading)) engine.observe(reading, false);
-        apply_settings_text(replay->settings[static_cast<std::size_t>(i)], settings);
+        apply_settings_text(replay->settings[i], settings);
         engine.frame(now_s, settings, pixels);
-        ASSERT_EQ(pixels, shown[static_cast<std::size_t>(i)]) << "frame " << i;
+        ASSERT_EQ(pixels, shown[i]) << "frame " << i;
     }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/sound/sound_out.h"
+#include "runtime/player/app/sound_out.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,6 @@
 #include <filesystem>
 #include <thread>
 
-#include "runtime/player/sound/tones.h"
 #include "support/paths.h"
 #include "support/temporary_folder.h"
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/training/attempt_result.h"
+#include "runtime/player/app/attempt_result.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "formats/attempt/difficulty.h"
 #include "formats/exercise/metric_table.h"
+#include "formats/scoring/draw_attempt.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -57,7 +57,7 @@ TEST(AttemptResult, AMissedMarkIsAlwaysAmongTheFive) {
         marks.push_back({name, 1, 2, -INFINITY, true});
     marks.push_back({"elapsed_time_s", NAN, 60, -INFINITY, false});
     const auto result = attempt_result(score_with(marks, {}), {});
-    ASSERT_EQ(result.rows.size(), kMostResults);
+    ASSERT_EQ(result.rows.size(), kMaxResults);
     EXPECT_EQ(result.rows[0].metric, "elapsed_time_s");
     EXPECT_EQ(result.marks, 8);
 }
@@ -83,9 +83,9 @@ TEST(AttemptResult, TheTrendEndsWithThisAttemptAndIsNotLong) {
         attempt_result(score_with({{"final_tip_to_target_mm", 3.5, 5, -INFINITY, true}},
                                   {{"final_tip_to_target_mm", 3.5}}),
                        earlier);
-    ASSERT_EQ(result.trend.size(), kMostTrend);
+    ASSERT_EQ(result.trend.size(), kMaxTrend);
     EXPECT_EQ(result.trend.back(), 3.5);
-    EXPECT_EQ(result.trend[kMostTrend - 2], 1);
+    EXPECT_EQ(result.trend[kMaxTrend - 2], 1);
 }
 
 TEST(MetricWords, AreThoseOfAClinician) {
@@ -104,7 +104,7 @@ TEST(Advice, EveryMeasureThatExercisesUseAsAMarkHasSome) {
           "posterior_wall_punctures", "correct_vessel_punctured", "probe_force_max_n",
           "needle_path_length_mm", "trajectory_deviation_mm"}) {
         ASSERT_NE(find_metric(name), nullptr) << name;
-        EXPECT_NE(advice_for(name)[0], 0) << name;
+        EXPECT_NE(find_metric(name)->advice[0], 0) << name;
     }
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/training/next_exercise.h"
+#include "runtime/player/app/next_exercise.h"
 
 #include <gtest/gtest.h>
 
-#include "formats/attempt/difficulty.h"
+#include "formats/scoring/draw_attempt.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -30,7 +30,7 @@ std::vector<ProgressEntry> history(const std::string& words) {
 
 std::string next(const std::string& words) {
     const int index = next_exercise_index(kExercises, history(words), "torso");
-    return kExercises[static_cast<std::size_t>(index)].name;
+    return kExercises[index].name;
 }
 
 TEST(NextExercise, GoesUpAfterMasteryAndDownAfterThreeFailures) {

@@ -4,13 +4,13 @@
 #include <gif_lib.h>
 #include <gtest/gtest.h>
 
-#include "formats/files/bundle_file.h"
-#include "runtime/imaging/doppler/doppler_colours.h"
-#include "runtime/player/session/pictures/gif_file.h"
-#include "runtime/player/training/case_cards.h"
-#include "runtime/player/training/clip_saver.h"
-#include "runtime/player/training/guided_start.h"
-#include "runtime/player/training/review_page.h"
+#include "formats/files/load_save.h"
+#include "runtime/imaging/doppler/doppler_picture.h"
+#include "runtime/player/app/attempt_steps.h"
+#include "runtime/player/app/case_cards.h"
+#include "runtime/player/app/clip_saver.h"
+#include "runtime/player/app/guided_start.h"
+#include "runtime/player/session/gif_file.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
 
@@ -93,8 +93,7 @@ TEST(GifFile, IsReadBackByTheLibraryWithEveryGreyAndTime) {
         EXPECT_EQ(control.DelayTime, 10 * (f + 1));
         for (int i = 0; i < kWidth * kHeight; ++i) {
             const int index = gif->SavedImages[f].RasterBits[i];
-            ASSERT_EQ(gif->SColorMap->Colors[index].Green,
-                      frames[static_cast<std::size_t>(f)][static_cast<std::size_t>(i)]);
+            ASSERT_EQ(gif->SColorMap->Colors[index].Green, frames[f][i]);
         }
     }
     DGifCloseFile(gif, &fault);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // What the mouse takes hold of on the picture in a Doppler mode, and where it moves it.
-#include "runtime/player/ui/picture/doppler_marks.h"
+#include "runtime/player/ui/doppler_marks.h"
 
 #include <gtest/gtest.h>
 

@@ -10,8 +10,7 @@
 #include <vector>
 
 #include "runtime/display/theme.h"
-#include "runtime/player/ui/layout/console_layout.h"
-#include "runtime/player/ui/layout/scan_layout.h"
+#include "runtime/player/ui/parts/layout.h"
 
 namespace sonocase::runtime {
 namespace {

@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "formats/bundle/case_bundle.h"
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "formats/progress_book/progress_book.h"
 #include "runtime/player/ui/window_picture.h"
 #include "support/flowing_case.h"

@@ -10,7 +10,7 @@
 #include <set>
 #include <sstream>
 
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "formats/progress_book/progress_book.h"
 #include "formats/recording/session.h"
 #include "runtime/player/ui/window_picture.h"

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "formats/files/recording_file.h"
+#include "formats/files/load_save.h"
 #include "formats/recording/session.h"
 #include "runtime/player/ui/window_picture.h"
 #include "support/flowing_case.h"

@@ -46,7 +46,7 @@ struct Picture {
                         for (int u = 0; u < by; ++u) {
                             const auto at =
                                 static_cast<std::size_t>(by * y + v) * width + by * x + u;
-                            sum += rgb[3 * at + static_cast<std::size_t>(c)];
+                            sum += rgb[3 * at + c];
                         }
                     }
                     small.rgb.push_back(static_cast<std::uint8_t>(sum / (by * by)));

@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "formats/bundle/case_bundle.h"
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "runtime/player/ui/window_picture.h"
 #include "support/flowing_case.h"
 #include "support/paths.h"

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "formats/bundle/case_bundle.h"
-#include "formats/files/bundle_file.h"
+#include "formats/files/load_save.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 #include "support/temporary_folder.h"

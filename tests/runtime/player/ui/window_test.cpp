@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/bundle/case_bundle.h"
-#include "formats/files/bundle_file.h"
-#include "runtime/player/ui/pages/shortcuts.h"
+#include "formats/files/load_save.h"
+#include "runtime/player/ui/keys.h"
 #include "runtime/player/ui/window_picture.h"
 #include "support/paths.h"
 #include "support/run_command.h"
@@ -207,7 +207,7 @@ TEST_F(WindowOnVirtualDisplay, WithoutOpenGl33SaysSoInOneLine) {
 // The help lists every key that the window reads, and docs/player.md has every line of the help.
 TEST(Shortcuts, EveryKeyOfTheWindowIsInTheHelpAndEveryLineOfItInTheDocument) {
     const std::string source =
-        sonocase::testing::read_text(SONOCASE_SOURCE "/runtime/player/ui/pages/keys.cpp");
+        sonocase::testing::read_text(SONOCASE_SOURCE "/runtime/player/ui/keys.cpp");
     const std::string document = sonocase::testing::read_text(SONOCASE_SOURCE "/docs/player.md");
     std::string help;
     for (const Shortcut& s : shortcuts()) {

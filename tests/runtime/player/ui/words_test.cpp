@@ -5,16 +5,16 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <filesystem>
 #include <regex>
 
+#include "formats/base/result.h"
 #include "formats/exercise/metric_table.h"
+#include "runtime/player/app/attempt_result.h"
 #include "runtime/player/app/case_steps.h"
-#include "runtime/player/training/attempt_result.h"
-#include "runtime/player/training/guided_start.h"
-#include "runtime/player/ui/pages/shortcuts.h"
-#include "runtime/player/words/said.h"
+#include "runtime/player/app/guided_start.h"
+#include "runtime/player/ui/keys.h"
+#include "runtime/player/words/po_text.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 
@@ -36,20 +36,79 @@ std::string fields(const std::string& words) {
     return all;
 }
 
+int count_of(const std::string& part, const std::string& text) {
+    int count = 0;
+    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+        ++count;
+    return count;
+}
+
 TEST_F(Words, KeepPrintfFieldsInTheirOrderAndAreListedOnce) {
     for (const Language& language : languages()) {
         for (std::size_t i = 0; i < language.catalogue.size(); ++i) {
             const Translation& t = language.catalogue[i];
-            EXPECT_NE(t.other[0], 0) << t.english;
+            EXPECT_FALSE(t.other.empty()) << t.english;
             // "100 % of" would read as a field; catalogue words with per cent write %%.
-            if (std::strchr(t.english, '%')) {
+            if (t.english.find('%') != std::string::npos) {
                 EXPECT_EQ(fields(t.english), fields(t.other)) << t.english;
             }
+            EXPECT_EQ(count_of("{}", t.english), count_of("{}", t.other)) << t.english;
             if (i > 0) {
-                EXPECT_STRNE(language.catalogue[i - 1].english, t.english);
+                EXPECT_NE(language.catalogue[i - 1].english, t.english);
             }
         }
     }
+}
+
+// read_po() leaves out what gettext leaves out; the files themselves hold nothing of the kind.
+TEST_F(Words, CataloguesHoldNoEmptyFuzzyOrObsoleteEntry) {
+    std::size_t catalogues = 0;
+    for (const auto& entry :
+         std::filesystem::directory_iterator(SONOCASE_SOURCE "/runtime/player/locale")) {
+        const std::string text = sonocase::testing::read_text(entry.path().string());
+        const Language language = read_po(text);
+        EXPECT_EQ(language.code, entry.path().stem()) << entry.path();
+        EXPECT_FALSE(language.name.empty()) << entry.path();
+        EXPECT_EQ(count_of("\nmsgid ", text), static_cast<int>(language.catalogue.size()) + 1)
+            << entry.path();  // and the header
+        EXPECT_EQ(count_of("\nmsgstr ", text), count_of("\nmsgid ", text)) << entry.path();
+        for (const char* never : {"fuzzy", "\n#~", "\nmsgctxt", "\nmsgid_plural"})
+            EXPECT_EQ(count_of(never, text), 0) << entry.path() << never;
+        ++catalogues;
+    }
+    EXPECT_EQ(catalogues + 1, languages().size());
+}
+
+TEST(Catalogue, IsReadAsGettextReadsIt) {
+    const Language language = read_po(
+        "# a comment\n"
+        "msgid \"\"\n"
+        "msgstr \"\"\n"
+        "\"Language: xx\\n\"\n"
+        "\"X-Language-Name: Xish\\n\"\n"
+        "\n"
+        "#, c-format\n"
+        "msgid \"\"\n"
+        "\"two \"\n"
+        "\"lines\"\n"
+        "msgstr \"zwei \\\"Zeilen\\\" \\\\\"\n"
+        "#, fuzzy\n"
+        "msgid \"fuzzy\"\n"
+        "msgstr \"ungenau\"\n"
+        "msgid \"empty\"\n"
+        "msgstr \"\"\n"
+        "#~ msgid \"old\"\n"
+        "#~ msgstr \"alt\"\n"
+        "msgid \"a\"\n"
+        "msgstr \"b\"");
+    EXPECT_EQ(language.code, "xx");
+    EXPECT_EQ(language.name, "Xish");
+    ASSERT_EQ(language.catalogue.size(), 2u);
+    EXPECT_EQ(language.catalogue[0].english, "a");
+    EXPECT_EQ(language.catalogue[0].other, "b");
+    EXPECT_EQ(language.catalogue[1].english, "two lines");
+    EXPECT_EQ(language.catalogue[1].other, "zwei \"Zeilen\" \\");
+    EXPECT_TRUE(read_po("").catalogue.empty());
 }
 
 // Every tr("...") of the window's sources; words that reach tr() through a table or as a tooltip
@@ -86,15 +145,10 @@ TEST_F(Words, EveryWordInTheSourcesIsInTheCatalogue) {
 }
 
 TEST_F(Words, MeasuresAdviceGuideHelpAndPresetsAreInTheCatalogue) {
-    const auto has = [](const char* words) {
-        for (const Translation& t : language_in_use().catalogue) {
-            if (std::strcmp(t.english, words) == 0) return true;
-        }
-        return *words == 0;
-    };
+    const auto has = [](const char* words) { return *words == 0 || translation(words) != nullptr; };
     for (const MetricInfo& info : metric_table()) {
         EXPECT_TRUE(has(info.title)) << info.title;
-        EXPECT_TRUE(has(advice_for(info.name))) << advice_for(info.name);
+        EXPECT_TRUE(has(info.advice)) << info.advice;
     }
     for (int i = 0; i <= kGuideSteps; ++i) {
         EXPECT_TRUE(has(guide_title(static_cast<GuideStep>(i))));
@@ -121,80 +175,93 @@ TEST_F(Words, TissueIsNamedWithItsSideAndNumber) {
     EXPECT_EQ(tissue_words("portal_vein_left"), "Portal vein left");
 }
 
-TEST_F(Words, SentencesAreSaidWholeOrPartByPart) {
-    EXPECT_EQ(tr_said("Saved as /tmp/a_b.png."), "Gespeichert als /tmp/a_b.png.");
-    EXPECT_EQ(tr_said("No Polhemus Viper is plugged in; plug it in and switch it on."),
-              "Kein Polhemus Viper ist angesteckt; stecken Sie ihn an und schalten Sie ihn ein.");
-    EXPECT_EQ(tr_said("An attempt is running. F5 again ends it as it is; B finishes it and shows "
-                      "the result."),
-              "Ein Versuch läuft. F5 noch einmal beendet ihn, wie er ist; B schließt ihn ab und "
-              "zeigt das Ergebnis.");
-    // What is not known stays, and takes nothing known with it.
-    EXPECT_EQ(tr_said("Nobody wrote this; replug it."),
-              "Nobody wrote this; stecken Sie ihn neu an.");
-    EXPECT_EQ(tr_said(""), "");
-    EXPECT_EQ(tr_said(";;;: ; : "), ";;;: ; : ");
-    EXPECT_TRUE(missing_words().empty());
-    use_language("en");
-    EXPECT_EQ(tr_said("Saved as x."), "Saved as x.");
+// An error as a tracker and a notice say it.
+std::string said(const Message& what, const Message& expected) {
+    return tr_message(Message("{}.", {Error{what, "", expected}.message()}));
 }
 
-// A literal of a notice, or of an error that becomes one; "a" + b + "c" is "a%sc".
-std::vector<std::string> said_in(const std::string& source, const std::regex& call) {
-    static const std::regex kParts(R"re("((?:[^"\\]|\\.)*)"|\+)re");
+TEST_F(Words, SentencesAreSaidWholeOrPartByPart) {
+    EXPECT_EQ(tr_message(Message("Saved as {}.", {"/tmp/a_b.png"})),
+              "Gespeichert als /tmp/a_b.png.");
+    EXPECT_EQ(
+        said(Message("No {} is plugged in", {"Polhemus Viper"}), "plug it in and switch it on"),
+        "Kein Polhemus Viper ist angesteckt; stecken Sie ihn an und schalten Sie ihn ein.");
+    EXPECT_EQ(tr_message(Message("An attempt is running. {} again ends it as it is; B finishes it "
+                                 "and shows the result.",
+                                 {"F5"})),
+              "Ein Versuch läuft. F5 noch einmal beendet ihn, wie er ist; B schließt ihn ab und "
+              "zeigt das Ergebnis.");
+    // Arguments are translated too.
+    EXPECT_EQ(tr_message(Message("{} is in use by another program",
+                                 {Message("The {} at {}", {"Polhemus Viper", "bus 1, device 2"})})),
+              "Polhemus Viper an bus 1, device 2 ist von einem anderen Programm belegt");
+    // What is not known stays, and takes nothing known with it.
+    EXPECT_EQ(said("Nobody wrote this", "replug it"), "Nobody wrote this; stecken Sie ihn neu an.");
+    EXPECT_EQ(tr_message(""), "");
+    EXPECT_EQ(tr_message(";;;: ; : "), ";;;: ; : ");
+    // An error's place is named as it is, without the line breaks of what it quotes.
+    EXPECT_EQ(tr_message(Error{"not a numeric address", "a\nb", "replug it"}.message()),
+              "a b: keine Adresse aus Zahlen; stecken Sie ihn neu an");
+    EXPECT_TRUE(missing_words().empty());
+    use_language("en");
+    EXPECT_EQ(tr_message(Message("Saved as {}.", {"x"})), "Saved as x.");
+}
+
+// The literals at the beginning of each call's arguments, one after the other.
+std::vector<std::string> literals_of(const std::string& source, const std::regex& call) {
+    static const std::regex kLiteral(R"re("((?:[^"\\]|\\.)*)")re");
     std::vector<std::string> found;
     for (std::sregex_iterator it(source.begin(), source.end(), call), end; it != end; ++it) {
         const std::string inside = (*it)[1];
         std::string words;
-        std::size_t at = 0;
-        bool literal_before = false, any = false;
-        for (std::sregex_iterator part(inside.begin(), inside.end(), kParts); part != end; ++part) {
-            const std::string between =
-                inside.substr(at, static_cast<std::size_t>(part->position()) - at);
-            const bool value = between.find_first_not_of(" \n") != std::string::npos;
-            if (value) words += "%s";
-            if (part->str() != "+") {
-                words += (*part)[1];
-                any = true;
-            }
-            literal_before = part->str() != "+";
-            at = static_cast<std::size_t>(part->position() + part->length());
-        }
-        if (!literal_before && inside.find_first_not_of(" \n", at) != std::string::npos)
-            words += "%s";
-        if (any) found.push_back(words);
+        for (std::sregex_iterator part(inside.begin(), inside.end(), kLiteral); part != end; ++part)
+            words += (*part)[1];
+        found.push_back(std::regex_replace(words, std::regex(R"re(\\(["\\]))re"), "$1"));
     }
     return found;
 }
 
-// Every notice of the window, and every message of a USB tracker.
+// Every notice of the window, and every message with arguments.
 TEST_F(Words, EveryNoticeIsInTheCatalogue) {
-    const std::regex notice(R"re(notices\.(?:news|warning|error)\(([^;?]*?)\);)re");
+    const std::string literals = R"re(((?:"(?:[^"\\]|\\.)*"\s*)+))re";
+    const std::regex notice(R"re(notices\.(?:news|warning|error)\(\s*\{?\s*)re" + literals);
+    const std::regex message(R"re((?:\bMessage(?: \w+)?\(|push_back\(\{|return \{)\s*)re" +
+                             literals + R"re(,\s*\{)re");
     const auto known = [](const std::string& words) {
         return !words.empty() && translation(words.c_str()) != nullptr;
     };
-    int found = 0;
-    for (const auto& entry :
-         std::filesystem::recursive_directory_iterator(SONOCASE_SOURCE "/runtime/player/app")) {
-        if (entry.path().extension() != ".cpp") continue;
-        for (const std::string& words :
-             said_in(sonocase::testing::read_text(entry.path().string()), notice)) {
-            EXPECT_TRUE(known(words)) << entry.path() << ": " << words;
-            ++found;
+    int found = 0, messages = 0;
+    for (const char* folder : {"/formats", "/runtime"}) {
+        for (const auto& entry :
+             std::filesystem::recursive_directory_iterator(SONOCASE_SOURCE + std::string(folder))) {
+            if (entry.path().extension() != ".cpp") continue;
+            const std::string source = sonocase::testing::read_text(entry.path().string());
+            for (const std::string& words : literals_of(source, notice)) {
+                EXPECT_TRUE(known(words)) << entry.path() << ": " << words;
+                ++found;
+            }
+            for (const std::string& words : literals_of(source, message)) {
+                if (words.find_first_not_of("{}:;. ") == std::string::npos) continue;
+                EXPECT_TRUE(known(words)) << entry.path() << ": " << words;
+                ++messages;
+            }
         }
     }
     EXPECT_GT(found, 15);
-    // As the trackers say them.
-    for (const char* message :
-         {"No Polhemus Liberty is plugged in; plug it in and switch it on.",
-          "No permission for the Polhemus Viper at bus 1, device 2; install the rule "
-          "60-sonocase-trackers.rules in /etc/udev/rules.d, run udevadm control --reload, then "
-          "replug it.",
-          "The Polhemus Viper at bus 1, device 2 is in use by another program; close the other "
-          "program, or replug it.",
-          "The tracker does not answer; switch it off and on.", "Looking for a server.",
-          "No sensor is connected to the tracker; plug the probe's and the needle's sensors in."}) {
-        const std::string german = tr_said(message);
+    EXPECT_GT(messages, 30);
+    // The words of the trackers.
+    const Message device("The {} at {}", {"Polhemus Viper", "bus 1, device 2"});
+    for (const std::string& german :
+         {said(Message("No {} is plugged in", {"Polhemus Liberty"}), "plug it in and switch it on"),
+          said(Message("No permission for the {} at {}", {"Polhemus Viper", "bus 1, device 2"}),
+               "install the rule 60-sonocase-trackers.rules in /etc/udev/rules.d, run udevadm "
+               "control --reload, then replug it"),
+          said(Message("{} is in use by another program", {device}),
+               "close the other program, or replug it"),
+          said("The tracker does not answer", "switch it off and on"),
+          tr_message("Looking for a server."),
+          said("No sensor is connected to the tracker",
+               "plug the probe's and the needle's sensors in")}) {
         for (const char* english : {" the ", "plug", "switch", "No "})
             EXPECT_EQ(german.find(english), std::string::npos) << german;
     }
@@ -203,14 +270,14 @@ TEST_F(Words, EveryNoticeIsInTheCatalogue) {
 TEST(Languages, AreChosenByCodeOrLocaleAndElseEnglish) {
     for (const char* code : {"de", "de_AT.UTF-8", "de-CH"}) {
         use_language(code);
-        EXPECT_STREQ(language_in_use().code, "de") << code;
+        EXPECT_EQ(language_in_use().code, "de") << code;
     }
     EXPECT_STREQ(tr("Gain"), "Gain");
     EXPECT_STREQ(tr("Depth"), "Tiefe");
     EXPECT_STREQ(tr("words that nobody wrote"), "words that nobody wrote");
     for (const char* code : {"en", "C", "", "den_XX", "fr_FR.UTF-8"}) {
         use_language(code);
-        EXPECT_STREQ(language_in_use().code, "en") << code;
+        EXPECT_EQ(language_in_use().code, "en") << code;
     }
     EXPECT_STREQ(tr("Depth"), "Depth");
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The codec of OpenIGTLink by itself.
-#include "runtime/tracking/igtl/igtl_message.h"
+#include "runtime/tracking/devices/igtl_message.h"
 
 #include <gtest/gtest.h>
 

@@ -10,10 +10,10 @@
 #include <set>
 #include <thread>
 
-#include "formats/base/event.h"
-#include "runtime/tracking/igtl/igtl_message.h"
-#include "runtime/tracking/igtl/igtl_server.h"
-#include "runtime/tracking/igtl/igtl_tracker.h"
+#include "formats/base/mailbox.h"
+#include "runtime/tracking/devices/igtl_message.h"
+#include "runtime/tracking/devices/igtl_server.h"
+#include "runtime/tracking/devices/igtl_tracker.h"
 #include "support/paths.h"
 #include "support/random.h"
 

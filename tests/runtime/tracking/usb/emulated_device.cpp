@@ -24,7 +24,7 @@
 #include <mutex>
 #include <thread>
 
-#include "formats/base/event.h"
+#include "formats/base/mailbox.h"
 
 namespace sonocase::testing {
 namespace {
@@ -329,7 +329,7 @@ ClientResult run_with_device(const DeviceSpec& spec,
     }
     ::close(pipe_ends[1]);
     std::atomic<bool> stop{false};
-    runtime::Event event;
+    Event event;
     std::thread player([&] {
         Clock::time_point replug_at = Clock::time_point::max();
         while (!stop) {

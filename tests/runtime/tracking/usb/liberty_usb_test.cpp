@@ -3,7 +3,7 @@
 // The driver of Polhemus Liberty and Patriot with an emulated device that streams two stations.
 #include <gtest/gtest.h>
 
-#include "runtime/tracking/usb/byte_fields.h"
+#include "runtime/tracking/devices/byte_stream.h"
 #include "runtime/tracking/usb/usb_run.h"
 
 namespace sonocase::runtime {

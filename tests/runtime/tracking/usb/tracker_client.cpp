@@ -9,9 +9,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "formats/base/event.h"
+#include "formats/base/mailbox.h"
 #include "runtime/player/session/frame_stats.h"
-#include "runtime/tracking/factory/make_tracker.h"
+#include "runtime/tracking/devices/make_tracker.h"
 
 using namespace sonocase;
 using namespace sonocase::runtime;

@@ -34,8 +34,8 @@ inline bool says(const nlohmann::json& seen, const char* words) {
 }
 
 // For a run in which the device was unplugged: readings came before, and the user was told.
-inline void expect_unplug_reported(const nlohmann::json& seen, int least_readings) {
-    EXPECT_GE(seen["readings"].get<int>(), least_readings);
+inline void expect_unplug_reported(const nlohmann::json& seen, int min_readings) {
+    EXPECT_GE(seen["readings"].get<int>(), min_readings);
     EXPECT_TRUE(says(seen, "unplugged")) << seen;
 }
 

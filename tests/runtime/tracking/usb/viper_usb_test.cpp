@@ -8,12 +8,12 @@
 #include <cstring>
 #include <iostream>
 
+#include "formats/base/constants.h"
 #include "formats/calibration/calibration.h"
-#include "formats/files/bundle_file.h"
-#include "formats/files/calibration_file.h"
-#include "runtime/tracking/usb/byte_fields.h"
+#include "formats/files/load_save.h"
+#include "runtime/tracking/devices/byte_stream.h"
+#include "runtime/tracking/devices/viper_protocol.h"
 #include "runtime/tracking/usb/usb_run.h"
-#include "runtime/tracking/usb/viper_protocol.h"
 #include "support/paths.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
@@ -123,7 +123,7 @@ class ViperFirmware final : public Firmware {
         put_u32_le(out, 16 + 64 + 4);
         for (std::uint32_t word : {0u, static_cast<std::uint32_t>(n), 0u, 2u})
             put_u32_le(out, word);
-        const double half = 0.25 * 3.14159265358979;  // a quarter turn about z
+        const double half = 0.25 * kPi;  // a quarter turn about z
         for (std::uint32_t sensor : {0u, 1u}) {
             // Wrong units show as wrong numbers.
             const double unit = units_ok_ && rate_ok_ ? 1 : 100;
@@ -267,8 +267,8 @@ TEST(ViperOverUsb, DrivesThePlayer) {
     const sonocase::testing::TemporaryFolder folder;
     ASSERT_TRUE(save_bundle(sonocase::testing::small_case(), folder / "cylinder.sonocase"));
     // The probe stands still at (100, -50, 0) with a quarter turn: the mannequin is put under it.
-    const Rigid world_from_probe{rotation_about({0, 0, 1}, 0.5 * 3.14159265358979), {100, -50, 0}};
-    const Rigid mannequin_from_probe{rotation_about({1, 0, 0}, 3.14159265358979), {0, 0, 59}};
+    const Rigid world_from_probe{rotation_about({0, 0, 1}, 0.5 * kPi), {100, -50, 0}};
+    const Rigid mannequin_from_probe{rotation_about({1, 0, 0}, kPi), {0, 0, 59}};
     Calibration mannequin;
     mannequin.kind = "mannequin";
     mannequin.sensor_from_tool = world_from_probe * inverse(mannequin_from_probe);

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/base/source_checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "formats/files/atomic_file.h"
+
+#include "formats/text/number_text.h"
+
+namespace sonocase::pipeline::inline base {
+
+namespace fs = std::filesystem;
+
+Status check_source_file(const std::string& path, const std::string& expected) {
+    std::error_code code;
+    const fs::file_status status = fs::status(path, code);
+    if (status.type() == fs::file_type::not_found)
+        return Error{"no such file or folder", path, "check the path"};
+    if (code) return Error{"cannot open: " + code.message(), path, "check that it may be read"};
+    if (Status regular = expect_regular_file(path, expected); !regular) return regular;
+    if (fs::file_size(path, code) == 0) return Error{"file is empty", path, "export it again"};
+    return Done{};
+}
+
+Status check_source_folder(const std::string& folder, const std::string& expected) {
+    std::error_code code;
+    for (const auto& entry : fs::directory_iterator(folder, code)) {
+        const fs::file_type type = entry.status(code).type();
+        if (type == fs::file_type::directory || type == fs::file_type::not_found) continue;
+        if (Status regular = expect_regular_file(entry.path(), expected); !regular) return regular;
+    }
+    if (code) return Error{"cannot open: " + code.message(), folder, "check that it may be read"};
+    return Done{};
+}
+
+namespace {
+
+double largest(Vector3 extent) {
+    return std::max({extent.x, extent.y, extent.z});
+}
+
+struct Unit {
+    const char* name;
+    double factor;  // mm
+};
+constexpr Unit kUnits[] = {{"metres", 1000},
+                           {"decimetres", 100},
+                           {"inches", 25.4},
+                           {"centimetres", 10},
+                           {"tenths of a millimetre", 0.1},
+                           {"hundredths of a millimetre", 0.01},
+                           {"micrometres", 0.001}};
+
+// The unit in which the extent comes nearest to `target_mm`, by ratio.
+const Unit* likely_unit(double extent, double target_mm) {
+    const Unit* best = nullptr;
+    double best_ratio = 4;  // a larger ratio is not due to a unit
+    for (const Unit& unit : kUnits) {
+        const double ratio = extent * unit.factor / target_mm;
+        const double off = std::max(ratio, 1 / ratio);
+        if (off < best_ratio) {
+            best_ratio = off;
+            best = &unit;
+        }
+    }
+    return best;
+}
+
+std::string advice(const Unit* unit, const std::string& option) {
+    if (unit == nullptr) return "write the file in millimetres";
+    return std::string("these look like ") + unit->name + ": give " + option + " " +
+           number_text(unit->factor, 4);
+}
+
+}  // namespace
+
+std::optional<Error> check_torso_extent(Vector3 extent_mm,
+                                        const std::string& what,
+                                        const std::string& where,
+                                        const std::string& option) {
+    const double size = largest(extent_mm);
+    if (size >= kMinTorsoMm && size <= kMaxTorsoMm) return std::nullopt;
+    return Error{what + " is " + number_text(extent_mm.x, 4) + " x " + number_text(extent_mm.y, 4) +
+                     " x " + number_text(extent_mm.z, 4) + " mm",
+                 where,
+                 "expected a torso of some 400 mm; " + advice(likely_unit(size, 400), option)};
+}
+
+std::optional<Error> check_same_unit(Vector3 body_extent_mm,
+                                     Vector3 surface_extent_mm,
+                                     const std::string& where) {
+    const double body = largest(body_extent_mm), surface = largest(surface_extent_mm);
+    const double ratio = surface / body;
+    if (ratio > 1.0 / 6 && ratio < 6) return std::nullopt;
+    return Error{"surface is " + number_text(surface, 4) + " mm long and the body " +
+                     number_text(body, 4) + " mm",
+                 where,
+                 "expected two torsos of like size; if the surface is wrong, " +
+                     advice(likely_unit(surface, body), "inputs.surface_scale =")};
+}
+
+}  // namespace sonocase::pipeline::inline base

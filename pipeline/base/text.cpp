@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/base/text.h"
+
+#include <cctype>
+#include <charconv>
+
+namespace sonocase::pipeline::inline base {
+
+namespace {
+
+std::vector<std::string> cells_of(std::string_view line, char separator) {
+    std::vector<std::string> cells;
+    std::string cell;
+    bool quoted = false;
+    const auto flush = [&] {
+        cells.emplace_back(trimmed(cell));
+        cell.clear();
+    };
+    for (std::size_t i = 0; i < line.size(); ++i) {
+        const char c = line[i];
+        if (c == '"') {
+            if (quoted && i + 1 < line.size() && line[i + 1] == '"')
+                cell += line[++i];
+            else
+                quoted = !quoted;
+        } else if (!quoted && separator == ' ' && (c == ' ' || c == '\t')) {
+            if (!trimmed(cell).empty()) flush();
+        } else if (!quoted && separator != ' ' && c == separator) {
+            flush();
+        } else {
+            cell += c;
+        }
+    }
+    if (separator != ' ' || !trimmed(cell).empty()) flush();
+    return cells;
+}
+
+char separator_of(std::string_view line) {
+    if (line.find(';') != std::string_view::npos) return ';';
+    if (line.find('\t') != std::string_view::npos) {
+        // Columns of numbers may be separated by blanks in some places and tabs in others.
+        bool blanks_within = false;
+        for (const std::string& cell : cells_of(line, '\t'))
+            blanks_within = blanks_within || cell.find(' ') != std::string::npos;
+        if (!blanks_within) return '\t';
+    }
+    return line.find(',') != std::string_view::npos ? ',' : ' ';
+}
+
+}  // namespace
+
+std::vector<TextRow> split_rows(std::string_view text) {
+    if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+    std::vector<TextRow> rows;
+    char separator = 0;
+    int number = 0;
+    while (!text.empty()) {
+        const std::size_t end = text.find_first_of("\n\r");
+        std::string_view line = text.substr(0, end);
+        ++number;
+        if (end == std::string_view::npos) {
+            text = {};
+        } else {
+            const bool pair = text[end] == '\r' && end + 1 < text.size() && text[end + 1] == '\n';
+            text.remove_prefix(end + (pair ? 2 : 1));
+        }
+        line = trimmed(line);
+        if (line.empty() || line.front() == '#' || line.starts_with("//")) continue;
+        if (separator == 0) {
+            separator = separator_of(line);
+        }
+        TextRow row{number, cells_of(line, separator)};
+        if (separator == ';' || separator == '\t') {
+            for (std::string& cell : row.cells) {
+                const std::size_t comma = cell.find(',');
+                if (comma == std::string::npos || cell.find(',', comma + 1) != std::string::npos)
+                    continue;
+                std::string dotted = cell;
+                dotted[comma] = '.';
+                if (number_in(dotted)) cell = dotted;
+            }
+        }
+        rows.push_back(std::move(row));
+    }
+    return rows;
+}
+
+std::optional<double> number_in(std::string_view cell) {
+    if (cell.starts_with('+')) cell.remove_prefix(1);
+    double value = 0;
+    const auto [end, code] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+    if (code != std::errc() || end != cell.data() + cell.size()) return std::nullopt;
+    return value;
+}
+
+std::string_view trimmed(std::string_view text) {
+    while (!text.empty() && std::isspace(static_cast<unsigned char>(text.front())))
+        text.remove_prefix(1);
+    while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())))
+        text.remove_suffix(1);
+    return text;
+}
+
+std::string lower_case(std::string_view text) {
+    std::string lower(text);
+    for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return lower;
+}
+
+}  // namespace sonocase::pipeline::inline base

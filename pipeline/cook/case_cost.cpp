@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/cook/case_cost.h"
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "pipeline/anatomy/analytic_torso.h"
+#include "pipeline/base/memory_limit.h"
+#include "pipeline/base/stopwatch.h"
+#include "pipeline/base/text.h"
+#include "pipeline/import/volume/volume_file.h"
+#include "pipeline/segmentation/distance/label_distance.h"
+#include "pipeline/segmentation/resample_labels.h"
+#include "pipeline/stages/import_stage.h"
+#include "pipeline/stages/mannequin_step.h"
+#include "pipeline/stages/stage_runner.h"
+#include "pipeline/stages/texture_stage.h"
+
+namespace sonocase::pipeline::inline cook {
+
+namespace {
+
+// Millions of nodes that resampling makes between the slices of a map; 0: they are not thick.
+double nodes_between_slices(Vector3 spacing_mm, double voxels) {
+    double h[3] = {spacing_mm.x, spacing_mm.y, spacing_mm.z};
+    std::sort(h, h + 3);
+    const LabelDistanceOptions options;
+    if (!(h[0] > 0) || h[2] < options.thick_ratio * h[1]) return 0;
+    return voxels / 1e6 * std::max(2.0, std::round(h[2] / h[1]));
+}
+
+// The map as it will be imported; of the analytic torso a coarse one, whose boxes are as large.
+// Organ meshes are not turned into voxels twice.
+Result<LabelVolume> labels_of(const Recipe& recipe) {
+    if (recipe.inputs.analytic)
+        return sample_analytic_torso(analytic_torso_grid({4, 4, 4}), recipe.inputs.torso.body);
+    if (is_mesh_source(recipe.resolve(recipe.inputs.labels)))
+        return Error{"organ meshes have no voxels yet", recipe.inputs.labels, ""};
+    SONOCASE_TRY(auto imported, import_inputs(recipe, {}, {}));
+    return std::move(imported.labels);
+}
+
+// Millions. Round a label: of its box in the map; how far the warp stretches it is not known.
+double region_voxels(const Recipe& recipe, const RegionRequest& region) {
+    Vector3 e = region.size_mm;
+    if (!region.label.empty()) {
+        const auto labels = labels_of(recipe);
+        if (!labels) return 0;
+        const Box3 box = box_of_label(*labels, region.label, region.margin_mm);
+        if (box.empty()) return 0;
+        e = box.extent();
+    }
+    return e.x * e.y * e.z / std::pow(region.voxel_mm, 3) / 1e6;
+}
+
+}  // namespace
+
+CaseSize case_size(const Recipe& recipe) {
+    CaseSize size;
+    if (recipe.inputs.analytic) {
+        const AnalyticInput& in = recipe.inputs.torso;
+        const Grid grid = analytic_torso_grid({in.voxel_mm, in.voxel_mm, in.slice_mm});
+        const auto voxels = static_cast<double>(grid.voxel_count());
+        size.label_voxels = voxels / 1e6;
+        size.interpolated_nodes = nodes_between_slices(grid.spacing_mm, voxels);
+    } else {
+        const VolumeSize labels = size_in_headers(recipe.resolve(recipe.inputs.labels));
+        size.label_mb = static_cast<double>(labels.bytes) / 1e6;
+        size.label_voxels = static_cast<double>(labels.voxels) / 1e6;
+        size.interpolated_nodes =
+            nodes_between_slices(labels.spacing_mm, static_cast<double>(labels.voxels));
+    }
+    const ResampleOptions& resample = recipe.settings.of<ResampleOptions>();
+    if (const auto volume = cooked_volume_mm3(recipe))
+        size.cooked_voxels = *volume / std::pow(resample.voxel_mm, 3) / 1e6;
+    if (resample.region) size.region_voxels = region_voxels(recipe, *resample.region);
+    return size;
+}
+
+Result<double> cooked_volume_mm3(const Recipe& recipe) {
+    SONOCASE_TRY(auto mannequin, read_mannequin(recipe));
+    const Vector3 e = extent_of(mannequin.surface);
+    return e.x * e.y * e.z;
+}
+
+MemoryNeed memory_need(const Recipe& recipe, double limit_mb) {
+    const double limit = limit_mb > 0 ? limit_mb : machine_memory_mb();
+    MemoryNeed need;
+    need.size = case_size(recipe);
+    for (const PlannedStage& stage : plan_stages(recipe, {})) {
+        if (stage.is_step()) continue;
+        const StageCost& cost = stage.descriptor->cost;
+        const double all = cost.memory_mb(need.size);
+        const double mb =
+            all <= limit ? all
+                         : std::max<double>(cost.min_memory_mb(need.size), std::min(all, limit));
+        if (mb <= need.mb) continue;
+        need.mb = mb;
+        need.stage = stage.stage;
+    }
+    return need;
+}
+
+Status check_memory(const MemoryNeed& need, double limit_mb) {
+    const bool given = limit_mb > 0;
+    const double limit = given ? limit_mb : machine_memory_mb();
+    if (need.mb <= limit) return Done{};
+    return Error{text("stage '%s' needs about %.0f MB for %.1f million voxels of the label map and "
+                      "%.1f million cooked ones, and %.0f MB are %s",
+                      need.stage.c_str(), need.mb, need.size.label_voxels,
+                      need.size.cooked_voxels + need.size.region_voxels, limit,
+                      given ? "allowed" : "in this machine"),
+                 "--memory-mb",
+                 "a larger resample.voxel_mm, a coarser or cropped label map, or more memory"};
+}
+
+namespace {
+
+// Relative least squares over demo-torso and real-torso at six voxel sizes, two threads, on a
+// machine that others used as well; the term in the label map is that of 88 and 210 million voxels
+// (docs/farm.md).
+constexpr double kFixedS = 5.53, kTextureS = 1.25, kVolumeS = 0.1003, kSurfaceS = 0.5727,
+                 kLabelsS = 0.52, kLabelsWithin = 3;
+// Resampling holds a map of more voxels in 16-bit numbers, which takes less for each.
+constexpr double kLargeS = 0.4, kLargeFrom = 30;
+// What one thread does alone: the start, the import, textures, the fit's last steps, packing.
+constexpr double kSerialS = 3.0, kSerialVolumeS = 0.012;
+// Seconds of the probe below when those builds were measured.
+constexpr double kProbeS = 0.27;
+
+double probe_processor_seconds() {
+    const double before = processor_seconds();
+    const LabelVolume ct = sample_analytic_torso(analytic_torso_grid({16, 16, 16}));
+    ResampleOptions options;
+    options.voxel_mm = 10;
+    const Registration truth = analytic_torso_truth();
+    (void)resample_labels({ct, truth}, options);
+    return processor_seconds() - before;
+}
+
+}  // namespace
+
+BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int threads) {
+    const double cooked = size.cooked_voxels;
+    BuildTime time;
+    time.processor_s =
+        speed *
+        (kFixedS + kTextureS * std::pow(texture_edge / 64.0, 3) +
+         kVolumeS * (cooked + size.region_voxels) + kSurfaceS * std::cbrt(cooked * cooked) +
+         kLabelsS * std::clamp(size.label_voxels - kLabelsWithin, 0.0, kLargeFrom - kLabelsWithin) +
+         kLargeS * std::max(0.0, size.label_voxels - kLargeFrom));
+    const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    const double serial = std::min(time.processor_s, speed * (kSerialS + kSerialVolumeS * cooked));
+    const int shared_by = threads > 0 ? std::min(threads, cores) : cores;
+    time.alone_s = serial + (time.processor_s - serial) / shared_by;
+    return time;
+}
+
+BuildTime build_time(
+    const Recipe& recipe, const CaseSize& size, double sized_voxel_mm, double speed, int threads) {
+    CaseSize now = size;
+    const double voxel_mm = recipe.settings.of<ResampleOptions>().voxel_mm;
+    now.cooked_voxels *= std::pow(sized_voxel_mm / voxel_mm, 3);
+    return build_time(now, recipe.settings.of<TextureStageOptions>().bank.edge, speed, threads);
+}
+
+double machine_speed() {
+    return probe_processor_seconds() / kProbeS;
+}
+
+}  // namespace sonocase::pipeline::inline cook

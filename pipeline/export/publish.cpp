@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/export/publish.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+#include <utility>
+
+#include "formats/base/base64.h"
+#include "formats/base/digest.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/case_exercises.h"
+#include "formats/files/atomic_file.h"
+#include "formats/text/json_reader.h"
+
+namespace sonocase::pipeline::inline exporting {
+namespace {
+
+std::string plain_name(const std::string& path) {
+    std::string name = std::filesystem::path(path).stem().string();
+    for (char& c : name) {
+        const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') ||
+                           (c >= 'A' && c <= 'Z') || c == '-' || c == '_';
+        if (!plain) c = '-';
+    }
+    return name.empty() ? "case" : name;
+}
+
+}  // namespace
+
+Result<ReadCase> site_case(std::span<const std::uint8_t> given, const std::string& path) {
+    SONOCASE_TRY(auto bundle, read_bundle(given, path));
+    const std::vector<Exercise> exercises = exercises_of(bundle, path).exercises;
+    const bool plain_first =
+        std::any_of(exercises.begin(), exercises.end(),
+                    [](const Exercise& exercise) { return exercise.model == "paper"; });
+    SONOCASE_TRY(auto arranged, arranged_for_loading(given, plain_first, path));
+    ReadCase read{{}, std::move(arranged)};
+    SiteCase& out = read.site;
+    const std::span<const std::uint8_t> bytes(read.bytes);
+    SONOCASE_TRY(auto first, parts_to_open(bytes, path));
+    out.first = std::move(first);
+    out.name = plain_name(path);
+    out.title = bundle.manifest.case_name.empty() ? out.name : bundle.manifest.case_name;
+    out.bytes = bytes.size();
+    out.digest = digest_of(bytes);
+    out.file = out.name + "-" + out.digest.substr(0, 8) + ".sonocase";
+    for (std::size_t at = 0; at < bytes.size(); at += kSegmentBytes)
+        out.segments.push_back(
+            hash_of(bytes.subspan(at, std::min(kSegmentBytes, bytes.size() - at))));
+    out.preview = std::move(bundle.preview_png);
+    for (const Exercise& exercise : exercises)
+        out.exercises.push_back({exercise.name, exercise.title, exercise.description});
+    return read;
+}
+
+std::vector<std::uint8_t> segment_list(const SiteCase& site) {
+    std::vector<std::uint8_t> out;
+    for (const std::uint64_t hash : site.segments) {
+        for (int n = 0; n < 8; ++n) out.push_back(static_cast<std::uint8_t>(hash >> 8 * n));
+    }
+    return out;
+}
+
+std::string site_list_json(const std::vector<SiteCase>& cases, const std::string& xapi) {
+    using detail::Json;
+    Json list = Json::array();
+    for (const SiteCase& one : cases) {
+        Json item = Json::object();
+        item["name"] = one.name;
+        item["title"] = one.title;
+        item["file"] = one.file;
+        item["bytes"] = one.bytes;
+        item["digest"] = one.digest;
+        item["segment_bytes"] = kSegmentBytes;
+        item["segments"] = one.file + ".segments";
+        item["segments_digest"] = digest_of(segment_list(one));
+        Json first = Json::array();
+        for (const ByteRange& range : one.first)
+            first.push_back(Json::array({range.at, range.count}));
+        item["first"] = std::move(first);
+        item["preview"] = one.preview.empty() ? Json(nullptr) : Json(one.name + ".png");
+        Json exercises = Json::array();
+        for (const SiteCase::Entry& exercise : one.exercises) {
+            Json entry = Json::object();
+            entry["name"] = exercise.name;
+            entry["title"] = exercise.title;
+            entry["description"] = exercise.description;
+            exercises.push_back(std::move(entry));
+        }
+        item["exercises"] = std::move(exercises);
+        list.push_back(std::move(item));
+    }
+    Json out = Json::object();
+    out["format"] = "sonocase site";
+    out["version"] = 2;
+    out["xapi"] = xapi;
+    out["cases"] = std::move(list);
+    return detail::json_text(out, false) + "\n";
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kProgramFiles[] = {"style.css", "sonoplay.js", "sonoplay.wasm",
+                                         "sonoplay-scalar.wasm", "worker.js"};
+constexpr std::size_t kLargeSinglePage = 12 << 20;  // bytes of a case; base64 adds a third
+
+// Text for data inside a page: it must not end the element that holds it.
+std::string inside_page(std::string text) {
+    for (std::size_t at = 0; (at = text.find('<', at)) != text.npos;)
+        text.replace(at, 1, "\\u003c");
+    return text;
+}
+
+Status replace_once(std::string& text, const std::string& what, const std::string& by) {
+    const std::size_t at = text.find(what);
+    if (at == text.npos) {
+        return Error{"the page has no place '" + what + "'", "",
+                     "build it anew with scripts/web of this version"};
+    }
+    text.replace(at, what.size(), by);
+    return Done{};
+}
+
+bool is_plain(const std::string& origin) {
+    return origin.find_first_not_of(
+               "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-:/") == origin.npos;
+}
+std::string without_path(const std::string& address) {
+    const std::size_t scheme = address.find("://");
+    return scheme == address.npos ? "" : address.substr(0, address.find('/', scheme + 3));
+}
+
+// The origin of a store's address, such as "https://store.example.org".
+Result<std::string> store_origin(const std::string& address) {
+    const std::string origin = without_path(address);
+    const bool local =
+        origin.starts_with("http://127.0.0.1:") || origin.starts_with("http://localhost:");
+    if (!is_plain(origin) || (!origin.starts_with("https://") && !local)) {
+        return Error{"'" + address + "' is not the address of a learning record store", "--xapi",
+                     "expected https://HOST/PATH"};
+    }
+    return origin;
+}
+
+// The origin of a pose server's address, such as "ws://127.0.0.1:18946".
+Result<std::string> pose_origin(const std::string& address) {
+    const std::string origin = without_path(address);
+    if (!is_plain(origin) || (!origin.starts_with("ws://") && !origin.starts_with("wss://"))) {
+        return Error{"'" + address + "' is not the address of a pose server", "--poses",
+                     "expected ws://HOST:PORT"};
+    }
+    return origin;
+}
+
+// The hosts besides its own that the page may connect to.
+Result<std::string> other_hosts(const PublishOptions& options) {
+    std::string out;
+    if (!options.xapi.empty()) {
+        SONOCASE_TRY(const auto origin, store_origin(options.xapi));
+        out += " " + origin;
+    }
+    if (!options.poses.empty()) {
+        SONOCASE_TRY(const auto origin, pose_origin(options.poses));
+        out += " " + origin;
+    }
+    return out;
+}
+
+Result<std::vector<ReadCase>> read_cases(const std::vector<std::string>& paths) {
+    std::vector<ReadCase> out;
+    std::set<std::string> names;
+    for (const std::string& path : paths) {
+        SONOCASE_TRY(auto bytes, read_large_file(path));
+        SONOCASE_TRY(auto read, site_case(bytes, path));
+        if (!names.insert(read.site.name).second) {
+            return Error{"two cases are named " + read.site.name, path, "rename one of the files"};
+        }
+        out.push_back(std::move(read));
+    }
+    return out;
+}
+
+Result<Published> publish_page(const std::vector<ReadCase>& cases,
+                               const std::string& program,
+                               const std::string& path,
+                               const PublishOptions& options) {
+    if (cases.size() != 1) {
+        return Error{"one page holds one case, and " + std::to_string(cases.size()) + " are given",
+                     "--single-file", "give one case"};
+    }
+    SONOCASE_TRY(auto page, read_text_file(program + "/single.html"));
+    SiteCase site = cases[0].site;
+    site.preview.clear();
+    const std::string list = "<script type=\"application/json\" id=\"site-list\">" +
+                             inside_page(site_list_json({site}, options.xapi)) + "</script>";
+    const std::string data = "<script type=\"text/plain\" id=\"case-" + site.name + "\">" +
+                             base64(cases[0].bytes) + "</script>";
+    SONOCASE_TRY(const auto hosts, other_hosts(options));
+    if (!hosts.empty()) {
+        SONOCASE_TRY_DONE(replace_once(page, "connect-src 'none'", "connect-src" + hosts));
+    }
+    SONOCASE_TRY_DONE(replace_once(page, "<!--LIST-->", list));
+    SONOCASE_TRY_DONE(replace_once(page, "<!--CASES-->", data));
+    SONOCASE_TRY_DONE(write_file(path, page));
+    Published out{{path}, {}};
+    if (cases[0].bytes.size() > kLargeSinglePage) {
+        out.warnings.push_back(
+            "The case is large for one page: browsers take seconds to open it. A case cooked with "
+            "--preset draft is smaller.");
+    }
+    return out;
+}
+
+}  // namespace
+
+Result<std::string> find_program() {
+    std::error_code failed;
+    const fs::path self = fs::read_symlink("/proc/self/exe", failed);
+    const fs::path bin = self.parent_path();
+    for (const fs::path& folder : {bin / "../share/sonocase/web", bin / "../../web/program"}) {
+        if (fs::is_regular_file(folder / "sonoplay.wasm", failed))
+            return fs::weakly_canonical(folder, failed).string();
+    }
+    return Error{"the player for browsers is not built", "",
+                 "build it with scripts/web, or name its folder with --program"};
+}
+
+Result<Published> publish(const std::vector<std::string>& cases,
+                          const std::string& site,
+                          const PublishOptions& options) {
+    std::string program = options.program_folder;
+    if (program.empty()) {
+        SONOCASE_TRY(auto found, find_program());
+        program = std::move(found);
+    }
+    SONOCASE_TRY(const auto read, read_cases(cases));
+    if (options.single_file) return publish_page(read, program, site, options);
+
+    SONOCASE_TRY(auto index, read_text_file(program + "/index.html"));
+    SONOCASE_TRY(const auto hosts, other_hosts(options));
+    if (!hosts.empty()) {
+        SONOCASE_TRY_DONE(replace_once(index, "connect-src 'self'", "connect-src 'self'" + hosts));
+    }
+    Published out;
+    Status written = Done{};
+    const auto write = [&](const std::string& name, const auto& content) {
+        if (!written) return;
+        written = write_file(site + "/" + name, content);
+        if (written) out.files.push_back(site + "/" + name);
+    };
+    std::vector<SiteCase> list;
+    for (const ReadCase& one : read) {
+        write(one.site.file, std::span<const std::uint8_t>(one.bytes));
+        write(one.site.file + ".segments", std::span<const std::uint8_t>(segment_list(one.site)));
+        if (!one.site.preview.empty())
+            write(one.site.name + ".png", std::span<const std::uint8_t>(one.site.preview));
+        list.push_back(one.site);
+    }
+    for (const char* name : kProgramFiles) {
+        SONOCASE_TRY(const auto bytes, read_file(program + "/" + name));
+        write(name, std::span<const std::uint8_t>(bytes));
+    }
+    write("index.html", std::string_view(index));
+    write("cases.json", std::string_view(site_list_json(list, options.xapi)));
+    if (!written) return written.error();
+    return out;
+}
+
+}  // namespace sonocase::pipeline::inline exporting

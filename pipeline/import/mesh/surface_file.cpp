@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/import/mesh/surface_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <tuple>
+#include <unordered_map>
+#include <vector>
+
+#include "formats/base/stage_report.h"
+#include "formats/files/atomic_file.h"
+#include "formats/volume/surface.h"
+#include "pipeline/base/source_checks.h"
+#include "pipeline/base/stopwatch.h"
+#include "pipeline/base/text.h"
+#include "pipeline/import/mesh/mesh_file.h"
+
+namespace sonocase::pipeline::inline import_mesh {
+
+namespace {
+
+constexpr std::size_t kDensePoints = 60000;  // a cloud of more is reduced
+constexpr double kCubeMm = 5;
+constexpr int kBlock = 10;  // cubes along a block, within which cubes are compared
+constexpr std::size_t kFew = 3, kTimesAsMany = 5;
+
+// A key of the cube of this edge that holds p, 21 bits per axis.
+std::uint64_t key_of(Point3 p, double edge_mm) {
+    std::uint64_t key = 0;
+    for (int a = 0; a < 3; ++a) {
+        const double cell = std::clamp(std::floor(p[a] / edge_mm), -1048576.0, 1048575.0);
+        key = key << 21 | static_cast<std::uint64_t>(static_cast<std::int64_t>(cell) + 1048576);
+    }
+    return key;
+}
+
+struct Cube {
+    Point3 mean;
+    std::size_t readings = 0;
+    std::uint64_t block = 0;
+};
+
+std::vector<Cube> cubes_of(const std::vector<Point3>& points) {
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed;
+    keyed.reserve(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i)
+        keyed.push_back({key_of(points[i], kCubeMm), static_cast<std::uint32_t>(i)});
+    std::sort(keyed.begin(), keyed.end());
+    std::vector<Cube> cubes;
+    for (std::size_t n = 0; n < keyed.size();) {
+        Vector3 sum;
+        std::size_t end = n;
+        for (; end < keyed.size() && keyed[end].first == keyed[n].first; ++end)
+            sum = sum + (points[keyed[end].second] - Point3{});
+        Cube cube;
+        cube.readings = end - n;
+        cube.mean = Point3{} + sum / static_cast<double>(cube.readings);
+        cube.block = key_of(cube.mean, kBlock * kCubeMm);
+        cubes.push_back(cube);
+        n = end;
+    }
+    return cubes;
+}
+
+// For each block, the number of readings in the cube in which its middle reading lies.
+std::unordered_map<std::uint64_t, std::size_t> usual_sizes(const std::vector<Cube>& cubes) {
+    std::vector<std::size_t> order(cubes.size());
+    for (std::size_t n = 0; n < order.size(); ++n) order[n] = n;
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return std::tie(cubes[a].block, cubes[a].readings, a) <
+               std::tie(cubes[b].block, cubes[b].readings, b);
+    });
+    std::unordered_map<std::uint64_t, std::size_t> usual;
+    for (std::size_t n = 0; n < order.size();) {
+        std::size_t end = n, readings = 0;
+        for (; end < order.size() && cubes[order[end]].block == cubes[order[n]].block; ++end)
+            readings += cubes[order[end]].readings;
+        std::size_t middle = n;
+        for (std::size_t seen = 0; middle + 1 < end; ++middle) {
+            seen += cubes[order[middle]].readings;
+            if (2 * seen >= readings) break;
+        }
+        usual[cubes[order[n]].block] = cubes[order[middle]].readings;
+        n = end;
+    }
+    return usual;
+}
+
+// The largest usual size in the blocks round a cube.
+std::size_t usual_near(const std::unordered_map<std::uint64_t, std::size_t>& usual, Point3 p) {
+    constexpr double kEdgeMm = kBlock * kCubeMm;
+    std::size_t largest = 0;
+    for (int n = 0; n < 27; ++n) {
+        const Vector3 aside{double(n % 3 - 1), double(n / 3 % 3 - 1), double(n / 9 - 1)};
+        const auto found = usual.find(key_of(p + kEdgeMm * aside, kEdgeMm));
+        if (found != usual.end()) largest = std::max(largest, found->second);
+    }
+    return largest;
+}
+
+// The readings in each cube of 5 mm become one at their mean, in the order of the cubes. Cubes that
+// hold one to three readings where the others near them hold five times as many are readings in the
+// air, which would count for as much as a cube full of skin, and are left out. A cloud of
+// kDensePoints or fewer is left alone. Normals are dropped. cloud: mm, finite. report: measures
+// given_points and sparse_points (left out); may be null. Cost: 0.2 us per reading.
+void reduce_points(Surface& cloud, StageReport* report) {
+    if (!cloud.triangles.empty() || cloud.points.size() <= kDensePoints) return;
+    const std::size_t given = cloud.points.size();
+    const std::vector<Cube> cubes = cubes_of(cloud.points);
+    const auto usual = usual_sizes(cubes);
+    std::size_t sparse = 0;
+    cloud.points.clear();
+    cloud.normals.clear();
+    for (const Cube& cube : cubes) {
+        if (cube.readings <= kFew && kTimesAsMany * cube.readings <= usual_near(usual, cube.mean)) {
+            sparse += cube.readings;
+        } else {
+            cloud.points.push_back(cube.mean);
+        }
+    }
+    cloud.points.shrink_to_fit();
+    if (report == nullptr) return;
+    report->measures.push_back({"given_points", static_cast<double>(given)});
+    report->measures.push_back({"sparse_points", static_cast<double>(sparse)});
+}
+
+struct Columns {
+    int point[3] = {0, 1, 2};
+    int normal[3] = {-1, -1, -1};
+    int status = -1;
+};
+
+int find_column(const TextRow& header, const char* name) {
+    for (std::size_t c = 0; c < header.cells.size(); ++c) {
+        std::string cell = lower_case(header.cells[c]);
+        if (cell.ends_with("_mm") || cell.ends_with("[mm]"))
+            cell = cell.substr(0, cell.find_first_of("_[ "));
+        if (cell == name) return static_cast<int>(c);
+    }
+    return -1;
+}
+
+bool find_columns(const TextRow& header, Columns* columns) {
+    constexpr const char* kNames[][3] = {{"x", "y", "z"}, {"tx", "ty", "tz"}, {"px", "py", "pz"}};
+    for (const auto& names : kNames) {
+        for (int axis = 0; axis < 3; ++axis)
+            columns->point[axis] = find_column(header, names[axis]);
+        if (columns->point[0] >= 0 && columns->point[1] >= 0 && columns->point[2] >= 0) {
+            constexpr const char* kNormals[3] = {"nx", "ny", "nz"};
+            for (int axis = 0; axis < 3; ++axis)
+                columns->normal[axis] = find_column(header, kNormals[axis]);
+            columns->status = find_column(header, "status");
+            return true;
+        }
+    }
+    return false;
+}
+
+}  // namespace
+
+Result<Surface> read_point_file(const std::string& path, std::vector<std::string>* warnings) {
+    SONOCASE_TRY(auto text, read_text_file(path));
+    const std::vector<TextRow> rows = split_rows(text);
+    Surface surface;
+    if (rows.empty()) return surface;
+    Columns columns;
+    std::size_t first = 0;
+    if (!number_in(rows[0].cells[0]) || !find_columns(rows[0], &columns)) {
+        columns = Columns{};
+        if (rows[0].cells.size() == 1 && number_in(rows[0].cells[0])) {
+            first = 1;  // XYZ files may begin with the number of points
+        } else if (!number_in(rows[0].cells[0])) {
+            if (!find_columns(rows[0], &columns))
+                return Error{
+                    "no columns x, y, z", path + ":" + std::to_string(rows[0].line),
+                    "expected a header with x,y,z (or tx,ty,tz), or three numbers per row"};
+            first = 1;
+        }
+    }
+    const bool has_normals =
+        columns.normal[0] >= 0 && columns.normal[1] >= 0 && columns.normal[2] >= 0;
+    std::size_t left_out = 0;
+    for (std::size_t r = first; r < rows.size(); ++r) {
+        const TextRow& row = rows[r];
+        const auto cell = [&](int column) -> std::optional<double> {
+            if (static_cast<std::size_t>(column) >= row.cells.size()) return std::nullopt;
+            return number_in(row.cells[column]);
+        };
+        if (columns.status >= 0 && static_cast<std::size_t>(columns.status) < row.cells.size() &&
+            lower_case(row.cells[columns.status]) != "ok") {
+            ++left_out;
+            continue;
+        }
+        Point3 point;
+        Vector3 normal;
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto value = cell(columns.point[axis]);
+            if (!value)
+                return Error{"row without three numbers", path + ":" + std::to_string(row.line),
+                             "expected x, y and z; correct or delete the row"};
+            point[axis] = *value;
+            if (has_normals) normal[axis] = cell(columns.normal[axis]).value_or(0.0);
+        }
+        if (!std::isfinite(point.x) || !std::isfinite(point.y) || !std::isfinite(point.z)) {
+            ++left_out;
+            continue;
+        }
+        surface.points.push_back(point);
+        if (has_normals) surface.normals.push_back(normalized(normal));
+    }
+    if (left_out > 0)
+        warnings->push_back(
+            std::to_string(left_out) +
+            " readings without position or with a status other than OK were left out");
+    return surface;
+}
+
+namespace {
+
+// Turns triangles until each agrees with its neighbours and every connected part faces outwards: on
+// the whole, away from the mean of the points. That point is inside a torso, so that this works for
+// a mesh that is open at its cuts as well as for a closed one. An edge of more than two triangles
+// does not link them. Returns how many were turned.
+std::size_t orient_outwards(Surface& surface) {
+    const std::size_t count = surface.triangles.size();
+    struct Side {
+        std::uint32_t low, high, triangle;
+        bool rising;  // the triangle runs along it from low to high
+    };
+    std::vector<Side> sides;
+    for (std::uint32_t t = 0; t < count; ++t) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            const std::uint32_t from = surface.triangles[t][c],
+                                to = surface.triangles[t][(c + 1) % 3];
+            sides.push_back({std::min(from, to), std::max(from, to), t, from < to});
+        }
+    }
+    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+        return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+    });
+    struct Link {
+        std::uint32_t other;
+        bool same_sense;  // both have the same winding as read
+    };
+    std::vector<std::vector<Link>> links(count);
+    for (std::size_t i = 0; i < sides.size();) {
+        std::size_t end = i + 1;
+        while (end < sides.size() && sides[end].low == sides[i].low &&
+               sides[end].high == sides[i].high)
+            ++end;
+        if (end - i == 2) {
+            const bool same = sides[i].rising != sides[i + 1].rising;
+            links[sides[i].triangle].push_back({sides[i + 1].triangle, same});
+            links[sides[i + 1].triangle].push_back({sides[i].triangle, same});
+        }
+        i = end;
+    }
+    Vector3 sum;
+    for (const Point3 p : surface.points) sum = sum + (p - Point3{});
+    const Point3 middle = Point3{} + sum / static_cast<double>(surface.points.size());
+    const auto volume = [&](std::uint32_t t) {
+        const auto& corner = surface.triangles[t];
+        return dot(surface.points[corner[0]] - middle,
+                   cross(surface.points[corner[1]] - middle, surface.points[corner[2]] - middle));
+    };
+    std::vector<std::int8_t> sense(count, 0);  // 1: as read, -1: turned, 0: not yet visited
+    std::size_t turned = 0;
+    for (std::uint32_t seed = 0; seed < count; ++seed) {
+        if (sense[seed] != 0) continue;
+        std::vector<std::uint32_t> part{seed};
+        sense[seed] = 1;
+        double outward = 0;
+        for (std::size_t next = 0; next < part.size(); ++next) {
+            const std::uint32_t t = part[next];
+            outward += sense[t] * volume(t);
+            for (const Link& link : links[t]) {
+                if (sense[link.other] != 0) continue;
+                sense[link.other] =
+                    static_cast<std::int8_t>(link.same_sense ? sense[t] : -sense[t]);
+                part.push_back(link.other);
+            }
+        }
+        for (const std::uint32_t t : part) {
+            if ((sense[t] > 0) == (outward >= 0)) continue;
+            std::swap(surface.triangles[t][1], surface.triangles[t][2]);
+            ++turned;
+        }
+    }
+    return turned;
+}
+
+}  // namespace
+
+Result<Surface> import_surface(const std::string& path,
+                               const SurfaceFileOptions& options,
+                               StageReport* report) {
+    const Stopwatch watch;
+    StageReport own;
+    own.stage = "surface_file";
+    SONOCASE_TRY_DONE(check_source_file(path, "expected a surface file"));
+    const std::string ending = lower_case(std::filesystem::path(path).extension().string());
+    const bool mesh = ending == ".ply" || ending == ".stl" || ending == ".obj" || ending == ".vtp";
+    const bool cloud = ending == ".csv" || ending == ".xyz" || ending == ".txt" ||
+                       ending == ".pts" || ending == ".asc" || ending == ".tsv";
+    if (!mesh && !cloud)
+        return Error{"not a known surface file name", path,
+                     "expected .ply, .stl, .obj, .vtp, .csv, .tsv, .txt or .xyz"};
+    SONOCASE_TRY(auto surface, mesh ? read_mesh_file(path, options.scale, &own)
+                                    : read_point_file(path, &own.warnings));
+    if (surface.points.empty())
+        return Error{"surface holds no points", path,
+                     "expected the digitised skin; check that this is the right file"};
+    for (const Point3 p : surface.points)
+        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+            return Error{"surface has a vertex that is not finite", path, "export it again"};
+    if (options.torso && surface.points.size() < kMinSurfacePoints)
+        return Error{
+            "surface of " + std::to_string(surface.points.size()) + " points", path,
+            "expected at least 30 all round the torso, 500 or more are good; take more readings"};
+    if (options.scale != 1)
+        for (Point3& p : surface.points) p = Point3{} + options.scale * (p - Point3{});
+    if (!mesh && options.torso) reduce_points(surface, &own);
+    Box3 box;
+    for (const Point3 p : surface.points) box.include(p);
+    if (options.torso) {
+        if (const auto error = check_torso_extent(box.extent(), "surface", path, "--scale"))
+            return *error;
+    }
+
+    if (!surface.triangles.empty()) {
+        // Folds that the reduction of a dense scan leaves are no fault of the file.
+        const std::size_t turned = orient_outwards(surface);
+        if (turned > 0 && own.measures.empty())
+            own.warnings.push_back(std::to_string(turned) +
+                                   " triangles faced inwards and were turned");
+        add_vertex_normals(surface);
+    }
+    const std::vector<Measure> reduction = std::move(own.measures);
+    own.measures = {{"points", static_cast<double>(surface.points.size())},
+                    {"triangles", static_cast<double>(surface.triangles.size())},
+                    {"width_mm", box.extent().x},
+                    {"depth_mm", box.extent().y},
+                    {"height_mm", box.extent().z}};
+    own.measures.insert(own.measures.end(), reduction.begin(), reduction.end());
+    own.seconds = watch.seconds();
+    if (report != nullptr) *report = std::move(own);
+    return surface;
+}
+
+}  // namespace sonocase::pipeline::inline import_mesh

@@ -1,0 +1,433 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "formats/files/atomic_file.h"
+#include "formats/files/load_save.h"
+#include "pipeline/cook/cook_case.h"
+#include "pipeline/stages/read_recipe.h"
+#include "pipeline/texture/read_example.h"
+#include "pipeline/tradeoff/program_beside.h"
+#include "pipeline/tradeoff/suites.h"
+
+namespace sonocase::pipeline::inline tradeoff {
+
+namespace {
+
+constexpr int kFrames = 12;
+
+// The player that lies beside this program, and what it plays.
+struct Player {
+    std::string program, bundle;
+    TemporaryFolder folder;
+    std::vector<ExampleImage> finest;
+    bool linear = false;  // a linear probe in place of each exercise's own
+};
+
+std::string quoted(const std::string& text) {
+    std::string out = "'";
+    for (char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return out + "'";
+}
+
+// The exercise with a linear probe in place of its own.
+std::string with_linear_probe(const std::string& toml) {
+    const std::size_t table = toml.find("[probe]"), end = toml.find("\n\n", table);
+    if (table == std::string::npos || end == std::string::npos) return toml;
+    return toml.substr(0, table) +
+           "[probe]\nshape = \"linear\"\nwidth_mm = 38\ndepth_mm = 36\nfrequency_mhz = 9\n"
+           "focus_mm = 20\nelevation_mm = 2" +
+           toml.substr(end);
+}
+
+Status start(Player& player) {
+    std::error_code failed;
+    const auto self = std::filesystem::read_symlink("/proc/self/exe", failed);
+    player.program = (self.parent_path() / "sonoplay").string();
+    if (failed || !std::filesystem::exists(player.program)) {
+        return Error{"the player is not beside this program", player.program,
+                     "build or install sonoplay, or leave --suite render out"};
+    }
+    SONOCASE_TRY_DONE(player.folder.make("sonocase-render"));
+    SONOCASE_TRY(auto recipe, embedded_recipe());
+    SONOCASE_TRY(auto cooked, cook_case(recipe));
+    if (player.linear) {
+        for (EmbeddedExercise& exercise : cooked.bundle.exercises)
+            exercise.toml = with_linear_probe(exercise.toml);
+    }
+    player.bundle = player.folder.path() + "/demo.sonocase";
+    return save_bundle(cooked.bundle, player.bundle);
+}
+
+// Returns the frames of a sweep under the settings, and the median time of a frame, with its truth
+// planes if the settings ask for them.
+Result<std::vector<ExampleImage>> play(const Player& player,
+                                       const Settings& settings,
+                                       double* seconds) {
+    const std::string out = player.folder.path() + "/frames",
+                      stats = player.folder.path() + "/stats.json";
+    std::string command = quoted(player.program) + " " + quoted(player.bundle) +
+                          " --headless --tracker sweep:tour --frames " + std::to_string(kFrames) +
+                          " --out " + quoted(out) + " --stats " + quoted(stats);
+    for (const Setting& s : settings) {
+        const std::string name = s.key.substr(s.key.find('.') + 1);
+        if (name == "labels") {
+            if (s.value == "on") command += " --truth " + quoted(player.folder.path() + "/truth");
+            continue;
+        }
+        const bool grain = name == "grain_db", even = name == "equalisation",
+                   reduction = name == "speckle_reduction";
+        if (name == "aperture_mm" || grain || even || reduction) {
+            const std::string machine = player.folder.path() + "/machine.toml";
+            const std::string text =
+                grain ? "[machine]\nbase = \"modern-linear\"\nname = \"grain\"\n"
+                        "[machine.noise]\ngrain_db = " +
+                            s.value + "\n"
+                : even      ? "[machine.equalisation]\namount = " + s.value + "\n"
+                : reduction ? "[machine.speckle_reduction]\nvariation = " + s.value + "\n"
+                            : "[machine.beam]\naperture_mm = " + s.value + "\n";
+            SONOCASE_TRY_DONE(write_file(machine, text));
+            command += " --machine " + quoted(machine);
+            continue;
+        }
+        command += " --" + name + "=" + quoted(s.value);
+    }
+    if (std::system((command + " >/dev/null 2>&1").c_str()) != 0) {
+        return Error{"the player failed", command, "run it to see why"};
+    }
+    SONOCASE_TRY(const auto text, read_text_file(stats));
+    const auto json = nlohmann::json::parse(text, nullptr, false);
+    if (json.is_discarded()) return Error{"is not JSON", stats, ""};
+    *seconds = json["frame_ms"].value("median", 0.0) * 1e-3;
+    if (json.contains("truth_ms")) *seconds += json["truth_ms"].value("median", 0.0) * 1e-3;
+    std::vector<ExampleImage> frames;
+    for (int i = 0; i < kFrames; ++i) {
+        char name[32];
+        std::snprintf(name, sizeof name, "/frame_%05d.png", i);
+        SONOCASE_TRY(auto frame, read_example(out + name));
+        frames.push_back(std::move(frame));
+    }
+    return frames;
+}
+
+// The root mean square difference in grey after averaging over 8 x 8 pixels. It compares places and
+// brightness, not single grains of speckle, which any change of sampling moves.
+double rms_grey(const std::vector<ExampleImage>& a, const std::vector<ExampleImage>& b) {
+    constexpr int kBlock = 8;
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t f = 0; f < a.size(); ++f) {
+        for (int y = 0; y + kBlock <= a[f].height; y += kBlock) {
+            for (int x = 0; x + kBlock <= a[f].width; x += kBlock) {
+                double difference = 0;
+                for (int v = 0; v < kBlock; ++v) {
+                    for (int u = 0; u < kBlock; ++u) {
+                        const std::size_t i = a[f].index(x + u, y + v);
+                        difference +=
+                            static_cast<double>(a[f].grey[i]) - static_cast<double>(b[f].grey[i]);
+                    }
+                }
+                difference /= kBlock * kBlock;
+                sum += difference * difference;
+                ++count;
+            }
+        }
+    }
+    return std::sqrt(sum / static_cast<double>(count));
+}
+
+// Measures settings against the finest sampling. suite: the prefix of the knobs' names.
+std::function<Result<Measured>(const Settings&)> against_the_finest(
+    const std::shared_ptr<Player>& player, const std::string& suite) {
+    return [player, suite](const Settings& settings) -> Result<Measured> {
+        if (player->bundle.empty()) {
+            SONOCASE_TRY_DONE(start(*player));
+        }
+        double seconds = 0;
+        const Settings finest{
+            {suite + ".scanlines", "768"}, {suite + ".samples", "1024"}, {suite + ".looks", "16"}};
+        if (player->finest.empty()) {
+            SONOCASE_TRY(auto frames, play(*player, finest, &seconds));
+            player->finest = std::move(frames);
+        }
+        SONOCASE_TRY(const auto frames, play(*player, settings, &seconds));
+        return Measured{rms_grey(frames, player->finest), seconds, ""};
+    };
+}
+
+}  // namespace
+
+Suite linear_suite() {
+    auto player = std::make_shared<Player>();
+    player->linear = true;
+    Suite suite;
+    suite.name = "linear";
+    suite.title = "A linear picture of the physical model";
+    suite.body = "demo-torso";
+    suite.error_name = "rms difference";
+    suite.error_unit = "grey, 8 x 8 pixels averaged";
+    suite.truth =
+        "Twelve frames of a sweep over the demo torso with a linear probe (38 mm, 9 MHz) are "
+        "compared with the same frames at 768 beams of 1024 samples and 16 looks; seconds are the "
+        "median of a frame on one thread.";
+    suite.knobs = {
+        {"linear.looks",
+         {"1", "2", "4", "6", "16"},
+         "4",
+         "",
+         "speckle fields that are averaged",
+         "grain of the ground between plates",
+         "the machine's own are 4, and 5 in the first 8 mm"},
+        {"linear.grain_db",
+         {"0", "0.6", "1.3", "2", "3"},
+         "1.3",
+         "dB",
+         "deviation of a sample's own gain",
+         "grain of single samples that grows with the echo, as real images have",
+         "modern-linear has 1.3; averaged over 8 x 8 pixels it hardly shows"},
+        {"linear.effects",
+         {"auto", "-streaks", "-fine_structure", "-wall", "-structure"},
+         "auto",
+         "",
+         "effects that are left out",
+         "septa and perimysium, the ground of muscle and fat, sheets of the wall",
+         "without plates muscle and fat are even"},
+    };
+    suite.measure = against_the_finest(player, suite.name);
+    return suite;
+}
+
+Suite render_suite() {
+    auto player = std::make_shared<Player>();
+    Suite suite;
+    suite.name = "render";
+    suite.title = "A frame of the physical model";
+    suite.body = "demo-torso";
+    suite.error_name = "rms difference";
+    suite.error_unit = "grey, 8 x 8 pixels averaged";
+    suite.truth =
+        "Twelve frames of a sweep over the demo torso are compared with the same frames at 768 "
+        "beams of 1024 "
+        "samples; seconds are the median of a frame on one thread.";
+    suite.knobs = {
+        {"render.scanlines",
+         {"64", "96", "128", "176", "256", "384"},
+         "176",
+         "",
+         "beams of the sector",
+         "detail across the beams",
+         "the lateral filter spans a number of beams, so few beams also change the grain"},
+        {"render.samples",
+         {"128", "256", "384", "416", "512", "768"},
+         "416",
+         "",
+         "samples along a beam",
+         "detail along the beam",
+         "two samples to the point spread's width along the beam are the player's choice"},
+        {"render.looks",
+         {"1", "2", "3", "4", "6", "16"},
+         "2",
+         "",
+         "speckle fields that are averaged",
+         "grain of the speckle",
+         "a look costs some 5 % of a frame; fewer make the speckle more contrasty"},
+        {"render.aperture_mm",
+         {"0", "8", "17", "30"},
+         "17",
+         "",
+         "width of the face that listens",
+         "the penumbra of shadows",
+         "costs one pass over the light of all samples, as much at every width but 0"},
+        {"render.equalisation",
+         {"0", "0.25", "0.5", "1"},
+         "1",
+         "",
+         "how far a beam's gain goes to its neighbours'",
+         "upright columns in the liver: of shadows, and of bright and dark places",
+         "costs the sum of cells and a product of all samples, as much at every amount but 0"},
+        {"render.speckle_reduction",
+         {"0", "0.15", "0.3", "0.6"},
+         "0.3",
+         "",
+         "how much the contrast of detail differs between places of the tissue",
+         "smooth regions beside busy ones",
+         "costs the sum of cells and a blend of all samples, as much at every value but 0"},
+        {"render.effects",
+         {"auto", "-deformation", "-wall", "-streaks", "-parenchyma,-fine_structure", "-structure",
+          "-clutter", "-boundaries"},
+         "auto",
+         "",
+         "effects that are left out",
+         "what that effect shows",
+         "what a scene does not show is not paid for in the first place"},
+        {"render.labels",
+         {"off", "on"},
+         "off",
+         "",
+         "truth of every pixel beside the picture",
+         "nothing: the picture is the same",
+         "labels, needle, shadow and depth cost about as much as a frame, and nothing when off"},
+    };
+    suite.pairs = {{"render.scanlines", "render.samples"}};
+    suite.named = {{TrialRole::paper, "model paper", {{"render.model", "paper"}}},
+                   {TrialRole::peer, "reference renderer", {{"render.renderer", "reference"}}}};
+    suite.measure = against_the_finest(player, suite.name);
+    return suite;
+}
+
+namespace {
+
+// Errors and time of the press field on a folder of finite element blocks, measured by the program
+// press_block.
+Result<Measured> measure(const std::string& blocks, const Settings& settings) {
+    if (!std::filesystem::exists(blocks))
+        return Error{"no finite element blocks", blocks,
+                     "give their folder or its parent as --data"};
+    std::string increments = "3", iterations = "12";
+    for (const Setting& s : settings) {
+        if (s.key == "press.increments") increments = s.value;
+        if (s.key == "press.iterations") iterations = s.value;
+    }
+    const std::string arguments = "'" + blocks + "' '" + increments + "' '" + iterations + "'";
+    SONOCASE_TRY(const auto text, output_of_program_beside("press_block", arguments, "press"));
+    const auto json = nlohmann::json::parse(text, nullptr, false);
+    if (json.is_discarded() || !json.contains("blocks"))
+        return Error{"is not the errors of blocks", "press_block " + arguments,
+                     "a JSON object with blocks{}"};
+    double error = 0, seconds = 0;
+    int count = 0;
+    for (const auto& block : json["blocks"]) {
+        for (const auto& state : block["states"]) {
+            if (state.value("pressed_mm", 0.0) > 8.5) continue;
+            error += state.value("mean_mm", 0.0);
+            ++count;
+        }
+        seconds += block.value("solve_ms", 0.0) * 1e-3 / static_cast<double>(json["blocks"].size());
+    }
+    if (count == 0) return Error{"no states", "press_block " + arguments, "states[] of the blocks"};
+    return Measured{error / count, seconds, ""};
+}
+
+}  // namespace
+
+Suite press_suite(const std::string& data) {
+    Suite suite;
+    suite.name = "press";
+    suite.title = "Tissue under a pressing probe";
+    suite.body = "blocks";
+    suite.error_name = "mean displacement error";
+    suite.error_unit = "mm";
+    suite.truth =
+        "Displacements of a nonlinear finite element model at up to 8 mm of pressing, mean over "
+        "the blocks of the data folder; seconds are the fastest of twenty solutions, look-ups in "
+        "the finite elements included.";
+    suite.knobs = {{"press.increments",
+                    {"1", "2", "3", "4", "8"},
+                    "3",
+                    "",
+                    "steps in which the face is pressed in",
+                    "moduli are taken at the stress reached",
+                    "from three on the model's own error is larger"},
+                   {"press.iterations",
+                    {"3", "6", "12", "24", "48"},
+                    "12",
+                    "",
+                    "conjugate gradients in each step, a third more in the first",
+                    "what is left of the linear system's error",
+                    "the model's own error is reached at twelve"}};
+    suite.pairs = {{"press.increments", "press.iterations"}};
+    // The path may name the folder of the blocks or the one that contains it.
+    std::error_code failed;
+    const std::string within = data + "/deformation";
+    const std::string blocks = std::filesystem::exists(within, failed) ? within : data;
+    suite.measure = [blocks](const Settings& settings) { return measure(blocks, settings); };
+    return suite;
+}
+
+namespace {
+
+// Measured by the program doppler_trial.
+Result<Measured> measure(const std::string& arguments) {
+    SONOCASE_TRY(const auto text,
+                 output_of_program_beside("doppler_trial", arguments, "colour and spectrum"));
+    const auto json = nlohmann::json::parse(text, nullptr, false);
+    if (json.is_discarded() || !json.contains("error") || !json.contains("seconds"))
+        return Error{"is not the error of a trial", "doppler_trial " + arguments,
+                     "a JSON object with error and seconds"};
+    return Measured{json["error"].get<double>(), json["seconds"].get<double>(),
+                    json.value("note", "")};
+}
+
+std::string value_of(const Settings& settings, const std::string& key, const char* standard) {
+    for (const Setting& s : settings)
+        if (s.key == key) return s.value;
+    return standard;
+}
+
+}  // namespace
+
+Suite colour_suite() {
+    Suite suite;
+    suite.name = "colour";
+    suite.title = "Colour Doppler";
+    suite.body = "tube";
+    suite.error_name = "noise of the velocity";
+    suite.error_unit = "of the Nyquist velocity";
+    suite.truth =
+        "A tube of 8 mm with 480 mL/min at 55 degrees, in a box of a third of a sector; the "
+        "standard deviation of its cells over forty frames. Seconds are the fastest of them. What "
+        "pulses cost a machine "
+        "is its frame rate, in the notes.";
+    suite.knobs = {{"colour.ensemble",
+                    {"4", "6", "8", "10", "12", "16"},
+                    "10",
+                    "",
+                    "pulses for each line",
+                    "noise of the velocity",
+                    "no pulse is simulated: more of them cost the machine time, and us none"},
+                   {"colour.persistence",
+                    {"1", "2", "3", "4"},
+                    "2",
+                    "",
+                    "frames whose noise is blended",
+                    "nothing: its noise lasts longer and is as large",
+                    "draws are kept from frame to frame"}};
+    suite.measure = [](const Settings& settings) {
+        return measure("colour " + value_of(settings, "colour.ensemble", "10") + " " +
+                       value_of(settings, "colour.persistence", "2"));
+    };
+    return suite;
+}
+
+Suite spectrum_suite() {
+    Suite suite;
+    suite.name = "spectrum";
+    suite.title = "Spectral Doppler";
+    suite.body = "tube";
+    suite.error_name = "rms error of the peak velocity";
+    suite.error_unit = "of the true one";
+    suite.truth =
+        "The same tube with an artery's pulse, a gate of 4 mm in its middle: 24 times 5 s of "
+        "spectrum. Seconds are those "
+        "of one line, of which there are 200 a second; the bias is in the notes.";
+    suite.knobs = {{"spectrum.gate_points",
+                    {"8", "16", "32", "64", "128", "256"},
+                    "64",
+                    "",
+                    "points of the gate",
+                    "how finely the gate's velocities are told apart",
+                    "what is left beyond 16 is the bins' and the envelope's"}};
+    suite.measure = [](const Settings& settings) {
+        return measure("spectrum " + value_of(settings, "spectrum.gate_points", "64"));
+    };
+    return suite;
+}
+
+}  // namespace sonocase::pipeline::inline tradeoff

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What every image model does for the renderer: it is created from a bundle and an exercise, gets a
+// geometry for each level of accuracy, and then renders frames, quickly or by its reference.
+//
+// To add a model: implement ImageFormation, describe it in an ImageModelInfo, and put that into the
+// list at the top of runtime/imaging/renderer.cpp.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "formats/base/jobs.h"
+#include "formats/base/result.h"
+#include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
+#include "runtime/imaging/core/effect_table.h"
+#include "runtime/imaging/core/frame_input.h"
+#include "runtime/imaging/core/host.h"
+#include "runtime/imaging/core/needle_chord.h"
+#include "runtime/imaging/core/render_options.h"
+#include "runtime/imaging/core/scan_geometry.h"
+#include "runtime/imaging/core/simd_target.h"
+
+namespace sonocase::runtime {
+
+namespace press {
+class PressField;
+}
+
+// What does the work of a renderer. Workers and jobs outlive whatever they are given to.
+struct RenderContext {
+    Workers& workers;       // for frames
+    JobRunner& jobs;        // for tables, while a renderer is created
+    SimdTarget simd;        // for the kernels
+    Clock clock = nullptr;  // null: passes take 0 ms
+};
+
+// What a model is created from. Everything referred to outlives the model.
+struct FormationInput {
+    CaseView bundle;
+    const Exercise& exercise;
+    const RenderOptions& options;
+    const EffectChoice& effects;
+    int scanlines = 0;  // at the finest level
+    RenderContext context;
+};
+
+// A frame as both renderers of a model get it: checked, and in the probe's frame.
+struct FrameRequest {
+    const FrameInput& input;
+    const NeedleShape* needle = nullptr;  // probe frame; null: none
+    // How the probe presses; the input's pose is where bone holds the face. Null: it does not.
+    const press::PressField* press = nullptr;
+    std::span<const float> row_gain_db;  // # samples of the level: console gain and TGC sliders
+};
+
+class ImageFormation {
+  public:
+    virtual ~ImageFormation() = default;
+
+    // Prepares one more level of accuracy, finest first; all levels come before the first frame.
+    // looks: share of the looks that the machine averages.
+    virtual void add_level(const ScanGeometry& geometry, double looks) = 0;
+
+    // pixels: # width * height of the geometry. costs: one per effect, to be filled in. Neither
+    // allocates nor throws.
+    virtual FrameStatus render_fast(int level,
+                                    const FrameRequest& request,
+                                    std::span<std::uint8_t> pixels,
+                                    std::span<EffectCost> costs) = 0;
+    // Renders the same picture by the slow, obvious renderer at level 0; never flipped.
+    virtual void render_reference(const FrameRequest& request,
+                                  std::span<std::uint8_t> pixels,
+                                  std::span<EffectCost> costs) = 0;
+};
+
+// A model before it is created.
+struct ImageModelInfo {
+    // Numbers at full accuracy, unless the options say otherwise.
+    int (*scanlines)(const Exercise& exercise, const RenderOptions& options);
+    int (*samples)(const Exercise& exercise, const RenderOptions& options);
+    std::span<const char* const> effects;  // names, in order of execution
+    // Thickness of the slab in which the needle shows, mm; 0: the needle's own.
+    double (*needle_slab_mm)(const Exercise& exercise);
+    Result<std::unique_ptr<ImageFormation>> (*create)(const FormationInput& input);
+};
+
+}  // namespace sonocase::runtime

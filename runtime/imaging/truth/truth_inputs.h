@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What the kernels of truth_rows.h read: a bundle's voxels and labels, and the geometry of a
+// picture's pixels. And the needle's plane.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "formats/bundle/case_bundle.h"
+#include "runtime/imaging/core/needle_chord.h"
+#include "runtime/imaging/core/scan_geometry.h"
+#include "runtime/imaging/truth/truth_rows.h"
+
+namespace sonocase::runtime {
+
+// Labels and surfaces of one volume.
+class TruthVolume {
+  public:
+    TruthVolume(const BrickVolume<std::uint8_t>& labels,
+                const BrickVolume<std::uint32_t>& boundary);
+
+    void fill(TruthFrameRows& rows) const;
+
+  private:
+    const BrickVolume<std::uint8_t>& labels_;
+    const BrickVolume<std::uint32_t>& boundary_;
+    std::vector<std::uint32_t> boundary_uniform_;
+    std::vector<std::int32_t> bricks_;
+    bool plain_boundaries_ = true;
+};
+
+class TruthVoxels {
+  public:
+    // physical: bone and gas are hard; otherwise the tissues that cast a shadow are. The bundle
+    // must outlive this.
+    TruthVoxels(const CaseBundle& bundle, bool physical);
+
+    // Sets what belongs to the bundle and not to the frame. rows.region points to `region` where
+    // model `physical` shows a fine region.
+    void fill(TruthFrameRows& rows, TruthFrameRows& region) const;
+
+  private:
+    const CaseBundle* bundle_;
+    std::vector<std::int32_t> swells_, hard_;
+    TruthVolume volume_;
+    std::optional<TruthVolume> region_;
+};
+
+// The runs of scanned pixels of a picture, and each pixel's ray and depth; made once.
+class TruthPixels {
+  public:
+    explicit TruthPixels(const ScanGeometry& geometry);
+
+    int rays() const { return rays_; }
+    float rays_per_px_at_face() const { return rays_per_px_at_face_; }
+    // Calls work(run, offset of the run's first pixel in a plane) for every run.
+    template <class Work>
+    void for_each_run(const Work& work) const {
+        for (const PixelRun& run : runs_) {
+            const TruthRun pixels{run.row, run.begin, run.end - run.begin, ray_.data() + run.entry,
+                                  r_mm_.data() + run.entry};
+            work(pixels, static_cast<std::size_t>(run.row) * width_px_ +
+                             static_cast<std::size_t>(run.begin));
+        }
+    }
+    bool scanned(int column, int row) const;
+    // Sets the pixels outside the scanned area, which no run visits.
+    template <class T>
+    void set_outside(std::span<T> plane, T value) const {
+        std::size_t at = 0;
+        for_each_run([&](const TruthRun& run, std::size_t begin) {
+            std::fill(plane.data() + at, plane.data() + begin, value);
+            at = begin + static_cast<std::size_t>(run.count);
+        });
+        std::fill(plane.data() + at, plane.data() + plane.size(), value);
+    }
+
+  private:
+    int width_px_ = 0, rays_ = 0;
+    float rays_per_px_at_face_ = 0;
+    std::vector<PixelRun> runs_;      // by row, then from the left
+    std::vector<std::uint16_t> ray_;  // per scanned pixel, and slack for a vector
+    std::vector<float> r_mm_;
+};
+
+// 1 where the slab shows the needle's shaft, 2 within tip_mm of its tip, 0 elsewhere.
+void needle_plane(const ScanGeometry& geometry,
+                  const TruthPixels& pixels,
+                  const NeedleShape& needle,
+                  double tip_mm,
+                  std::span<std::uint8_t> plane);
+
+// Mirrors each row of a plane; an empty plane stays empty.
+template <class T>
+void flip_rows(std::span<T> plane, std::size_t width) {
+    for (std::size_t at = 0; at < plane.size(); at += width)
+        std::reverse(plane.begin() + static_cast<std::ptrdiff_t>(at),
+                     plane.begin() + static_cast<std::ptrdiff_t>(at + width));
+}
+
+}  // namespace sonocase::runtime

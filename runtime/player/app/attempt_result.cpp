@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/player/app/attempt_result.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "formats/exercise/metric_table.h"
+#include "formats/scoring/draw_attempt.h"
+
+namespace sonocase::runtime::inline player_app {
+namespace {
+
+bool is_share(const std::string& metric) {
+    constexpr std::string_view kEnd = "_fraction";
+    return metric.size() > kEnd.size() &&
+           metric.compare(metric.size() - kEnd.size(), kEnd.size(), kEnd) == 0;
+}
+
+// How far a missed mark was missed, relative to its limit.
+double miss(const ResultRow& row) {
+    if (!row.has_limit || row.reached) return 0;
+    if (!std::isfinite(row.value)) return 1e9;
+    const double scale = std::max(std::abs(row.limit), 1e-3);
+    return std::abs(row.value - row.limit) / scale;
+}
+
+void place_on_scale(ResultRow& row) {
+    double high = std::isfinite(row.value) ? row.value : 0;
+    if (row.has_limit) high = std::max(high, row.limit);
+    double end = is_share(row.metric) ? 1 : 1.35 * high;
+    if (!(end > 0)) end = 1;
+    row.value_at =
+        static_cast<float>(std::clamp(std::isfinite(row.value) ? row.value / end : 0.0, 0.0, 1.0));
+    row.limit_at = static_cast<float>(std::clamp(row.limit / end, 0.0, 1.0));
+}
+
+ResultRow row_of(const PassResult& mark) {
+    ResultRow row;
+    row.metric = mark.metric;
+    row.value = mark.value;
+    row.has_limit = true;
+    row.at_least = !std::isfinite(mark.at_most);
+    row.limit = row.at_least ? mark.at_least : mark.at_most;
+    row.reached = mark.passed;
+    return row;
+}
+
+double metric_of(const ProgressEntry& entry, const std::string& name) {
+    for (const Metric& metric : entry.metrics) {
+        if (metric.name == name) return metric.value;
+    }
+    return NAN;
+}
+
+}  // namespace
+
+AttemptResult attempt_result(const SessionScore& score, std::span<const ProgressEntry> earlier) {
+    AttemptResult result;
+    result.marks = static_cast<int>(score.pass_marks.size());
+    result.has_marks = result.marks > 0;
+    result.passed = score.passed;
+    for (const PassResult& mark : score.pass_marks) {
+        result.rows.push_back(row_of(mark));
+        result.marks_reached += mark.passed;
+    }
+    // A mark that was missed is never among those that do not fit.
+    std::stable_sort(result.rows.begin(), result.rows.end(),
+                     [](const ResultRow& a, const ResultRow& b) { return miss(a) > miss(b); });
+    if (!result.rows.empty()) {
+        result.trend_metric = result.rows.front().metric;
+        const MetricInfo* info = find_metric(result.trend_metric);
+        if (!result.passed && info) result.advice = info->advice;
+    }
+    for (const Metric& metric : score.metrics) {
+        if (result.rows.size() >= kMaxResults) break;
+        const MetricInfo* info = find_metric(metric.name);
+        const bool listed = std::any_of(result.rows.begin(), result.rows.end(),
+                                        [&](const auto& r) { return r.metric == metric.name; });
+        if (!info || listed || !info->evidence[0] || !std::isfinite(metric.value)) continue;
+        ResultRow row;
+        row.metric = metric.name;
+        row.value = metric.value;
+        result.rows.push_back(row);
+    }
+    if (result.rows.size() > kMaxResults) result.rows.resize(kMaxResults);
+    for (ResultRow& row : result.rows) {
+        const MetricInfo* info = find_metric(row.metric);
+        row.title = info ? info->title : "";
+        place_on_scale(row);
+    }
+    if (result.trend_metric.empty()) return result;
+    for (const ProgressEntry& entry : earlier) {
+        const double value = metric_of(entry, result.trend_metric);
+        if (std::isfinite(value)) result.trend.push_back(value);
+    }
+    const double now = score.value(result.trend_metric);
+    if (std::isfinite(now)) result.trend.push_back(now);
+    if (result.trend.size() > kMaxTrend)
+        result.trend.erase(result.trend.begin(),
+                           result.trend.end() - static_cast<std::ptrdiff_t>(kMaxTrend));
+    return result;
+}
+
+std::string metric_words(const std::string& metric, double value) {
+    if (!std::isfinite(value)) return "–";
+    char words[48];
+    if (is_share(metric)) {
+        std::snprintf(words, sizeof words, "%.0f %%", 100 * value);
+        return words;
+    }
+    const std::string unit = metric_unit(metric);
+    if (unit == "s" && value >= 60) {
+        const int whole = static_cast<int>(std::lround(value));
+        std::snprintf(words, sizeof words, "%d:%02d", whole / 60, whole % 60);
+        return words;
+    }
+    const bool whole = std::abs(value - std::round(value)) < 1e-9 || std::abs(value) >= 100;
+    std::snprintf(words, sizeof words, whole ? "%.0f" : "%.1f", value);
+    return unit.empty() ? words : std::string(words) + " " + (unit == "percent" ? "%" : unit);
+}
+
+Standing standing(std::span<const ProgressEntry> entries,
+                  const std::string& case_name,
+                  const std::string& exercise,
+                  int mastery) {
+    Standing result;
+    for (const ProgressEntry& entry : entries) {
+        if (entry.case_name != case_name || entry.exercise != exercise) continue;
+        ++result.attempts;
+        result.passes += entry.passed;
+        if (!entry.passed)
+            result.in_a_row = 0;
+        else if (attempt_difficulty(entry.seed) >= 0)
+            ++result.in_a_row;
+        result.mastered = result.mastered || result.in_a_row >= std::max(mastery, 1);
+        const double mm = metric_of(entry, "final_tip_to_target_mm");
+        if (std::isfinite(mm) && (result.best_mm < 0 || mm < result.best_mm)) result.best_mm = mm;
+    }
+    return result;
+}
+
+}  // namespace sonocase::runtime::inline player_app

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// The task: what to do, where the needle is, how the attempt goes, and the button that starts and
+// ends it.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "runtime/player/ui/panels.h"
+#include "runtime/player/ui/parts/panel_parts.h"
+#include "runtime/player/words/words.h"
+
+namespace sonocase::runtime::inline player_ui {
+namespace {
+
+constexpr float kRow = 28;
+
+const char* const kSteps[] = {"Find the target", "Bring the needle into the plane",
+                              "Advance with the tip in view", "Stop in the middle"};
+
+// Which of the four steps is to be done now; 4: all are.
+int present_step(const TaskCardInput& input) {
+    const FrameRecord& record = input.record;
+    if (std::find(input.targets_reached.begin(), input.targets_reached.end(), false) ==
+            input.targets_reached.end() &&
+        !input.targets_reached.empty())
+        return 4;
+    const Point3 tip = record.needle.mannequin_from_drawn * Point3{0, 0, 0};
+    double nearest_plane = 1e9, nearest_tip = 1e9;
+    for (std::size_t i = 0; i < input.target_centres.size(); ++i) {
+        const Point3 p = inverse(record.tools.mannequin_from_probe) * input.target_centres[i];
+        if (p.z > 0) nearest_plane = std::min(nearest_plane, std::abs(p.y));
+        nearest_tip = std::min(nearest_tip, distance(tip, input.target_centres[i]));
+    }
+    if (record.tools.has_needle && record.needle.depth_mm > 0) return nearest_tip < 12 ? 3 : 2;
+    return record.tools.has_probe && nearest_plane < 5 ? 1 : 0;
+}
+
+void draw_steps(Ui& ui, Box& room, const TaskCardInput& input) {
+    const int now = present_step(input);
+    const Box tabs = room.take_top(28, 6);
+    for (int i = 0; i < 4; ++i) {
+        const Box tab = tabs.column(i, 4, 4);
+        ui.fill(tab, i == now ? colour::kChosen : colour::kControl, 4);
+        if (i == now) ui.fill({tab.x, tab.bottom() - 3, tab.w, 3}, colour::kAccent, 1.5f);
+        if (i < now) {
+            ui.icon(Icon::check, tab.x + 0.5f * tab.w - 9, tab.y + 5, 18, colour::kGood);
+        } else {
+            ui.text(tab, std::to_string(i + 1), i == now ? Type::bold : Type::body,
+                    i == now ? colour::kText : colour::kDim, Align::centre);
+        }
+    }
+    const char* words = now < 4 ? kSteps[now] : "All targets reached";
+    const float high = std::min(ui.paragraph_height(room.w, tr(words), Type::bold), 36.0f);
+    ui.paragraph(room.take_top(high, 8), tr(words), Type::bold, colour::kText, true);
+}
+
+void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
+    const FrameRecord& record = input.record;
+    const bool needle = input.live && record.tools.has_needle;
+    const Point3 tip = record.needle.mannequin_from_drawn * Point3{0, 0, 0};
+    const auto row = [&](const char* name, const std::string& value, unsigned packed) {
+        if (room.h < kRow) return;
+        ui.row(room.take_top(kRow), tr(name), value, packed);
+    };
+    if (input.shows_targets && !input.exam) {
+        double nearest = 1e9;
+        for (const Point3& centre : input.target_centres)
+            nearest = std::min(nearest, distance(tip, centre));
+        if (!input.target_centres.empty())
+            row("Tip to target", needle ? text("%.0f mm", nearest) : "–", colour::kText);
+    }
+    if (!input.attempt) {
+        if (input.exam) return;
+        row("Needle depth",
+            needle && record.needle.depth_mm > 0 ? text("%.0f mm", record.needle.depth_mm) : "–",
+            colour::kText);
+        return;
+    }
+    const AttemptView view = input.attempt->view();
+    if (!input.exam) {
+        const bool inside = needle && view.depth_mm > 0;
+        const bool seen = inside && view.tip_in_view;
+        row("Tip in view",
+            !inside ? "–"
+            : seen  ? tr("Yes")
+                    : tr("No"),
+            !inside ? colour::kDim
+            : seen  ? colour::kGood
+                    : colour::kWarn);
+    }
+    row("Skin punctures", std::to_string(view.insertions), colour::kText);
+    if (view.in_no_go && !input.exam && room.h >= 20) {
+        const Box line = room.take_top(22, 4);
+        ui.icon(Icon::warn, line.x, line.y + 2, 18, colour::kBad);
+        ui.text({line.x + 24, line.y, line.w - 24, line.h}, tr("Critical structure touched"),
+                Type::small, colour::kBad, Align::left, true);
+    }
+    if (!view.problem.empty())
+        room.take_top(
+            ui.paragraph(room, tr_message(view.problem), Type::small, colour::kBad, true));
+}
+
+// Hints asked for so far, the last one in full; where that does not fit, one line and a button.
+void draw_hints(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
+    const int count = static_cast<int>(input.exercise.hints.size());
+    if (room.h < 44) return;
+    const int shown = std::min(input.hints_shown, count);
+    const std::string words = shown == 0                  ? ""
+                              : input.hints_shown > count ? std::string(tr("The target is shown."))
+                                                          : input.exercise.hints[shown - 1];
+    const float text_height =
+        words.empty() ? 0 : ui.paragraph_height(room.w - 20, words, Type::small) + 10;
+    const float high = std::min(44 + text_height, room.h);
+    Box card = room.take_top(high, 8);
+    ui.card(card, "hint", colour::kRaised);
+    Box head = card.take_top(44);
+    ui.icon(Icon::hint, head.x + 10, head.y + 13, 18, colour::kDim);
+    char line[64];
+    std::snprintf(line, sizeof line, tr("Hint %d of %d"), std::min(input.hints_shown, count + 1),
+                  count + 1);
+    if (input.hints_shown <= count) {
+        ButtonStyle style;
+        style.link = true;
+        style.key = "H";
+        style.tip = "Hints used are noted in the result";
+        const char* next = input.hints_shown < count ? "Next hint" : "Show target";
+        const float wide = ui.width(tr(next), Type::body) + 44;
+        request.next_hint = ui.button("hint", head.take_right(wide), tr(next), style);
+    }
+    ui.text({head.x + 34, head.y, head.w - 34, head.h}, line, Type::small, colour::kDim,
+            Align::left, true);
+    if (!words.empty() && card.h > 18)
+        ui.paragraph({card.x + 10, card.y, card.w - 20, card.h - 2}, words, Type::small,
+                     colour::kText, true);
+}
+
+void draw_guide(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
+    const GuideStep step = input.guide->step();
+    Box card = room.take_top(std::min(room.h, 210.0f), 8);
+    ui.card(card, "guide", colour::kRaised);
+    ui.fill({card.x, card.y + 6, 4, card.h - 12}, colour::kAccent, 2);
+    card = card.inset(14, 8);
+    char line[48];
+    std::snprintf(line, sizeof line, tr("Step %d of %d"), static_cast<int>(step) + 1,
+                  kGuideSteps + 1);
+    ui.text(card.take_top(20), line, Type::small, colour::kDim);
+    ui.text(card.take_top(26), tr(guide_title(step)), Type::bold, colour::kText, Align::left, true);
+    ButtonStyle style;
+    style.link = true;
+    style.tip = "Go on without doing this";
+    const Box foot = card.take_bottom(36);
+    if (step != GuideStep::done)
+        request.skip_guide =
+            ui.button("skip", {foot.x, foot.y, ui.width(tr("Skip"), Type::body) + 12, foot.h},
+                      tr("Skip"), style);
+    ui.paragraph(card, tr(guide_words(step)), Type::small, colour::kText, true);
+}
+
+// The title of an attempt that is easier or harder than the exercise as written.
+const char* attempt_words(int difficulty) {
+    return difficulty < -1    ? "Attempt %d · much easier"
+           : difficulty == -1 ? "Attempt %d · easier"
+           : difficulty == 1  ? "Attempt %d · harder"
+                              : "Attempt %d · much harder";
+}
+
+void draw_head(Ui& ui, Box& room, const TaskCardInput& input) {
+    const Exercise& exercise = input.exercise;
+    const std::string title = exercise.title.empty() ? exercise.name : exercise.title;
+    const float line = ui.line_height(Type::heading);
+    const float high = std::min(ui.paragraph_height(room.w, title, Type::heading), 2 * line + 1);
+    ui.paragraph(room.take_top(high, 4), title, Type::heading, colour::kText, true);
+    char words[80];
+    if (input.attempt && input.difficulty != 0) {
+        std::snprintf(words, sizeof words, tr(attempt_words(input.difficulty)),
+                      input.attempt_number);
+    } else {
+        std::snprintf(words, sizeof words, tr("Attempt %d · difficulty %d of 5"),
+                      input.attempt_number, exercise.difficulty);
+    }
+    Box second = room.take_top(22, 8);
+    if (input.attempt) {
+        const std::string time = clock_words(input.attempt->view().seconds);
+        const Box clock = second.take_right(ui.width(time, Type::bold) + 28);
+        ui.icon(Icon::timer, clock.x + 2, clock.y + 2, 18, colour::kDim);
+        ui.text({clock.x + 24, clock.y, clock.w - 24, clock.h}, time, Type::bold);
+    }
+    ui.text(second, words, Type::small, colour::kDim, Align::left, true);
+}
+
+}  // namespace
+
+bool draw_attempt_button(Ui& ui, const Box& box, const TaskCardInput& input) {
+    ButtonStyle style;
+    style.primary = true;
+    style.key = input.replays ? "P" : "B";
+    style.icon = input.replays ? Icon::close : input.attempt ? Icon::check : Icon::live;
+    style.enabled = input.live || input.attempt != nullptr;
+    style.tip = input.replays   ? "Back to the result"
+                : input.attempt ? "Ends and scores it"
+                                : "The target gets a new place, and the time starts";
+    const char* words = input.replays   ? "End replay"
+                        : input.attempt ? "Finish attempt"
+                                        : "Start attempt";
+    std::string shown = tr(words);
+    if (input.attempt && !input.shows_finish)
+        shown += " · " + clock_words(input.attempt->view().seconds);
+    return ui.button("attempt", box, shown, style);
+}
+
+TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& input) {
+    TaskCardRequest request;
+    ui.card(card, "task");
+    Box room = card.inset(12);
+    if (input.shows_finish) {
+        const bool pressed = draw_attempt_button(ui, room.take_bottom(48, 8), input);
+        (input.replays ? request.end_replay : request.toggle_attempt) = pressed;
+    }
+    draw_head(ui, room, input);
+    if (!input.attempt && !input.replays && room.h > 150) {
+        Box links = room.take_bottom(44, 8);
+        ButtonStyle style;
+        if (input.has_result) {
+            style.icon = Icon::review;
+            style.tip = "The result of the last attempt";
+            const Box place = input.mouse ? links.take_left(44, 8) : links;
+            request.show_result =
+                ui.button("result", place, input.mouse ? "" : tr("Result"), style);
+        }
+        if (input.mouse) {
+            style.icon = Icon::needle;
+            style.key = "N";
+            style.tip = "Shift + N puts it across the plane";
+            request.toggle_needle =
+                ui.button("needle", links,
+                          tr(input.mouse->has_needle() ? "Withdraw needle" : "Take needle"), style);
+        }
+    }
+    if (input.guide) {
+        draw_guide(ui, room, input, request);
+        return request;
+    }
+    if (input.replays) {
+        ui.paragraph(room,
+                     tr("What was done, beside the straight way (dotted). The bar below the "
+                        "picture goes to any moment, at any speed."),
+                     Type::small, colour::kDim, true);
+        return request;
+    }
+    if (input.attempt && !input.exam && room.h > 150) draw_steps(ui, room, input);
+    if (!input.attempt && !input.exercise.description.empty()) {
+        const float room_left = std::max(room.h - 3 * kRow, 0.0f);
+        const float high = std::min(
+            ui.paragraph_height(room.w, input.exercise.description, Type::small), room_left);
+        if (high >= 17)
+            ui.paragraph(room.take_top(high, 8), input.exercise.description, Type::small,
+                         colour::kDim, true);
+    }
+    if (room.h > 8) {
+        ui.line(room.x, room.y, room.right(), room.y, colour::kLine);
+        room.take_top(6);
+    }
+    draw_values(ui, room, input);
+    if (input.attempt && input.exam) {
+        ui.paragraph(room, tr("Exam: no hints, no distances, no target drawn. It counts."),
+                     Type::small, colour::kDim, true);
+    } else if (input.attempt) {
+        room.take_top(4);
+        draw_hints(ui, room, input, request);
+    }
+    return request;
+}
+
+}  // namespace sonocase::runtime::inline player_ui

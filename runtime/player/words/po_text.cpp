@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/player/words/po_text.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+namespace sonocase::runtime::inline player_words {
+namespace {
+
+bool takes(std::string_view& line, std::string_view keyword) {
+    if (line.substr(0, keyword.size()) != keyword) return false;
+    line.remove_prefix(keyword.size());
+    return true;
+}
+
+// What stands between the quotes of a line, without its backslashes.
+std::string unquoted(std::string_view line) {
+    std::string out;
+    const std::size_t begin = line.find('"') + 1, end = line.rfind('"');
+    for (std::size_t i = begin; i < end; ++i) {
+        if (line[i] != '\\') {
+            out += line[i];
+            continue;
+        }
+        const char c = line[++i];
+        out += c == 'n' ? '\n' : c == 't' ? '\t' : c;
+    }
+    return out;
+}
+
+// The value of a line "Key: value" of the header.
+std::string header_value(const std::string& header, const std::string& key) {
+    const std::size_t at = header.find(key + ": ");
+    if (at == std::string::npos) return "";
+    const std::size_t begin = at + key.size() + 2;
+    return header.substr(begin, header.find('\n', begin) - begin);
+}
+
+}  // namespace
+
+Language read_po(std::string_view text) {
+    Language language;
+    Translation entry;
+    std::string* part = nullptr;  // of the entry, to which the line in hand belongs
+    bool fuzzy = false, next_fuzzy = false;
+    const auto finish = [&] {
+        if (part == &entry.other && entry.english.empty()) {
+            language.code = header_value(entry.other, "Language");
+            language.name = header_value(entry.other, "X-Language-Name");
+        } else if (part == &entry.other && !entry.other.empty() && !fuzzy) {
+            language.catalogue.push_back(entry);
+        }
+        entry = {};
+        fuzzy = std::exchange(next_fuzzy, false);
+    };
+    while (!text.empty()) {
+        std::string_view line = text.substr(0, text.find('\n'));
+        text.remove_prefix(std::min(line.size() + 1, text.size()));
+        if (takes(line, "#,")) {
+            next_fuzzy = next_fuzzy || line.find("fuzzy") != std::string_view::npos;
+        } else if (takes(line, "msgid ")) {
+            finish();
+            part = &entry.english;
+        } else if (takes(line, "msgstr ")) {
+            part = &entry.other;
+        }
+        if (part && !line.empty() && line.find_first_not_of(' ') == line.find('"'))
+            *part += unquoted(line);
+    }
+    finish();
+    std::sort(language.catalogue.begin(), language.catalogue.end(),
+              [](const Translation& a, const Translation& b) { return a.english < b.english; });
+    return language;
+}
+
+}  // namespace sonocase::runtime::inline player_words
