@@ -35,9 +35,13 @@ if(SONOCASE_SANITIZE)
                       -fno-sanitize-recover=undefined)
   add_link_options(-fsanitize=${SONOCASE_SANITIZE})
 endif()
-# Adds scripts/cmake/keep_modules.c to a program; that file says why.
+# Adds scripts/cmake/keep_modules.c to a program; that file says why. By a library of its own: a program with a source in C
+# would ask for C headers precompiled as well.
 function(sonocase_keep_modules program)
-  target_sources(${program} PRIVATE "${CMAKE_SOURCE_DIR}/scripts/cmake/keep_modules.c")
+  if(NOT TARGET sonocase_kept_modules)
+    add_library(sonocase_kept_modules OBJECT "${CMAKE_SOURCE_DIR}/scripts/cmake/keep_modules.c")
+  endif()
+  target_link_libraries(${program} PRIVATE sonocase_kept_modules)
   target_link_options(${program} PRIVATE -Wl,--export-dynamic-symbol=dlclose)
 endfunction()
 

@@ -54,13 +54,13 @@ void mark_closed(std::span<const PressTissue> tissues,
             lumens = lumens || samples.lumen[n];
         if (!lumens) continue;
         for (int i = 0; i < kColumns; ++i) {
-            const bool closed = near(j, i);
+            const bool near_closed = near(j, i);
             if (samples.lumen[j] && i >= kSideColumns && i < kSideColumns + kFaceColumns) {
                 const double height = drains(j, i) * fine_height(j);
                 rest += height;
-                if (!closed) open += height * double{columns.lumen.row(j)[i]};
+                if (!near_closed) open += height * double{columns.lumen.row(j)[i]};
             }
-            if (!closed) continue;
+            if (!near_closed) continue;
             out.any = true;
             // One of these nodes is the nearest to each place of the part.
             const int first = nearest(columns.pressed_mm.row(j)[i]),
