@@ -21,7 +21,8 @@ using namespace pybind11::literals;
 
 // sonocase.Error: a failure of the outside world, with the text that the programs print.
 struct OutsideError : std::exception {
-    explicit OutsideError(const Error& error) : text(error.message()) {}
+    explicit OutsideError(const Error& error)
+        : text(static_cast<const std::string&>(error.message())) {}
     const char* what() const noexcept override { return text.c_str(); }
     std::string text;
 };

@@ -72,7 +72,7 @@ const char* tr(const char* english) {
 }
 
 std::string tr_message(const Message& message) {
-    if (language_in_use().catalogue.empty()) return message;
+    if (language_in_use().catalogue.empty()) return static_cast<const std::string&>(message);
     const std::string* other = find_translation(message.format());
     if (message.arguments().empty()) return other ? *other : message;
     std::vector<std::string> arguments;
