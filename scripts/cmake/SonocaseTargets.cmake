@@ -105,6 +105,7 @@ endfunction()
 
 # What nearly every source of ours includes of the standard library, parsed once. A source still includes all that it uses: the
 # page's program, the fuzzers and clang-tidy compile without this.
+# A source with options of its own skips it (SKIP_PRECOMPILE_HEADERS): GCC 12 may crash where the optimisation differs.
 set(sonocase_std_headers <algorithm> <array> <atomic> <charconv> <chrono> <cmath> <complex> <cstddef> <cstdint> <cstring>
   <functional> <limits> <map> <memory> <mutex> <numbers> <numeric> <optional> <set> <span> <string> <string_view> <thread>
   <tuple> <unordered_map> <utility> <variant> <vector>)
