@@ -25,17 +25,17 @@ namespace sonocase::testing {
 class Attempt {
   public:
     // at_rest, breathing: anatomies of the bundle. All must outlive the attempt.
-    Attempt(const CaseBundle& bundle,
+    Attempt(const CaseBundle& cooked,
             const Anatomy& at_rest,
             const Anatomy& breathing,
-            const Exercise& exercise,
+            const Exercise& written,
             std::uint64_t seed)
-        : bundle(bundle),
+        : bundle(cooked),
           anatomy(breathing),
-          exercise(draw_attempt(exercise, at_rest, bundle.labels, seed).exercise),
-          skin(bundle),
-          mouse(skin, this->exercise),
-          needle(&breathing, exercise.needle) {}
+          exercise(draw_attempt(written, at_rest, cooked.labels, seed).exercise),
+          skin(cooked),
+          mouse(skin, exercise),
+          needle(&breathing, written.needle) {}
 
     static constexpr double kTickS = 0.05;
     // A sample of the tools as they are now.

@@ -14,9 +14,15 @@ namespace {
 Session example() {
     testing::Random random(21);
     Session s;
-    s.header = {"demo",           "00ff",       "liver biopsy",
-                "11ee",           "Ada L.",     "2026-03-01T10:00:00Z",
-                "sonoplay 0.1.0", "model=paper"};
+    s.header = {.case_name = "demo",
+                .case_digest = "00ff",
+                .exercise = "liver biopsy",
+                .exercise_digest = "11ee",
+                .trainee = "Ada L.",
+                .started = "2026-03-01T10:00:00Z",
+                .program = "sonoplay 0.1.0",
+                .render = "model=paper",
+                .attempt = ""};
     for (int i = 0; i < 40; ++i) {
         SessionSample sample;
         sample.time_s = 0.05 * i;

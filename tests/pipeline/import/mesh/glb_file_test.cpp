@@ -62,9 +62,9 @@ TEST(GlbFile, SurvivesChangedBytes) {
     const auto whole = glb_of({{"a", ball_mesh({0, 0, 0}, 1, 4), ""}});
     int refused = 0;
     for (std::size_t n = 0; n < std::min<std::size_t>(whole.size(), 900); ++n)
-        for (const std::uint8_t value : {0, 57, 255}) {
+        for (const int value : {0, 57, 255}) {
             auto bytes = whole;
-            bytes[n] = value;
+            bytes[n] = static_cast<std::uint8_t>(value);
             refused += !read_glb(bytes, "x.glb");
         }
     EXPECT_GT(refused, 500);
