@@ -110,7 +110,7 @@ TEST_F(DicomFolder, WithASliceOfAnotherSeriesBesideItsOwnIsReadWithAWarning) {
     ASSERT_TRUE(result) << result.error().message();
     ASSERT_FALSE(result->report.warnings.empty());
     EXPECT_NE(result->report.warnings[0].find("2 DICOM series"), std::string::npos);
-    EXPECT_NE(result->report.warnings[0].find("not other.dcm"), std::string::npos);
+    EXPECT_NE(result->report.warnings[0].find("not 1 x CT from other.dcm"), std::string::npos);
     EXPECT_EQ(result->labels.grid.size.z, volume_.size.z);
 }
 
@@ -156,6 +156,58 @@ TEST_F(DicomFolder, WithASliceOffItsPlaceOrTurnedOrCutOffIsRefused) {
         folder_.write("series/" + name_of(5), whole.substr(0, whole.size() - bytes));
         expect_refused("s0005.dcm", "cut off");
     }
+}
+
+// "3" and "3.0" are one thickness.
+TEST_F(DicomFolder, WithOneThicknessWrittenInTwoWaysIsOneSeries) {
+    write_all();
+    declared_.thickness = "3.0000";
+    write(name_of(4), 4);
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    EXPECT_TRUE(result->report.warnings.empty() ||
+                result->report.warnings[0].find("DICOM") == std::string::npos);
+    EXPECT_EQ(result->labels.grid.size, volume_.size);
+}
+
+TEST_F(DicomFolder, WithNumbersThatAreNotFiniteIsRefused) {
+    write_all();
+    for (const char* position : {"nan\\0\\0", "0\\inf\\0", "0\\0", "a\\b\\c", "1e999\\0\\0"}) {
+        declared_.position = position;
+        write(name_of(5), 5);
+        expect_refused("s0005.dcm", "and not 3 finite numbers");
+    }
+    declared_.position = "";
+    declared_.thickness = "nan";
+    write_all();
+    expect_refused("s0000.dcm", "SliceThickness is 'nan', and not 1 finite number");
+}
+
+// A tilted gantry: slices that slide over one another.
+TEST_F(DicomFolder, ThatIsShearedIsSquaredBelowATenthOfAVoxelAndRefusedBeyond) {
+    volume_.columns(1, 2) = 0.02;  // 0.3 mm over the stack, and voxels of 4 mm
+    write_all();
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    EXPECT_LT(distance(result->labels.grid.origin_mm, volume_.origin + Vector3{0, 0.15, 0}), 1e-6);
+    EXPECT_NEAR(result->labels.grid.spacing_mm.z, 3, 1e-9);
+    const auto& notes = result->report.notes;
+    EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const Note& note) {
+        return note.name == "shear" && note.text.find("0.15 mm at either end") != std::string::npos;
+    }));
+    volume_.columns(1, 2) = 0.5;
+    write_all();
+    expect_refused("series", "sheared against their stack by 9.46 degrees");
+}
+
+TEST_F(DicomFolder, WhoseSlicesAreThinnerThanTheyLieApartIsReadWithAWarning) {
+    declared_.thickness = "1.5";
+    write_all();
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    ASSERT_FALSE(result->report.warnings.empty());
+    EXPECT_NE(result->report.warnings[0].find("1.5 mm thick and lie 3 mm apart"),
+              std::string::npos);
 }
 
 // Like a large clinical export: 3,000 slices, one wrong. Reading the headers takes about a second.
