@@ -24,6 +24,7 @@
 #include "formats/text/stage_report_json.h"
 #include "pipeline/anatomy/label_table.h"
 #include "pipeline/import/mesh/ply_file.h"
+#include "pipeline/import/volume/dicom_frames.h"
 #include "pipeline/import/volume/dicom_segmentation.h"
 #include "pipeline/import/volume/volume_header.h"
 #include "pipeline/registration/map/registration.h"
@@ -202,6 +203,28 @@ void label_tables(Bytes bytes) {
     check_error(pipeline::parse_label_xml(text_of(bytes), "fuzz"));
 }
 
+// The elements of a DICOM file, whatever it holds.
+void dicom_header(Bytes bytes) {
+    const MemoryFile file(bytes);
+    const auto header = pipeline::read_dicom_header(file.path());
+    if (!header) return;
+    demand(header->pixels_at <= header->size || header->cut_off(0));
+    for (const pipeline::DicomTag tag : {0x00620002u, 0x00620001u, 0x00280010u, 0x00081115u}) {
+        pipeline::text_of(header->set, tag);
+        pipeline::whole_of(header->set, tag);
+        for (const pipeline::DicomSet& item : pipeline::items_of(header->set, tag))
+            pipeline::shorts_of(item, 0x0062000d);
+    }
+    const auto frames = pipeline::frames_of(
+        header->set, std::max(1, std::min(1000, pipeline::whole_of(header->set, 0x00280008))));
+    for (const pipeline::DicomFrame& frame : frames) {
+        if (!frame.placed() || !frame.fault.empty()) continue;
+        demand(std::isfinite(frame.position.x + frame.position.y + frame.position.z));
+        demand(std::abs(norm(frame.normal()) - 1) < 1e-9);
+        demand(frame.row_spacing_mm >= 0 && std::isfinite(frame.thickness_mm));
+    }
+}
+
 // Runs of packed bits are those that are found bit by bit.
 void packed_bits(Bytes bytes) {
     if (bytes.size() < 4) return;
@@ -326,6 +349,7 @@ const std::vector<Target>& targets() {
         {"stage_report", stage_report},
         {"nifti_extension", nifti_extension},
         {"label_tables", label_tables},
+        {"dicom_header", dicom_header},
         {"packed_bits", packed_bits},
         {"ply", ply},
         {"viper", viper},

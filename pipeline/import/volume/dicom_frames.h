@@ -1,30 +1,68 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Elements of a DICOM header, and where the frames of an object lie: by the functional groups of a
-// multi-frame object, by its own elements where it has none. Only for .cpp files of this folder
-// that include GDCM. Elements that are missing or damaged give an empty text or 0.
+// The elements of a DICOM file, and where its frames lie: by the functional groups of a multi-frame
+// object, by its own elements where it has none. Internal to this room.
+//
+// Headers are read here and not by GDCM, which ends the program at some damaged files and makes up
+// what is missing. No pixel is read.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
-
-#include <gdcmDataSet.h>
-#include <gdcmSequenceOfItems.h>
 
 #include "pipeline/import/volume/dicom_series.h"
 
 namespace sonocase::pipeline::inline import_volume {
 
-std::string text_of(const gdcm::DataSet& set, const gdcm::Tag& tag);  // without padding
-int short_of(const gdcm::DataSet& set, const gdcm::Tag& tag);         // of 16 bits
-int whole_of(const gdcm::DataSet& set, const gdcm::Tag& tag);         // text of 1 .. 1e6; else 0
+// Group and element number: 0x00280010 is Rows.
+using DicomTag = std::uint32_t;
 
-// The items of a sequence; null where there is none.
-using DicomItems = gdcm::SmartPointer<gdcm::SequenceOfItems>;
-DicomItems items_of(const gdcm::DataSet& set, const gdcm::Tag& tag);
+// Elements one after another, as they lie in a file.
+struct DicomSet {
+    std::string_view bytes;
+    bool has_kinds = true;  // each names its value representation
+    bool big_endian = false;
+};
 
-// The place of each of the object's frames. Frames that lack a position or an orientation are not
-// placed, and one whose numbers are damaged or not finite says which in `fault`.
-std::vector<DicomFrame> frames_of(const gdcm::DataSet& set, int frames);
+// The header of a file, whose elements have all been found to lie within one another and the file.
+struct DicomHeader {
+    DicomHeader() = default;
+    DicomHeader(DicomHeader&&) = default;
+    DicomHeader& operator=(DicomHeader&&) = default;
+
+    std::vector<char> bytes;  // of the file's beginning, or of all of it, inflated
+    std::string transfer_syntax;
+    DicomSet set;  // the elements before the pixels; a view of `bytes`
+    bool inflated = false;
+    bool has_pixels = false;
+    bool packed = false;           // the pixels are compressed
+    std::uint64_t pixels_at = 0;   // in the file, or in `bytes` if inflated
+    std::uint64_t pixels_end = 0;  // as the header says; beyond the file: it is cut off
+    std::uint64_t size = 0;        // of the file, or of `bytes` if inflated
+
+    bool cut_off(std::uint64_t pixel_bytes) const {
+        return pixels_end > size || (!packed && pixels_at + pixel_bytes > size);
+    }
+};
+bool is_dicom_file(const std::string& path);  // by its first bytes
+// Empty for a file of another kind and for one whose header is damaged or cut off.
+std::optional<DicomHeader> read_dicom_header(const std::string& path);
+
+// Elements that are missing or damaged give an empty text, 0 or no items.
+std::string text_of(const DicomSet& set, DicomTag tag);  // without padding
+std::vector<std::uint16_t> shorts_of(const DicomSet& set, DicomTag tag);
+int short_of(const DicomSet& set, DicomTag tag);  // the first of 16 bits
+int whole_of(const DicomSet& set, DicomTag tag);  // text of 1 .. 1e6; else 0
+std::vector<DicomSet> items_of(const DicomSet& set, DicomTag tag);
+
+// The place of each of the object's frames. One whose numbers are damaged or not finite says which
+// in `fault`.
+std::vector<DicomFrame> frames_of(const DicomSet& set, int frames);
+
+// The lattice of slices like `frame`, whose first pixel lies at `first` in DICOM's axes, in RAS+.
+Grid ras_grid(Point3 first, const DicomFrame& frame, double step_mm, Int3 size);
 
 }  // namespace sonocase::pipeline::inline import_volume

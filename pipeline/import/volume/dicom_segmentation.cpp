@@ -8,11 +8,9 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <set>
-
-#include <gdcmBitmap.h>
-#include <gdcmReader.h>
 
 #include "formats/text/number_text.h"
 #include "pipeline/base/memory_limit.h"
@@ -24,13 +22,14 @@
 namespace sonocase::pipeline::inline import_volume {
 namespace {
 
-const gdcm::Tag kCharacterSet(0x8, 0x5), kSopClass(0x8, 0x16), kMeaning(0x8, 0x104),
-    kCode(0x8, 0x100), kScheme(0x8, 0x102), kOrganization(0x20, 0x9311), kSamples(0x28, 2),
-    kFrames(0x28, 8), kRows(0x28, 0x10), kColumns(0x28, 0x11), kBits(0x28, 0x100),
-    kPadding(0x28, 0x120), kType(0x62, 1), kSegments(0x62, 2), kSegmentNumber(0x62, 4),
-    kLabel(0x62, 5), kColour(0x62, 0xd), kMaximum(0x62, 0xe), kPropertyType(0x62, 0xf),
-    kTypeModifier(0x62, 0x11), kFractionalType(0x62, 0x10), kPerFrame(0x5200, 0x9230),
-    kPixels(0x7fe0, 0x10);
+constexpr DicomTag kCharacterSet = 0x00080005, kSopClass = 0x00080016, kCode = 0x00080100,
+                   kScheme = 0x00080102, kMeaning = 0x00080104, kOrganization = 0x00209311,
+                   kSamples = 0x00280002, kFrames = 0x00280008, kRows = 0x00280010,
+                   kColumns = 0x00280011, kBits = 0x00280100, kPadding = 0x00280120,
+                   kType = 0x00620001, kSegments = 0x00620002, kSegmentNumber = 0x00620004,
+                   kLabel = 0x00620005, kColour = 0x0062000d, kMaximum = 0x0062000e,
+                   kPropertyType = 0x0062000f, kFractionalType = 0x00620010,
+                   kTypeModifier = 0x00620011, kPerFrame = 0x52009230;
 
 constexpr const char* kAgain = "write the segmentation again";
 constexpr const char* kUnpack =
@@ -90,12 +89,9 @@ bool says_nothing(const std::string& label) {
 }
 
 // PCS-values of 16 bits to sRGB (ICC profile connection space, D50), as text from 0 to 1.
-std::string rgb_of_lab(const gdcm::DataSet& set) {
-    if (!set.FindDataElement(kColour)) return "";
-    const gdcm::ByteValue* bytes = set.GetDataElement(kColour).GetByteValue();
-    std::uint16_t lab[3];
-    if (bytes == nullptr || bytes->GetLength() < sizeof lab) return "";
-    std::memcpy(lab, bytes->GetPointer(), sizeof lab);
+std::string rgb_of_lab(const DicomSet& set) {
+    const std::vector<std::uint16_t> lab = shorts_of(set, kColour);
+    if (lab.size() < 3) return "";
     const double l = lab[0] * 100.0 / 65535, a = lab[1] * 255.0 / 65535 - 128,
                  b = lab[2] * 255.0 / 65535 - 128;
     const auto from = [](double t) {
@@ -115,31 +111,27 @@ std::string rgb_of_lab(const gdcm::DataSet& set) {
     return text;
 }
 
-Result<std::vector<Segment>> segments_of(const gdcm::DataSet& set, const std::string& path) {
+Result<std::vector<Segment>> segments_of(const DicomSet& set, const std::string& path) {
     const std::string characters = text_of(set, kCharacterSet);
-    const auto words = [&](const gdcm::DataSet& of, const gdcm::Tag& tag) {
+    const auto words = [&](const DicomSet& of, DicomTag tag) {
         std::string result = utf8(text_of(of, tag), characters);
         for (char& c : result)
             if (static_cast<unsigned char>(c) < 32) c = ' ';
         return result;
     };
     std::vector<Segment> segments;
-    const DicomItems items = items_of(set, kSegments);
-    for (std::size_t n = 1; items && n <= items->GetNumberOfItems(); ++n) {
-        const gdcm::DataSet& item = items->GetItem(n).GetNestedDataSet();
+    for (const DicomSet& item : items_of(set, kSegments)) {
         Segment segment;
         segment.number = short_of(item, kSegmentNumber);
         segment.name = words(item, kLabel);
         segment.colour = rgb_of_lab(item);
         std::string meaning;
-        const DicomItems types = items_of(item, kPropertyType);
-        if (types && types->GetNumberOfItems() > 0) {
-            const gdcm::DataSet& type = types->GetItem(1).GetNestedDataSet();
+        if (const auto types = items_of(item, kPropertyType); !types.empty()) {
+            const DicomSet& type = types.front();
             meaning = words(type, kMeaning);
             segment.code = meaning + " (" + words(type, kScheme) + " " + words(type, kCode) + ")";
-            const DicomItems sides = items_of(type, kTypeModifier);
-            if (sides && sides->GetNumberOfItems() > 0)
-                segment.modifier = words(sides->GetItem(1).GetNestedDataSet(), kMeaning);
+            if (const auto sides = items_of(type, kTypeModifier); !sides.empty())
+                segment.modifier = words(sides.front(), kMeaning);
         }
         if (says_nothing(segment.name) && !meaning.empty())
             segment.name = segment.modifier.empty() ? meaning : meaning + " " + segment.modifier;
@@ -178,27 +170,25 @@ void tell_apart(std::vector<Segment>& segments, std::vector<std::string>& warnin
 enum class Kind { binary, fractional, labelmap };
 
 struct Object {
-    gdcm::Reader reader;
+    DicomHeader header;
     Kind kind = Kind::binary;
     int rows = 0, columns = 0, bits = 0;
     std::vector<DicomFrame> frames;
     std::vector<Segment> segments;
 
-    const gdcm::DataSet& set() const { return reader.GetFile().GetDataSet(); }
+    const DicomSet& set() const { return header.set; }
     std::size_t frame_pixels() const {
         return static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
     }
 };
 
-Status read_header(const std::string& path, bool with_pixels, Object& object) {
-    object.reader.SetFileName(path.c_str());
-    if (!object.reader.CanRead() ||
-        !(with_pixels ? object.reader.Read() : object.reader.ReadUpToTag(kPixels, {kPixels})))
-        return Error{
-            "cannot be read as DICOM: the file is damaged, cut off, or packed in a way "
-            "that is not known here",
-            path, "copy it or export it again, without compression"};
-    const gdcm::DataSet& set = object.set();
+Status read_header(const std::string& path, Object& object) {
+    auto header = read_dicom_header(path);
+    if (!header)
+        return Error{"cannot be read as DICOM: the file is damaged or cut off", path,
+                     "copy it or export it again"};
+    object.header = *std::move(header);
+    const DicomSet& set = object.set();
     if (text_of(set, kSopClass) == "1.2.840.10008.5.1.4.1.1.66.5")
         return Error{"a DICOM surface segmentation: triangles, not voxels", path,
                      "export its surfaces as STL or PLY, and give those as organ meshes"};
@@ -223,8 +213,7 @@ Status read_header(const std::string& path, bool with_pixels, Object& object) {
     if (!bits_fit || short_of(set, kSamples) > 1)
         return Error{text("a DICOM segmentation (%s) of %d bits", type.c_str(), object.bits), path,
                      "expected 1 bit (BINARY), 8 (FRACTIONAL), 8 or 16 (LABELMAP)"};
-    const DicomItems each = items_of(set, kPerFrame);
-    const std::size_t given = each ? each->GetNumberOfItems() : 0;
+    const std::size_t given = items_of(set, kPerFrame).size();
     if (given != static_cast<std::size_t>(frames) && !(frames == 1 && given == 0)) {
         if (text_of(set, kOrganization) == "TILED_FULL")
             return Error{"a DICOM segmentation of a microscope slide", path,
@@ -335,7 +324,7 @@ Result<FramePlaces> place_frames(const Object& object,
 // The pixels as the file means them. `frame_step` is the number of values from frame to frame:
 // bits of a packed object, else whole values of its bits.
 struct Pixels {
-    std::vector<char> unpacked;  // where they were compressed
+    std::vector<char> kept;
     const std::uint8_t* bytes = nullptr;
     std::size_t frame_step = 0;
 };
@@ -344,49 +333,45 @@ Status read_pixels(const Object& object,
                    const std::string& path,
                    Pixels& pixels,
                    std::vector<std::string>& warnings) {
-    const gdcm::DataSet& set = object.set();
-    const gdcm::TransferSyntax syntax =
-        object.reader.GetFile().GetHeader().GetDataSetTransferSyntax();
-    if (!set.FindDataElement(kPixels))
-        return Error{"file is cut off: it ends before its pixels begin", path, "copy it again"};
-    const gdcm::DataElement& element = set.GetDataElement(kPixels);
+    const DicomHeader& header = object.header;
     const std::size_t frame = object.frame_pixels(), frames = object.frames.size();
-    const std::size_t bits = frame * frames * static_cast<std::size_t>(object.bits);
+    const std::uint64_t bits = frame * frames * static_cast<std::uint64_t>(object.bits);
+    const std::uint64_t needed = (bits + 7) / 8;
     pixels.frame_step = frame;
-    if (syntax.IsEncapsulated()) {
+    if (!header.has_pixels || header.cut_off(needed))
+        return Error{"file is cut off: it ends before its pixels do", path,
+                     "copy it or export it again"};
+    if (header.packed) {
         if (object.bits == 1)
             return Error{"a DICOM segmentation whose single bits are compressed", path, kUnpack};
-        const auto whole = static_cast<std::uint16_t>(object.bits);
-        gdcm::Bitmap bitmap;
-        bitmap.SetNumberOfDimensions(3);
-        bitmap.SetDimension(0, static_cast<unsigned>(object.columns));
-        bitmap.SetDimension(1, static_cast<unsigned>(object.rows));
-        bitmap.SetDimension(2, static_cast<unsigned>(frames));
-        bitmap.SetPixelFormat(
-            gdcm::PixelFormat(1, whole, whole, static_cast<std::uint16_t>(whole - 1), 0));
-        bitmap.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
-        bitmap.SetTransferSyntax(syntax);
-        bitmap.SetDataElement(element);
-        if (bits / 8 > std::uint64_t{4} << 30)
+        if (needed > std::uint64_t{4} << 30)
             return Error{"compressed frames of more than 4 GB", path, kUnpack};
-        pixels.unpacked.resize(bits / 8);
-        if (bitmap.GetBufferLength() != pixels.unpacked.size() ||
-            !bitmap.GetBuffer(pixels.unpacked.data()))
+        pixels.kept.resize(needed);
+        if (!unpack_dicom_pixels(path, object.columns, object.rows, static_cast<int>(frames),
+                                 object.bits, pixels.kept.data()))
             return Error{"the compressed frames cannot be read", path, kUnpack};
-        pixels.bytes = reinterpret_cast<const std::uint8_t*>(pixels.unpacked.data());
+        pixels.bytes = reinterpret_cast<const std::uint8_t*>(pixels.kept.data());
         return Done{};
     }
-    if (syntax.GetSwapCode() == gdcm::SwapCode::BigEndian && object.bits != 8)
+    if (header.set.big_endian && object.bits != 8)
         return Error{"a DICOM segmentation in big-endian order", path,
                      "turn it first: dcmconv +te IN OUT (DCMTK)"};
-    const gdcm::ByteValue* bytes = element.GetByteValue();
-    const std::size_t length =
-        bytes == nullptr ? 0 : static_cast<std::size_t>(std::uint32_t(bytes->GetLength()));
-    if (length < (bits + 7) / 8)
-        return Error{text("file is cut off: %zu bytes of pixels, where its %zu frames take %zu",
-                          length, frames, (bits + 7) / 8),
-                     path, "copy it or export it again"};
-    pixels.bytes = reinterpret_cast<const std::uint8_t*>(bytes->GetPointer());
+    const std::uint64_t length = header.pixels_end - header.pixels_at;
+    if (length < needed)
+        return Error{text("%.0f bytes of pixels, where its %zu frames take %.0f",
+                          static_cast<double>(length), frames, static_cast<double>(needed)),
+                     path, kAgain};
+    if (header.inflated) {
+        pixels.bytes =
+            reinterpret_cast<const std::uint8_t*>(header.bytes.data() + header.pixels_at);
+    } else {
+        std::ifstream file(path, std::ios::binary);
+        file.seekg(static_cast<std::streamoff>(header.pixels_at));
+        pixels.kept.resize(length);
+        if (!file.read(pixels.kept.data(), static_cast<std::streamsize>(length)))
+            return Error{"cannot be read", path, "check that it may be read"};
+        pixels.bytes = reinterpret_cast<const std::uint8_t*>(pixels.kept.data());
+    }
     // Bits run on from frame to frame. Some programs begin each frame with a byte of its own, which
     // the length shows.
     const std::size_t apart = frames * ((frame + 7) / 8);
@@ -631,7 +616,7 @@ void add_fields(const Object& object, const std::string& path, NativeVolume& vol
 
 Result<NativeVolume> read_object(const std::string& path, double scan_step_mm) {
     Object object;
-    SONOCASE_TRY_DONE(read_header(path, true, object));
+    SONOCASE_TRY_DONE(read_header(path, object));
     NativeVolume volume;
     SONOCASE_TRY(auto where, place_frames(object, scan_step_mm, path));
     volume.grid = where.grid;
@@ -801,7 +786,7 @@ VolumeSize size_in_segmentation(const std::string& path) {
     const QuietLibrary quiet;
     try {
         Object object;
-        if (!read_header(path, false, object)) return {};
+        if (!read_header(path, object)) return {};
         const auto where = place_frames(object, 0, path);
         if (!where) return {};
         const std::uint64_t voxels = where->grid.voxel_count();

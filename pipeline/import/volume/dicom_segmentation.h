@@ -30,6 +30,10 @@ Result<NativeVolume> read_dicom_segmentation(const std::string& path, double sca
 
 VolumeSize size_in_segmentation(const std::string& path);
 
+// The compressed pixels of a file, of 8 or 16 bits, by GDCM; false where it cannot read them.
+bool unpack_dicom_pixels(
+    const std::string& path, int columns, int rows, int frames, int bits, char* to);
+
 // Which slice of an even stack each frame is.
 struct FrameLattice {
     double step_mm = 0;

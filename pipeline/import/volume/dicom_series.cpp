@@ -13,6 +13,7 @@
 #include <fstream>
 #include <map>
 
+#include <gdcmBitmap.h>
 #include <gdcmReader.h>
 #include <itkGDCMImageIO.h>
 #include <itkObject.h>
@@ -32,14 +33,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const gdcm::Tag kImageType(0x8, 0x8), kSopClass(0x8, 0x16), kModality(0x8, 0x60),
-    kDescription(0x8, 0x103e), kReferencedSeries(0x8, 0x1115), kSeries(0x20, 0xe),
-    kAcquisition(0x20, 0x12), kNumber(0x20, 0x13), kFrameOfReference(0x20, 0x52),
-    kInAcquisition(0x20, 0x1002), kInSeries(0x20, 0x1209), kSamples(0x28, 2), kFrames(0x28, 8),
-    kRows(0x28, 0x10), kColumns(0x28, 0x11), kBits(0x28, 0x100), kSlices(0x54, 0x81),
-    kPixels(0x7fe0, 0x10);
+constexpr DicomTag kImageType = 0x00080008, kSopClass = 0x00080016, kModality = 0x00080060,
+                   kDescription = 0x0008103e, kReferencedSeries = 0x00081115, kSeries = 0x0020000e,
+                   kAcquisition = 0x00200012, kNumber = 0x00200013, kFrameOfReference = 0x00200052,
+                   kInAcquisition = 0x00201002, kInSeries = 0x00201209, kSamples = 0x00280002,
+                   kFrames = 0x00280008, kRows = 0x00280010, kColumns = 0x00280011,
+                   kBits = 0x00280100, kSlices = 0x00540081;
 
-DicomSlice slice_of(const gdcm::DataSet& set) {
+DicomSlice slice_of(const DicomSet& set) {
     DicomSlice slice;
     slice.series = text_of(set, kSeries);
     slice.acquisition = text_of(set, kAcquisition);
@@ -60,52 +61,42 @@ DicomSlice slice_of(const gdcm::DataSet& set) {
 }
 
 // Whether the file ends before its pixels do. GDCM reads such a file and leaves the rest as zeros.
-// Pixels that are compressed say so themselves.
-bool is_cut_off(const gdcm::Reader& reader, const std::string& path, const DicomSlice& slice) {
-    const gdcm::File& dicom = reader.GetFile();
-    const gdcm::TransferSyntax syntax = dicom.GetHeader().GetDataSetTransferSyntax();
-    if (syntax.IsEncapsulated() || syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian)
-        return false;
-    const gdcm::DataSet& set = dicom.GetDataSet();
-    const std::uint64_t bits = static_cast<std::uint64_t>(slice.rows) *
-                               static_cast<std::uint64_t>(slice.columns) * slice.frames.size() *
-                               static_cast<std::uint64_t>(std::max(1, short_of(set, kSamples))) *
-                               static_cast<std::uint64_t>(short_of(set, kBits));
-    std::uint64_t at = reader.GetStreamCurrentPosition();
-    std::ifstream file(path, std::ios::binary);
-    char tag[8] = {};
-    file.seekg(static_cast<std::streamoff>(at));
-    if (file.read(tag, sizeof tag) && std::memcmp(tag, "\xe0\x7f\x10\x00", 4) == 0)
-        at += tag[4] == 'O' ? 12 : 8;  // with its kind, or without
-    std::error_code code;
-    return fs::file_size(path, code) < at + bits / 8;
+bool is_cut_off(const DicomHeader& header) {
+    const auto count = [&](DicomTag tag) {
+        return static_cast<std::uint64_t>(std::max(1, short_of(header.set, tag)));
+    };
+    const std::uint64_t bits =
+        count(kRows) * count(kColumns) * count(kSamples) * count(kBits) *
+        static_cast<std::uint64_t>(std::max(1, whole_of(header.set, kFrames)));
+    return !header.has_pixels || header.cut_off((bits + 7) / 8);
 }
 
 bool is_one_of(const std::string& text, std::initializer_list<const char*> texts) {
     return std::any_of(texts.begin(), texts.end(), [&](const char* one) { return text == one; });
 }
 
-DicomObject object_of(const gdcm::DataSet& set, const std::string& path) {
-    DicomObject object{path, text_of(set, kModality), text_of(set, kFrameOfReference), ""};
-    const DicomItems series = items_of(set, kReferencedSeries);
-    if (series && series->GetNumberOfItems() > 0)
-        object.series = text_of(series->GetItem(1).GetNestedDataSet(), kSeries);
+DicomObject object_of(const DicomSet& set, const std::string& path) {
+    DicomObject object;
+    object.path = path;
+    object.modality = text_of(set, kModality);
+    object.frame_of_reference = text_of(set, kFrameOfReference);
+    const std::vector<DicomSet> series = items_of(set, kReferencedSeries);
+    if (!series.empty()) object.series = text_of(series.front(), kSeries);
     return object;
 }
 
 // Puts one file where it belongs.
 void add_file(const std::string& path, DicomFolder& folder) {
-    gdcm::Reader reader;
-    reader.SetFileName(path.c_str());
-    if (!reader.CanRead()) return;
-    if (!reader.ReadUpToTag(kPixels, {kPixels})) {
+    const auto header = read_dicom_header(path);
+    if (!header) {
         if (is_dicom_file(path)) folder.damaged.push_back(path);
         return;
     }
-    const gdcm::DataSet& set = reader.GetFile().GetDataSet();
+    const DicomSet& set = header->set;
     const std::string type = text_of(set, kSopClass);
     DicomObject object = object_of(set, path);
     if (type.starts_with("1.2.840.10008.5.1.4.1.1.66.") || object.modality == "SEG") {
+        object.cut_off = is_cut_off(*header);
         folder.segmentations.push_back(std::move(object));
         return;
     }
@@ -127,18 +118,11 @@ void add_file(const std::string& path, DicomFolder& folder) {
     }
     DicomSlice slice = slice_of(set);
     slice.path = path;
-    slice.cut_off = is_cut_off(reader, path, slice);
+    slice.cut_off = is_cut_off(*header);
     folder.slices.push_back(std::move(slice));
 }
 
 }  // namespace
-
-bool is_dicom_file(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    char mark[4] = {};
-    file.seekg(128);
-    return file.read(mark, sizeof mark) && std::memcmp(mark, "DICM", 4) == 0;
-}
 
 DicomFolder read_dicom_headers(const std::string& path) {
     std::vector<std::string> paths;
@@ -154,22 +138,15 @@ DicomFolder read_dicom_headers(const std::string& path) {
         }
     }
     std::sort(paths.begin(), paths.end());  // a folder lists its files in no fixed order
-    const QuietLibrary quiet;
     DicomFolder folder;
-    for (const std::string& file : paths) {
-        try {
-            add_file(file, folder);
-        } catch (const std::exception&) {
-            if (is_dicom_file(file)) folder.damaged.push_back(file);
-        }
-    }
+    for (const std::string& file : paths) add_file(file, folder);
     // Beside a CT, captured screens and the like are no labels.
     const auto& slices = folder.slices;
     const auto is_scan = [](const DicomSlice& s) { return is_one_of(s.modality, {"CT", "MR"}); };
     if (std::any_of(slices.begin(), slices.end(), is_scan)) {
         for (const DicomSlice& slice : slices)
             if (!is_scan(slice) && !slice.modality.empty())
-                folder.others.push_back({slice.path, slice.modality, slice.frame_of_reference, ""});
+                folder.others.push_back({slice.path, slice.modality, slice.frame_of_reference});
         std::erase_if(folder.slices, [&](const DicomSlice& slice) {
             return !is_scan(slice) && !slice.modality.empty();
         });
@@ -596,13 +573,16 @@ Result<NativeVolume> read_headed(const DicomFolder& folder, const std::string& p
                      path, "give one of them by its own path"};
     if (!folder.segmentations.empty()) {
         const DicomObject& segmentation = folder.segmentations.front();
+        if (segmentation.cut_off)
+            return Error{"file is cut off: it ends before its pixels do", segmentation.path,
+                         "copy or export it again"};
         SONOCASE_TRY(
             auto volume,
             read_dicom_segmentation(segmentation.path, scan_step_mm(segmentation, folder.slices)));
         check_scan(segmentation, folder.slices, volume);
         std::vector<DicomObject> others = folder.others;
         others.insert(others.end(), folder.structure_sets.begin(), folder.structure_sets.end());
-        for (const std::string& file : folder.damaged) others.push_back({file, "damaged", "", ""});
+        for (const std::string& file : folder.damaged) others.push_back({file, "damaged"});
         if (!others.empty())
             volume.notes.push_back({"left_out", "of the folder: " + objects_text(others)});
         return volume;
@@ -631,18 +611,34 @@ Result<NativeVolume> read_headed(const DicomFolder& folder, const std::string& p
 
 }  // namespace
 
-Grid ras_grid(Point3 first, const DicomFrame& frame, double step_mm, Int3 size) {
-    Grid grid;
-    grid.size = size;
-    grid.spacing_mm = {frame.column_spacing_mm, frame.row_spacing_mm, step_mm};
-    const Vector3 axes[3] = {frame.along_rows, frame.along_columns, frame.normal()};
-    for (int row = 0; row < 3; ++row) {
-        const double sign = row < 2 ? -1 : 1;  // LPS to RAS
-        grid.origin_mm[row] = sign * first[row];
-        for (int column = 0; column < 3; ++column)
-            grid.direction(row, column) = sign * axes[column][row];
+bool unpack_dicom_pixels(
+    const std::string& path, int columns, int rows, int frames, int bits, char* to) {
+    const QuietLibrary quiet;
+    try {
+        gdcm::Reader reader;
+        reader.SetFileName(path.c_str());
+        const gdcm::Tag pixels(0x7fe0, 0x10);
+        if (!reader.CanRead() || !reader.Read()) return false;
+        const gdcm::File& file = reader.GetFile();
+        if (!file.GetDataSet().FindDataElement(pixels)) return false;
+        const auto depth = static_cast<std::uint16_t>(bits);
+        gdcm::Bitmap bitmap;
+        bitmap.SetNumberOfDimensions(3);
+        bitmap.SetDimension(0, static_cast<unsigned>(columns));
+        bitmap.SetDimension(1, static_cast<unsigned>(rows));
+        bitmap.SetDimension(2, static_cast<unsigned>(frames));
+        bitmap.SetPixelFormat(
+            gdcm::PixelFormat(1, depth, depth, static_cast<std::uint16_t>(depth - 1), 0));
+        bitmap.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
+        bitmap.SetTransferSyntax(file.GetHeader().GetDataSetTransferSyntax());
+        bitmap.SetDataElement(file.GetDataSet().GetDataElement(pixels));
+        const auto bytes = static_cast<std::uint64_t>(columns) * static_cast<std::uint64_t>(rows) *
+                           static_cast<std::uint64_t>(frames) *
+                           static_cast<std::uint64_t>(bits / 8);
+        return bitmap.GetBufferLength() == bytes && bitmap.GetBuffer(to);
+    } catch (const std::exception&) {
+        return false;
     }
-    return grid;
 }
 
 VolumeSize size_in_dicom(const std::string& path) {

@@ -48,9 +48,10 @@ struct DicomSlice {
 // A DICOM object that is no slice.
 struct DicomObject {
     std::string path;
-    std::string modality;            // "SEG", "RTSTRUCT", "SR", ...
-    std::string frame_of_reference;  // Frame of Reference UID
-    std::string series;              // Series Instance UID of the images that it refers to
+    std::string modality = {};            // "SEG", "RTSTRUCT", "SR", ...
+    std::string frame_of_reference = {};  // Frame of Reference UID
+    std::string series = {};              // Series Instance UID of the images that it refers to
+    bool cut_off = false;                 // a segmentation that ends before its pixels do
 };
 
 struct DicomFolder {
@@ -64,8 +65,6 @@ struct DicomFolder {
 // Every DICOM object in the folder and its sub-folders, in the order of their names; or in the
 // file. Other files are skipped.
 DicomFolder read_dicom_headers(const std::string& path);
-
-bool is_dicom_file(const std::string& path);  // by its first bytes
 
 // "2 SR (a.dcm, ...), 1 PR (b.dcm)"; empty for none.
 std::string objects_text(const std::vector<DicomObject>& objects);
@@ -82,8 +81,5 @@ struct DicomStack {
 // missing at an end by the number that a header declares; numbers that are not finite; spacing that
 // is uneven in another way. Cost: n log n.
 Result<DicomStack> dicom_stack(std::vector<DicomSlice> slices, const std::string& folder);
-
-// The lattice of slices like `frame`, whose first pixel lies at `first` in DICOM's axes, in RAS+.
-Grid ras_grid(Point3 first, const DicomFrame& frame, double step_mm, Int3 size);
 
 }  // namespace sonocase::pipeline::inline import_volume

@@ -9,7 +9,7 @@
 #include <unordered_map>
 
 #include "pipeline/base/source_checks.h"
-#include "pipeline/import/volume/dicom_series.h"
+#include "pipeline/import/volume/dicom_frames.h"
 #include "pipeline/import/volume/native_volume.h"
 
 namespace sonocase::pipeline::inline import_volume {

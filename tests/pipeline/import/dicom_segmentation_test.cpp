@@ -309,7 +309,7 @@ TEST_F(DicomSegmentation, OrScanOfSeveralFramesLiesWhereItsFramesSay) {
                       volume_.voxels[n]);
     }
     object_.without = {7};
-    expect_refused(imported(), "1 slice is missing between frame 8 of seg.dcm and frame 9");
+    expect_refused(imported(), "1 slice is missing between frame 9 of seg.dcm and frame 8");
     object_.reversed = false;
     expect_refused(imported(), "1 slice is missing between frame 7 of seg.dcm and frame 8");
     object_.without.clear();
