@@ -182,28 +182,6 @@ std::optional<Element> find(const DicomSet& set, DicomTag tag) {
     return std::nullopt;
 }
 
-// All of a deflated data set; empty where it is damaged.
-std::vector<char> inflated(std::string_view bytes) {
-    constexpr std::size_t kMost = std::size_t{1} << 31;
-    std::vector<char> out;
-    z_stream stream{};
-    if (inflateInit2(&stream, -15) != Z_OK) return out;
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-    stream.avail_in = static_cast<uInt>(std::min(bytes.size(), kMost));
-    int state = Z_OK;
-    while (state == Z_OK && out.size() < kMost) {
-        const std::size_t at = out.size();
-        out.resize(std::max<std::size_t>(1 << 16, 2 * at));
-        stream.next_out = reinterpret_cast<Bytef*>(out.data() + at);
-        stream.avail_out = static_cast<uInt>(out.size() - at);
-        state = inflate(&stream, Z_NO_FLUSH);
-        out.resize(out.size() - stream.avail_out);
-    }
-    inflateEnd(&stream);
-    if (state != Z_STREAM_END) out.clear();
-    return out;
-}
-
 enum class Read { whole, longer, damaged };  // longer: more of the file is needed
 
 // Reads the header in what is there of the file.
@@ -234,7 +212,7 @@ Read read_header_in(DicomHeader& header) {
     header.set.has_kinds = syntax.empty() ? letters : syntax != "1.2.840.10008.1.2";
     if (syntax == "1.2.840.10008.1.2.1.99" && !header.inflated) {
         if (!whole_file) return Read::longer;
-        header.bytes = inflated(header.set.bytes);
+        header.bytes = inflate_dicom(header.set.bytes);
         if (header.bytes.empty()) return Read::damaged;
         header.inflated = true;
         header.size = header.bytes.size();
@@ -289,9 +267,13 @@ bool numbers_of(const DicomSet& set,
         const bool there = at <= text.size();
         if (!there || !parse_number(text.substr(at, end - at), numbers[n]) ||
             !std::isfinite(numbers[n])) {
-            if (fault.empty())
-                fault = sonocase::pipeline::text("%s is '%.60s', and not %d finite number%s", name,
-                                                 text.c_str(), wanted, wanted == 1 ? "" : "s");
+            if (fault.empty()) {
+                std::string shown = text.substr(0, 60);
+                for (char& c : shown)
+                    if (c < ' ' || c > '~') c = '?';
+                fault = sonocase::pipeline::text("%s is '%s', and not %d finite number%s", name,
+                                                 shown.c_str(), wanted, wanted == 1 ? "" : "s");
+            }
             return false;
         }
         at = end + 1;
@@ -386,6 +368,47 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path) {
     }
     if (header.packed) header.pixels_end = end_of_fragments(file, header.pixels_at, header.size);
     return header;
+}
+
+std::vector<char> inflate_dicom(std::string_view bytes) {
+    constexpr std::size_t kMost = std::size_t{1} << 31;
+    std::vector<char> out;
+    z_stream stream{};
+    if (inflateInit2(&stream, -15) != Z_OK) return out;
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+    stream.avail_in = static_cast<uInt>(std::min(bytes.size(), kMost));
+    int state = Z_OK;
+    while (state == Z_OK && out.size() < kMost) {
+        const std::size_t at = out.size();
+        out.resize(std::max<std::size_t>(1 << 16, 2 * at));
+        stream.next_out = reinterpret_cast<Bytef*>(out.data() + at);
+        stream.avail_out = static_cast<uInt>(out.size() - at);
+        state = inflate(&stream, Z_NO_FLUSH);
+        out.resize(out.size() - stream.avail_out);
+    }
+    inflateEnd(&stream);
+    if (state != Z_STREAM_END) out.clear();
+    return out;
+}
+
+std::vector<std::string> read_dicom_fragments(const std::string& path, const DicomHeader& header) {
+    std::vector<std::string> fragments;
+    std::ifstream file(path, std::ios::binary);
+    std::uint64_t at = header.pixels_at;
+    for (bool offsets = true;; offsets = false) {  // the first is a table of offsets
+        unsigned char head[8];
+        file.seekg(static_cast<std::streamoff>(at));
+        if (!file.read(reinterpret_cast<char*>(head), sizeof head) || head[2] == 0xdd) break;
+        const std::uint64_t length =
+            head[4] | head[5] << 8 | head[6] << 16 | std::uint64_t{head[7]} << 24;
+        at += 8 + length;
+        if (at > header.size) break;
+        if (offsets) continue;
+        std::string fragment(length, '\0');
+        if (!file.read(fragment.data(), static_cast<std::streamsize>(length))) break;
+        fragments.push_back(std::move(fragment));
+    }
+    return fragments;
 }
 
 std::string text_of(const DicomSet& set, DicomTag tag) {

@@ -51,6 +51,11 @@ bool is_dicom_file(const std::string& path);  // by its first bytes
 // Empty for a file of another kind and for one whose header is damaged or cut off.
 std::optional<DicomHeader> read_dicom_header(const std::string& path);
 
+// The fragments of pixels that are packed.
+std::vector<std::string> read_dicom_fragments(const std::string& path, const DicomHeader& header);
+// What was deflated, without the padding behind it; empty where it is damaged.
+std::vector<char> inflate_dicom(std::string_view bytes);
+
 // Elements that are missing or damaged give an empty text, 0 or no items.
 std::string text_of(const DicomSet& set, DicomTag tag);  // without padding
 std::vector<std::uint16_t> shorts_of(const DicomSet& set, DicomTag tag);

@@ -194,7 +194,7 @@ Status read_header(const std::string& path, Object& object) {
                      "export its surfaces as STL or PLY, and give those as organ meshes"};
     const std::string type = text_of(set, kType);
     if (type != "BINARY" && type != "FRACTIONAL" && type != "LABELMAP")
-        return Error{"a DICOM segmentation of the unknown type '" + type + "'", path,
+        return Error{"a DICOM segmentation of an unknown type", path,
                      "expected BINARY, FRACTIONAL or LABELMAP"};
     object.kind = type == "BINARY"       ? Kind::binary
                   : type == "FRACTIONAL" ? Kind::fractional
@@ -329,6 +329,73 @@ struct Pixels {
     std::size_t frame_step = 0;
 };
 
+// One frame of run lengths (PackBits): 8 bits, or 16 as their upper and then their lower bytes.
+// False where it is damaged. GDCM reads beyond the end of such a one.
+bool unpack_run_lengths(std::string_view from, std::size_t pixels, std::size_t bytes, char* to) {
+    const auto number = [&](std::size_t n) {
+        std::uint32_t value = 0;
+        for (std::size_t b = 0; b < 4; ++b)
+            value |= std::uint32_t{static_cast<std::uint8_t>(from[4 * n + b])} << (8 * b);
+        return value;
+    };
+    if (from.size() < 64 || number(0) != bytes) return false;
+    for (std::size_t plane = 0; plane < bytes; ++plane) {
+        std::size_t at = number(plane + 1), done = 0;
+        while (done < pixels) {
+            if (at >= from.size()) return false;
+            const int code = static_cast<signed char>(from[at++]);
+            if (code == -128) continue;
+            const auto count = static_cast<std::size_t>(code < 0 ? 1 - code : 1 + code);
+            const std::size_t stored = code < 0 ? 1 : count;
+            if (stored > from.size() - at || count > pixels - done) return false;
+            for (std::size_t n = 0; n < count; ++n)
+                to[(done + n) * bytes + bytes - 1 - plane] = from[at + (code < 0 ? 0 : n)];
+            at += stored;
+            done += count;
+        }
+    }
+    return true;
+}
+
+// Compressed frames: one fragment each of run lengths or deflate, or what GDCM knows.
+Status unpack(const Object& object, const std::string& path, Pixels& pixels) {
+    const DicomHeader& header = object.header;
+    const bool run_lengths = header.transfer_syntax == "1.2.840.10008.1.2.5";
+    const bool deflate = header.transfer_syntax == "1.2.840.10008.1.2.8.1";
+    const std::size_t frame = object.frame_pixels(), frames = object.frames.size();
+    const auto bits = static_cast<std::size_t>(object.bits);
+    const std::size_t bytes = (frame * bits + 7) / 8;  // each frame begins with a byte of its own
+    if (bits == 1 && !deflate)
+        return Error{"a DICOM segmentation whose single bits are compressed", path, kUnpack};
+    if (bytes * frames > std::size_t{4} << 30)
+        return Error{"compressed frames of more than 4 GB", path, kUnpack};
+    const Error failed{
+        "the compressed frames are damaged, or packed in a way that is not known here", path,
+        kUnpack};
+    pixels.kept.resize(bytes * frames);
+    pixels.bytes = reinterpret_cast<const std::uint8_t*>(pixels.kept.data());
+    if (bits == 1) pixels.frame_step = bytes * 8;
+    if (!run_lengths && !deflate) {
+        if (!unpack_dicom_pixels(path, object.columns, object.rows, static_cast<int>(frames),
+                                 object.bits, pixels.kept.data()))
+            return failed;
+        return Done{};
+    }
+    const std::vector<std::string> fragments = read_dicom_fragments(path, header);
+    if (fragments.size() != frames) return failed;
+    for (std::size_t n = 0; n < frames; ++n) {
+        char* to = pixels.kept.data() + n * bytes;
+        if (run_lengths) {
+            if (!unpack_run_lengths(fragments[n], frame, bits / 8, to)) return failed;
+            continue;
+        }
+        const std::vector<char> whole = inflate_dicom(fragments[n]);
+        if (whole.size() < bytes) return failed;
+        std::copy_n(whole.begin(), bytes, to);
+    }
+    return Done{};
+}
+
 Status read_pixels(const Object& object,
                    const std::string& path,
                    Pixels& pixels,
@@ -341,18 +408,7 @@ Status read_pixels(const Object& object,
     if (!header.has_pixels || header.cut_off(needed))
         return Error{"file is cut off: it ends before its pixels do", path,
                      "copy it or export it again"};
-    if (header.packed) {
-        if (object.bits == 1)
-            return Error{"a DICOM segmentation whose single bits are compressed", path, kUnpack};
-        if (needed > std::uint64_t{4} << 30)
-            return Error{"compressed frames of more than 4 GB", path, kUnpack};
-        pixels.kept.resize(needed);
-        if (!unpack_dicom_pixels(path, object.columns, object.rows, static_cast<int>(frames),
-                                 object.bits, pixels.kept.data()))
-            return Error{"the compressed frames cannot be read", path, kUnpack};
-        pixels.bytes = reinterpret_cast<const std::uint8_t*>(pixels.kept.data());
-        return Done{};
-    }
+    if (header.packed) return unpack(object, path, pixels);
     if (header.set.big_endian && object.bits != 8)
         return Error{"a DICOM segmentation in big-endian order", path,
                      "turn it first: dcmconv +te IN OUT (DCMTK)"};

@@ -69,14 +69,53 @@ std::string sequence(std::uint16_t group, std::uint16_t number, const std::strin
 }
 
 // Preamble and file meta information.
-std::string dicom_head(const std::string& type, const std::string& instance) {
+std::string dicom_head(const std::string& type,
+                       const std::string& instance,
+                       const std::string& syntax = "1.2.840.10008.1.2.1") {
     const std::string meta = element(2, 1, "OB", std::string("\0\1", 2)) +
                              element(2, 2, "UI", type) + element(2, 3, "UI", instance) +
-                             element(2, 0x10, "UI", "1.2.840.10008.1.2.1") +
-                             element(2, 0x12, "UI", "1.2.3.4");
+                             element(2, 0x10, "UI", syntax) + element(2, 0x12, "UI", "1.2.3.4");
     std::string length(4, '\0');
     put(length, 0, static_cast<std::uint32_t>(meta.size()));
     return std::string(128, '\0') + "DICM" + element(2, 0, "UL", length) + meta;
+}
+
+// A frame as run lengths: repeats of three and more, and what lies between as it is.
+std::string run_lengths(const std::string& frame, std::size_t planes) {
+    std::string head(64, '\0'), body;
+    put(head, 0, static_cast<std::uint32_t>(planes));
+    for (std::size_t plane = 0; plane < planes; ++plane) {
+        put(head, 4 + 4 * plane, static_cast<std::uint32_t>(64 + body.size()));
+        std::string bytes;
+        for (std::size_t n = planes - 1 - plane; n < frame.size(); n += planes) bytes += frame[n];
+        for (std::size_t n = 0; n < bytes.size();) {
+            std::size_t same = 1;
+            while (n + same < bytes.size() && same < 128 && bytes[n + same] == bytes[n]) ++same;
+            if (same > 2) {
+                body += static_cast<char>(1 - static_cast<int>(same));
+                body += bytes[n];
+            } else {
+                body += static_cast<char>(same - 1);
+                body += bytes.substr(n, same);
+            }
+            n += same;
+        }
+    }
+    return head + body;
+}
+
+std::string deflated(const std::string& frame) {
+    z_stream stream{};
+    deflateInit2(&stream, 6, Z_DEFLATED, -15, 8, Z_DEFAULT_STRATEGY);
+    std::string out(deflateBound(&stream, frame.size()), '\0');
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(frame.data()));
+    stream.avail_in = static_cast<uInt>(frame.size());
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = static_cast<uInt>(out.size());
+    deflate(&stream, Z_FINISH);
+    out.resize(stream.total_out);
+    deflateEnd(&stream);
+    return out;
 }
 
 std::string orientation(const TinyVolume& volume) {
@@ -269,7 +308,11 @@ std::string dicom_object(const TinyVolume& volume, const TinyObject& object) {
     const bool scan = object.kind == "CT", labelmap = object.kind == "LABELMAP";
     const std::string base = "1.2.840.10008.5.1.4.1.1.";
     const std::string type = base + (scan ? "2.1" : labelmap ? "66.7" : "66.4");
-    std::string bytes = dicom_head(type, "1.2.3.8.1");
+    const bool lengths = object.packing == "run lengths";
+    std::string bytes = dicom_head(type, "1.2.3.8.1",
+                                   object.packing.empty() ? "1.2.840.10008.1.2.1"
+                                   : lengths              ? "1.2.840.10008.1.2.5"
+                                                          : "1.2.840.10008.1.2.8.1");
     bytes += element(8, 0x16, "UI", type) + element(8, 0x18, "UI", "1.2.3.8.1");
     bytes += element(8, 0x60, "CS",
                      !object.modality.empty() ? object.modality
@@ -317,7 +360,17 @@ std::string dicom_object(const TinyVolume& volume, const TinyObject& object) {
         return !any;
     });
     if (object.reversed) std::reverse(frames.begin(), frames.end());
-    std::string groups, bits, pixels;
+    const auto packed_bits = [](const std::string& bits) {
+        std::string out;
+        for (std::size_t n = 0; n < bits.size(); n += 8) {
+            int byte = 0;
+            for (std::size_t b = n; b < std::min(n + 8, bits.size()); ++b)
+                if (bits[b] == '1') byte |= 1 << (b - n);
+            out += static_cast<char>(byte);
+        }
+        return out;
+    };
+    std::string groups, bits, pixels, fragments = item("");
     bool first = true;
     for (const auto& [s, k] : frames) {
         std::string group;
@@ -344,13 +397,16 @@ std::string dicom_object(const TinyVolume& volume, const TinyObject& object) {
             else
                 pixels += static_cast<char>(value);
         }
+        if (object.packing.empty()) continue;
+        const std::string one = pixels + packed_bits(bits);
+        std::string fragment =
+            lengths ? run_lengths(one, labelmap && object.bits == 16 ? 2 : 1) : deflated(one);
+        if (fragment.size() % 2) fragment += '\0';
+        fragments += item(fragment);
+        pixels.clear();
+        bits.clear();
     }
-    for (std::size_t n = 0; n < bits.size(); n += 8) {
-        int byte = 0;
-        for (std::size_t b = n; b < std::min(n + 8, bits.size()); ++b)
-            if (bits[b] == '1') byte |= 1 << (b - n);
-        pixels += static_cast<char>(byte);
-    }
+    pixels += packed_bits(bits);
     const std::uint16_t allocated = scan || (labelmap && object.bits == 16) ? 16
                                     : object.kind == "BINARY"               ? 1
                                                                             : 8;
@@ -387,7 +443,10 @@ std::string dicom_object(const TinyVolume& volume, const TinyObject& object) {
                               sequence(0x28, 0x9110, measures + spacing));
         bytes += element(0x5200, 0x9230, "SQ", groups);
     }
-    return bytes + element(0x7fe0, 0x10, scan ? "OW" : "OB", pixels);
+    if (object.packing.empty()) return bytes + element(0x7fe0, 0x10, scan ? "OW" : "OB", pixels);
+    std::string end("\xfe\xff\xdd\xe0\0\0\0\0", 8), start = element(0x7fe0, 0x10, "OB", "");
+    put(start, 8, std::uint32_t{0xffffffff});
+    return bytes + start + fragments + end;
 }
 
 }  // namespace sonocase::testing

@@ -80,6 +80,7 @@ struct TinyObject {
     std::string first_position;                    // instead of the first frame's own
     bool placed_by_header = false;                 // CT: by the elements of a single slice
     std::string modality;                          // empty: by the kind
+    std::string packing;                           // "run lengths", "deflate"; empty: none
     std::string frame_of_reference = "1.2.3.7";
 };
 std::string dicom_object(const TinyVolume& volume, const TinyObject& object);
