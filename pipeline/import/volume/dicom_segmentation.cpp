@@ -241,6 +241,7 @@ struct FramePlaces {
 
 Result<FramePlaces> place_frames(const Object& object,
                                  double scan_step_mm,
+                                 bool resample_shear,
                                  const std::string& path) {
     const DicomFrame& first = object.frames.front();
     const Vector3 normal = first.normal();
@@ -291,14 +292,21 @@ Result<FramePlaces> place_frames(const Object& object,
             worst = n;
         }
     }
-    if (off > 0.1)
+    if (off > 0.1 && !(resample_shear && off <= 0.5))
         return Error{
             frame_text(worst) +
-                text(" lies %.3g mm to the side and %.3g mm down against frame 1, which "
-                     "is no whole number of pixels (a tilted gantry?)",
+                text(" lies %.3g mm to the side and %.3g mm down against frame 1, which is no "
+                     "whole number of pixels (a tilted gantry?)",
                      right[worst] * first.column_spacing_mm, down[worst] * first.row_spacing_mm),
-            path, "resample the scan and its segmentation to an orthogonal grid first"};
-    if (off > 1e-3)
+            path,
+            "give --resample-shear, or resample the scan and its segmentation to an orthogonal "
+            "grid first"};
+    if (off > 0.1)
+        result.warnings.push_back(
+            text("frames of the DICOM segmentation lie beside one lattice (a tilted gantry?): each "
+                 "was moved to the nearest pixels, to within %.2g mm",
+                 std::hypot(first.row_spacing_mm, first.column_spacing_mm) / 2));
+    else if (off > 1e-3)
         result.notes.push_back(
             {"off_lattice", text("frames lie up to %.2g of a pixel off one lattice", off)});
     const auto [left, rightmost] = std::minmax_element(result.column.begin(), result.column.end());
@@ -670,11 +678,13 @@ void add_fields(const Object& object, const std::string& path, NativeVolume& vol
         volume.warnings.push_back("segments without a voxel are left out: " + empty);
 }
 
-Result<NativeVolume> read_object(const std::string& path, double scan_step_mm) {
+Result<NativeVolume> read_object(const std::string& path,
+                                 double scan_step_mm,
+                                 bool resample_shear) {
     Object object;
     SONOCASE_TRY_DONE(read_header(path, object));
     NativeVolume volume;
-    SONOCASE_TRY(auto where, place_frames(object, scan_step_mm, path));
+    SONOCASE_TRY(auto where, place_frames(object, scan_step_mm, resample_shear, path));
     volume.grid = where.grid;
     volume.notes = std::move(where.notes);
     volume.warnings = std::move(where.warnings);
@@ -828,10 +838,12 @@ Result<FrameLattice> lattice_of(const std::vector<double>& places,
     return lattice;
 }
 
-Result<NativeVolume> read_dicom_segmentation(const std::string& path, double scan_step_mm) {
+Result<NativeVolume> read_dicom_segmentation(const std::string& path,
+                                             double scan_step_mm,
+                                             bool resample_shear) {
     const QuietLibrary quiet;
     try {
-        return read_object(path, scan_step_mm);
+        return read_object(path, scan_step_mm, resample_shear);
     } catch (const std::exception&) {
         return Error{"cannot be read as a DICOM segmentation: the file is damaged", path,
                      "copy it or export it again"};
@@ -843,7 +855,7 @@ VolumeSize size_in_segmentation(const std::string& path) {
     try {
         Object object;
         if (!read_header(path, object)) return {};
-        const auto where = place_frames(object, 0, path);
+        const auto where = place_frames(object, 0, true, path);
         if (!where) return {};
         const std::uint64_t voxels = where->grid.voxel_count();
         return {voxels, voxels * (object.bits == 16 ? 2 : 1), where->grid.spacing_mm};

@@ -25,8 +25,11 @@ namespace sonocase::pipeline::inline import_volume {
 //
 // Errors: damaged or cut off; compressed in a way that is not known; frames that belong to no
 // segment, do not say where they lie, are turned against one another, or lie on no even lattice.
+// resample_shear: frames that lie beside the lattice go to its nearest pixels.
 // Memory: the file, and one or two bytes per voxel.
-Result<NativeVolume> read_dicom_segmentation(const std::string& path, double scan_step_mm = 0);
+Result<NativeVolume> read_dicom_segmentation(const std::string& path,
+                                             double scan_step_mm,
+                                             bool resample_shear);
 
 VolumeSize size_in_segmentation(const std::string& path);
 

@@ -423,37 +423,97 @@ std::string size_text(const itk::ImageIOBase& io) {
            " pixels";
 }
 
-// The lattice of the stack: its third axis is the normal of the slices. Slices that slide over one
-// another (a tilted gantry) by less than a tenth of a voxel from the first to the last are squared;
-// the middle of the body stays where it is.
-Result<Grid> grid_of(const DicomStack& stack, const std::string& path, std::vector<Note>& notes) {
+// How far the last slice lies beside the first (a tilted gantry), in DICOM's axes.
+Vector3 slide_of(const DicomStack& stack) {
     const DicomFrame &first = stack.slices.front().place(), &last = stack.slices.back().place();
-    const Vector3 normal = first.normal(), all = last.position - first.position;
+    const Vector3 all = last.position - first.position, normal = first.normal();
+    return all - dot(all, normal) * normal;
+}
+
+// The lattice of the stack: its third axis is the normal of the slices. Slices that slide over one
+// another by less than a tenth of a voxel from the first to the last are squared; the middle of the
+// body stays where it is.
+Result<Grid> grid_of(const DicomStack& stack, const std::string& path, NativeVolume& volume) {
+    const DicomFrame &first = stack.slices.front().place(), &last = stack.slices.back().place();
     const auto count = static_cast<double>(stack.slices.size());
-    const double height = dot(all, normal);
+    const double height = dot(last.position - first.position, first.normal());
     double step = count > 1 ? height / (count - 1) : first.thickness_mm;
     if (!(step > 0)) step = first.between_mm;
     if (!(step > 0)) return Error{"one slice that does not say how thick it is", path, kExpected};
-    Vector3 slide = all - height * normal;
+    const Vector3 slide = slide_of(stack);
+    const double off = norm(slide);
     const double voxel = std::max({first.row_spacing_mm, first.column_spacing_mm, step});
-    if (norm(slide) > 0.1 * voxel)
-        return Error{
-            text("slices are sheared against their stack by %.3g degrees (a tilted gantry): the "
-                 "last lies %.4g mm beside the first",
-                 std::atan2(norm(slide), height) * 180 / kPi, norm(slide)),
-            path,
-            "resample the series to an orthogonal grid first (3D Slicer does it when it "
-            "loads the series with its acquisition geometry regularised)"};
-    if (norm(slide) > 1e-3 * voxel)
-        notes.push_back({"shear", text("slices slide by %.3g mm over the stack: squared, with an "
-                                       "error of %.3g mm at either end",
-                                       norm(slide), norm(slide) / 2)});
-    else
-        slide = {0, 0, 0};
-    const Point3 origin = first.position + slide / 2;
+    Point3 origin = first.position;
+    if (off > 1e-3 * voxel && off <= 0.1 * voxel) {
+        volume.notes.push_back(
+            {"shear", text("slices slide by %.3g mm over the stack: squared, with an error of "
+                           "%.3g mm at either end",
+                           off, off / 2)});
+        origin = origin + slide / 2;
+    }
     return ras_grid(origin, first, step,
                     {stack.slices.front().columns, stack.slices.front().rows,
                      static_cast<std::int32_t>(stack.slices.size())});
+}
+
+// Whether the slices slide by more than can be squared: an error, or a warning if they are to be
+// resampled.
+Result<bool> is_sheared(const DicomStack& stack,
+                        const Grid& grid,
+                        bool resample,
+                        const std::string& path,
+                        std::vector<std::string>& warnings) {
+    const double off = norm(slide_of(stack));
+    const Vector3 spacing = grid.spacing_mm;
+    if (off <= 0.1 * std::max({spacing.x, spacing.y, spacing.z})) return false;
+    const std::string what = text(
+        "slices are sheared against their stack by %.3g degrees (a tilted gantry): the last lies "
+        "%.4g mm beside the first",
+        std::atan2(off, spacing.z * (grid.size.z - 1)) * 180 / kPi, off);
+    if (!resample)
+        return Error{what, path,
+                     "give --resample-shear, or resample the series to an orthogonal "
+                     "grid first"};
+    warnings.push_back(what + text("; each slice was moved by whole pixels, to within %.2g mm",
+                                   std::hypot(spacing.x, spacing.y) / 2));
+    return true;
+}
+
+// Moves each slice by the whole pixels that it slides by, on a grid with room for all.
+void unshear(const DicomStack& stack, NativeVolume& volume) {
+    const DicomFrame& first = stack.slices.front().place();
+    const Vector3 slide = slide_of(stack);
+    const Grid old = volume.grid;
+    const auto shift = [&](int k, int axis) {
+        const Vector3 along = axis == 0 ? first.along_rows : first.along_columns;
+        return static_cast<int>(std::lround(dot(slide, along) / old.spacing_mm[axis] * k /
+                                            std::max(1, old.size.z - 1)));
+    };
+    int low[2] = {0, 0};
+    for (int axis = 0; axis < 2; ++axis) {
+        const int last = shift(old.size.z - 1, axis);
+        low[axis] = std::min(0, last);
+        volume.grid.size[axis] += std::abs(last);
+    }
+    volume.grid.origin_mm = old.point_from_voxel({double(low[0]), double(low[1]), 0});
+    const auto row = static_cast<std::size_t>(old.size.x),
+               rows = static_cast<std::size_t>(old.size.y);
+    const std::size_t bytes = volume.bytes.size() / old.voxel_count();
+    std::vector<std::byte> moved(volume.grid.voxel_count() * bytes);
+    for (int k = 0; k < old.size.z; ++k) {
+        const auto right = static_cast<std::size_t>(shift(k, 0) - low[0]),
+                   down = static_cast<std::size_t>(shift(k, 1) - low[1]);
+        for (std::size_t j = 0; j < rows; ++j) {
+            const std::size_t from = (static_cast<std::size_t>(k) * rows + j) * row;
+            const std::size_t to =
+                (static_cast<std::size_t>(k) * static_cast<std::size_t>(volume.grid.size.y) + j +
+                 down) *
+                    static_cast<std::size_t>(volume.grid.size.x) +
+                right;
+            std::memcpy(moved.data() + to * bytes, volume.bytes.data() + from * bytes, row * bytes);
+        }
+    }
+    volume.bytes = std::move(moved);
 }
 
 // Reads one slice to the end of the volume, which begins with the first and takes its type.
@@ -487,10 +547,14 @@ void sort_frames(const DicomStack& stack, NativeVolume& volume) {
     volume.bytes = std::move(sorted);
 }
 
-Result<NativeVolume> read_stack(const DicomStack& stack, const std::string& path) {
+Result<NativeVolume> read_stack(const DicomStack& stack,
+                                bool resample_shear,
+                                const std::string& path) {
     NativeVolume volume;
     volume.warnings = stack.warnings;
-    SONOCASE_TRY(volume.grid, grid_of(stack, path, volume.notes));
+    SONOCASE_TRY(volume.grid, grid_of(stack, path, volume));
+    SONOCASE_TRY(const bool sheared,
+                 is_sheared(stack, volume.grid, resample_shear, path, volume.warnings));
     const DicomSlice& first = stack.slices.front();
     const bool one_file = first.of_frame > 0;
     for (const DicomSlice& slice : stack.slices) {
@@ -519,6 +583,7 @@ Result<NativeVolume> read_stack(const DicomStack& stack, const std::string& path
         }
     }
     if (one_file) sort_frames(stack, volume);
+    if (sheared) unshear(stack, volume);
     return volume;
 }
 
@@ -566,7 +631,9 @@ double scan_step_mm(const DicomObject& segmentation, std::vector<DicomSlice> sli
            static_cast<double>(stack->slices.size() - 1);
 }
 
-Result<NativeVolume> read_headed(const DicomFolder& folder, const std::string& path) {
+Result<NativeVolume> read_headed(const DicomFolder& folder,
+                                 bool resample_shear,
+                                 const std::string& path) {
     if (folder.segmentations.size() > 1)
         return Error{"folder holds " + std::to_string(folder.segmentations.size()) +
                          " DICOM segmentations: " + objects_text(folder.segmentations),
@@ -576,9 +643,9 @@ Result<NativeVolume> read_headed(const DicomFolder& folder, const std::string& p
         if (segmentation.cut_off)
             return Error{"file is cut off: it ends before its pixels do", segmentation.path,
                          "copy or export it again"};
-        SONOCASE_TRY(
-            auto volume,
-            read_dicom_segmentation(segmentation.path, scan_step_mm(segmentation, folder.slices)));
+        SONOCASE_TRY(auto volume, read_dicom_segmentation(segmentation.path,
+                                                          scan_step_mm(segmentation, folder.slices),
+                                                          resample_shear));
         check_scan(segmentation, folder.slices, volume);
         std::vector<DicomObject> others = folder.others;
         others.insert(others.end(), folder.structure_sets.begin(), folder.structure_sets.end());
@@ -606,7 +673,7 @@ Result<NativeVolume> read_headed(const DicomFolder& folder, const std::string& p
     SONOCASE_TRY(auto stack, dicom_stack(folder.slices, path));
     if (!folder.others.empty())
         stack.warnings.push_back("left out of the DICOM folder: " + objects_text(folder.others));
-    return read_stack(stack, path);
+    return read_stack(stack, resample_shear, path);
 }
 
 }  // namespace
@@ -655,11 +722,11 @@ VolumeSize size_in_dicom(const std::string& path) {
     return size;
 }
 
-Result<NativeVolume> read_dicom(const std::string& path) {
+Result<NativeVolume> read_dicom(const std::string& path, bool resample_shear) {
     const QuietLibrary quiet;
     itk::Object::GlobalWarningDisplayOff();
     try {
-        return read_headed(read_dicom_headers(path), path);
+        return read_headed(read_dicom_headers(path), resample_shear, path);
     } catch (const std::exception&) {
         return damaged(path);
     }

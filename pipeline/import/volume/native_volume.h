@@ -32,8 +32,9 @@ struct NativeVolume {
 VolumeSize size_in_file_header(const std::string& path);        // one file
 Result<NativeVolume> read_itk_volume(const std::string& path);  // one file
 // A DICOM segmentation or an object of several frames; a folder with one segmentation, beside the
-// scan that it was drawn on or alone; or a folder's largest series.
-Result<NativeVolume> read_dicom(const std::string& path);
+// scan that it was drawn on or alone; or a folder's largest series. resample_shear: slices of a
+// tilted gantry are moved by whole pixels; else they are an error.
+Result<NativeVolume> read_dicom(const std::string& path, bool resample_shear = false);
 VolumeSize size_in_dicom(const std::string& path);  // by headers alone
 
 // How to permute and flip the axes of a grid so that they lie nearest to those of its frame.

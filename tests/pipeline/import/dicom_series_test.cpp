@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "pipeline/import/volume/label_map.h"
+#include "pipeline/import/volume/native_volume.h"
 #include "support/temporary_folder.h"
 #include "three_boxes.h"
 
@@ -195,9 +196,31 @@ TEST_F(DicomFolder, ThatIsShearedIsSquaredBelowATenthOfAVoxelAndRefusedBeyond) {
     EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const Note& note) {
         return note.name == "shear" && note.text.find("0.15 mm at either end") != std::string::npos;
     }));
-    volume_.columns(1, 2) = 0.5;
+    volume_.columns(1, 2) = 0.53;
     write_all();
-    expect_refused("series", "sheared against their stack by 9.46 degrees");
+    expect_refused("series", "sheared against their stack by 10 degrees");
+    // Moved by whole pixels: every voxel within half a pixel of where its slice lies.
+    const auto native = read_dicom(folder_ / "series", true);
+    ASSERT_TRUE(native) << native.error().message();
+    EXPECT_EQ(native->grid.size.y, volume_.size.y + 2);
+    const auto* voxels = reinterpret_cast<const std::uint16_t*>(native->bytes.data());
+    std::size_t inside = 0, n = 0;
+    for (int k = 0; k < native->grid.size.z; ++k)
+        for (int j = 0; j < native->grid.size.y; ++j)
+            for (int i = 0; i < native->grid.size.x; ++i, ++n) {
+                if (voxels[n] == 0) continue;
+                ++inside;
+                const Point3 p = native->grid.point_from_voxel({double(i), double(j), double(k)});
+                const Vector3 from = p - volume_.position(0, 0, k);
+                const int across = static_cast<int>(std::lround(from.x / 2)),
+                          down = static_cast<int>(std::lround(from.y / 4));
+                EXPECT_LE(distance(p, volume_.position(across, down, k)), 2 + 1e-9);
+                ASSERT_EQ(voxels[n], volume_.voxels[static_cast<std::size_t>(
+                                         (k * volume_.size.y + down) * volume_.size.x + across)]);
+            }
+    EXPECT_EQ(inside,
+              volume_.voxels.size() - static_cast<std::size_t>(std::count(
+                                          volume_.voxels.begin(), volume_.voxels.end(), 0)));
 }
 
 TEST_F(DicomFolder, WhoseSlicesAreThinnerThanTheyLieApartIsReadWithAWarning) {
