@@ -431,8 +431,7 @@ Vector3 slide_of(const DicomStack& stack) {
 }
 
 // The lattice of the stack: its third axis is the normal of the slices. Slices that slide over one
-// another by less than a tenth of a voxel from the first to the last are squared; the middle of the
-// body stays where it is.
+// another are squared about the middle of the body where that moves none by a tenth of a voxel.
 Result<Grid> grid_of(const DicomStack& stack, const std::string& path, NativeVolume& volume) {
     const DicomFrame &first = stack.slices.front().place(), &last = stack.slices.back().place();
     const auto count = static_cast<double>(stack.slices.size());
@@ -442,9 +441,9 @@ Result<Grid> grid_of(const DicomStack& stack, const std::string& path, NativeVol
     if (!(step > 0)) return Error{"one slice that does not say how thick it is", path, kExpected};
     const Vector3 slide = slide_of(stack);
     const double off = norm(slide);
-    const double voxel = std::max({first.row_spacing_mm, first.column_spacing_mm, step});
+    const double voxel = std::min({first.row_spacing_mm, first.column_spacing_mm, step});
     Point3 origin = first.position;
-    if (off > 1e-3 * voxel && off <= 0.1 * voxel) {
+    if (off > 1e-3 * voxel && off <= 0.2 * voxel) {
         volume.notes.push_back(
             {"shear", text("slices slide by %.3g mm over the stack: squared, with an error of "
                            "%.3g mm at either end",
@@ -465,7 +464,7 @@ Result<bool> is_sheared(const DicomStack& stack,
                         std::vector<std::string>& warnings) {
     const double off = norm(slide_of(stack));
     const Vector3 spacing = grid.spacing_mm;
-    if (off <= 0.1 * std::max({spacing.x, spacing.y, spacing.z})) return false;
+    if (off <= 0.2 * std::min({spacing.x, spacing.y, spacing.z})) return false;
     const std::string what = text(
         "slices are sheared against their stack by %.3g degrees (a tilted gantry): the last lies "
         "%.4g mm beside the first",
