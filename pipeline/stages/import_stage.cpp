@@ -4,6 +4,7 @@
 #include "pipeline/stages/import_stage.h"
 
 #include "formats/files/load_save.h"
+#include "pipeline/anatomy/anatomy_check.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
 #include "pipeline/stages/label_codec.h"
@@ -33,7 +34,11 @@ LabelFile sample_analytic(const AnalyticInput& in) {
 }
 
 void add_meshes(OptionsOf<MeshImportOptions>& options) {
-    options.help_group("Organ meshes")
+    options
+        .choice(
+            "anatomy", [](auto& o) { return &o.anatomy; }, {"check", "accept"}, "",
+            "check: refuse labels that fit no human body; accept: warn only")
+        .help_group("Organ meshes")
         .number(
             "voxel_mm", [](auto& o) { return &o.mesh.voxel_mm; }, 0.3, 10, "mm",
             "meshes: edge of the voxels")
@@ -173,11 +178,9 @@ StageVerb verb() {
     return verb;
 }
 
-}  // namespace
-
-Result<ImportedLabels> import_inputs(const Recipe& recipe,
-                                     const MeshImportOptions& given,
-                                     const Progress& progress) {
+Result<ImportedLabels> read_inputs(const Recipe& recipe,
+                                   const MeshImportOptions& given,
+                                   const Progress& progress) {
     const RecipeInputs& in = recipe.inputs;
     const std::string path = recipe.resolve(in.labels), table = recipe.resolve(in.label_table);
     if (is_mesh_source(path)) {
@@ -189,6 +192,21 @@ Result<ImportedLabels> import_inputs(const Recipe& recipe,
     options.table = table;
     options.scale = in.labels_scale;
     return import_label_map(path, options, progress);
+}
+
+}  // namespace
+
+Result<ImportedLabels> import_inputs(const Recipe& recipe,
+                                     const MeshImportOptions& given,
+                                     const Progress& progress) {
+    SONOCASE_TRY(auto imported, read_inputs(recipe, given, progress));
+    const std::string path = recipe.resolve(recipe.inputs.labels);
+    const auto odd =
+        report_anatomy(imported.labels, {.mesh = is_mesh_source(path)}, imported.report);
+    if (odd && given.anatomy != "accept")
+        return Error{"this is no human body: " + *odd, path,
+                     "if it is one, give --anatomy accept, or anatomy = \"accept\" in [import]"};
+    return imported;
 }
 
 StageDescriptor import_stage() {

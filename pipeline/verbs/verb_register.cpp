@@ -146,6 +146,7 @@ struct RegisterInputs {
     RegisterOptions options;
     double import_seconds = 0;
     std::vector<Measure> reduction;  // of a dense mannequin, as import_surface reports it
+    std::vector<Note> notes;         // of the import: "anatomy"
     std::vector<std::string> warnings;
 };
 // What becomes of a dense scan, without its size.
@@ -183,6 +184,8 @@ Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Pr
     inputs.reduction = reduction_of(surface_report);
     SONOCASE_TRY(ImportedLabels labels,
                  import_inputs(a.recipe, a.recipe.settings.of<MeshImportOptions>(), progress));
+    for (const Note& note : labels.report.notes)
+        if (note.name == "anatomy") inputs.notes.push_back(note);
     inputs.warnings = surface_report.warnings;
     inputs.warnings.insert(inputs.warnings.end(), labels.report.warnings.begin(),
                            labels.report.warnings.end());
@@ -221,6 +224,7 @@ void add_input_reports(const RegisterInputs& inputs, StageReport& report) {
     report.measures.push_back({"import_seconds", inputs.import_seconds});
     report.measures.push_back({"surface_seconds", inputs.skin.report.seconds});
     report.seconds += inputs.skin.report.seconds;
+    report.notes.insert(report.notes.end(), inputs.notes.begin(), inputs.notes.end());
     report.warnings.insert(report.warnings.begin(), inputs.warnings.begin(), inputs.warnings.end());
 }
 
