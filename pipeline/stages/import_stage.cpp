@@ -161,7 +161,7 @@ StageVerb verb() {
     StageVerb verb;
     verb.inputs = {
         {"LABELS", "",
-         "NIfTI, NRRD, .seg.nrrd, MetaImage, folder of masks, folder of DICOM slices, or organ "
+         "NIfTI, NRRD, .seg.nrrd, MetaImage, DICOM file or folder, folder of masks, or organ "
          "meshes (GLB, STL, PLY, OBJ, VTP, or a folder of them)",
          true, &RecipeInputs::labels},
         {"--table", "FILE.csv",

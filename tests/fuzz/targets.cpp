@@ -6,6 +6,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -23,6 +24,8 @@
 #include "formats/text/stage_report_json.h"
 #include "pipeline/anatomy/label_table.h"
 #include "pipeline/import/mesh/ply_file.h"
+#include "pipeline/import/volume/dicom_frames.h"
+#include "pipeline/import/volume/dicom_segmentation.h"
 #include "pipeline/import/volume/volume_header.h"
 #include "pipeline/registration/map/registration.h"
 #include "runtime/tracking/devices/guidance_protocol.h"
@@ -200,6 +203,46 @@ void label_tables(Bytes bytes) {
     check_error(pipeline::parse_label_xml(text_of(bytes), "fuzz"));
 }
 
+// The elements of a DICOM file, whatever it holds.
+void dicom_header(Bytes bytes) {
+    const MemoryFile file(bytes);
+    const auto header = pipeline::read_dicom_header(file.path());
+    if (!header) return;
+    demand(header->pixels_at <= header->size || header->cut_off(0));
+    for (const pipeline::DicomTag tag : {0x00620002u, 0x00620001u, 0x00280010u, 0x00081115u}) {
+        pipeline::text_of(header->set, tag);
+        pipeline::whole_of(header->set, tag);
+        for (const pipeline::DicomSet& item : pipeline::items_of(header->set, tag))
+            pipeline::shorts_of(item, 0x0062000d);
+    }
+    const auto frames = pipeline::frames_of(
+        header->set, std::max(1, std::min(1000, pipeline::whole_of(header->set, 0x00280008))));
+    for (const pipeline::DicomFrame& frame : frames) {
+        if (!frame.placed() || !frame.fault.empty()) continue;
+        demand(std::isfinite(frame.position.x + frame.position.y + frame.position.z));
+        demand(std::abs(norm(frame.normal()) - 1) < 1e-9);
+        demand(frame.row_spacing_mm >= 0 && std::isfinite(frame.thickness_mm));
+    }
+}
+
+// Runs of packed bits are those that are found bit by bit.
+void packed_bits(Bytes bytes) {
+    if (bytes.size() < 4) return;
+    const std::size_t bits = 8 * (bytes.size() - 3);
+    const std::size_t first = (bytes[0] + 256u * bytes[1]) % bits;
+    const std::size_t count = std::min<std::size_t>(bits - first, 8u * bytes[2]);
+    const std::uint8_t* from = bytes.data() + 3;
+    std::vector<bool> inside(count, false);
+    std::size_t next = 0;
+    pipeline::for_bit_runs(from, first, count, [&](std::size_t start, std::size_t length) {
+        demand(length > 0 && start >= next && start + length <= count);
+        next = start + length + 1;
+        std::fill_n(inside.begin() + static_cast<std::ptrdiff_t>(start), length, true);
+    });
+    for (std::size_t n = 0; n < count; ++n)
+        demand(inside[n] == (((from[(first + n) / 8] >> ((first + n) % 8)) & 1) != 0));
+}
+
 void ply(Bytes bytes) {
     const MemoryFile file(bytes);
     check_error(pipeline::read_ply_file(file.path()));
@@ -306,6 +349,8 @@ const std::vector<Target>& targets() {
         {"stage_report", stage_report},
         {"nifti_extension", nifti_extension},
         {"label_tables", label_tables},
+        {"dicom_header", dicom_header},
+        {"packed_bits", packed_bits},
         {"ply", ply},
         {"viper", viper},
         {"liberty", liberty},

@@ -41,6 +41,7 @@ struct Structure {
 struct StructureList {
     Grid grid;
     std::vector<Structure> structures;
+    std::vector<Note> notes;
     std::vector<std::string> warnings;
 };
 
@@ -128,6 +129,7 @@ Result<StructureList> read_label_file(const std::string& path, const std::string
 
     StructureList list;
     list.grid = file.grid;
+    list.notes = std::move(file.notes);
     list.warnings = std::move(file.warnings);
     for (std::size_t layer = 0; layer < file.layers.size(); ++layer) {
         // One pass over the voxels: a run ends where the value changes.
@@ -391,6 +393,7 @@ Result<ImportedLabels> import_label_map(const std::string& path,
     StageReport& report = result.report;
     report.stage = stage_names::kImport;
     report.version = kImportVersion;
+    report.notes = std::move(list.notes);
     report.warnings = std::move(list.warnings);
     const int unnamed_count = name_unnamed(structures, report.warnings);
     std::stable_sort(

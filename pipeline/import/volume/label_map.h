@@ -48,8 +48,9 @@ struct ImportedLabels {
 inline constexpr int kImportVersion = 2;
 
 // path  NIfTI, NRRD, .seg.nrrd, MetaImage; a folder with one binary mask per structure (file name =
-//       structure); a folder with a DICOM series whose pixels are label values; or a .labels file
-//       that import wrote, returned unchanged.
+//       structure); a DICOM segmentation, or a folder with one (beside its CT, or alone) or with a
+//       DICOM series whose pixels are label values; or a .labels file that import wrote, returned
+//       unchanged.
 // The palette holds the labels that occur, in order of value, after [0], the outside. Label::tissue
 // comes from the table's tissue_class, else from the built-in tissue table by the name; a class
 // that does not exist is an error. Where masks or segments overlap the smaller structure remains: a

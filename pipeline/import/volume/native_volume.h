@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "formats/base/result.h"
+#include "formats/base/stage_report.h"
 #include "formats/volume/label_volume.h"
 #include "pipeline/import/volume/volume_file.h"
 
@@ -24,12 +25,17 @@ struct NativeVolume {
     int layers = 1;                // values per voxel, stored side by side
     std::vector<std::byte> bytes;  // # voxels * layers * size of component
     std::map<std::string, std::string> fields;
+    std::vector<Note> notes;  // what was found and assumed, for the report
     std::vector<std::string> warnings;
 };
 
-VolumeSize size_in_file_header(const std::string& path);            // one file
-Result<NativeVolume> read_itk_volume(const std::string& path);      // one file
-Result<NativeVolume> read_dicom_series(const std::string& folder);  // the folder's largest series
+VolumeSize size_in_file_header(const std::string& path);        // one file
+Result<NativeVolume> read_itk_volume(const std::string& path);  // one file
+// A DICOM segmentation or an object of several frames; a folder with one segmentation, beside the
+// scan that it was drawn on or alone; or a folder's largest series. resample_shear: slices of a
+// tilted gantry are moved by whole pixels; else they are an error.
+Result<NativeVolume> read_dicom(const std::string& path, bool resample_shear = false);
+VolumeSize size_in_dicom(const std::string& path);  // by headers alone
 
 // How to permute and flip the axes of a grid so that they lie nearest to those of its frame.
 struct AxisOrder {

@@ -9,7 +9,7 @@
 #include <unordered_map>
 
 #include "pipeline/base/source_checks.h"
-#include "pipeline/import/volume/dicom_series.h"
+#include "pipeline/import/volume/dicom_frames.h"
 #include "pipeline/import/volume/native_volume.h"
 
 namespace sonocase::pipeline::inline import_volume {
@@ -73,14 +73,15 @@ Result<NativeVolume> read_native(const std::string& path) {
     std::error_code code;
     if (fs::is_directory(path, code)) {
         SONOCASE_TRY_DONE(check_source_folder(path, "expected DICOM slices"));
-        return read_dicom_series(path);
+        return read_dicom(path);
     }
-    if (fs::exists(path, code) && !is_volume_file_name(path))
+    SONOCASE_TRY_DONE(check_source_file(path, "expected a volume file"));
+    if (is_dicom_file(path)) return read_dicom(path);
+    if (!is_volume_file_name(path))
         return Error{
             "not a known volume file name", path,
-            "expected .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a folder of masks or of DICOM "
-            "slices"};
-    SONOCASE_TRY_DONE(check_source_file(path, "expected a volume file"));
+            "expected .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a DICOM segmentation, a folder of "
+            "masks or of DICOM files"};
     return read_itk_volume(path);
 }
 
@@ -165,20 +166,14 @@ class ValueTable {
 
 VolumeSize size_in_headers(const std::string& path) {
     std::error_code code;
-    if (!fs::is_directory(path, code)) return size_in_file_header(path);
+    if (!fs::is_directory(path, code))
+        return check_source_file(path, "") && is_dicom_file(path) ? size_in_dicom(path)
+                                                                  : size_in_file_header(path);
     if (!check_source_folder(path, "")) return {};
     for (const auto& entry : fs::directory_iterator(path, code))
         if (is_volume_file_name(entry.path().string()))
             return size_in_file_header(entry.path().string());
-    const auto stack = dicom_stack(read_dicom_headers(path), path);
-    if (!stack) return {};
-    VolumeSize size;
-    for (const DicomSlice& slice : stack->slices)
-        size.voxels += static_cast<std::uint64_t>(slice.rows) *
-                       static_cast<std::uint64_t>(slice.columns) *
-                       static_cast<std::uint64_t>(slice.frames);
-    size.bytes = 2 * size.voxels;  // CT and most others have two bytes per voxel
-    return size;
+    return size_in_dicom(path);
 }
 
 Result<LabelLayers> read_label_layers(const std::string& path) {
@@ -189,6 +184,7 @@ Result<LabelLayers> read_label_layers(const std::string& path) {
     LabelLayers result;
     result.grid = reoriented(native.grid, order);
     result.fields = std::move(native.fields);
+    result.notes = std::move(native.notes);
     result.warnings = std::move(native.warnings);
     const auto layer_count = static_cast<std::size_t>(native.layers);
     result.layers.assign(layer_count, std::vector<std::uint8_t>(result.grid.voxel_count()));

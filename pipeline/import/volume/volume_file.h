@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Medical volumes as files: NIfTI, NRRD (also .seg.nrrd), MetaImage, or a folder with a DICOM
-// series.
+// Medical volumes as files: NIfTI, NRRD (also .seg.nrrd), MetaImage, a DICOM segmentation, or a
+// folder with one or with a DICOM series.
 //
 // Placement is converted here: whatever the file's axis order and world convention, the returned
 // grid is in RAS+ millimetres, its axes permuted and flipped so that i points most nearly to the
@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "formats/base/result.h"
+#include "formats/base/stage_report.h"
 #include "formats/volume/label_volume.h"
 
 namespace sonocase::pipeline::inline import_volume {
@@ -25,6 +26,7 @@ struct LabelLayers {
     std::vector<std::int32_t> values;  // ascending, distinct, over all layers; # <= 256
     std::vector<std::vector<std::uint8_t>> layers;  // # layers x # voxels, index into values
     std::map<std::string, std::string> fields;      // NRRD key-value pairs
+    std::vector<Note> notes;                        // what was found and assumed, for the report
     std::vector<std::string> warnings;
 };
 
