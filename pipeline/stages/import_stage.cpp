@@ -154,7 +154,8 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
     const std::string files = digests.labels + " " + digests.label_table;
     if (is_mesh_source(recipe.resolve(in.labels)))
         return {key_text(files, {in.labels_scale, kMeshImportVersion})};
-    return {key_text(files, {in.labels_scale})};
+    return {key_text(files + " " + in.label_names + " " + in.orientation,
+                     {in.labels_scale, in.resample_shear ? 1.0 : 0.0, kVolumeReadingVersion})};
 }
 
 StageVerb verb() {
@@ -165,9 +166,20 @@ StageVerb verb() {
          "meshes (GLB, STL, PLY, OBJ, VTP, or a folder of them)",
          true, &RecipeInputs::labels},
         {"--table", "FILE.csv",
-         "Names of the values: rows of value,name[,tissue_class]; of meshes: node,label,role",
+         "Names of the values: rows of value,name[,tissue_class], or a table of ITK-SNAP, Slicer, "
+         "FreeSurfer or nnU-Net; of meshes: node,label,role",
          false, &RecipeInputs::label_table},
-        {"--scale", "", "Millimetres per unit of the file", false, &RecipeInputs::labels_scale}};
+        {"--scale", "", "Millimetres per unit of the file", false, &RecipeInputs::labels_scale},
+        {"--names", "", "Whose numbers the values are that neither the file nor a table names",
+         false, &RecipeInputs::label_names, names_options()},
+        {"--orientation",
+         "",
+         "Which transform of a NIfTI header places the voxels",
+         false,
+         &RecipeInputs::orientation,
+         {"auto", "sform", "qform"}},
+        {"--resample-shear", "", "Resample a map whose axes are not at right angles", false,
+         &RecipeInputs::resample_shear}};
     verb.output_type = "CT.labels";
     verb.output_meaning = "Where to write";
     verb.save = [](StageInputs&, const StageValue& value, const std::string& path) {
@@ -191,6 +203,11 @@ Result<ImportedLabels> read_inputs(const Recipe& recipe,
     ImportOptions options;
     options.table = table;
     options.scale = in.labels_scale;
+    options.names = in.label_names;
+    options.reading.orientation = in.orientation == "sform"   ? Orientation::sform
+                                  : in.orientation == "qform" ? Orientation::qform
+                                                              : Orientation::automatic;
+    options.reading.resample_shear = in.resample_shear;
     return import_label_map(path, options, progress);
 }
 

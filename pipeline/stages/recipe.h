@@ -97,6 +97,9 @@ struct RecipeInputs {
     std::string examples;   // folder of ultrasound patches; empty: synthetic examples
     std::string landmarks;  // CSV of name,ct_x,ct_y,ct_z,x,y,z
     double labels_scale = 1;
+    std::string label_names = "auto";  // names_options()
+    std::string orientation = "auto";  // of a NIfTI map: "auto", "sform" or "qform"
+    bool resample_shear = false;       // of a map with slanted axes
     double surface_scale = 1;
     std::optional<Vector3> up;  // the patient's head direction in the surface's frame
 };

@@ -21,6 +21,7 @@
 #include "formats/text/number_text.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/import/mesh/surface_file.h"
+#include "pipeline/import/volume/label_map.h"
 #include "pipeline/registration/fit_pictures.h"
 #include "pipeline/registration/landmark_candidates.h"
 #include "pipeline/registration/landmark_file.h"
@@ -125,6 +126,16 @@ void add_register_options(CLI::App& app, RegisterArguments& a, bool several) {
     surface->expected(1, several ? 100 : 1);
     app.add_option("--table", in.label_table, "CSV of value,name[,tissue_class] for the label map")
         ->type_name("FILE.csv");
+    app.add_option("--names", in.label_names,
+                   "Whose numbers the values are that neither the file nor a table names")
+        ->check(CLI::IsMember(names_options()))
+        ->capture_default_str();
+    app.add_option("--orientation", in.orientation,
+                   "Which transform of a NIfTI header places the voxels")
+        ->check(CLI::IsMember(std::vector<std::string>{"auto", "sform", "qform"}))
+        ->capture_default_str();
+    app.add_flag("--resample-shear", in.resample_shear,
+                 "Resample a label map whose axes are not at right angles");
     app.add_option("--up", a.up, "The patient's head direction in the surface's frame")
         ->type_name("X,Y,Z");
     app.add_option("--landmarks", in.landmarks, "Rows name,ct_x,ct_y,ct_z,x,y,z in mm")

@@ -26,6 +26,7 @@
 #include "pipeline/import/mesh/ply_file.h"
 #include "pipeline/import/volume/dicom_frames.h"
 #include "pipeline/import/volume/dicom_segmentation.h"
+#include "pipeline/import/volume/nifti_file.h"
 #include "pipeline/import/volume/volume_header.h"
 #include "pipeline/registration/map/registration.h"
 #include "runtime/tracking/devices/guidance_protocol.h"
@@ -198,8 +199,34 @@ void nifti_extension(Bytes bytes) {
     check_error(pipeline::load_nifti_label_table(file.path()));
 }
 
+// What a header places is finite, or an error says why not.
+void check_placement(const Result<pipeline::Placement>& read) {
+    check_error(read);
+    if (!read) return;
+    pipeline::NativeVolume volume;
+    check_error(pipeline::place_volume(*read, {}, "fuzz", volume));
+    for (const double entry : read->columns.m) demand(std::isfinite(entry));
+    for (int axis = 0; axis < 3; ++axis) {
+        demand(std::isfinite(read->origin_mm[axis]));
+        demand(read->size[axis] >= 1 && read->size[axis] <= 65535);
+    }
+}
+
+void volume_headers(Bytes bytes) {
+    for (const auto orientation : {pipeline::Orientation::automatic, pipeline::Orientation::sform,
+                                   pipeline::Orientation::qform}) {
+        const auto header = pipeline::parse_nifti_header(bytes, "fuzz", orientation);
+        check_error(header);
+        if (header) check_placement(header->placement);
+    }
+    check_placement(pipeline::nrrd_placement(text_of(bytes), "fuzz"));
+    check_placement(pipeline::meta_placement(text_of(bytes), "fuzz"));
+    const MemoryFile file(bytes);
+    check_error(pipeline::read_nifti_volume(file.path(), {}));
+}
+
 void label_tables(Bytes bytes) {
-    check_error(pipeline::parse_label_csv(text_of(bytes), "fuzz"));
+    check_error(pipeline::parse_label_table(text_of(bytes), "fuzz"));
     check_error(pipeline::parse_label_xml(text_of(bytes), "fuzz"));
 }
 
@@ -348,6 +375,7 @@ const std::vector<Target>& targets() {
         {"registration", registration},
         {"stage_report", stage_report},
         {"nifti_extension", nifti_extension},
+        {"volume_headers", volume_headers},
         {"label_tables", label_tables},
         {"dicom_header", dicom_header},
         {"packed_bits", packed_bits},

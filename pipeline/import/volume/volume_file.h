@@ -20,6 +20,15 @@
 
 namespace sonocase::pipeline::inline import_volume {
 
+// Which of the two transforms of a NIfTI header places its voxels. automatic: the sform where its
+// code is above 0, with a warning where the two disagree.
+enum class Orientation { automatic, sform, qform };
+
+struct VolumeReading {
+    Orientation orientation = Orientation::automatic;
+    bool resample_shear = false;  // slanted axes: nearest voxels of a grid with right angles
+};
+
 // A volume of few distinct whole numbers in one or more layers (a .seg.nrrd may have several).
 struct LabelLayers {
     Grid grid;
@@ -30,10 +39,13 @@ struct LabelLayers {
     std::vector<std::string> warnings;
 };
 
+// Every number of the geometry is read from the header itself and is finite (nifti_file.h,
+// volume_header.h). Values that a scale factor of the header leaves near whole numbers are rounded.
+//
 // Errors: not a readable volume; a pipe or a device; values that are not whole numbers; more than
 // 256 distinct ones (most likely a CT). Cost: one pass; memory: the file's voxels in its own type
 // and one byte each.
-Result<LabelLayers> read_label_layers(const std::string& path);
+Result<LabelLayers> read_label_layers(const std::string& path, const VolumeReading& reading = {});
 
 // The number of voxels of a file or of a folder with a DICOM series, and the bytes that they take
 // in their own type. Only headers are read. For a folder of masks, those of one mask. 0: they
