@@ -148,7 +148,7 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
                           in.torso.slice_mm})};
     const std::string files = digests.labels + " " + digests.label_table;
     if (is_mesh_source(recipe.resolve(in.labels)))
-        return {key_text(files, {in.labels_scale, kMeshImportVersion})};
+        return {key_text(files + " axes " + in.labels_axes, {in.labels_scale, kMeshImportVersion})};
     return {key_text(files, {in.labels_scale})};
 }
 
@@ -157,12 +157,18 @@ StageVerb verb() {
     verb.inputs = {
         {"LABELS", "",
          "NIfTI, NRRD, .seg.nrrd, MetaImage, folder of masks, folder of DICOM slices, or organ "
-         "meshes (GLB, STL, PLY, OBJ, VTP, or a folder of them)",
+         "meshes (GLB, STL, PLY, OBJ, VTP, VTK, or a folder of them)",
          true, &RecipeInputs::labels},
         {"--table", "FILE.csv",
          "Names of the values: rows of value,name[,tissue_class]; of meshes: node,label,role",
          false, &RecipeInputs::label_table},
-        {"--scale", "", "Millimetres per unit of the file", false, &RecipeInputs::labels_scale}};
+        {"--scale", "", "Millimetres per unit of the file", false, &RecipeInputs::labels_scale},
+        {"--axes",
+         "",
+         "Meshes: axes of the coordinates, whatever the files say",
+         false,
+         &RecipeInputs::labels_axes,
+         {"file", "ras", "lps"}}};
     verb.output_type = "CT.labels";
     verb.output_meaning = "Where to write";
     verb.save = [](StageInputs&, const StageValue& value, const std::string& path) {
@@ -183,8 +189,12 @@ Result<ImportedLabels> import_inputs(const Recipe& recipe,
     if (is_mesh_source(path)) {
         MeshImportOptions options = given;
         options.mesh.scale = in.labels_scale;
+        options.mesh.axes = axes_named(in.labels_axes);
         return import_meshes(path, table, options, progress);
     }
+    if (in.labels_axes != "file")
+        return Error{"--axes is for organ meshes", path,
+                     "a volume says its axes itself: leave the option out"};
     ImportOptions options;
     options.table = table;
     options.scale = in.labels_scale;

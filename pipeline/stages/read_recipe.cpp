@@ -81,6 +81,9 @@ void read_inputs(const TomlTable& table, RecipeInputs& inputs) {
     table.text("surface", inputs.surface);
     table.text("examples", inputs.examples);
     table.text("landmarks", inputs.landmarks);
+    table.text("surface_landmarks", inputs.surface_landmarks);
+    table.text("labels_axes", inputs.labels_axes, {"file", "ras", "lps"});
+    table.text("surface_axes", inputs.surface_axes, {"file", "ras", "lps"});
     table.number("labels_scale", inputs.labels_scale, kMinScale, kMaxScale);
     table.number("surface_scale", inputs.surface_scale, kMinScale, kMaxScale);
     read_up(table, inputs);

@@ -185,6 +185,7 @@ struct VerbInput {
     std::string meaning;
     bool required = false;
     std::variant<std::string RecipeInputs::*, double RecipeInputs::*> to;
+    std::vector<std::string> choices = {};  // of a text; empty: any
 };
 
 // A flag of a stage's verb that names the file of a result that the stage takes. A role without a

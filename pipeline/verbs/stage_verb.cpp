@@ -83,6 +83,7 @@ void add_inputs(CLI::App& app, const StageVerb& verb, RecipeInputs& inputs) {
                                     input.meaning)
                          ->check(CLI::Range(kMinScale, kMaxScale))
                          ->capture_default_str();
+        if (!input.choices.empty()) option->check(CLI::IsMember(input.choices));
         if (!input.type_name.empty()) option->type_name(input.type_name);
         option->required(input.required);
     }
@@ -215,6 +216,7 @@ int run_stage_verb(const StageTable& table, const StageDescriptor& stage, int ar
     const Status written = write_results(stage, arguments, inputs, *value, report);
     bar.reset();
     if (!written) return fail(name, written.error());
+    print_notes(name, report);
     print_warnings(name, report);
     return kDone;
 }
