@@ -128,7 +128,7 @@ struct ColumnName {
 
 bool is_position_word(std::string_view word) {
     return is_one_of(word, {"position", "positions", "pos", "translation", "trans", "coord",
-                            "coordinate", "coords", "location", "loc", "point", "tip"});
+                            "coordinate", "coords", "location", "loc", "point", "points", "tip"});
 }
 
 ColumnName column_name(std::string_view cell) {
@@ -193,6 +193,9 @@ ColumnName column_name(std::string_view cell) {
                                                          : ColumnName::none;
         return name;
     }
+    // ParaView: Points:0, Points:1, Points:2.
+    if (const int axis = axis_of(last, "012"); axis >= 0 && before == "points")
+        return {ColumnName::position, axis, name.unit_mm};
     const int first = axis_of(words[0], "xyz");
     if (first >= 0 && words.size() == 2 && is_position_word(last))
         return {ColumnName::position, first, name.unit_mm};

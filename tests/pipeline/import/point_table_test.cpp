@@ -70,6 +70,7 @@ TEST(PointTable, FindsColumnsByTheirNames) {
         {"CloudCompare", "//X Y Z R G B\n" + rows("", " 10 20 30", " ")},
         {"Matlab", "% n, x, y, z, v\n" + numbered},
         {"positions", "frame,Position X,Position Y,Position Z,w\n" + numbered},
+        {"ParaView", "id,\"Points:0\",\"Points:1\",\"Points:2\",\"Normals:0\"\n" + numbered},
         {"ROS",
          "%time,field.pose.position.x,field.pose.position.y,field.pose.position.z,"
          "field.pose.orientation.x\n" +
