@@ -153,7 +153,7 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
                           in.torso.slice_mm})};
     const std::string files = digests.labels + " " + digests.label_table;
     if (is_mesh_source(recipe.resolve(in.labels)))
-        return {key_text(files, {in.labels_scale, kMeshImportVersion})};
+        return {key_text(files + " axes " + in.labels_axes, {in.labels_scale, kMeshImportVersion})};
     return {key_text(files + " " + in.label_names + " " + in.orientation,
                      {in.labels_scale, in.resample_shear ? 1.0 : 0.0, kVolumeReadingVersion})};
 }
@@ -163,7 +163,7 @@ StageVerb verb() {
     verb.inputs = {
         {"LABELS", "",
          "NIfTI, NRRD, .seg.nrrd, MetaImage, DICOM file or folder, folder of masks, or organ "
-         "meshes (GLB, STL, PLY, OBJ, VTP, or a folder of them)",
+         "meshes (GLB, STL, PLY, OBJ, VTP, VTK, or a folder of them)",
          true, &RecipeInputs::labels},
         {"--table", "FILE.csv",
          "Names of the values: rows of value,name[,tissue_class], or a table of ITK-SNAP, Slicer, "
@@ -179,7 +179,13 @@ StageVerb verb() {
          &RecipeInputs::orientation,
          {"auto", "sform", "qform"}},
         {"--resample-shear", "", "Resample a map whose axes are not at right angles", false,
-         &RecipeInputs::resample_shear}};
+         &RecipeInputs::resample_shear},
+        {"--axes",
+         "",
+         "Meshes: axes of the coordinates, whatever the files say",
+         false,
+         &RecipeInputs::labels_axes,
+         {"file", "ras", "lps"}}};
     verb.output_type = "CT.labels";
     verb.output_meaning = "Where to write";
     verb.save = [](StageInputs&, const StageValue& value, const std::string& path) {
@@ -198,8 +204,12 @@ Result<ImportedLabels> read_inputs(const Recipe& recipe,
     if (is_mesh_source(path)) {
         MeshImportOptions options = given;
         options.mesh.scale = in.labels_scale;
+        options.mesh.axes = axes_named(in.labels_axes);
         return import_meshes(path, table, options, progress);
     }
+    if (in.labels_axes != "file")
+        return Error{"--axes is for organ meshes", path,
+                     "a volume says its axes itself: leave the option out"};
     ImportOptions options;
     options.table = table;
     options.scale = in.labels_scale;

@@ -139,7 +139,8 @@ Status add_hints(const Recipe& recipe, RegisterOptions& options) {
     const RecipeInputs& in = recipe.inputs;
     options.up = in.up;
     if (!in.landmarks.empty()) {
-        SONOCASE_TRY(auto landmarks, load_landmarks(recipe.resolve(in.landmarks)));
+        SONOCASE_TRY(auto landmarks, load_landmarks(recipe.resolve(in.landmarks),
+                                                    recipe.resolve(in.surface_landmarks)));
         options.landmarks = std::move(landmarks);
     }
     if (in.analytic)

@@ -23,7 +23,8 @@
 #include "formats/recording/sequence.h"
 #include "formats/text/stage_report_json.h"
 #include "pipeline/anatomy/label_table.h"
-#include "pipeline/import/mesh/ply_file.h"
+#include "pipeline/base/point_table.h"
+#include "pipeline/import/mesh/polygon_file.h"
 #include "pipeline/import/volume/dicom_frames.h"
 #include "pipeline/import/volume/dicom_segmentation.h"
 #include "pipeline/import/volume/nifti_file.h"
@@ -275,6 +276,32 @@ void ply(Bytes bytes) {
     check_error(pipeline::read_ply_file(file.path()));
 }
 
+void stl(Bytes bytes) {
+    const MemoryFile file(bytes);
+    check_error(pipeline::read_stl_file(file.path()));
+}
+
+void vtk(Bytes bytes) {
+    const MemoryFile file(bytes);
+    check_error(pipeline::read_vtk_file(file.path()));
+    pipeline::is_vtk_surface(file.path());
+}
+
+void point_table(Bytes bytes) {
+    for (const bool often : {false, true}) {
+        auto read = pipeline::parse_point_table(text_of(bytes), "fuzz", {often, often});
+        check_error(read);
+        if (!read) continue;
+        demand(read->normals.empty() || read->normals.size() == read->points.size());
+        demand(read->names.empty() || read->names.size() == read->points.size());
+        pipeline::place_points(*read, 1, pipeline::Axes::unsaid);
+    }
+}
+
+void markups(Bytes bytes) {
+    check_error(pipeline::parse_markups(text_of(bytes), "fuzz"));
+}
+
 // Device streams come in pieces: the first byte says how large.
 template <class Reader, class Item, class Use>
 void in_pieces(Bytes bytes, Use use) {
@@ -380,6 +407,10 @@ const std::vector<Target>& targets() {
         {"dicom_header", dicom_header},
         {"packed_bits", packed_bits},
         {"ply", ply},
+        {"stl", stl},
+        {"vtk", vtk},
+        {"point_table", point_table},
+        {"markups", markups},
         {"viper", viper},
         {"liberty", liberty},
         {"guidance", guidance},
