@@ -21,6 +21,7 @@
 #include "formats/machine/machine.h"
 #include "formats/recording/poses.h"
 #include "formats/recording/sequence.h"
+#include "formats/recording/transform_log.h"
 #include "formats/text/stage_report_json.h"
 #include "pipeline/anatomy/label_table.h"
 #include "pipeline/base/point_table.h"
@@ -167,9 +168,14 @@ void poses(Bytes bytes) {
 }
 
 void sequence(Bytes bytes) {
-    const auto read = read_sequence(bytes, "fuzz");
+    const std::string_view text = text_of(bytes);
+    (void)pixel_file_of(bytes);
+    const auto read = looks_like_transform_log(text) ? parse_transform_log(text, "fuzz")
+                                                     : read_sequence(bytes, "fuzz");
     check_error(read);
     if (!read) return;
+    for (int t = 0; t < static_cast<int>(read->transforms.size()); ++t)
+        demand(poses_of(*read, t).size() <= read->frames.size());
     for (const SequenceFrame& frame : read->frames) {
         demand(frame.poses.size() == read->transforms.size());
         for (const SequencePose& pose : frame.poses) rigid_from_matrix(pose.to_from);
@@ -371,8 +377,11 @@ void openigtlink(Bytes bytes) {
         g::Header header;
         header.type = type;
         header.body_size = bytes.size() - 1;
-        for (const g::NamedPose& pose : g::parse_poses(header, bytes.subspan(1)))
-            demand(is_finite(pose.to_from));
+        for (const std::uint16_t version : {1, 2}) {  // 2: with metadata
+            header.version = version;
+            for (const g::NamedPose& pose : g::parse_poses(header, bytes.subspan(1)))
+                demand(is_finite(pose.to_from));
+        }
     }
 }
 
