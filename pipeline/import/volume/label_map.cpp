@@ -48,7 +48,6 @@ struct StructureList {
     std::vector<Structure> structures;
     std::vector<Note> notes;
     std::vector<std::string> warnings;
-    std::vector<Note> notes;
     int assumed_names = 0;  // given by the number alone
 };
 
