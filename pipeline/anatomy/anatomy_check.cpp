@@ -40,11 +40,24 @@ double student(double z2, double spread) {
     return kPeak - std::log(spread) - 0.5 * (kFreedom + 1) * std::log1p(z2 / kFreedom);
 }
 
+constexpr double kMuch = 0.35;  // share of a cut structure without which it says little
+
 struct Seen {
     const LabelSummary* label = nullptr;
     bool cut = false;
-    std::array<bool, 3> cut_axis{}, cut_both{};
+    std::array<bool, 3> cut_low{}, cut_high{}, cut_axis{}, cut_both{};
     double ln_ml = 0;
+    double lost = 0;  // share that the grid's faces may have taken, under the name given
+
+    double lost_of(const ModelStructure& s, double size) const {
+        if (!cut) return 0;
+        const double whole = s.usual_ml * size * size * size;
+        return std::clamp(1 - std::exp(ln_ml) / whole, 0.15, 1.0);
+    }
+    // Along axis r its middle is where the cut left it.
+    bool says_nothing(const ModelStructure& s, int r) const {
+        return cut_both[r] || (cut_axis[r] && std::max(lost, lost_of(s, 1)) >= kMuch);
+    }
 };
 using Names = std::vector<const ModelStructure*>;  // # seen; null: no structure of the model
 
@@ -52,16 +65,15 @@ using Names = std::vector<const ModelStructure*>;  // # seen; null: no structure
 double variance(
     const Seen& seen, const ModelStructure& s, int r, int m, double size, double voxel) {
     const double spread = s.spread[m] * size;
-    double cut = 0;
-    if (seen.cut) cut = (seen.cut_axis[r] ? 0.6 : 0.25) * s.half_mm * size;
+    const double cut = (seen.cut_axis[r] ? 0.7 : 0.3) * seen.lost_of(s, size) * s.half_mm * size;
     return spread * spread + cut * cut + voxel * voxel / 12;
 }
 
-// Density of a label's middle, d from its place. Where the map's faces decide how near to each other
-// labels lie, a smaller body gains nothing by it, and a label between two faces says nothing.
+// Density of a label's middle, d from its place. Where the map's faces decide how near to each
+// other labels lie, a smaller body gains nothing by it.
 double place_density(
     const Seen& seen, const ModelStructure& s, int r, int m, double size, double voxel, double d) {
-    if (seen.cut_both[r]) return kNoPlace;
+    if (seen.says_nothing(s, r)) return kNoPlace;
     const double v = variance(seen, s, r, m, size, voxel);
     const double norm = seen.cut && size < 1 ? variance(seen, s, r, m, 1, voxel) : v;
     return student(d * d / v, std::sqrt(norm));
@@ -69,8 +81,11 @@ double place_density(
 
 double volume_density(const Seen& seen, const ModelStructure& s, double ln_scale) {
     const double z = (seen.ln_ml - std::log(s.usual_ml) - ln_scale) / s.spread_ln;
-    // A cut organ is any part of the whole.
-    return student(seen.cut && z < 0 ? 0 : z * z, s.spread_ln);
+    double density = student(z * z, s.spread_ln);
+    if (seen.ln_ml > std::log(s.max_ml) + ln_scale) density -= 4;  // nobody has that
+    if (seen.lost < kMuch) return density;
+    // Any part of the whole, but not more.
+    return kNoVolume + (z < 0 ? 0 : density - student(0, s.spread_ln));
 }
 
 // x = shift + row . place
@@ -134,7 +149,7 @@ class Match {
             for (int r = 0; r < 3; ++r)
                 if (r != wrong) score += best_near(o, r, k0, k[r]);
             for (int other = -kSteps; other <= kSteps; ++other) {
-                if (std::abs(other - k0) < 2) continue;
+                if (std::abs(other - k0) < 3) continue;
                 k[wrong] = other;
                 consider(o, k, score + axis_score(o, wrong, other), best);
             }
@@ -222,7 +237,7 @@ class Match {
             Eigen::Vector4d right = precision.cwiseProduct(prior);
             for (std::size_t i = 0; i < seen_.size(); ++i) {
                 const ModelStructure* s = names_[i];
-                if (s == nullptr || seen_[i].cut_both[r]) continue;
+                if (s == nullptr || seen_[i].says_nothing(*s, r)) continue;
                 const Eigen::Vector4d u(1, s->at.x, s->at.y, s->at.z);
                 const double x = seen_[i].label->centre[r];
                 const double v = variance(seen_[i], *s, r, m, size, voxel_[r]);
@@ -235,7 +250,11 @@ class Match {
                 right += w * x * u;
             }
             if (!(normal(0, 0) > 0)) break;
+            const Eigen::Vector4d before = b;
             b = normal.ldlt().solve(right);
+            if (round > 0 && std::abs(b[0] - before[0]) < 0.01 * size &&
+                (b - before).tail<3>().cwiseAbs().maxCoeff() < 1e-4 * size)
+                break;
         }
         out.shift = b[0];
         out.row = b.tail<3>();
@@ -331,18 +350,25 @@ class Check {
                 skin_ = label.box;
             const int s = model_structure(label.name);
             if (s < 0 || !(label.ml > 0)) continue;
-            Seen seen{&label, false, {}, {}, std::log(label.ml)};
-            for (int a = 0; a < 3; ++a) {
-                seen.cut_axis[a] = label.cut_low[a] || label.cut_high[a];
-                seen.cut_both[a] = label.cut_low[a] && label.cut_high[a];
-            }
+            Seen seen;
+            seen.label = &label;
+            seen.ln_ml = std::log(label.ml);
+            seen.cut_low = label.cut_low;
+            seen.cut_high = label.cut_high;
             seen_.push_back(seen);
             label_of_.push_back(l);
             names_.push_back(&torso_model()[s]);
         }
         find_cut_planes();
-        for (Seen& seen : seen_)
-            seen.cut = seen.cut_axis[0] || seen.cut_axis[1] || seen.cut_axis[2];
+        for (std::size_t i = 0; i < seen_.size(); ++i) {
+            Seen& seen = seen_[i];
+            for (int a = 0; a < 3; ++a) {
+                seen.cut_axis[a] = seen.cut_low[a] || seen.cut_high[a];
+                seen.cut_both[a] = seen.cut_low[a] && seen.cut_high[a];
+                seen.cut = seen.cut || seen.cut_axis[a];
+            }
+            seen.lost = seen.lost_of(*names_[i], 1);
+        }
     }
 
     int known() const { return static_cast<int>(seen_.size()); }
@@ -376,26 +402,22 @@ class Check {
   private:
     Match match(Names names) const { return {seen_, body_, skin_, std::move(names)}; }
 
-    // A plane across the body at which several structures end is a cut, wherever the grid ends.
+    // A height at which several structures end is a cut, wherever the grid ends.
     void find_cut_planes() {
-        constexpr int kEnough = 4;
-        for (int a = 0; a < 3; ++a) {
-            for (const bool high : {false, true}) {
-                const auto end = [&](const Seen& seen) {
-                    return high ? seen.label->box.upper[a] : -seen.label->box.lower[a];
-                };
-                double last = -INFINITY;
-                for (const Seen& seen : seen_) last = std::max(last, end(seen));
-                const auto ends = [&](const Seen& seen) {
-                    return end(seen) > last - 0.6 * body_.voxel_mm[a];
-                };
-                if (std::count_if(seen_.begin(), seen_.end(), ends) < kEnough) continue;
-                for (Seen& seen : seen_)
-                    if (ends(seen)) {
-                        seen.cut_both[a] = seen.cut_both[a] || (high ? seen.label->cut_low[a]
-                                                                     : seen.label->cut_high[a]);
-                        seen.cut_axis[a] = true;
-                    }
+        constexpr int kEnough = 4, a = 2;
+        for (const bool high : {false, true}) {
+            const auto end = [&](const Seen& seen) {
+                return high ? seen.label->box.upper[a] : -seen.label->box.lower[a];
+            };
+            double last = -INFINITY;
+            for (const Seen& seen : seen_) last = std::max(last, end(seen));
+            const auto ends = [&](const Seen& seen) {
+                return end(seen) > last - 0.6 * body_.voxel_mm[a];
+            };
+            if (std::count_if(seen_.begin(), seen_.end(), ends) < kEnough) continue;
+            for (Seen& seen : seen_) {
+                if (!ends(seen)) continue;
+                (high ? seen.cut_high : seen.cut_low)[a] = true;
             }
         }
     }
@@ -445,7 +467,7 @@ class Check {
             Hypothesis h;
             h.cause = AnatomyCause::spacing;
             h.fit = as_is.one_axis_wrong(axis);
-            h.score = h.fit.score - 3 - std::log(3.0) - std::log(5.0);
+            h.score = h.fit.score - 3 - std::log(3.0);
             h.names = names_;
             h.axis = axis;
             const double others = 0.5 * (h.fit.k[(axis + 1) % 3] + h.fit.k[(axis + 2) % 3]);
@@ -514,7 +536,7 @@ class Check {
     // How much likelier another name of a label must be.
     double change_cost(std::size_t i, const ModelStructure& to) const {
         const ModelStructure& from = *names_[i];
-        double cost = from.family == to.family ? 1 : 2;
+        double cost = from.family == to.family ? 0.7 : 0.9;
         if (seen_[i].cut) cost += 1.5;              // a part can look like anything
         if (norm(from.at - to.at) < 25) cost += 3;  // little harm, and little to tell them apart by
         return cost;
@@ -537,6 +559,16 @@ class Check {
                 axis.shift += (seen_[i].label->centre[r] - names_[i]->at[r]) /
                               static_cast<double>(seen_.size());
         }
+        // No label of a body with a uterus is a prostate, and the other way round.
+        const auto named = [&](std::string_view family) {
+            return std::any_of(names_.begin(), names_.end(),
+                               [&](const ModelStructure* s) { return s->family == family; });
+        };
+        const bool woman = named("uterus") || named("ovary"), man = named("prostate");
+        const auto possible = [&](const ModelStructure& s) {
+            return !(woman && s.family == "prostate") &&
+                   !(man && (s.family == "uterus" || s.family == "ovary"));
+        };
         for (const Fit& start : {right_, middle}) {
             Fit fit = start;
             for (int round = 0; round < 3; ++round) {
@@ -545,6 +577,10 @@ class Check {
                 for (Eigen::Index i = 0; i < rows; ++i) {
                     for (Eigen::Index j = 0; j < columns; ++j) {
                         const bool own = &model[j] == names_[i];
+                        if (!own && !possible(model[j])) {
+                            cost(i, j) = 1e6;
+                            continue;
+                        }
                         cost(i, j) = -scorer.density(i, &model[j], fit) +
                                      (own ? 0 : change_cost(static_cast<std::size_t>(i), model[j]));
                     }
@@ -555,6 +591,7 @@ class Check {
                 Hypothesis h;
                 h.cause = AnatomyCause::names_exchanged;
                 double changes = 0;
+                int changed = 0;
                 for (Eigen::Index i = 0; i < rows; ++i) {
                     const ModelStructure* s =
                         column[i] < static_cast<int>(columns) ? &model[column[i]] : nullptr;
@@ -563,7 +600,8 @@ class Check {
                         changes += s == nullptr ? 2 : change_cost(static_cast<std::size_t>(i), *s);
                 }
                 h.fit = match(h.names).human({});
-                h.score = h.fit.score - 1 - changes;
+                // One label alone is more often an odd organ than a wrong name.
+                h.score = h.fit.score - (changed > 1 ? 0.5 : 3) - changes;
                 fit = h.fit;
                 // A label alone that fits no name is an odd organ, which the fit allows for.
                 bool other_name = false;
@@ -574,47 +612,39 @@ class Check {
         }
     }
 
-    // One name for two structures, of which the second is not there otherwise.
+    // One name for a structure and its missing partner on the other side: the box holds both places,
+    // as that of one alone never does, and its middle lies between them.
     void two_in_one() {
         const std::set<const ModelStructure*> there(names_.begin(), names_.end());
-        const Match scorer = match(names_);
         for (std::size_t i = 0; i < seen_.size(); ++i) {
             const ModelStructure& own = *names_[i];
-            for (const ModelStructure& second : torso_model()) {
-                const bool pair = own.other >= 0 && &torso_model()[own.other] == &second;
-                if (there.contains(&second) || (second.family == own.family && !pair)) continue;
-                const Vector3 apart = second.at - own.at;
-                const double share = second.usual_ml / (own.usual_ml + second.usual_ml);
-                if (share < 0.1 || norm(apart) < 60) continue;
-                ModelStructure both = own;
-                both.at = own.at + share * apart;
-                both.spread = own.spread + 0.3 * second.spread;
-                both.half_mm += 0.5 * norm(apart);
-                both.usual_ml += second.usual_ml;
-                // Their box holds both places, as that of an organ and its missing partner seldom
-                // does by chance.
-                const Box3& box = seen_[i].label->box;
-                bool reaches = true;
-                for (int r = 0; r < 3; ++r)
-                    for (const Vector3& at : {own.at, second.at}) {
-                        const double x = right_.axes[r].at(at), near = 15 + own.spread[r];
-                        reaches = reaches && x > box.lower[r] - near && x < box.upper[r] + near;
-                    }
-                const double prior = pair ? 5 : -5;
-                if (!reaches ||
-                    scorer.density(i, &both, right_) + prior < scorer.density(i, &own, right_) + 2)
-                    continue;
-                Hypothesis h;
-                h.cause = AnatomyCause::two_in_one;
-                h.names = names_;
-                h.label = static_cast<int>(i);
-                h.second = static_cast<int>(&second - torso_model().data());
-                Names names = names_;
-                names[i] = &both;
-                h.fit = match(names).human({});
-                h.score = h.fit.score + prior;
-                offer(h);
-            }
+            if (own.other < 0) continue;
+            const ModelStructure& second = torso_model()[own.other];
+            if (there.contains(&second)) continue;
+            const Box3& box = seen_[i].label->box;
+            bool holds = true;
+            for (int r = 0; r < 3; ++r)
+                for (const Vector3& at : {own.at, second.at}) {
+                    const double x = right_.axes[r].at(at), near = 15 + own.spread[r];
+                    if (r > 0 && seen_[i].says_nothing(own, r)) continue;
+                    holds = holds && x > box.lower[r] - near && x < box.upper[r] + near;
+                }
+            if (!holds) continue;
+            ModelStructure both = own;
+            both.at = 0.5 * (own.at + second.at);
+            both.spread = 1.3 * own.spread;
+            both.half_mm += std::abs(own.at.x);
+            both.usual_ml *= 2;
+            Names names = names_;
+            names[i] = &both;
+            Hypothesis h;
+            h.cause = AnatomyCause::two_in_one;
+            h.names = names_;
+            h.label = static_cast<int>(i);
+            h.second = own.other;
+            h.fit = match(std::move(names)).human({});
+            h.score = h.fit.score + 5;
+            offer(h);
         }
     }
 

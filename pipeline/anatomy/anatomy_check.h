@@ -7,13 +7,13 @@
 // the map is right; its axes are turned round or exchanged; its unit or one spacing is wrong; its
 // names are shifted, exchanged or another table's; one name covers two organs. Each hypothesis may
 // still shift, stretch and tilt the model as bodies differ, with normal priors: about 12 % in size,
-// beside children, 13 % between axes, 12 degrees of tilt. Positions and logarithms of volumes have
-// Student's t distribution with five degrees of freedom, such that no single organ decides. What a
+// beside children, 9 % between axes, 12 degrees of tilt. Positions and logarithms of volumes have
+// Student's t distribution with eight degrees of freedom, such that no single organ decides. What a
 // cut face of the grid may have taken from an organ widens its spread along that axis. The
 // hypothesis of the greatest posterior density is reported if it beats "the map is right" by more
 // than AnatomyOptions::margin.
 //
-// A finding is a likely cause and no proof, hence a warning; an error only where no human body fits.
+// A finding is a likely cause and no proof, hence a warning; an error where no human body fits.
 // docs/anatomy-check.md has the rates of faults that are found, and of false alarms.
 #pragma once
 
@@ -48,6 +48,8 @@ struct BodySummary {
 
 // Cost: one pass over the voxels. ct_from_grid: turns the grid's own frame into `ct`.
 BodySummary summarise_body(const LabelVolume& labels, const Matrix3& ct_from_grid = {});
+
+inline constexpr int kAnatomyCheckVersion = 1;  // of what it warns of
 
 enum class AnatomyCause : std::uint8_t {
     mirrored,        // left and right exchanged, of organs and of names with a side
@@ -89,15 +91,16 @@ struct AnatomyReport {
 
 struct AnatomyOptions {
     bool mesh = false;  // what to advise: --axes rather than --orientation
-    double margin = 3;  // of a finding, > 0
+    double margin = 2;  // of a finding, > 0
 };
 
 AnatomyReport check_anatomy(const BodySummary& body, const AnatomyOptions& options = {});
 
 // How well the names fit the labels: natural logarithm of the density of all places and volumes
-// under the names, against the same labels without names, per known label. Above 1 names fit, below
-// 0 others' would fit better; empty with fewer than four labels whose names are known. For choosing
-// among the tables that could name a map: call it once for each.
+// under the names, against the same labels without names, per known label. Empty with fewer than
+// four labels whose names are known. For choosing among the tables that could name a map: call it
+// once for each. Right names have 6 to 8, a shifted table below 2.
+inline constexpr double kNamesAgree = 3;
 std::optional<double> names_agreement(const BodySummary& body);
 
 // Whether the model knows a structure of this name, in English, by TotalSegmentator or others.

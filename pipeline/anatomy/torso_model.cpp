@@ -20,10 +20,10 @@ struct Row {
 };
 
 // Places (assumed): levels and sides as in any atlas of sectional anatomy, the figures read off CT
-// maps and rounded. Usual volumes: masses of ICRP Publication 89 (2002), adult man, where it has the
-// organ; spleen: Prassopoulos 1997 (215 ml, 107 to 315); pancreas: Saisho 2007 (72 +- 26 ml). Lower
-// limits: a newborn of the same publication, halved; upper ones: organs of the largest cysts,
-// effusions and pregnancies (assumed).
+// maps and rounded. Usual volumes: masses of ICRP Publication 89 (2002), adult man, where it has
+// the organ; spleen: Prassopoulos 1997 (215 ml, 107 to 315); pancreas: Saisho 2007 (72 +- 26 ml).
+// Lower limits: a newborn of the same publication, halved; upper ones: organs of the largest
+// cysts, effusions and pregnancies (assumed).
 constexpr Row kRows[] = {
     {"liver", ' ', {62, 48, 95}, {22, 20, 28}, 85, 60, 1500, 8000, 0.3},
     {"spleen", ' ', {-100, -5, 98}, {18, 25, 28}, 55, 4, 180, 3500, 0.5},

@@ -142,8 +142,8 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
         LabelFile{"ct", std::move(imported.labels), {}, {}, {std::move(imported.report)}});
 }
 
-// The texts hold everything that the labels depend on; for the analytic torso, what its label map
-// shows of it.
+// The texts hold everything that the labels and their report depend on; for the analytic torso,
+// what its label map shows of it.
 std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
     const RecipeInputs& in = recipe.inputs;
     const AnalyticBody& body = in.torso.body;
@@ -153,9 +153,11 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
                           in.torso.slice_mm})};
     const std::string files = digests.labels + " " + digests.label_table;
     if (is_mesh_source(recipe.resolve(in.labels)))
-        return {key_text(files + " axes " + in.labels_axes, {in.labels_scale, kMeshImportVersion})};
+        return {key_text(files + " axes " + in.labels_axes,
+                         {in.labels_scale, kMeshImportVersion, kAnatomyCheckVersion})};
     return {key_text(files + " " + in.label_names + " " + in.orientation,
-                     {in.labels_scale, in.resample_shear ? 1.0 : 0.0, kVolumeReadingVersion})};
+                     {in.labels_scale, in.resample_shear ? 1.0 : 0.0, kVolumeReadingVersion,
+                      kAnatomyCheckVersion})};
 }
 
 StageVerb verb() {
