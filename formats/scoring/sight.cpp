@@ -100,7 +100,7 @@ constexpr double kBoneFloor = 0.075, kBoneFade = 0.98895, kGasTail = 1.4, kGasFa
 constexpr double kApertureMm = 17, kPenumbraMm = 90;
 // A needle is thicker than a pulse: its echo, relative to liver's, grows with the root of the
 // frequency, in MHz.
-constexpr double kNeedleEcho = 9, kNeedleDiffuse = 0.035, kOwnShade = 0.35, kTipGlint = 0.25,
+constexpr double kNeedleEcho = 9, kNeedleDiffuse = 0.035, kOwnShade = 0.35, kTipGlint = 0.04,
                  kTipGlintMm = 1;
 constexpr double kLiverGrey = 80;
 
