@@ -13,7 +13,7 @@
 namespace sonocase::runtime {
 namespace {
 
-constexpr int kPoses = 60;
+constexpr int kPoses = 40;
 constexpr double kStretchMm = 4;  // of the shaft, whose pixels are averaged
 // The speckle of these pictures has a deviation of 13 grey: a rise well above it is seen, one well
 // below it is not, and between them observers differ.
@@ -119,6 +119,10 @@ TEST(NeedleSight, SaysWhatFramesShow) {
     Verdicts shafts, tips;
     compare_with_frames(phantom(), phantom_exercise(), shafts, tips);
     EXPECT_LT(shafts.seen, 0.8 * shafts.points);  // ribs, gas, air and angles hide some of it
+    Exercise thin = phantom_exercise();
+    thin.needle.gauge = 21;
+    thin.needle.slab_mm = 0.9;
+    compare_with_frames(phantom(), thin, shafts, tips);
     compare_with_frames(phantom(), sonocase::testing::phantom_linear_exercise(), shafts, tips);
     EXPECT_GT(shafts.clear, 400);
     EXPECT_GT(tips.clear, 60);
