@@ -98,9 +98,9 @@ constexpr double kEdgeFraction = 0.1, kEdgeDb = 10;  // poor contact at the ends
 // Tails of bone and gas, and what is left of them after kSightStepMm: e^(-1/90), e^(-1/18).
 constexpr double kBoneFloor = 0.075, kBoneFade = 0.98895, kGasTail = 1.4, kGasFade = 0.94596;
 constexpr double kApertureMm = 17, kPenumbraMm = 90;
-// A needle is thicker than a pulse: its echo, relative to liver's, grows with the root of the
-// frequency, in MHz.
-constexpr double kNeedleEcho = 9, kNeedleDiffuse = 0.035, kOwnShade = 0.35, kTipGlint = 0.25,
+// A needle is thicker than a pulse: its echo, relative to liver's, grows with the roots of its
+// diameter, mm, and of the frequency, MHz.
+constexpr double kNeedleEcho = 8, kNeedleDiffuse = 0.035, kOwnShade = 0.35, kTipGlint = 0.04,
                  kTipGlintMm = 1;
 constexpr double kLiverGrey = 80;
 
@@ -196,6 +196,8 @@ NeedleSight::NeedleSight(const Anatomy* anatomy, const Exercise& exercise)
     const double own = exercise.model == "paper" ? needle_diameter_mm(exercise.needle)
                                                  : exercise.probe.elevation_mm;
     half_slab_mm_ = 0.5 * (exercise.needle.slab_mm > 0 ? exercise.needle.slab_mm : own);
+    echo_ =
+        kNeedleEcho * std::sqrt(exercise.probe.frequency_mhz * needle_diameter_mm(exercise.needle));
 }
 
 namespace {
@@ -293,7 +295,7 @@ double NeedleSight::contrast(const Rigid& mannequin_from_probe,
     const double mirror = sine2 * sine2 * sine2 * sine2 * sine2 * sine2;
     // The needle shades its own far side, the more of it the steeper it runs along the beam.
     const double shade = 1 / (1 + kOwnShade / std::sqrt(std::max(sine2, 0.01)));
-    const double needle = shade * light.lit * kNeedleEcho * std::sqrt(probe_.frequency_mhz) *
+    const double needle = shade * light.lit * echo_ *
                           (kNeedleDiffuse + (1 - kNeedleDiffuse) * mirror +
                            kTipGlint * std::max(1 - from_tip_mm / kTipGlintMm, 0.0));
     const double tissue = light.lit * light.echo;

@@ -100,7 +100,7 @@ class NeedleSight {
   private:
     const Anatomy* anatomy_;
     Probe probe_;
-    double length_mm_ = 0, half_slab_mm_ = 0;
+    double length_mm_ = 0, half_slab_mm_ = 0, echo_ = 0;
 };
 
 }  // namespace sonocase
