@@ -15,7 +15,10 @@ constexpr double kSearchMm = 100;   // the skin is looked for this far before an
 constexpr double kShadowDb = 24;    // a beam that is so much darker than tissue alone makes it
 constexpr double kFewest = 0.06;    // share of a depth that must hold tissue for it to count
 constexpr double kMostDb = 30;      // limit of what is added at any depth
+constexpr double kSheetsDb = 3;     // what the sheets of the wall add to its ground
 constexpr double kMeanOfLogDb = 2;  // a logarithm's mean lies so far below that of the amplitude
+
+constexpr int kBeyond = -1;  // the volume ends: a cut face and no skin
 
 int label_at(const CaseBundle& bundle, Point3 p) {
     const Point3 v = bundle.grid.voxel_from_point(p);
@@ -23,7 +26,7 @@ int label_at(const CaseBundle& bundle, Point3 p) {
     const int i = static_cast<int>(std::floor(v.x + 0.5)),
               j = static_cast<int>(std::floor(v.y + 0.5)),
               k = static_cast<int>(std::floor(v.z + 0.5));
-    if (i < 0 || j < 0 || k < 0 || i >= size.x || j >= size.y || k >= size.z) return 0;
+    if (i < 0 || j < 0 || k < 0 || i >= size.x || j >= size.y || k >= size.z) return kBeyond;
     return bundle.label_bricks.at(i, j, k);
 }
 
@@ -49,9 +52,9 @@ std::optional<Rigid> opening_pose(const CaseBundle& bundle, const Exercise& exer
     std::optional<double> nearest;
     bool before = true;  // no skin where the search begins
     for (double t = -kSearchMm; t <= kSearchMm; t += 0.5 * bundle.grid.spacing_mm.x) {
-        const bool inside = label_at(bundle, at + t * z) != 0;
-        if (inside && !before && (!nearest || std::abs(t) < std::abs(*nearest))) nearest = t;
-        before = inside;
+        const int label = label_at(bundle, at + t * z);
+        if (label > 0 && !before && (!nearest || std::abs(t) < std::abs(*nearest))) nearest = t;
+        before = label != 0;
     }
     if (!nearest) return {};
     return Rigid{Matrix3::from_columns(x, cross(z, x), z), at + *nearest * z - Point3{}};
@@ -93,6 +96,7 @@ OpeningGain opening_gain(const PhysicalScene& scene,
         for (double r = 0.5 * kStepMm; r < g.depth_mm; r += kStepMm) {
             const Point3 p = *pose * Point3{o.x + r * d.x, 0, o.z + r * d.z};
             const int label = label_at(bundle, p);
+            if (label == kBeyond) break;
             const AcousticProperties& a = scene.acoustics[static_cast<std::size_t>(label)];
             if (a.kind == TissueKind::outside) {
                 if (!entered && r < kMaxGapMm) continue;  // skin and face come together
@@ -110,7 +114,8 @@ OpeningGain opening_gain(const PhysicalScene& scene,
             if (walled && r < kWallDepthMm) {
                 const LayerPoint at = scene.layers.at(bundle.grid.voxel_from_point(p));
                 if (at.above_organs > 0)
-                    level += a.wall_db + wall_ground_db(tables.wall, at.depth, at.above_organs);
+                    level += a.wall_db + kSheetsDb +
+                             wall_ground_db(tables.wall, at.depth, at.above_organs);
             }
             const auto zone = static_cast<std::size_t>(std::min(8 * r / g.depth_mm, 7.0));
             sum[zone] += level;

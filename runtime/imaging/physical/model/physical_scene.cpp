@@ -125,7 +125,7 @@ TargetTissue tissue_of_target(TargetLook look) {
         case TargetLook::none:
         case TargetLook::lesion: break;
         case TargetLook::marker: return {{12, 0.5, TissueKind::soft}, 12};
-        case TargetLook::abscess: return {{-30, 0.2, TissueKind::fluid}, 4};
+        case TargetLook::abscess: return {{-30, 0.2, TissueKind::fluid}, 2};
         case TargetLook::cyst:
         case TargetLook::calyx: return {{-58, 0.02, TissueKind::fluid}, 3};
     }

@@ -123,8 +123,8 @@ double lateral_width(
                : 1.25 * wavelength * std::max(2.0, r / 14) * grown(probe.focus_mm, 25);
 }
 
-// Edge of the scatterers' lattice: as coarse as the point spread allows, so that samples a beam apart
-// share scatterers.
+// Edge of the scatterers' lattice: as coarse as the point spread allows, so that samples a beam
+// apart share scatterers.
 double cell_edge(double axial_fwhm, double frequency_mhz) {
     return std::min(kCellMm * std::pow(3.5 / frequency_mhz, 0.7), axial_fwhm);
 }
