@@ -3,10 +3,10 @@
 // Tracked poses: one row per reading, `frame,timestamp_s,status,tx,ty,tz,r00 ... r22`, mm,
 // row-major. The pose maps points of the named tool to the tracker: p_tracker = R p_tool + t.
 //
-// Read as well: columns in any order and in either case, a quaternion (qw or q0, qx, qy, qz) for the
-// nine numbers, NDI's Tx, Ty, Tz and State, a time in ms (time_ms), places in m or cm (tx_m), cells
-// between semicolons or tabs, and decimal commas there. `frame`, a time and a status may be left
-// out: rows are numbered, all times are 0 (has_times), every row counts.
+// Read as well: columns in any order and in either case, a quaternion (qw or q0, qx, qy, qz) for
+// the nine numbers, NDI's Tx, Ty, Tz and State, a time in ms (time_ms), places in m or cm (tx_m),
+// cells between semicolons or tabs, there with decimal commas. `frame`, a time and a status may be
+// left out: rows are numbered, all times are 0 (has_times), every row counts.
 #pragma once
 
 #include <span>

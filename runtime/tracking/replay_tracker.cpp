@@ -241,8 +241,9 @@ Result<Recording> load_recording(const std::string& files, double needle_lag_s) 
         const std::vector<std::size_t> nearest = nearest_needles(recording);
         if (std::all_of(nearest.begin(), nearest.end(),
                         [&](std::size_t j) { return j == recording.needle.size(); })) {
-            return Error{"no reading of the needle is at the time of one of the probe", files,
-                         "both must be on one clock; or give their lag: --calibration LAG.json"};
+            return Error{
+                "no reading of the needle is at the time of one of the probe", files,
+                "both must be on one clock, or their lag be given: --calibration LAG.json"};
         }
     }
     return recording;
