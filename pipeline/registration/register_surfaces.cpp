@@ -17,10 +17,6 @@ namespace sonocase::pipeline::inline registration {
 
 namespace {
 
-// Rounds of matching of the rigid pose, which ends when it rests: after four, poses from different
-// starts are still 0.7 mm apart, after fifteen 0.1.
-constexpr int kRigidRounds = 15;
-
 // The reports of a registration: measures for --report, warnings for people.
 
 void add_fit(StageReport& report, const std::string& step, const FitMeasure& fit) {
@@ -196,8 +192,8 @@ RegisterResult align(const FitContext& s,
                      const Stopwatch& watch,
                      const Progress& progress) {
     const PoseChoice choice = choose_pose(s, options, progress);
-    const Rigid pose = refine_rigid_robust(s.fine, s.target, choice.best.rigid.target_from_skin,
-                                           s.hints, 6, kRigidRounds);
+    const Rigid pose =
+        refine_rigid_robust(s.fine, s.target, choice.best.rigid.target_from_skin, s.hints, 6, 4);
     RegisterResult result;
     result.registration = in_frames(s, RigidQuadratic::from_rigid(pose));
     result.registration.min_det_jacobian = 1;
