@@ -3,12 +3,14 @@
 #include "pipeline/base/source_checks.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 
 #include "formats/files/atomic_file.h"
 
 #include "formats/text/number_text.h"
+#include "pipeline/base/text.h"
 
 namespace sonocase::pipeline::inline base {
 
@@ -34,6 +36,53 @@ Status check_source_folder(const std::string& folder, const std::string& expecte
     }
     if (code) return Error{"cannot open: " + code.message(), folder, "check that it may be read"};
     return Done{};
+}
+
+Result<Axes> axes_said(std::string_view line, const std::string& where) {
+    const std::string text = lower_case(line);
+    for (const std::string_view key : {"space", "coordinatesystem", "coordinate system"}) {
+        std::size_t at = text.find(key);
+        if (at == std::string::npos) continue;
+        if (at > 0 && std::isalnum(static_cast<unsigned char>(text[at - 1]))) continue;
+        at = text.find_first_not_of(" \t", at + key.size());
+        if (at == std::string::npos || (text[at] != '=' && text[at] != ':')) continue;
+        at = text.find_first_not_of(" \t", at + 1);
+        if (at == std::string::npos) continue;
+        const std::string word = text.substr(at, text.find_first_of(" \t\r\n,;\"", at) - at);
+        if (word == "ras" || word == "0" || word == "right-anterior-superior") return Axes::ras;
+        if (word == "lps" || word == "1" || word == "left-posterior-superior") return Axes::lps;
+        // Words that are no coordinate system are somebody's title.
+        if (word != "ijk" && word != "2" && word != "las" && word != "lpi" && word != "rai" &&
+            word != "ras+" && word != "lps+")
+            continue;
+        if (word.back() == '+') return word == "ras+" ? Axes::ras : Axes::lps;
+        return Error{"the coordinate system is '" + word + "'", where,
+                     "expected RAS or LPS: export it again in one of them"};
+    }
+    return Axes::unsaid;
+}
+
+Axes axes_named(std::string_view word) {
+    return word == "ras" ? Axes::ras : word == "lps" ? Axes::lps : Axes::unsaid;
+}
+
+const char* name_of_axes(Axes axes) {
+    return axes == Axes::ras ? "ras" : axes == Axes::lps ? "lps" : "file";
+}
+
+Point3 to_ras(Point3 p, Axes axes) {
+    return axes == Axes::lps ? Point3{-p.x, -p.y, p.z} : p;
+}
+
+std::string axes_sentence(Axes said, Axes told) {
+    const auto name = [](Axes axes) { return axes == Axes::lps ? "LPS+" : "RAS+"; };
+    if (told != Axes::unsaid && said != Axes::unsaid && said != told)
+        return text("the axes are %s as the option --axes says, though the file says %s",
+                    name(told), name(said));
+    if (told != Axes::unsaid) return text("the axes are %s as the option --axes says", name(told));
+    if (said != Axes::unsaid) return text("the file says that its axes are %s", name(said));
+    return "the file does not say its axes: x, y and z are kept, as RAS+ (--axes lps if they are "
+           "LPS+)";
 }
 
 namespace {
@@ -77,6 +126,10 @@ std::string advice(const Unit* unit, const std::string& option) {
 
 }  // namespace
 
+std::string scale_advice(Vector3 extent, const std::string& option) {
+    return "expected a torso of some 400 mm; " + advice(likely_unit(largest(extent), 400), option);
+}
+
 std::optional<Error> check_torso_extent(Vector3 extent_mm,
                                         const std::string& what,
                                         const std::string& where,
@@ -85,8 +138,7 @@ std::optional<Error> check_torso_extent(Vector3 extent_mm,
     if (size >= kMinTorsoMm && size <= kMaxTorsoMm) return std::nullopt;
     return Error{what + " is " + number_text(extent_mm.x, 4) + " x " + number_text(extent_mm.y, 4) +
                      " x " + number_text(extent_mm.z, 4) + " mm",
-                 where,
-                 "expected a torso of some 400 mm; " + advice(likely_unit(size, 400), option)};
+                 where, scale_advice(extent_mm, option)};
 }
 
 std::optional<Error> check_same_unit(Vector3 body_extent_mm,

@@ -10,6 +10,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "formats/base/geometry.h"
 #include "formats/base/result.h"
@@ -25,6 +26,21 @@ Status check_source_file(const std::string& path, const std::string& expected);
 // entry comes to an end. Subfolders are not looked into.
 Status check_source_folder(const std::string& folder, const std::string& expected);
 
+// How a file's x, y and z lie in the patient: RAS+ grows to the right, the front and the head, LPS+
+// to the left, the back and the head.
+enum class Axes { unsaid, ras, lps };
+
+// What a line of a header or a comment says: "SPACE=LPS" (3D Slicer's models), "CoordinateSystem =
+// RAS" or 0, "... = LPS" or 1 (its markups). `where` is that of the error for any other system.
+Result<Axes> axes_said(std::string_view line, const std::string& where);
+// "ras", "lps", or "file" for unsaid: the words of options.
+Axes axes_named(std::string_view word);
+const char* name_of_axes(Axes axes);
+// The point in RAS+; unsaid counts as RAS+.
+Point3 to_ras(Point3 p, Axes axes);
+// One sentence for reports: what the axes were taken for, and why. `told`: by an option.
+std::string axes_sentence(Axes said, Axes told);
+
 // Bounds of the largest extent of a torso, a part of one, or a whole person, mm.
 inline constexpr double kMinTorsoMm = 20;
 inline constexpr double kMaxTorsoMm = 3000;
@@ -35,6 +51,9 @@ std::optional<Error> check_torso_extent(Vector3 extent_mm,
                                         const std::string& what,
                                         const std::string& where,
                                         const std::string& option);
+
+// What to do about a torso of this extent: the option with the factor that makes it one.
+std::string scale_advice(Vector3 extent, const std::string& option);
 
 // Returns an Error if two extents of one person differ by more than a factor of six, as they do if
 // their units differ.

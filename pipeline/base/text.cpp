@@ -7,9 +7,7 @@
 
 namespace sonocase::pipeline::inline base {
 
-namespace {
-
-std::vector<std::string> cells_of(std::string_view line, char separator) {
+std::vector<std::string> split_line(std::string_view line, char separator) {
     std::vector<std::string> cells;
     std::string cell;
     bool quoted = false;
@@ -41,14 +39,52 @@ char separator_of(std::string_view line) {
     if (line.find('\t') != std::string_view::npos) {
         // Columns of numbers may be separated by blanks in some places and tabs in others.
         bool blanks_within = false;
-        for (const std::string& cell : cells_of(line, '\t'))
+        for (const std::string& cell : split_line(line, '\t'))
             blanks_within = blanks_within || cell.find(' ') != std::string::npos;
         if (!blanks_within) return '\t';
     }
     return line.find(',') != std::string_view::npos ? ',' : ' ';
 }
 
+namespace {
+
+// Bytes of the UTF-8 character at the start of `text`; 0 where there is none.
+std::size_t utf8_character(std::string_view text) {
+    const auto byte = [&](std::size_t n) { return static_cast<unsigned char>(text[n]); };
+    const unsigned first = byte(0);
+    const std::size_t size = first < 0x80                    ? 1
+                             : first >= 0xC2 && first < 0xE0 ? 2
+                             : first >= 0xE0 && first < 0xF0 ? 3
+                             : first >= 0xF0 && first < 0xF5 ? 4
+                                                             : 0;
+    if (size == 0 || size > text.size()) return 0;
+    for (std::size_t n = 1; n < size; ++n)
+        if (byte(n) < 0x80 || byte(n) > 0xBF) return 0;
+    if (size < 3) return size;
+    const unsigned second = byte(1);
+    const bool overlong = (first == 0xE0 && second < 0xA0) || (first == 0xF0 && second < 0x90);
+    const bool beyond = (first == 0xED && second > 0x9F) || (first == 0xF4 && second > 0x8F);
+    return overlong || beyond ? 0 : size;
+}
+
 }  // namespace
+
+Status expect_utf8(std::string_view text, const std::string& where) {
+    if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF") ||
+        text.substr(0, 4).find('\0') != std::string_view::npos)
+        return Error{"the text is UTF-16 and not UTF-8", where + ":1",
+                     "save it as UTF-8 (in a spreadsheet: CSV UTF-8)"};
+    int line = 1;
+    while (!text.empty()) {
+        const std::size_t size = utf8_character(text);
+        if (size == 0)
+            return Error{"the text is not UTF-8", where + ":" + std::to_string(line),
+                         "save it as UTF-8 (in a spreadsheet: CSV UTF-8)"};
+        line += text.front() == '\n';
+        text.remove_prefix(size);
+    }
+    return Done{};
+}
 
 std::vector<TextRow> split_rows(std::string_view text) {
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
@@ -70,7 +106,7 @@ std::vector<TextRow> split_rows(std::string_view text) {
         if (separator == 0) {
             separator = separator_of(line);
         }
-        TextRow row{number, cells_of(line, separator)};
+        TextRow row{number, split_line(line, separator)};
         if (separator == ';' || separator == '\t') {
             for (std::string& cell : row.cells) {
                 const std::size_t comma = cell.find(',');

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/base/result.h"
+
 namespace sonocase::pipeline::inline base {
 
 // One line of a report, formatted like printf; cut to 499 characters.
@@ -29,6 +31,16 @@ struct TextRow {
 // out empty lines and lines that start with '#' or "//". With ';' or a tab as separator, a comma
 // between digits is a decimal comma.
 std::vector<TextRow> split_rows(std::string_view text);
+
+// The cells of one line, as split_rows has them: at `separator`, where ' ' stands for blanks and
+// tabs.
+std::vector<std::string> split_line(std::string_view line, char separator);
+// ';', tab, ',' or ' ': the separator of the line.
+char separator_of(std::string_view line);
+
+// Done for UTF-8, with or without a byte order mark. An error names the line of the first byte that
+// is none, or says that the text is UTF-16, and how to save it.
+Status expect_utf8(std::string_view text, const std::string& where);
 
 // The whole cell as a number; empty if it is not a number. "nan" and "inf" count as numbers.
 std::optional<double> number_in(std::string_view cell);

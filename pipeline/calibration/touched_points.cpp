@@ -6,48 +6,29 @@
 
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
+#include "pipeline/base/point_table.h"
 #include "pipeline/base/text.h"
 
 namespace sonocase::pipeline::inline calibration {
 
+namespace {
+
+Result<NamedPoints> named_points(PointTable table, const std::string& where) {
+    place_points(table, 1, Axes::unsaid);
+    if (table.points.empty()) return Error{"no points", where, "expected rows name,x,y,z in mm"};
+    return NamedPoints{std::move(table.names), std::move(table.points)};
+}
+
+}  // namespace
+
 Result<NamedPoints> parse_named_points(std::string_view csv, const std::string& where) {
-    NamedPoints out;
-    bool first = true;
-    for (const TextRow& row : split_rows(csv)) {
-        const std::string at = where + ": line " + std::to_string(row.line);
-        const std::size_t columns = row.cells.size();
-        const bool named = columns >= 4;
-        if (columns < 3) {
-            return Error{std::to_string(columns) + " columns", at, "expected name,x,y,z or x,y,z"};
-        }
-        Point3 p;
-        bool numbers = true;
-        for (std::size_t c = 0; c < 3; ++c) {
-            const auto value = number_in(row.cells[c + (named ? 1 : 0)]);
-            numbers = numbers && value.has_value();
-            if (value) p[static_cast<int>(c)] = *value;
-        }
-        if (!numbers) {
-            if (first) {  // the header
-                first = false;
-                continue;
-            }
-            return Error{"a coordinate is not a number", at, "expected name,x,y,z or x,y,z in mm"};
-        }
-        first = false;
-        if (named) out.names.push_back(row.cells[0]);
-        out.points.push_back(p);
-        if (!out.names.empty() && out.names.size() != out.points.size()) {
-            return Error{"some rows have names and some have none", at, "name every row or none"};
-        }
-    }
-    if (out.points.empty()) return Error{"no points", where, "expected rows name,x,y,z in mm"};
-    return out;
+    SONOCASE_TRY(auto table, parse_point_table(csv, where, {.names = true, .keep_holes = true}));
+    return named_points(std::move(table), where);
 }
 
 Result<NamedPoints> load_named_points(const std::string& path) {
-    SONOCASE_TRY(const auto text, read_text_file(path));
-    return parse_named_points(text, path);
+    SONOCASE_TRY(auto table, load_point_table(path, {.names = true, .keep_holes = true}));
+    return named_points(std::move(table), path);
 }
 
 Result<std::pair<NamedPoints, NamedPoints>> pair_points(const NamedPoints& known,

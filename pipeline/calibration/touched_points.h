@@ -19,7 +19,8 @@ struct NamedPoints {
     std::vector<Point3> points;
 };
 
-// Reads rows name,x,y,z, or x,y,z without names; mm; a header row is skipped. NaN is kept.
+// Reads rows name,x,y,z, or x,y,z without names, or columns by their names and markups of 3D Slicer
+// (pipeline/base/point_table.h), in mm and RAS+. NaN is kept.
 Result<NamedPoints> parse_named_points(std::string_view csv, const std::string& where);
 Result<NamedPoints> load_named_points(const std::string& path);
 

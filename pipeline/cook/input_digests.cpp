@@ -54,10 +54,11 @@ Result<InputDigests> digest_inputs(const Recipe& recipe, const DigestOfInput& di
                              {in.label_table, inputs.label_table},
                              {in.surface, inputs.surface},
                              {in.examples, inputs.examples},
-                             {in.landmarks, inputs.landmarks}}) {
+                             {in.landmarks, inputs.landmarks},
+                             {in.surface_landmarks, inputs.landmarks}}) {
         if (item.given.empty()) continue;
         SONOCASE_TRY(auto hash, digest(recipe.resolve(item.given)));
-        item.to = hash;
+        item.to += hash;
         inputs.files.push_back({item.given, std::move(hash)});
     }
     return inputs;

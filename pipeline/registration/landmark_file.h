@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Landmarks as a CSV: rows name,ct_x,ct_y,ct_z,x,y,z in mm, the last three on the mannequin's
-// surface.
+// surface; or as two lists of marks (CSV of name,x,y,z, or markups of 3D Slicer), one on either
+// body.
 #pragma once
 
 #include <string>
@@ -13,8 +14,12 @@
 
 namespace sonocase::pipeline::inline registration {
 
-// A header row is allowed. Errors name file and line.
+// A header row is allowed; one that names all six coordinates says their order. Errors name file
+// and line.
 Result<std::vector<Landmark>> parse_landmarks(std::string_view csv, const std::string& where);
-Result<std::vector<Landmark>> load_landmarks(const std::string& path);
+// surface_path: the marks on the surface where `path` holds those of the patient alone; marks are
+// paired by name, and those that one file lacks are an error. Empty: `path` holds pairs.
+Result<std::vector<Landmark>> load_landmarks(const std::string& path,
+                                             const std::string& surface_path = "");
 
 }  // namespace sonocase::pipeline::inline registration

@@ -4,6 +4,7 @@
 #include "pipeline/stages/import_stage.h"
 
 #include "formats/files/load_save.h"
+#include "pipeline/anatomy/anatomy_check.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
 #include "pipeline/stages/label_codec.h"
@@ -33,7 +34,11 @@ LabelFile sample_analytic(const AnalyticInput& in) {
 }
 
 void add_meshes(OptionsOf<MeshImportOptions>& options) {
-    options.help_group("Organ meshes")
+    options
+        .choice(
+            "anatomy", [](auto& o) { return &o.anatomy; }, {"check", "accept"}, "",
+            "check: refuse labels that fit no human body; accept: warn only")
+        .help_group("Organ meshes")
         .number(
             "voxel_mm", [](auto& o) { return &o.mesh.voxel_mm; }, 0.3, 10, "mm",
             "meshes: edge of the voxels")
@@ -137,8 +142,8 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
         LabelFile{"ct", std::move(imported.labels), {}, {}, {std::move(imported.report)}});
 }
 
-// The texts hold everything that the labels depend on; for the analytic torso, what its label map
-// shows of it.
+// The texts hold everything that the labels and their report depend on; for the analytic torso,
+// what its label map shows of it.
 std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
     const RecipeInputs& in = recipe.inputs;
     const AnalyticBody& body = in.torso.body;
@@ -148,9 +153,11 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
                           in.torso.slice_mm})};
     const std::string files = digests.labels + " " + digests.label_table;
     if (is_mesh_source(recipe.resolve(in.labels)))
-        return {key_text(files, {in.labels_scale, kMeshImportVersion})};
+        return {key_text(files + " axes " + in.labels_axes,
+                         {in.labels_scale, kMeshImportVersion, kAnatomyCheckVersion})};
     return {key_text(files + " " + in.label_names + " " + in.orientation,
-                     {in.labels_scale, in.resample_shear ? 1.0 : 0.0, kVolumeReadingVersion})};
+                     {in.labels_scale, in.resample_shear ? 1.0 : 0.0, kVolumeReadingVersion,
+                      kAnatomyCheckVersion})};
 }
 
 StageVerb verb() {
@@ -158,7 +165,7 @@ StageVerb verb() {
     verb.inputs = {
         {"LABELS", "",
          "NIfTI, NRRD, .seg.nrrd, MetaImage, DICOM file or folder, folder of masks, or organ "
-         "meshes (GLB, STL, PLY, OBJ, VTP, or a folder of them)",
+         "meshes (GLB, STL, PLY, OBJ, VTP, VTK, or a folder of them)",
          true, &RecipeInputs::labels},
         {"--table", "FILE.csv",
          "Names of the values: rows of value,name[,tissue_class], or a table of ITK-SNAP, Slicer, "
@@ -174,7 +181,13 @@ StageVerb verb() {
          &RecipeInputs::orientation,
          {"auto", "sform", "qform"}},
         {"--resample-shear", "", "Resample a map whose axes are not at right angles", false,
-         &RecipeInputs::resample_shear}};
+         &RecipeInputs::resample_shear},
+        {"--axes",
+         "",
+         "Meshes: axes of the coordinates, whatever the files say",
+         false,
+         &RecipeInputs::labels_axes,
+         {"file", "ras", "lps"}}};
     verb.output_type = "CT.labels";
     verb.output_meaning = "Where to write";
     verb.save = [](StageInputs&, const StageValue& value, const std::string& path) {
@@ -185,18 +198,20 @@ StageVerb verb() {
     return verb;
 }
 
-}  // namespace
-
-Result<ImportedLabels> import_inputs(const Recipe& recipe,
-                                     const MeshImportOptions& given,
-                                     const Progress& progress) {
+Result<ImportedLabels> read_inputs(const Recipe& recipe,
+                                   const MeshImportOptions& given,
+                                   const Progress& progress) {
     const RecipeInputs& in = recipe.inputs;
     const std::string path = recipe.resolve(in.labels), table = recipe.resolve(in.label_table);
     if (is_mesh_source(path)) {
         MeshImportOptions options = given;
         options.mesh.scale = in.labels_scale;
+        options.mesh.axes = axes_named(in.labels_axes);
         return import_meshes(path, table, options, progress);
     }
+    if (in.labels_axes != "file")
+        return Error{"--axes is for organ meshes", path,
+                     "a volume says its axes itself: leave the option out"};
     ImportOptions options;
     options.table = table;
     options.scale = in.labels_scale;
@@ -206,6 +221,21 @@ Result<ImportedLabels> import_inputs(const Recipe& recipe,
                                                               : Orientation::automatic;
     options.reading.resample_shear = in.resample_shear;
     return import_label_map(path, options, progress);
+}
+
+}  // namespace
+
+Result<ImportedLabels> import_inputs(const Recipe& recipe,
+                                     const MeshImportOptions& given,
+                                     const Progress& progress) {
+    SONOCASE_TRY(auto imported, read_inputs(recipe, given, progress));
+    const std::string path = recipe.resolve(recipe.inputs.labels);
+    const auto odd =
+        report_anatomy(imported.labels, {.mesh = is_mesh_source(path)}, imported.report);
+    if (odd && given.anatomy != "accept")
+        return Error{"this is no human body: " + *odd, path,
+                     "if it is one, give --anatomy accept, or anatomy = \"accept\" in [import]"};
+    return imported;
 }
 
 StageDescriptor import_stage() {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "pipeline/stages/mannequin_step.h"
+
+#include <algorithm>
+
 #include "pipeline/import/mesh/surface_file.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/roles.h"
@@ -17,7 +20,8 @@ Result<StageValue> run(StageInputs& inputs, const Progress&) {
 // The texts hold everything that the mannequin can depend on, for the analytic torso as well.
 std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
     const RecipeInputs& in = recipe.inputs;
-    if (!in.analytic) return {key_text(digests.surface, {in.surface_scale})};
+    if (!in.analytic)
+        return {key_text(digests.surface + " axes " + in.surface_axes, {in.surface_scale})};
     const AnalyticInput& torso = in.torso;
     const AnalyticMannequinOptions& made = torso.mannequin;
     return {
@@ -39,6 +43,7 @@ Result<Mannequin> read_mannequin(const Recipe& recipe) {
     }
     SurfaceFileOptions options;
     options.scale = in.surface_scale;
+    options.axes = axes_named(in.surface_axes);
     SONOCASE_TRY(auto surface,
                  import_surface(recipe.resolve(in.surface), options, &mannequin.report));
     mannequin.surface = std::move(surface);
@@ -61,6 +66,16 @@ StageDescriptor mannequin_step() {
         std::vector<std::string> warnings;
         for (const std::string& warning : value.as(kMannequin).report.warnings)
             warnings.push_back("surface: " + warning);
+        // What was turned or scaled on the file's word alone; a surface that is kept needs none.
+        const std::vector<Note>& notes = value.as(kMannequin).report.notes;
+        const auto said = [&](const char* name) {
+            return std::find_if(notes.begin(), notes.end(),
+                                [&](const Note& note) { return note.name == name; });
+        };
+        if (const auto axes = said("axes_said"); axes != notes.end() && axes->text == "lps")
+            warnings.push_back("surface: " + said("axes")->text);
+        if (const auto unit = said("unit"); unit != notes.end())
+            warnings.push_back("surface: " + unit->text);
         return warnings;
     };
     return step;

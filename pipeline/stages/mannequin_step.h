@@ -13,7 +13,7 @@ namespace sonocase::pipeline::inline stages {
 // The result of the step "mannequin".
 struct Mannequin {
     Surface surface;     // `mannequin`, mm
-    StageReport report;  // of reading the file; warnings alone
+    StageReport report;  // of reading the file; warnings and notes alone
 };
 
 // Errors: those of import_surface.

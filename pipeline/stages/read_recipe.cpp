@@ -82,6 +82,9 @@ void read_inputs(const TomlTable& table, RecipeInputs& inputs) {
     table.text("surface", inputs.surface);
     table.text("examples", inputs.examples);
     table.text("landmarks", inputs.landmarks);
+    table.text("surface_landmarks", inputs.surface_landmarks);
+    table.text("labels_axes", inputs.labels_axes, {"file", "ras", "lps"});
+    table.text("surface_axes", inputs.surface_axes, {"file", "ras", "lps"});
     table.number("labels_scale", inputs.labels_scale, kMinScale, kMaxScale);
     table.text("label_names", inputs.label_names, names_options());
     table.text("orientation", inputs.orientation, {"auto", "sform", "qform"});

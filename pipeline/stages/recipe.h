@@ -95,7 +95,9 @@ struct RecipeInputs {
     std::string label_table;
     std::string surface;
     std::string examples;   // folder of ultrasound patches; empty: synthetic examples
-    std::string landmarks;  // CSV of name,ct_x,ct_y,ct_z,x,y,z
+    std::string landmarks;  // CSV of name,ct_x,ct_y,ct_z,x,y,z; or the patient's marks alone, and
+    std::string surface_landmarks;  // those of the same names on the surface
+    std::string labels_axes = "file", surface_axes = "file";  // or "ras", "lps": told by hand
     double labels_scale = 1;
     std::string label_names = "auto";  // names_options()
     std::string orientation = "auto";  // of a NIfTI map: "auto", "sform" or "qform"

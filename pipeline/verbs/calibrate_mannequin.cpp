@@ -20,7 +20,7 @@ namespace {
 
 struct MannequinOptions {
     CalibrateOptions common;
-    std::string landmarks, touched, surface, tool, start;
+    std::string landmarks, touched, surface, tool, start, axes = "file";
     bool scale = false;
 };
 
@@ -41,6 +41,9 @@ void add_options(CLI::App& app, MannequinOptions& m) {
     app.add_option("--start", m.start,
                    "Earlier calibration of this mannequin to start the sweep from")
         ->type_name("CAL.json");
+    app.add_option("--axes", m.axes, "Axes of the surface file's coordinates, whatever it says")
+        ->check(CLI::IsMember({"file", "ras", "lps"}))
+        ->capture_default_str();
     app.add_flag("--scale", m.scale, "Allow one uniform scale");
 }
 
@@ -98,7 +101,7 @@ Result<PosedMannequin> fit_landmarks(const MannequinOptions& m, const NamedPoint
 }
 
 Result<PosedMannequin> fit_sweep(const MannequinOptions& m, const NamedPoints& world) {
-    SONOCASE_TRY(auto skin, import_surface(m.surface));
+    SONOCASE_TRY(auto skin, import_surface(m.surface, {.axes = axes_named(m.axes)}));
     SweepOptions how;
     how.fit_scale = m.scale;
     if (!m.start.empty()) {

@@ -220,6 +220,7 @@ int run_stage_verb(const StageTable& table, const StageDescriptor& stage, int ar
     const Status written = write_results(stage, arguments, inputs, *value, report);
     bar.reset();
     if (!written) return fail(name, written.error());
+    print_notes(name, report);
     print_warnings(name, report);
     return kDone;
 }

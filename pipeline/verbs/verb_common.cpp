@@ -120,6 +120,14 @@ int wrong_usage(const char* verb, const std::string& what) {
     return kWrongUsage;
 }
 
+void print_notes(const char* verb, const StageReport& report) {
+    for (const Note& note : report.notes)
+        if (note.name == "axes" || note.name == "unit" || note.name == "surface_axes" ||
+            note.name == "surface_unit")
+            std::fprintf(stderr, "sonocase %s: %s: %s\n", verb, note.name.c_str(),
+                         one_line(note.text).c_str());
+}
+
 void print_warnings(const char* verb, const StageReport& report) {
     for (const std::string& warning : report.warnings)
         std::fprintf(stderr, "sonocase %s: warning: %s\n", verb, one_line(warning).c_str());

@@ -42,6 +42,8 @@ std::optional<int> parse_command_line(CLI::App& app, int argc, char** argv);
 int fail(const char* verb, const Error& error);
 // Prints what is wrong with the usage and where help is, and returns kWrongUsage.
 int wrong_usage(const char* verb, const std::string& what);
+// Prints "sonocase VERB: axes: ..." where the report says what the axes or the unit were taken for.
+void print_notes(const char* verb, const StageReport& report);
 // Prints "sonocase VERB: warning: ..." for each warning.
 void print_warnings(const char* verb, const StageReport& report);
 

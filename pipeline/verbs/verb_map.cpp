@@ -9,7 +9,7 @@
 #include "formats/files/atomic_file.h"
 #include "formats/text/number_text.h"
 #include "pipeline/base/parallel.h"
-#include "pipeline/base/text.h"
+#include "pipeline/base/point_table.h"
 #include "pipeline/registration/map/inverse_map.h"
 #include "pipeline/registration/map/registration.h"
 #include "pipeline/verbs/verb_common.h"
@@ -20,40 +20,11 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// Columns x, y, z by the header, or the first three. Rows that are not numbers become NaN, so that
-// the output has the same rows as the input.
+// Rows without a position become NaN, so that the output has the same rows as the input.
 Result<std::vector<Point3>> read_points(const std::string& path) {
-    SONOCASE_TRY(const std::string text, read_text_file(path));
-    std::vector<Point3> points;
-    std::size_t column[3] = {0, 1, 2};
-    bool first = true;
-    for (const TextRow& row : split_rows(text)) {
-        if (first) {
-            first = false;
-            bool header = false;
-            for (std::size_t c = 0; c < row.cells.size(); ++c) {
-                const std::string name = lower_case(row.cells[c]);
-                for (int axis = 0; axis < 3; ++axis) {
-                    if (name == std::string(1, "xyz"[axis])) {
-                        column[axis] = c;
-                        header = true;
-                    }
-                }
-            }
-            if (header) continue;
-            if (!row.cells.empty() && !number_in(row.cells[0])) continue;  // some other header
-        }
-        Point3 p{kNan, kNan, kNan};
-        for (int axis = 0; axis < 3; ++axis) {
-            if (column[axis] >= row.cells.size()) {
-                return Error{"row of " + std::to_string(row.cells.size()) + " cells",
-                             path + ":" + std::to_string(row.line), "x,y,z in mm"};
-            }
-            if (const auto v = number_in(row.cells[column[axis]])) p[axis] = *v;
-        }
-        points.push_back(p);
-    }
-    return points;
+    SONOCASE_TRY(auto table, load_point_table(path, {.names = true, .keep_holes = true}));
+    place_points(table, 1, Axes::unsaid);
+    return std::move(table.points);
 }
 
 const char* status_name(MapStatus status) {

@@ -25,16 +25,16 @@ namespace sonocase::pipeline::inline verbs {
 namespace {
 
 struct PackFiles {
-    std::string labels, textures, mannequin, skin, registration, out, name;
+    std::string labels, textures, mannequin, skin, registration, out, name, axes = "file";
     std::vector<std::string> exercises;
     bool structure = true;
     std::uint64_t seed = 1;
 };
 
 // Reads a .surface file, or any surface file that import reads.
-Result<Surface> load_any_surface(const std::string& path) {
+Result<Surface> load_any_surface(const std::string& path, Axes axes) {
     SONOCASE_TRY(const auto bytes, sonocase::read_file(path));
-    if (container_kind(bytes) != "SURF") return import_surface(path);
+    if (container_kind(bytes) != "SURF") return import_surface(path, {.axes = axes});
     SONOCASE_TRY(auto file, load_surface_file(path));
     return std::move(file.surface);
 }
@@ -45,7 +45,7 @@ Result<PackResult> pack(const PackFiles& files, const Progress& progress) {
         return Error{"labels are in the frame '" + labels.frame + "'", files.labels,
                      "expected resampled labels, in the frame 'mannequin'"};
     SONOCASE_TRY(auto textures, load_texture_file(files.textures));
-    SONOCASE_TRY(auto mannequin, load_any_surface(files.mannequin));
+    SONOCASE_TRY(auto mannequin, load_any_surface(files.mannequin, axes_named(files.axes)));
     std::vector<EmbeddedExercise> exercises;
     for (const std::string& path : files.exercises) {
         SONOCASE_TRY(auto text, sonocase::read_text_file(path));
@@ -57,7 +57,7 @@ Result<PackResult> pack(const PackFiles& files, const Progress& progress) {
     Registration registration;
     const bool has_skin = !files.skin.empty(), has_fit = !files.registration.empty();
     if (has_skin) {
-        SONOCASE_TRY(auto loaded, load_any_surface(files.skin));
+        SONOCASE_TRY(auto loaded, load_any_surface(files.skin, Axes::unsaid));
         skin = std::move(loaded);
     }
     if (has_fit) {
@@ -123,6 +123,9 @@ int verb_pack(int argc, char** argv) {
     app.add_option("--surface", files.mannequin, "The mannequin, as digitised")
         ->type_name("FILE")
         ->required();
+    app.add_option("--axes", files.axes, "Axes of the surface file's coordinates, whatever it says")
+        ->check(CLI::IsMember({"file", "ras", "lps"}))
+        ->capture_default_str();
     auto* skin =
         app.add_option("--skin", files.skin, "The patient's skin, ct frame")->type_name("FILE");
     auto* fit = app.add_option("--registration", files.registration,

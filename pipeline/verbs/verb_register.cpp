@@ -94,7 +94,8 @@ Status take_recipe(int argc, char** argv, RegisterArguments& a) {
     if (in.analytic)
         return Error{"the recipe names no files: it has [analytic]", path,
                      "expected [inputs] with labels and surface"};
-    for (std::string* file : {&in.labels, &in.label_table, &in.surface, &in.landmarks})
+    for (std::string* file :
+         {&in.labels, &in.label_table, &in.surface, &in.landmarks, &in.surface_landmarks})
         if (!file->empty()) *file = recipe.resolve(*file);
     recipe.folder.clear();  // paths of flags start from the working folder
     recipe.data.clear();
@@ -118,9 +119,11 @@ void add_register_options(CLI::App& app, RegisterArguments& a, bool several) {
         ->required(in.labels.empty());
     auto* surface =
         app.add_option("--surface", a.surfaces,
-                       several ? "Mannequin: PLY, STL, OBJ, VTP, or CSV of readings; of several, "
-                                 "the one that fits best is taken"
-                               : "Mannequin: PLY, STL, OBJ, VTP, or CSV of readings")
+                       several
+                           ? "Mannequin: a mesh (PLY, STL, OBJ, VTP, VTK, GLB) or CSV of readings; "
+                             "of several, "
+                             "the one that fits best is taken"
+                           : "Mannequin: a mesh (PLY, STL, OBJ, VTP, VTK, GLB) or CSV of readings")
             ->type_name("FILE")
             ->required(a.surfaces.empty());
     surface->expected(1, several ? 100 : 1);
@@ -138,8 +141,16 @@ void add_register_options(CLI::App& app, RegisterArguments& a, bool several) {
                  "Resample a label map whose axes are not at right angles");
     app.add_option("--up", a.up, "The patient's head direction in the surface's frame")
         ->type_name("X,Y,Z");
-    app.add_option("--landmarks", in.landmarks, "Rows name,ct_x,ct_y,ct_z,x,y,z in mm")
-        ->type_name("FILE.csv");
+    app.add_option("--landmarks", in.landmarks,
+                   "Rows name,ct_x,ct_y,ct_z,x,y,z in mm; or the patient's marks alone")
+        ->type_name("FILE");
+    app.add_option("--surface-landmarks", in.surface_landmarks,
+                   "The marks of --landmarks on the surface, by name: CSV, .fcsv or .mrk.json")
+        ->type_name("FILE");
+    app.add_option("--axes", in.surface_axes,
+                   "Axes of the surface file's coordinates, whatever it says")
+        ->check(CLI::IsMember({"file", "ras", "lps"}))
+        ->capture_default_str();
     app.add_option("--scale", in.surface_scale, "Millimetres per unit of the surface file")
         ->check(CLI::Range(kMinScale, kMaxScale))
         ->capture_default_str();
@@ -157,6 +168,7 @@ struct RegisterInputs {
     RegisterOptions options;
     double import_seconds = 0;
     std::vector<Measure> reduction;  // of a dense mannequin, as import_surface reports it
+    std::vector<Note> notes;         // of the import: what axes and units were taken for, the anatomy
     std::vector<std::string> warnings;
 };
 // What becomes of a dense scan, without its size.
@@ -168,6 +180,20 @@ std::vector<Measure> reduction_of(const StageReport& report) {
             reduction.push_back(m);
     }
     return reduction;
+}
+
+SurfaceFileOptions surface_options(const RegisterArguments& a) {
+    SurfaceFileOptions options;
+    options.scale = a.recipe.inputs.surface_scale;
+    options.axes = axes_named(a.recipe.inputs.surface_axes);
+    return options;
+}
+
+// The notes of a surface under names of their own: the labels may have such notes too.
+std::vector<Note> surface_notes(const StageReport& report) {
+    std::vector<Note> notes;
+    for (const Note& note : report.notes) notes.push_back({"surface_" + note.name, note.text});
+    return notes;
 }
 
 // Reads and prepares what the fit needs. The stages import and surface do the same for a case; here
@@ -185,15 +211,19 @@ Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Pr
         inputs.options.up = up;
     }
     if (!in.landmarks.empty()) {
-        SONOCASE_TRY(std::vector<Landmark> landmarks, load_landmarks(in.landmarks));
+        SONOCASE_TRY(std::vector<Landmark> landmarks,
+                     load_landmarks(in.landmarks, in.surface_landmarks));
         inputs.options.landmarks = std::move(landmarks);
     }
     StageReport surface_report;
-    SONOCASE_TRY(Surface surface, import_surface(mannequin, {in.surface_scale}, &surface_report));
+    SONOCASE_TRY(Surface surface, import_surface(mannequin, surface_options(a), &surface_report));
     inputs.mannequin = std::move(surface);
     inputs.reduction = reduction_of(surface_report);
+    inputs.notes = surface_notes(surface_report);
     SONOCASE_TRY(ImportedLabels labels,
                  import_inputs(a.recipe, a.recipe.settings.of<MeshImportOptions>(), progress));
+    for (const Note& note : labels.report.notes)
+        if (note.name == "anatomy" || note.name == "axes") inputs.notes.push_back(note);
     inputs.warnings = surface_report.warnings;
     inputs.warnings.insert(inputs.warnings.end(), labels.report.warnings.begin(),
                            labels.report.warnings.end());
@@ -217,9 +247,12 @@ Status read_other_mannequin(const RegisterArguments& a,
                             const std::string& path,
                             RegisterInputs& inputs) {
     StageReport report;
-    SONOCASE_TRY(Surface surface, import_surface(path, {a.recipe.inputs.surface_scale}, &report));
+    SONOCASE_TRY(Surface surface, import_surface(path, surface_options(a), &report));
     inputs.mannequin = std::move(surface);
     inputs.reduction = reduction_of(report);
+    std::erase_if(inputs.notes, [](const Note& n) { return n.name.starts_with("surface_"); });
+    const std::vector<Note> notes = surface_notes(report);
+    inputs.notes.insert(inputs.notes.end(), notes.begin(), notes.end());
     inputs.warnings.insert(inputs.warnings.end(), report.warnings.begin(), report.warnings.end());
     return Done{};
 }
@@ -229,9 +262,11 @@ void add_input_reports(const RegisterInputs& inputs, StageReport& report) {
     report.measures.insert(report.measures.end(), inputs.skin.report.measures.begin(),
                            inputs.skin.report.measures.end());
     report.measures.insert(report.measures.end(), inputs.reduction.begin(), inputs.reduction.end());
+    report.notes.insert(report.notes.end(), inputs.notes.begin(), inputs.notes.end());
     report.measures.push_back({"import_seconds", inputs.import_seconds});
     report.measures.push_back({"surface_seconds", inputs.skin.report.seconds});
     report.seconds += inputs.skin.report.seconds;
+    report.notes.insert(report.notes.end(), inputs.notes.begin(), inputs.notes.end());
     report.warnings.insert(report.warnings.begin(), inputs.warnings.begin(), inputs.warnings.end());
 }
 
@@ -429,6 +464,7 @@ int run_fit_verb(const FitVerb& verb, int argc, char** argv) {
     add_input_reports(fitted->inputs, fitted->result.report);
     if (auto status = write_fit(arguments, *fitted); !status)
         return fail(verb.name, status.error());
+    print_notes(verb.name, fitted->result.report);
     print_warnings(verb.name, fitted->result.report);
     print_fit(fitted->result);
     return kDone;

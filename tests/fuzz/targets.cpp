@@ -21,9 +21,11 @@
 #include "formats/machine/machine.h"
 #include "formats/recording/poses.h"
 #include "formats/recording/sequence.h"
+#include "formats/recording/transform_log.h"
 #include "formats/text/stage_report_json.h"
 #include "pipeline/anatomy/label_table.h"
-#include "pipeline/import/mesh/ply_file.h"
+#include "pipeline/base/point_table.h"
+#include "pipeline/import/mesh/polygon_file.h"
 #include "pipeline/import/volume/dicom_frames.h"
 #include "pipeline/import/volume/dicom_segmentation.h"
 #include "pipeline/import/volume/nifti_file.h"
@@ -166,9 +168,14 @@ void poses(Bytes bytes) {
 }
 
 void sequence(Bytes bytes) {
-    const auto read = read_sequence(bytes, "fuzz");
+    const std::string_view text = text_of(bytes);
+    (void)pixel_file_of(bytes);
+    const auto read = looks_like_transform_log(text) ? parse_transform_log(text, "fuzz")
+                                                     : read_sequence(bytes, "fuzz");
     check_error(read);
     if (!read) return;
+    for (int t = 0; t < static_cast<int>(read->transforms.size()); ++t)
+        demand(poses_of(*read, t).size() <= read->frames.size());
     for (const SequenceFrame& frame : read->frames) {
         demand(frame.poses.size() == read->transforms.size());
         for (const SequencePose& pose : frame.poses) rigid_from_matrix(pose.to_from);
@@ -275,6 +282,32 @@ void ply(Bytes bytes) {
     check_error(pipeline::read_ply_file(file.path()));
 }
 
+void stl(Bytes bytes) {
+    const MemoryFile file(bytes);
+    check_error(pipeline::read_stl_file(file.path()));
+}
+
+void vtk(Bytes bytes) {
+    const MemoryFile file(bytes);
+    check_error(pipeline::read_vtk_file(file.path()));
+    pipeline::is_vtk_surface(file.path());
+}
+
+void point_table(Bytes bytes) {
+    for (const bool often : {false, true}) {
+        auto read = pipeline::parse_point_table(text_of(bytes), "fuzz", {often, often});
+        check_error(read);
+        if (!read) continue;
+        demand(read->normals.empty() || read->normals.size() == read->points.size());
+        demand(read->names.empty() || read->names.size() == read->points.size());
+        pipeline::place_points(*read, 1, pipeline::Axes::unsaid);
+    }
+}
+
+void markups(Bytes bytes) {
+    check_error(pipeline::parse_markups(text_of(bytes), "fuzz"));
+}
+
 // Device streams come in pieces: the first byte says how large.
 template <class Reader, class Item, class Use>
 void in_pieces(Bytes bytes, Use use) {
@@ -344,8 +377,11 @@ void openigtlink(Bytes bytes) {
         g::Header header;
         header.type = type;
         header.body_size = bytes.size() - 1;
-        for (const g::NamedPose& pose : g::parse_poses(header, bytes.subspan(1)))
-            demand(is_finite(pose.to_from));
+        for (const std::uint16_t version : {1, 2}) {  // 2: with metadata
+            header.version = version;
+            for (const g::NamedPose& pose : g::parse_poses(header, bytes.subspan(1)))
+                demand(is_finite(pose.to_from));
+        }
     }
 }
 
@@ -380,6 +416,10 @@ const std::vector<Target>& targets() {
         {"dicom_header", dicom_header},
         {"packed_bits", packed_bits},
         {"ply", ply},
+        {"stl", stl},
+        {"vtk", vtk},
+        {"point_table", point_table},
+        {"markups", markups},
         {"viper", viper},
         {"liberty", liberty},
         {"guidance", guidance},

@@ -49,7 +49,7 @@ class Reader {
     Reader(const Json& json, std::span<const std::uint8_t> bin, const std::string& where)
         : json_(json), bin_(bin), where_(where) {}
 
-    Result<std::vector<MeshNode>> read() {
+    Result<std::vector<MeshNode>> read(std::vector<std::string>* aside) {
         const Json& required = member(json_, "extensionsRequired");
         if (required.is_array() && !required.empty())
             return Error{"the file needs the extension " +
@@ -65,8 +65,9 @@ class Reader {
                     return fault("a node has a child that is not there");
                 parent[c] = static_cast<int>(n);
             }
+        const std::vector<bool> shown = nodes_of_scene(nodes);
         for (std::size_t n = 0; n < nodes.size(); ++n) {
-            if (!nodes[n].contains("mesh")) continue;
+            if (!nodes[n].is_object() || !nodes[n].contains("mesh")) continue;
             Affine to_scene;
             int up = static_cast<int>(n);
             for (std::size_t steps = 0; up >= 0; up = parent[up]) {
@@ -77,6 +78,10 @@ class Reader {
             node.name = "node_" + std::to_string(n);
             if (const Json& name = member(nodes[n], "name"); name.is_string())
                 node.name = name.get<std::string>();
+            if (!shown[n]) {
+                if (aside != nullptr) aside->push_back(node.name);
+                continue;
+            }
             SONOCASE_TRY_DONE(read_mesh(index(nodes[n]["mesh"]), node.surface));
             for (Point3& p : node.surface.points) p = to_scene * p;
             nodes_.push_back(std::move(node));
@@ -86,6 +91,31 @@ class Reader {
     }
 
   private:
+    // Without a scene all nodes count; of several, those of the one that the file opens with.
+    std::vector<bool> nodes_of_scene(const Json& nodes) const {
+        const Json& scenes = member(json_, "scenes");
+        const std::size_t scene = index_or(json_, "scene", 0);
+        if (!scenes.is_array() || scene >= scenes.size() ||
+            !member(scenes[scene], "nodes").is_array())
+            return std::vector<bool>(nodes.size(), true);
+        std::vector<bool> shown(nodes.size(), false);
+        std::vector<std::size_t> open;
+        const auto add = [&](const Json& list) {
+            for (const Json& node : list)
+                if (const std::size_t n = index(node); n < nodes.size() && !shown[n]) {
+                    shown[n] = true;
+                    open.push_back(n);
+                }
+        };
+        add(member(scenes[scene], "nodes"));
+        while (!open.empty()) {
+            const std::size_t n = open.back();
+            open.pop_back();
+            add(member(nodes[n], "children"));
+        }
+        return shown;
+    }
+
     static const Json& member(const Json& object, const char* key) {
         static const Json none;
         if (!object.is_object()) return none;
@@ -224,8 +254,18 @@ class Reader {
 
 }  // namespace
 
+Point3 ras_from_gltf(Point3 p, Axes told) {
+    return told == Axes::unsaid ? Point3{-p.x, p.z, p.y} : to_ras(p, told);
+}
+
+std::string gltf_axes_sentence(Axes told) {
+    if (told != Axes::unsaid) return axes_sentence(Axes::unsaid, told);
+    return "a GLB is in metres, y to the head, z to the front, x to the left: turned to RAS+";
+}
+
 Result<std::vector<MeshNode>> read_glb(std::span<const std::uint8_t> bytes,
-                                       const std::string& where) {
+                                       const std::string& where,
+                                       std::vector<std::string>* aside) {
     if (bytes.size() < 20 || word_at(bytes, 0) != kMagic)
         return Error{"not a binary glTF file", where, "expected .glb, version 2"};
     if (word_at(bytes, 4) != 2)
@@ -247,7 +287,7 @@ Result<std::vector<MeshNode>> read_glb(std::span<const std::uint8_t> bytes,
     if (bytes.size() >= next + 8 && word_at(bytes, next + 4) == kBinChunk)
         bin = bytes.subspan(next + 8,
                             std::min<std::size_t>(word_at(bytes, next), bytes.size() - next - 8));
-    return Reader(json, bin, where).read();
+    return Reader(json, bin, where).read(aside);
 }
 
 }  // namespace sonocase::pipeline::inline import_mesh

@@ -18,22 +18,26 @@
 #include <vtkCallbackCommand.h>
 #include <vtkCellArray.h>
 #include <vtkCleanPolyData.h>
+#include <vtkFieldData.h>
+#include <vtkFloatArray.h>
 #include <vtkNew.h>
 #include <vtkOBJReader.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
-#include <vtkSTLReader.h>
 #include <vtkStaticCellLocator.h>
+#include <vtkStringArray.h>
 #include <vtkTriangleFilter.h>
 #include <vtkTypeInt64Array.h>
 #include <vtkXMLPolyDataReader.h>
 
 #include "formats/base/stage_report.h"
+#include "formats/files/atomic_file.h"
 #include "formats/volume/surface.h"
 #include "pipeline/base/quiet_library.h"
 #include "pipeline/base/text.h"
-#include "pipeline/import/mesh/ply_file.h"
+#include "pipeline/import/mesh/glb_file.h"
+#include "pipeline/import/mesh/polygon_file.h"
 
 namespace sonocase::pipeline::inline import_mesh {
 namespace {
@@ -194,17 +198,13 @@ void keep_first_error(vtkObject*, unsigned long, void* client, void* data) {
 }
 
 template <class Reader>
-vtkSmartPointer<vtkPolyData> read_with(
-    const std::string& path,
-    std::string* error,
-    const std::function<void(Reader&)>& set_up = [](Reader&) {}) {
+vtkSmartPointer<vtkPolyData> read_with(const std::string& path, std::string* error) {
     vtkNew<vtkCallbackCommand> observer;
     observer->SetCallback(keep_first_error);
     observer->SetClientData(error);
     vtkNew<Reader> reader;
     reader->AddObserver("ErrorEvent", observer);
     reader->SetFileName(path.c_str());
-    set_up(*reader.Get());
     reader->Update();
     vtkSmartPointer<vtkPolyData> data = reader->GetOutput();
     return data;
@@ -237,27 +237,60 @@ vtkSmartPointer<vtkPolyData> polygons_of(PolygonFile file) {
     return data;
 }
 
-// VTK accepts a binary STL file of any length; the file's header says how long it must be.
-bool binary_stl_is_cut_off(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    char head[84];
-    if (!file.read(head, sizeof head)) return false;  // the reader reports what is wrong
-    char text[512];
-    file.read(text, sizeof text);
-    const bool ascii =
-        std::string_view(head, 5) == "solid" &&
-        std::all_of(head, head + sizeof head, [](char c) { return c >= 9 && c < 127; }) &&
-        std::all_of(text, text + file.gcount(), [](char c) { return c >= 9 && c < 127; });
-    if (ascii) return false;
-    std::uint32_t triangles = 0;
-    std::memcpy(&triangles, head + 80, sizeof triangles);
-    return std::filesystem::file_size(path) < 84 + 50ull * triangles;
+// Takes the corners; each triangle has its own.
+vtkSmartPointer<vtkPolyData> triangles_of(const std::vector<float>& corners) {
+    vtkNew<vtkFloatArray> values;
+    values->SetNumberOfComponents(3);
+    values->SetNumberOfTuples(static_cast<vtkIdType>(corners.size() / 3));
+    std::copy(corners.begin(), corners.end(), values->GetPointer(0));
+    vtkNew<vtkPoints> points;
+    points->SetData(values);
+    vtkNew<vtkTypeInt64Array> offsets, ids;
+    const auto count = static_cast<vtkIdType>(corners.size() / 9);
+    offsets->SetNumberOfValues(count + 1);
+    ids->SetNumberOfValues(3 * count);
+    for (vtkIdType n = 0; n <= count; ++n) offsets->SetValue(n, 3 * n);
+    for (vtkIdType n = 0; n < 3 * count; ++n) ids->SetValue(n, n);
+    vtkNew<vtkCellArray> polygons;
+    polygons->SetData(offsets, ids);
+    auto data = vtkSmartPointer<vtkPolyData>::New();
+    data->SetPoints(points);
+    data->SetPolys(polygons);
+    return data;
 }
 
-std::uint64_t stl_triangles(const std::string& path) {
-    std::error_code code;
-    const auto bytes = std::filesystem::file_size(path, code);
-    return code ? 0 : bytes / 50;  // of the binary form; the text form takes five times as many
+// VTK's readers pass on what the file says.
+bool names_no_vertex(vtkPolyData& data) {
+    for (vtkCellArray* cells : {data.GetPolys(), data.GetStrips()}) {
+        if (cells == nullptr) continue;
+        vtkIdType count = 0;
+        const vtkIdType* ids = nullptr;
+        for (cells->InitTraversal(); cells->GetNextCell(count, ids);)
+            for (vtkIdType n = 0; n < count; ++n)
+                if (ids[n] < 0 || ids[n] >= data.GetNumberOfPoints()) return true;
+    }
+    return false;
+}
+
+// The comments of an OBJ, whichever line they stand in.
+Result<Axes> axes_of_obj(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    Axes axes = Axes::unsaid;
+    for (std::string line; std::getline(file, line);) {
+        if (!line.starts_with("#")) continue;
+        SONOCASE_TRY(const Axes said, axes_said(line, path));
+        if (said != Axes::unsaid) axes = said;
+    }
+    return axes;
+}
+
+Result<Axes> axes_of_fields(vtkPolyData& data, const std::string& path) {
+    vtkFieldData* fields = data.GetFieldData();
+    auto* space = fields == nullptr
+                      ? nullptr
+                      : vtkStringArray::SafeDownCast(fields->GetAbstractArray("SPACE"));
+    if (space == nullptr || space->GetNumberOfValues() < 1) return Axes::unsaid;
+    return axes_said("SPACE=" + std::string(space->GetValue(0)), path);
 }
 
 // A dense mesh is reduced before anything is made of its single triangles.
@@ -304,39 +337,91 @@ Surface surface_of(vtkPolyData& data) {
 
 }  // namespace
 
-Result<Surface> read_mesh_file(const std::string& path, double scale, StageReport* report) {
-    const char* todo = "check that the file is complete; export it again";
+bool is_mesh_file(const std::string& path) {
+    const std::string ending = lower_case(std::filesystem::path(path).extension().string());
+    return ending == ".glb" || ending == ".stl" || ending == ".ply" || ending == ".obj" ||
+           ending == ".vtp" || (ending == ".vtk" && is_vtk_surface(path));
+}
+
+namespace {
+
+constexpr const char* kAgain = "check that the file is complete; export it again";
+
+// All nodes of a GLB as one surface.
+Result<PolygonFile> read_gltf(const std::string& path, Axes told, StageReport* report) {
+    SONOCASE_TRY(const auto bytes, read_file(path));
+    std::vector<std::string> aside;
+    SONOCASE_TRY(auto nodes, read_glb(bytes, path, &aside));
+    if (!aside.empty() && report != nullptr)
+        report->warnings.push_back(std::to_string(aside.size()) +
+                                   " nodes are not in the file's scene and were left out: " +
+                                   aside[0] + (aside.size() > 1 ? ", ..." : ""));
+    PolygonFile file;
+    for (const MeshNode& node : nodes) {
+        const auto base = static_cast<std::uint32_t>(file.points.size());
+        for (const Point3 p : node.surface.points) file.points.push_back(ras_from_gltf(p, told));
+        for (const auto& t : node.surface.triangles) {
+            for (const std::uint32_t corner : t) file.corners.push_back(base + corner);
+            file.ends.push_back(file.corners.size());
+        }
+    }
+    return file;
+}
+
+// Empty `error`: read.
+Result<vtkSmartPointer<vtkPolyData>> read_polygons(const std::string& path,
+                                                   const std::string& ending,
+                                                   Axes told,
+                                                   StageReport* report,
+                                                   MeshFile& out) {
+    if (ending == ".stl") {
+        SONOCASE_TRY(const auto file, read_stl_file(path));
+        out.axes = file.axes;
+        return triangles_of(file.corners);
+    }
+    if (ending == ".obj" || ending == ".vtp") {
+        std::string error;
+        const bool obj = ending == ".obj";
+        auto data = obj ? read_with<vtkOBJReader>(path, &error)
+                        : read_with<vtkXMLPolyDataReader>(path, &error);
+        if (error.empty() && data != nullptr && names_no_vertex(*data))
+            error = "a polygon names a vertex that does not exist";
+        if (!error.empty() || data == nullptr)
+            return Error{"cannot be read as a mesh (" + error + ")", path, kAgain};
+        SONOCASE_TRY(out.axes, obj ? axes_of_obj(path) : axes_of_fields(*data, path));
+        return data;
+    }
+    if (ending == ".glb") out.unit_mm = 1000;
+    SONOCASE_TRY(auto file, ending == ".ply"   ? read_ply_file(path)
+                            : ending == ".vtk" ? read_vtk_file(path)
+                                               : read_gltf(path, told, report));
+    out.axes = file.axes;
+    if (!file.ends.empty()) return polygons_of(std::move(file));
+    out.surface = {std::move(file.points), std::move(file.normals), {}};
+    for (Vector3& normal : out.surface.normals) normal = normalized(normal);
+    return vtkSmartPointer<vtkPolyData>();
+}
+
+}  // namespace
+
+Result<MeshFile> read_mesh_file(const std::string& path,
+                                double scale,
+                                Axes told,
+                                StageReport* report) {
     const std::string ending = lower_case(std::filesystem::path(path).extension().string());
     const QuietLibrary quiet;
-    std::string error;
-    vtkSmartPointer<vtkPolyData> data;
+    MeshFile out;
     try {
-        if (ending == ".ply") {
-            SONOCASE_TRY(auto file, read_ply_file(path));
-            if (file.ends.empty()) {
-                Surface cloud{file.points, file.normals, {}};
-                for (Vector3& normal : cloud.normals) normal = normalized(normal);
-                return cloud;
-            }
-            data = polygons_of(std::move(file));
-        } else if (ending == ".stl") {
-            if (binary_stl_is_cut_off(path)) return Error{"STL file is cut off", path, todo};
-            // The merging of a dense scan's corners is left to its reduction.
-            const bool merge = stl_triangles(path) <= kDenseTriangles;
-            data = read_with<vtkSTLReader>(path, &error,
-                                           [&](vtkSTLReader& reader) { reader.SetMerging(merge); });
-        } else if (ending == ".obj") {
-            data = read_with<vtkOBJReader>(path, &error);
-        } else {
-            data = read_with<vtkXMLPolyDataReader>(path, &error);
+        SONOCASE_TRY(auto data, read_polygons(path, ending, told, report, out));
+        if (data == nullptr) return out;
+        if (data->GetNumberOfPolys() == 0 && data->GetNumberOfStrips() == 0) {
+            out.surface = surface_of(*data);
+            return out;
         }
-        if (!error.empty() || data == nullptr)
-            return Error{"cannot be read as a mesh (" + error + ")", path, todo};
-        if (data->GetNumberOfPolys() == 0 && data->GetNumberOfStrips() == 0)
-            return surface_of(*data);
-
-        if (data->GetNumberOfPolys() > static_cast<vtkIdType>(kDenseTriangles))
-            return reduced(*data, scale, report);
+        if (data->GetNumberOfPolys() > static_cast<vtkIdType>(kDenseTriangles)) {
+            out.surface = reduced(*data, scale * out.unit_mm, report);
+            return out;
+        }
         vtkNew<vtkTriangleFilter> triangles;
         triangles->SetInputData(data);
         triangles->PassVertsOff();
@@ -350,10 +435,11 @@ Result<Surface> read_mesh_file(const std::string& path, double scale, StageRepor
         clean->ConvertPolysToLinesOff();
         clean->ConvertLinesToPointsOff();
         clean->Update();
-        return surface_of(*clean->GetOutput());
+        out.surface = surface_of(*clean->GetOutput());
+        return out;
     } catch (const std::exception& exception) {
         return Error{std::string("cannot be read as a mesh (") + exception.what() + ")", path,
-                     todo};
+                     kAgain};
     }
 }
 

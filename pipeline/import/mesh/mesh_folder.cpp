@@ -13,6 +13,7 @@
 #include "pipeline/base/source_checks.h"
 #include "pipeline/base/text.h"
 #include "pipeline/import/mesh/glb_file.h"
+#include "pipeline/import/mesh/mesh_file.h"
 #include "pipeline/import/mesh/node_table.h"
 #include "pipeline/import/mesh/solid_voxels.h"
 #include "pipeline/import/mesh/surface_file.h"
@@ -22,18 +23,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_mesh_file(const fs::path& path) {
-    const std::string ending = lower_case(path.extension().string());
-    return ending == ".glb" || ending == ".stl" || ending == ".ply" || ending == ".obj" ||
-           ending == ".vtp";
-}
-
 std::vector<std::string> mesh_files(const std::string& path) {
     std::error_code code;
     if (!fs::is_directory(path, code)) return {path};
     std::vector<std::string> files;
     for (const auto& entry : fs::directory_iterator(path, code))
-        if (is_mesh_file(entry.path())) files.push_back(entry.path().string());
+        if (is_mesh_file(entry.path().string())) files.push_back(entry.path().string());
     std::sort(files.begin(), files.end());
     return files;
 }
@@ -58,10 +53,15 @@ class Collector {
         std::vector<MeshNode> nodes;
         if (glb) {
             SONOCASE_TRY(auto bytes, read_file(path));
-            SONOCASE_TRY(auto read, read_glb(bytes, path));
+            SONOCASE_TRY(auto read, read_glb(bytes, path, &aside_));
             nodes = std::move(read);
         } else {
-            SONOCASE_TRY(auto surface, import_surface(path, {1, false}));
+            StageReport report;
+            SONOCASE_TRY(auto surface, import_surface(path, {1, false, options_.axes}, &report));
+            for (const Note& note : report.notes) {
+                if (note.name == "axes") sentence_ = note.text;
+                if (note.name == "axes_said") said_[note.text].push_back(name);
+            }
             nodes.push_back({name, fs::path(path).stem().string(), std::move(surface)});
         }
         for (MeshNode& node : nodes) {
@@ -77,6 +77,20 @@ class Collector {
         return Done{};
     }
 
+    // What was taken for the axes of the files that are no GLB; empty: all are.
+    Result<std::string> axes(const std::string& where) const {
+        if (options_.axes != Axes::unsaid || said_.size() < 2) return sentence_;
+        const auto& [one, files] = *said_.begin();
+        const auto& [other, others] = *std::next(said_.begin());
+        const auto words = [](const std::string& axes) {
+            return axes == "file" ? std::string("no axes") : axes == "lps" ? "LPS+" : "RAS+";
+        };
+        return Error{"its files do not agree: " + files[0] + " says " + words(one) + ", " +
+                         others[0] + " says " + words(other),
+                     where,
+                     "give --axes lps or --axes ras if all have the same, or export them alike"};
+    }
+    const std::vector<std::string>& aside() const { return aside_; }
     const std::vector<std::string>& unmapped() const { return unmapped_; }
     std::vector<Organ>& organs() { return organs_; }
     int nodes() const { return nodes_; }
@@ -97,7 +111,7 @@ class Collector {
         const double mm = options_.scale * (glb ? 1000 : 1);
         for (const Point3 given : node.surface.points) {
             const Point3 p = table_.placed(file, {mm * given.x, mm * given.y, mm * given.z});
-            to.points.push_back(glb ? Point3{-p.x, p.z, p.y} : p);
+            to.points.push_back(glb ? ras_from_gltf(p, options_.axes) : p);
         }
         for (const auto& t : node.surface.triangles)
             to.triangles.push_back({base + t[0], base + t[1], base + t[2]});
@@ -106,7 +120,9 @@ class Collector {
     const NodeTable& table_;
     const MeshOptions& options_;
     std::vector<Organ> organs_;
-    std::vector<std::string> unmapped_;
+    std::vector<std::string> unmapped_, aside_;
+    std::map<std::string, std::vector<std::string>> said_;  // names of files by their axes
+    std::string sentence_;
     int nodes_ = 0;
 };
 
@@ -224,6 +240,15 @@ Result<MeshBody> read_meshes(const std::string& path,
     MeshBody body;
     body.attribution = table.attribution;
     StageReport& report = body.report;
+    SONOCASE_TRY(const std::string axes, collector.axes(path));
+    if (!axes.empty())
+        report.notes.push_back({"axes", axes});
+    else if (options.axes != Axes::unsaid)
+        report.notes.push_back({"axes", gltf_axes_sentence(options.axes)});
+    if (!collector.aside().empty())
+        report.warnings.push_back(
+            std::to_string(collector.aside().size()) +
+            " nodes are not in their file's scene and were left out: " + collector.aside()[0]);
     SONOCASE_TRY(auto grid, grid_of(collector.organs(), options, path));
     body.grid = grid;
     Totals totals;

@@ -11,6 +11,7 @@
 #include "formats/base/stage_report.h"
 #include "formats/volume/label_volume.h"
 #include "pipeline/base/progress.h"
+#include "pipeline/base/source_checks.h"
 #include "pipeline/import/mesh/mend_mesh.h"
 #include "pipeline/import/mesh/solid_voxels.h"
 
@@ -23,8 +24,9 @@ struct MeshOptions {
     double weld_mm = 0.01;
     double cap_mm = 400;  // a longer cap is an error, unless
     bool allow_long_caps = false;
-    double hole_mm2 = 900;  // of a lumen's slices
-    double accuracy = 2;    // of the winding numbers of open meshes
+    double hole_mm2 = 900;     // of a lumen's slices
+    double accuracy = 2;       // of the winding numbers of open meshes
+    Axes axes = Axes::unsaid;  // of every file, told by hand; unsaid: as each says
 };
 
 struct MeshSolid {
@@ -42,11 +44,12 @@ struct MeshBody {
 
 bool is_mesh_source(const std::string& path);  // a mesh file, or a folder with one
 
-// GLB is in metres, y to the head, z to the front, x to the patient's left; everything else is
-// taken as RAS+ mm. Nodes of one label are one solid. Errors: what the readers refuse; nodes
-// without a row, listed; a label that two files give as organs; a cap longer than allowed; no body.
-// Warnings: loops that do not close, components that faced inwards, volumes of voxels and mesh that
-// differ by more than 3 %, lumens that leaked.
+// GLB is in metres, y to the head, z to the front, x to the patient's left; everything else is in
+// mm, RAS+ or LPS+ as its header says, RAS+ if none says anything; the report's note "axes" says
+// which. Nodes of one label are one solid. Errors: what the readers refuse; nodes without a row,
+// listed; files of which some say their axes and some do not; a label that two files give as
+// organs; a cap longer than allowed; no body. Warnings: loops that do not close, components that
+// faced inwards, volumes of voxels and mesh that differ by more than 3 %, lumens that leaked.
 Result<MeshBody> read_meshes(const std::string& path,
                              const std::string& table_path,
                              const MeshOptions& options,

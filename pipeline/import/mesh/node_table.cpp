@@ -114,6 +114,8 @@ Point3 NodeTable::placed(const std::string& file, Point3 p) const {
 }
 
 Result<NodeTable> parse_node_table(std::string_view csv, const std::string& where) {
+    SONOCASE_TRY_DONE(expect_utf8(csv, where));
+    if (csv.starts_with("\xEF\xBB\xBF")) csv.remove_prefix(3);
     NodeTable table;
     // Comment lines stay as empty lines, so that the numbers of lines are right.
     std::string rows;

@@ -12,10 +12,13 @@
 
 #include "formats/base/stage_report.h"
 #include "formats/files/atomic_file.h"
+#include "formats/text/number_text.h"
 #include "formats/volume/surface.h"
+#include "pipeline/base/point_table.h"
 #include "pipeline/base/source_checks.h"
 #include "pipeline/base/stopwatch.h"
 #include "pipeline/base/text.h"
+#include "pipeline/import/mesh/glb_file.h"
 #include "pipeline/import/mesh/mesh_file.h"
 
 namespace sonocase::pipeline::inline import_mesh {
@@ -127,98 +130,37 @@ void reduce_points(Surface& cloud, StageReport* report) {
     report->measures.push_back({"sparse_points", static_cast<double>(sparse)});
 }
 
-struct Columns {
-    int point[3] = {0, 1, 2};
-    int normal[3] = {-1, -1, -1};
-    int status = -1;
+struct GivenSurface {
+    Surface surface;  // as given, GLB in metres
+    Axes axes = Axes::unsaid;
+    double unit_mm = 1;
 };
 
-int find_column(const TextRow& header, const char* name) {
-    for (std::size_t c = 0; c < header.cells.size(); ++c) {
-        std::string cell = lower_case(header.cells[c]);
-        if (cell.ends_with("_mm") || cell.ends_with("[mm]"))
-            cell = cell.substr(0, cell.find_first_of("_[ "));
-        if (cell == name) return static_cast<int>(c);
-    }
-    return -1;
-}
-
-bool find_columns(const TextRow& header, Columns* columns) {
-    constexpr const char* kNames[][3] = {{"x", "y", "z"}, {"tx", "ty", "tz"}, {"px", "py", "pz"}};
-    for (const auto& names : kNames) {
-        for (int axis = 0; axis < 3; ++axis)
-            columns->point[axis] = find_column(header, names[axis]);
-        if (columns->point[0] >= 0 && columns->point[1] >= 0 && columns->point[2] >= 0) {
-            constexpr const char* kNormals[3] = {"nx", "ny", "nz"};
-            for (int axis = 0; axis < 3; ++axis)
-                columns->normal[axis] = find_column(header, kNormals[axis]);
-            columns->status = find_column(header, "status");
-            return true;
-        }
-    }
-    return false;
-}
-
-}  // namespace
-
-Result<Surface> read_point_file(const std::string& path, std::vector<std::string>* warnings) {
-    SONOCASE_TRY(auto text, read_text_file(path));
-    const std::vector<TextRow> rows = split_rows(text);
-    Surface surface;
-    if (rows.empty()) return surface;
-    Columns columns;
-    std::size_t first = 0;
-    if (!number_in(rows[0].cells[0]) || !find_columns(rows[0], &columns)) {
-        columns = Columns{};
-        if (rows[0].cells.size() == 1 && number_in(rows[0].cells[0])) {
-            first = 1;  // XYZ files may begin with the number of points
-        } else if (!number_in(rows[0].cells[0])) {
-            if (!find_columns(rows[0], &columns))
-                return Error{
-                    "no columns x, y, z", path + ":" + std::to_string(rows[0].line),
-                    "expected a header with x,y,z (or tx,ty,tz), or three numbers per row"};
-            first = 1;
-        }
-    }
-    const bool has_normals =
-        columns.normal[0] >= 0 && columns.normal[1] >= 0 && columns.normal[2] >= 0;
-    std::size_t left_out = 0;
-    for (std::size_t r = first; r < rows.size(); ++r) {
-        const TextRow& row = rows[r];
-        const auto cell = [&](int column) -> std::optional<double> {
-            if (static_cast<std::size_t>(column) >= row.cells.size()) return std::nullopt;
-            return number_in(row.cells[column]);
-        };
-        if (columns.status >= 0 && static_cast<std::size_t>(columns.status) < row.cells.size() &&
-            lower_case(row.cells[columns.status]) != "ok") {
-            ++left_out;
-            continue;
-        }
-        Point3 point;
-        Vector3 normal;
-        for (int axis = 0; axis < 3; ++axis) {
-            const auto value = cell(columns.point[axis]);
-            if (!value)
-                return Error{"row without three numbers", path + ":" + std::to_string(row.line),
-                             "expected x, y and z; correct or delete the row"};
-            point[axis] = *value;
-            if (has_normals) normal[axis] = cell(columns.normal[axis]).value_or(0.0);
-        }
-        if (!std::isfinite(point.x) || !std::isfinite(point.y) || !std::isfinite(point.z)) {
-            ++left_out;
-            continue;
-        }
-        surface.points.push_back(point);
-        if (has_normals) surface.normals.push_back(normalized(normal));
-    }
-    if (left_out > 0)
-        warnings->push_back(
-            std::to_string(left_out) +
+Result<GivenSurface> read_cloud(const std::string& path, StageReport& report) {
+    SONOCASE_TRY(auto table, load_point_table(path));
+    if (table.left_out > 0)
+        report.warnings.push_back(
+            std::to_string(table.left_out) +
             " readings without position or with a status other than OK were left out");
-    return surface;
+    return GivenSurface{{std::move(table.points), std::move(table.normals), {}},
+                        table.axes,
+                        table.unit_mm > 0 ? table.unit_mm : 1};
 }
 
-namespace {
+Result<GivenSurface> read_given(const std::string& path,
+                                const SurfaceFileOptions& options,
+                                bool mesh,
+                                StageReport& report) {
+    if (!mesh) return read_cloud(path, report);
+    SONOCASE_TRY(auto file, read_mesh_file(path, options.scale, options.axes, &report));
+    return GivenSurface{std::move(file.surface), file.axes, file.unit_mm};
+}
+
+void turn(Surface& surface, Axes axes) {
+    if (axes != Axes::lps) return;
+    for (Point3& p : surface.points) p = to_ras(p, axes);
+    for (Vector3& n : surface.normals) n = to_ras(Point3{} + n, axes) - Point3{};
+}
 
 // Turns triangles until each agrees with its neighbours and every connected part faces outwards: on
 // the whole, away from the mean of the points. That point is inside a torso, so that this works for
@@ -302,14 +244,17 @@ Result<Surface> import_surface(const std::string& path,
     own.stage = "surface_file";
     SONOCASE_TRY_DONE(check_source_file(path, "expected a surface file"));
     const std::string ending = lower_case(std::filesystem::path(path).extension().string());
-    const bool mesh = ending == ".ply" || ending == ".stl" || ending == ".obj" || ending == ".vtp";
+    const bool glb = ending == ".glb", mesh = ending == ".vtk" || is_mesh_file(path);
     const bool cloud = ending == ".csv" || ending == ".xyz" || ending == ".txt" ||
-                       ending == ".pts" || ending == ".asc" || ending == ".tsv";
+                       ending == ".pts" || ending == ".asc" || ending == ".tsv" ||
+                       ending == ".fcsv" || is_markups_file(path);
     if (!mesh && !cloud)
-        return Error{"not a known surface file name", path,
-                     "expected .ply, .stl, .obj, .vtp, .csv, .tsv, .txt or .xyz"};
-    SONOCASE_TRY(auto surface, mesh ? read_mesh_file(path, options.scale, &own)
-                                    : read_point_file(path, &own.warnings));
+        return Error{
+            "not a known surface file name", path,
+            "expected .ply, .stl, .obj, .vtp, .vtk, .glb, .csv, .tsv, .txt, .xyz, .fcsv or "
+            ".mrk.json"};
+    SONOCASE_TRY(auto given, read_given(path, options, mesh, own));
+    Surface& surface = given.surface;
     if (surface.points.empty())
         return Error{"surface holds no points", path,
                      "expected the digitised skin; check that this is the right file"};
@@ -320,14 +265,31 @@ Result<Surface> import_surface(const std::string& path,
         return Error{
             "surface of " + std::to_string(surface.points.size()) + " points", path,
             "expected at least 30 all round the torso, 500 or more are good; take more readings"};
-    if (options.scale != 1)
-        for (Point3& p : surface.points) p = Point3{} + options.scale * (p - Point3{});
-    if (!mesh && options.torso) reduce_points(surface, &own);
+    // Of a cloud the unit told by hand counts; of a GLB it is one of metres.
+    const double mm = glb                  ? 1000 * options.scale
+                      : options.scale != 1 ? options.scale
+                                           : given.unit_mm;
+    if (mm != 1)
+        for (Point3& p : surface.points) p = Point3{} + mm * (p - Point3{});
+    if (!glb) turn(surface, options.axes != Axes::unsaid ? options.axes : given.axes);
+    own.notes.push_back(
+        {"axes", glb ? gltf_axes_sentence(options.axes) : axes_sentence(given.axes, options.axes)});
+    own.notes.push_back({"axes_said", name_of_axes(given.axes)});
+    if (!mesh && given.unit_mm != 1)
+        own.notes.push_back(
+            {"unit", options.scale != 1
+                         ? "the option --scale counts, and not the unit that the file says"
+                         : "the file says its unit: " + number_text(given.unit_mm, 4) + " mm"});
+    if (options.torso) reduce_points(surface, &own);
     Box3 box;
     for (const Point3 p : surface.points) box.include(p);
     if (options.torso) {
-        if (const auto error = check_torso_extent(box.extent(), "surface", path, "--scale"))
+        // The advice is for the file as it is.
+        const double told = glb ? options.scale : mm;
+        if (auto error = check_torso_extent(box.extent(), "surface", path, "--scale")) {
+            if (told != 1) error->expected = scale_advice(box.extent() / told, "--scale");
             return *error;
+        }
     }
 
     if (!surface.triangles.empty()) {
@@ -347,7 +309,7 @@ Result<Surface> import_surface(const std::string& path,
     own.measures.insert(own.measures.end(), reduction.begin(), reduction.end());
     own.seconds = watch.seconds();
     if (report != nullptr) *report = std::move(own);
-    return surface;
+    return std::move(surface);
 }
 
 }  // namespace sonocase::pipeline::inline import_mesh

@@ -134,6 +134,63 @@ std::string vtp_text(const Mesh& mesh) {
     return out.str();
 }
 
+std::string stl_text(const Mesh& mesh, const std::string& solid, const std::string& newline) {
+    std::ostringstream out;
+    out << solid << newline;
+    for (const auto& t : mesh.triangles) {
+        out << " facet normal 0 0 0" << newline << "  outer loop" << newline;
+        for (const std::uint32_t corner : t) {
+            const Point3 p = mesh.points[corner];
+            out << "   vertex " << p.x << " " << p.y << " " << p.z << newline;
+        }
+        out << "  endloop" << newline << " endfacet" << newline;
+    }
+    out << "endsolid x" << newline;
+    return out.str();
+}
+
+// Legacy VTK: polygons as lists of counts and corners, or, from version 5, as offsets and corners.
+std::string vtk_text(const Mesh& mesh, const std::string& title, bool five) {
+    std::ostringstream out;
+    out << "# vtk DataFile Version " << (five ? "5.1" : "3.0") << "\n"
+        << title << "\nASCII\nDATASET POLYDATA\nPOINTS " << mesh.points.size() << " float\n";
+    for (const Point3 p : mesh.points) out << p.x << " " << p.y << " " << p.z << "\n";
+    const std::size_t n = mesh.triangles.size();
+    if (five) {
+        out << "METADATA\nINFORMATION 0\n\nPOLYGONS " << n + 1 << " " << 3 * n
+            << "\nOFFSETS vtktypeint64\n";
+        for (std::size_t t = 0; t <= n; ++t) out << 3 * t << " ";
+        out << "\nCONNECTIVITY vtktypeint64\n";
+        for (const auto& t : mesh.triangles) out << t[0] << " " << t[1] << " " << t[2] << "\n";
+    } else {
+        out << "POLYGONS " << n << " " << 4 * n << "\n";
+        for (const auto& t : mesh.triangles)
+            out << "3 " << t[0] << " " << t[1] << " " << t[2] << "\n";
+    }
+    out << "POINT_DATA " << mesh.points.size() << "\nNORMALS n float\n";
+    return out.str();
+}
+
+std::string vtk_binary(const Mesh& mesh, const std::string& title) {
+    std::string bytes = "# vtk DataFile Version 4.2\n" + title +
+                        "\nBINARY\nDATASET POLYDATA\nPOINTS " + std::to_string(mesh.points.size()) +
+                        " double\n";
+    for (const Point3 p : mesh.points)
+        for (int axis = 0; axis < 3; ++axis) append(bytes, p[axis], true);
+    bytes += "\nPOLYGONS " + std::to_string(mesh.triangles.size()) + " " +
+             std::to_string(4 * mesh.triangles.size()) + "\n";
+    for (const auto& t : mesh.triangles) {
+        append(bytes, std::int32_t{3}, true);
+        for (const std::uint32_t corner : t) append(bytes, corner, true);
+    }
+    return bytes + "\n";
+}
+
+Mesh as_lps(Mesh mesh) {
+    for (Point3& p : mesh.points) p = {-p.x, -p.y, p.z};
+    return mesh;
+}
+
 void expect_ellipsoid(const Result<Surface>& surface, const std::string& name) {
     ASSERT_TRUE(surface.has_value()) << name << ": " << surface.error().message();
     const Mesh mesh = ellipsoid();
@@ -152,11 +209,9 @@ void expect_ellipsoid(const Result<Surface>& surface, const std::string& name) {
 }
 
 std::vector<std::pair<std::string, std::string>> files_that_say_their_length(const Mesh& mesh) {
-    return {{"a.ply", ply_ascii(mesh)},
-            {"l.ply", ply_binary(mesh, false)},
-            {"b.ply", ply_binary(mesh, true)},
-            {"a.stl", stl_binary(mesh)},
-            {"a.vtp", vtp_text(mesh)}};
+    return {{"a.ply", ply_ascii(mesh)},        {"l.ply", ply_binary(mesh, false)},
+            {"b.ply", ply_binary(mesh, true)}, {"a.stl", stl_binary(mesh)},
+            {"b.vtk", vtk_binary(mesh, "x")},  {"a.vtp", vtp_text(mesh)}};
 }
 
 TEST(ImportSurface, EveryMeshFormatGivesTheSameSurfaceWithOutwardNormals) {
@@ -165,8 +220,184 @@ TEST(ImportSurface, EveryMeshFormatGivesTheSameSurfaceWithOutwardNormals) {
     auto files = files_that_say_their_length(mesh);
     files.emplace_back("A.STL", stl_binary(mesh));
     files.emplace_back("a.obj", obj_text(mesh));
+    files.emplace_back("a.vtk", vtk_text(mesh, "a title", false));
+    files.emplace_back("5.vtk", vtk_text(mesh, "a title", true));
     for (const auto& [name, bytes] : files)
         expect_ellipsoid(import_surface(folder.write(name, bytes)), name);
+}
+
+// Only the size tells a binary STL from a text.
+TEST(ImportSurface, StlIsTextOrBinaryWhateverItsNamesAre) {
+    const TemporaryFolder folder;
+    const Mesh mesh = ellipsoid();
+    Mesh upper = mesh, lower = mesh;
+    upper.triangles.resize(300);
+    lower.triangles.erase(lower.triangles.begin(), lower.triangles.begin() + 300);
+    std::string capitals = stl_text(mesh, "solid scan", "\n");
+    for (char& c : capitals) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    std::string solid = stl_binary(mesh);
+    solid.replace(0, 12, "solid facet ");
+    for (const auto& [name, bytes] :
+         {std::pair<const char*, std::string>{"umlaut", stl_text(mesh,
+                                                                 "solid R\xC3\xBC"
+                                                                 "cken",
+                                                                 "\n")},
+          {"latin", stl_text(mesh,
+                             "solid R\xFC"
+                             "cken K\xF6rper",
+                             "\r\n")},
+          {"chinese", stl_text(mesh, "solid " + std::string(120, '\xE7'), "\n")},
+          {"capitals", capitals},
+          {"blank", " " + stl_text(mesh, "solid", "\n")},
+          {"bom", "\xEF\xBB\xBF" + stl_text(mesh, "solid a vertex facet", "\n")},
+          {"two", stl_text(upper, "solid a", "\n") + stl_text(lower, "solid b", "\n")},
+          {"binary called solid", solid},
+          {"binary with a tail", stl_binary(mesh) + std::string(7, '\0')}})
+        expect_ellipsoid(import_surface(folder.write(std::string(name) + ".stl", bytes)), name);
+    const std::string whole = stl_text(mesh, "solid a", "\n");
+    // The advice: a text that is whole gets the line that lacks.
+    const std::string open = whole.substr(0, whole.find("endsolid"));
+    EXPECT_FALSE(import_surface(folder.write("open.stl", open)));
+    expect_ellipsoid(import_surface(folder.write("ended.stl", open + "endsolid\n")), "ended");
+    for (const std::size_t size : {whole.size() - 20, whole.size() / 2, std::size_t{120}})
+        EXPECT_FALSE(import_surface(folder.write("cut.stl", whole.substr(0, size)))) << size;
+}
+
+// What a header says of the axes counts, whatever the format; an option counts more, and the report
+// says what was taken.
+TEST(ImportSurface, TurnsLpsToRas) {
+    const TemporaryFolder folder;
+    const Mesh mesh = ellipsoid(), lps = as_lps(mesh);
+    const auto said = [](std::string text, const std::string& after, const std::string& line) {
+        return text.insert(text.find(after) + after.size(), line);
+    };
+    std::string stl = stl_binary(lps);
+    stl.replace(0, 27, "3D Slicer output. SPACE=LPS");
+    std::string vtp =
+        said(vtp_text(lps), "<PolyData>",
+             "<FieldData><DataArray type=\"String\" Name=\"SPACE\" "
+             "NumberOfTuples=\"1\" format=\"ascii\">76 80 83 0</DataArray></FieldData>");
+    std::string fcsv =
+        "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n"
+        "# columns = id,x,y,z,ow\n";
+    std::string markups;
+    for (const Point3 p : lps.points) {
+        fcsv += "1," + std::to_string(p.x) + "," + std::to_string(p.y) + "," + std::to_string(p.z) +
+                ",0\n";
+        markups += (markups.empty() ? "" : ",") + std::string("{\"position\":[") +
+                   std::to_string(p.x) + "," + std::to_string(p.y) + "," + std::to_string(p.z) +
+                   "]}";
+    }
+    const std::pair<const char*, std::string> files[] = {
+        {"b.stl", stl},
+        {"t.stl", stl_text(lps, "solid 3D Slicer output. SPACE=LPS", "\n")},
+        {"a.ply", said(ply_ascii(lps), "ply\nformat ascii 1.0\n", "comment SPACE=LPS\n")},
+        {"a.obj", "# 3D Slicer output. SPACE=LPS\n" + obj_text(lps)},
+        {"a.vtk", vtk_text(lps, "3D Slicer output. SPACE=LPS", false)},
+        {"5.vtk", vtk_text(lps, "SPACE=LPS", true)},
+        {"a.vtp", vtp},
+        {"a.fcsv", fcsv},
+        {"a.mrk.json",
+         "{\"markups\":[{\"coordinateSystem\":\"LPS\",\"controlPoints\":[" + markups + "]}]}"}};
+    const auto note = [](const StageReport& report) {
+        for (const Note& n : report.notes)
+            if (n.name == "axes") return n.text;
+        return std::string();
+    };
+    for (const auto& [name, bytes] : files) {
+        StageReport report;
+        const auto s = import_surface(folder.write(name, bytes), {}, &report);
+        ASSERT_TRUE(s) << name << ": " << s.error().message();
+        ASSERT_EQ(s->points.size(), mesh.points.size()) << name;
+        EXPECT_NE(note(report).find("says that its axes are LPS"), std::string::npos) << name;
+        Box3 box;
+        for (const Point3 p : s->points) box.include(p);
+        // The middle of the ellipsoid: turned once and not twice.
+        EXPECT_NEAR(box.lower.x + box.upper.x, 20, 1e-2) << name;
+        EXPECT_NEAR(box.lower.y + box.upper.y, 40, 1e-2) << name;
+        // Told by hand: kept as they are.
+        const auto kept = import_surface(folder / name, {.axes = Axes::ras}, &report);
+        ASSERT_TRUE(kept) << name;
+        Box3 other;
+        for (const Point3 p : kept->points) other.include(p);
+        EXPECT_NEAR(other.lower.x + other.upper.x, -20, 1e-2) << name;
+        EXPECT_NE(note(report).find("--axes"), std::string::npos) << name;
+    }
+    StageReport report;
+    expect_ellipsoid(
+        import_surface(folder.write("n.stl", stl_binary(lps)), {.axes = Axes::lps}, &report),
+        "told");
+    EXPECT_EQ(note(report), "the axes are LPS+ as the option --axes says");
+    expect_ellipsoid(import_surface(folder.write("r.stl", stl_binary(mesh)), {}, &report), "kept");
+    EXPECT_NE(note(report).find("does not say"), std::string::npos);
+}
+
+// A cloud is reduced whatever its file, and whatever it is reduced to is the same.
+TEST(ImportSurface, ReducesADenseCloudOfAnyFile) {
+    const TemporaryFolder folder;
+    std::string xyz, ply;
+    constexpr int kCount = 80000;
+    for (int n = 0; n < kCount; ++n) {
+        const double theta = std::acos(1 - 2 * (n + 0.5) / kCount), phi = 2.399963 * n;
+        const float p[3] = {static_cast<float>(150 * std::sin(theta) * std::cos(phi)),
+                            static_cast<float>(100 * std::sin(theta) * std::sin(phi)),
+                            static_cast<float>(200 * std::cos(theta))};
+        char row[64];
+        std::snprintf(row, sizeof row, "%.9g %.9g %.9g\n", p[0], p[1], p[2]);
+        xyz += row;
+        for (const float v : p) append(ply, v);
+    }
+    ply = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(kCount) +
+          "\nproperty float x\nproperty float y\nproperty float z\nend_header\n" + ply;
+    const auto text = import_surface(folder.write("a.xyz", xyz)),
+               binary = import_surface(folder.write("a.ply", ply));
+    ASSERT_TRUE(text && binary);
+    EXPECT_LT(binary->points.size(), 30000u);
+    EXPECT_EQ(text->points, binary->points);
+}
+
+TEST(ImportSurface, UnitOfTheFileCountsAndAdviceIsForTheFile) {
+    const TemporaryFolder folder;
+    std::string metres = "x (m),y (m),z (m)\n", wrong = "x (m),y (m),z (m)\n";
+    for (const Point3 p : ellipsoid().points) {
+        char row[128];
+        std::snprintf(row, sizeof row, "%.6f,%.6f,%.6f\n", p.x / 1000, p.y / 1000, p.z / 1000);
+        metres += row;
+        std::snprintf(row, sizeof row, "%.6f,%.6f,%.6f\n", p.x / 10, p.y / 10, p.z / 10);
+        wrong += row;
+    }
+    StageReport report;
+    const auto read = import_surface(folder.write("m.csv", metres), {}, &report);
+    ASSERT_TRUE(read) << read.error().message();
+    EXPECT_NEAR(report.measures[4].value, 400, 0.1);  // height_mm
+    const std::string path = folder.write("w.csv", wrong);
+    const auto refused = import_surface(path);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().expected.find("--scale 10"), std::string::npos)
+        << refused.error().message();
+    const auto told = import_surface(path, {.scale = 10}, &report);
+    ASSERT_TRUE(told) << told.error().message();
+    EXPECT_NEAR(report.measures[4].value, 400, 0.1);
+}
+
+TEST(ImportSurfaceRefuses, DamagedVtkFilesAndOtherDataSets) {
+    const TemporaryFolder folder;
+    const std::string whole = vtk_text(ellipsoid(), "x", false);
+    const auto with = [&](const std::string& from, const std::string& to) {
+        std::string text = whole;
+        return folder.write("d.vtk", text.replace(text.find(from), from.size(), to));
+    };
+    for (const auto& [from, to] :
+         {std::pair<const char*, const char*>{"POLYDATA", "STRUCTURED_POINTS"},
+          {"POINTS ", "POINTS 9"},
+          {"POLYGONS ", "POLYGONS 9"},
+          {"float", "bit"},
+          {"ASCII", "TEXT"},
+          {"\n3 0 ", "\n3 99999 "},
+          {"\n3 0 ", "\n3 -1 "}}) {
+        const auto surface = import_surface(with(from, to));
+        EXPECT_FALSE(surface) << from << to;
+    }
 }
 
 TEST(ImportSurface, TurnsAMeshThatFacesInwardsAndTrianglesThatDisagree) {
@@ -274,7 +505,7 @@ TEST(ImportSurfaceRefuses, TooFewPointsNoneAndWhatIsNotThere) {
 // Without the check each of these would wait or read for ever.
 TEST(ImportSurfaceRefuses, PipesAndDevicesWithoutOpeningThem) {
     const TemporaryFolder folder;
-    for (const char* name : {"p.ply", "p.stl", "p.obj", "p.vtp", "p.csv", "p.xyz"}) {
+    for (const char* name : {"p.ply", "p.stl", "p.obj", "p.vtp", "p.vtk", "p.csv", "p.xyz"}) {
         const std::string pipe = folder / name;
         ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
         const std::string device = folder / (std::string("zero_") + name);

@@ -8,6 +8,9 @@
 #include <cmath>
 #include <random>
 
+#include "pipeline/registration/landmark_file.h"
+#include "support/temporary_folder.h"
+
 namespace sonocase::pipeline {
 namespace {
 
@@ -91,6 +94,53 @@ TEST(LandmarkCandidates, ThePictureAndTheRowsHoldBoth) {
         {{&skin, {0, 0, 1}, {0, 1, 0}, found}, {&skin, {0, 0, 1}, {0, 1, 0}, found}});
     ASSERT_GT(png.size(), 1000u);
     EXPECT_EQ(png[1], 'P');
+}
+
+TEST(LandmarkFile, ColumnsGoByTheirNamesInAnyOrder) {
+    const auto plain = parse_landmarks("navel,1,2,3,4,5,6\n", "a.csv");
+    const auto named = parse_landmarks(
+        "\xEF\xBB\xBFx;y;z;ct_x;ct_y;ct_z;name;remark\n4,0;5;6;1;2;3;navel;soft\n", "a.csv");
+    for (const auto& read : {plain, named}) {
+        ASSERT_TRUE(read) << read.error().message();
+        EXPECT_EQ(read->at(0).name, "navel");
+        EXPECT_EQ(read->at(0).ct, (Point3{1, 2, 3}));
+        EXPECT_EQ(read->at(0).mannequin, (Point3{4, 5, 6}));
+    }
+    const auto more = parse_landmarks("navel,1,2,3,4,5,6,7\n", "a.csv");
+    ASSERT_FALSE(more);
+    EXPECT_NE(more.error().message().find("name,ct_x,ct_y,ct_z,x,y,z"), std::string::npos);
+    EXPECT_TRUE(parse_landmarks("name,ct_x,ct_y,ct_z,x,y,z,w\nnavel,1,2,3,4,5,6,7\n", "a.csv"));
+    EXPECT_NE(parse_landmarks("navel,1,2,3,4,5,6\nh\xFC"
+                              "fte,1,2,3,4,5,6\n",
+                              "a.csv")
+                  .error()
+                  .message()
+                  .find("a.csv:2"),
+              std::string::npos);
+}
+
+TEST(LandmarkFile, TwoListsOfMarksArePairedByName) {
+    const testing::TemporaryFolder folder;
+    const std::string patient =
+        folder.write("ct.mrk.json",
+                     R"({"markups":[{"coordinateSystem":"LPS","controlPoints":[
+            {"label":"navel","position":[-1,-2,3]},{"label":"hip","position":[-4,-5,6]}]}]})");
+    const std::string surface =
+        folder.write("m.fcsv",
+                     "# Markups fiducial file version = 4.11\n# CoordinateSystem = RAS\n"
+                     "# columns = id,x,y,z,label\n1,40,50,60,hip\n2,10,20,30,navel\n");
+    const auto pairs = load_landmarks(patient, surface);
+    ASSERT_TRUE(pairs) << pairs.error().message();
+    ASSERT_EQ(pairs->size(), 2u);
+    EXPECT_EQ(pairs->at(0).ct, (Point3{1, 2, 3}));
+    EXPECT_EQ(pairs->at(0).mannequin, (Point3{10, 20, 30}));
+    EXPECT_EQ(pairs->at(1).mannequin, (Point3{40, 50, 60}));
+    // One list alone is no pair; the advice is the option of the second.
+    const auto alone = load_landmarks(patient);
+    ASSERT_FALSE(alone);
+    EXPECT_NE(alone.error().message().find("--surface-landmarks"), std::string::npos);
+    const std::string less = folder.write("less.csv", "name,x,y,z\nhip,1,2,3\n");
+    EXPECT_NE(load_landmarks(patient, less).error().message().find("'navel'"), std::string::npos);
 }
 
 }  // namespace

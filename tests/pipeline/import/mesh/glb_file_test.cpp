@@ -32,6 +32,20 @@ TEST(GlbFile, KeepsNamesPointsAndTransforms) {
     EXPECT_NEAR(top.z, 14, 1e-5);
 }
 
+TEST(GlbFile, TakesTheNodesOfItsScene) {
+    const auto bytes = glb_of({{"liver", ball_mesh({0, 0, 0}, 1, 6), ""},
+                               {"draft", ball_mesh({5, 0, 0}, 1, 6), ""},
+                               {"group", ball_mesh({0, 0, 9}, 1, 6), "\"children\":[0]"}},
+                              "\"scene\":1,\"scenes\":[{\"nodes\":[1]},{\"nodes\":[2]}]");
+    std::vector<std::string> aside;
+    const auto nodes = read_glb(bytes, "x.glb", &aside);
+    ASSERT_TRUE(nodes) << nodes.error().message();
+    ASSERT_EQ(nodes->size(), 2u);
+    EXPECT_EQ((*nodes)[0].name, "liver");
+    EXPECT_EQ((*nodes)[1].name, "group");
+    EXPECT_EQ(aside, (std::vector<std::string>{"draft"}));
+}
+
 TEST(GlbFile, EveryTruncationIsRefusedInOneLine) {
     const auto whole = glb_of({{"a", ball_mesh({0, 0, 0}, 1, 6), ""}});
     for (std::size_t n = 0; n < whole.size(); n += 7) {

@@ -12,6 +12,7 @@
 #include "pipeline/import/body/body_rules.h"
 #include "pipeline/import/mesh/mesh_shapes.h"
 #include "pipeline/import/mesh/node_table.h"
+#include "pipeline/import/mesh/surface_file.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -91,6 +92,69 @@ TEST_F(MeshFolder, WarnsOfTwoFilesOfOneOrgan) {
     ASSERT_TRUE(body);
     ASSERT_FALSE(body->report.warnings.empty());
     EXPECT_NE(body->report.warnings[0].find("2 files"), std::string::npos);
+}
+
+// Balls as OBJ: `comment` above the vertices.
+std::string obj_of(const Surface& ball, const std::string& comment) {
+    std::string out = comment + "\n";
+    for (const Point3 p : ball.points)
+        out += "v " + std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) +
+               "\n";
+    for (const auto& t : ball.triangles)
+        out += "f " + std::to_string(t[0] + 1) + " " + std::to_string(t[1] + 1) + " " +
+               std::to_string(t[2] + 1) + "\n";
+    return out;
+}
+
+TEST_F(MeshFolder, HonoursLpsAndAsksWhereFilesDisagree) {
+    const auto put = [&](const char* name, Point3 middle, const char* comment) {
+        std::ofstream(folder_ / name) << obj_of(ball_mesh(middle, 25), comment);
+    };
+    const auto middle_of_liver = [](const MeshBody& body) {
+        const VoxelMask& mask = body.solids[0].mask;
+        return body.grid.point_from_voxel({mask.first.x + 0.5 * (mask.size.x - 1),
+                                           mask.first.y + 0.5 * (mask.size.y - 1),
+                                           mask.first.z + 0.5 * (mask.size.z - 1)});
+    };
+    const auto note = [](const MeshBody& body) {
+        for (const Note& n : body.report.notes)
+            if (n.name == "axes") return n.text;
+        return std::string("none");
+    };
+    const std::string table = "liver,liver,organ\nspleen,spleen,organ\n";
+    put("liver.obj", {-60, -20, 30}, "# SPACE=LPS");
+    put("spleen.obj", {60, -20, 30}, "# SPACE=LPS");
+    auto body = read(table);
+    ASSERT_TRUE(body) << body.error().message();
+    EXPECT_LT(distance(middle_of_liver(*body), {60, 20, 30}), 2);
+    EXPECT_NE(note(*body).find("LPS"), std::string::npos);
+    // One file that says nothing: asked, and the option that is named mends it.
+    put("spleen.obj", {60, -20, 30}, "# nothing");
+    EXPECT_NE(refusal(table).find("--axes lps"), std::string::npos) << refusal(table);
+    body = read(table, {.axes = Axes::lps});
+    ASSERT_TRUE(body) << body.error().message();
+    EXPECT_LT(distance(middle_of_liver(*body), {60, 20, 30}), 2);
+    put("liver.obj", {-60, -20, 30}, "# nothing");
+    body = read(table);
+    ASSERT_TRUE(body);
+    EXPECT_LT(distance(middle_of_liver(*body), {-60, -20, 30}), 2);
+    EXPECT_NE(note(*body).find("does not say"), std::string::npos);
+}
+
+TEST_F(MeshFolder, AGlbIsASurfaceToo) {
+    write("skin.glb", {{"skin", ball_mesh({30, 10, 20}, 100), ""}});
+    const auto skin = import_surface((folder_ / "skin.glb").string());
+    ASSERT_TRUE(skin) << skin.error().message();
+    Box3 box;
+    for (const Point3 p : skin->points) box.include(p);
+    // In mm; x to the left, y to the head, z to the front become (-30, 20, 10).
+    EXPECT_LT(distance(box.lower + 0.5 * box.extent(), {-30, 20, 10}), 0.01);
+    EXPECT_NEAR(box.extent().z, 200, 1);
+    const auto told = import_surface((folder_ / "skin.glb").string(), {.axes = Axes::ras});
+    ASSERT_TRUE(told);
+    Box3 other;
+    for (const Point3 p : told->points) other.include(p);
+    EXPECT_LT(distance(other.lower + 0.5 * other.extent(), {30, 10, 20}), 0.01);
 }
 
 TEST(NodeTable, BlendsAFrameAlongItsAxis) {
