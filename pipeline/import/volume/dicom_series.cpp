@@ -119,6 +119,7 @@ void add_file(const std::string& path, DicomFolder& folder) {
     DicomSlice slice = slice_of(set);
     slice.path = path;
     slice.cut_off = is_cut_off(*header);
+    slice.run_lengths = header->transfer_syntax == "1.2.840.10008.1.2.5";
     folder.slices.push_back(std::move(slice));
 }
 
@@ -546,6 +547,23 @@ void sort_frames(const DicomStack& stack, NativeVolume& volume) {
     volume.bytes = std::move(sorted);
 }
 
+// GDCM reads beyond the end of damaged run lengths.
+bool has_sound_runs(const std::string& path) {
+    const auto header = read_dicom_header(path);
+    if (!header) return false;
+    const auto bytes = static_cast<std::size_t>(short_of(header->set, kBits) / 8 *
+                                                std::max(1, short_of(header->set, kSamples)));
+    const std::size_t pixels = static_cast<std::size_t>(short_of(header->set, kRows)) *
+                               static_cast<std::size_t>(short_of(header->set, kColumns));
+    std::vector<char> room(bytes * pixels);
+    const auto fragments = read_dicom_fragments(path, *header);
+    return fragments.size() ==
+               static_cast<std::size_t>(std::max(1, whole_of(header->set, kFrames))) &&
+           std::all_of(fragments.begin(), fragments.end(), [&](const std::string& one) {
+               return unpack_dicom_runs(one, pixels, bytes, room.data());
+           });
+}
+
 Result<NativeVolume> read_stack(const DicomStack& stack,
                                 bool resample_shear,
                                 const std::string& path) {
@@ -558,6 +576,9 @@ Result<NativeVolume> read_stack(const DicomStack& stack,
     const bool one_file = first.of_frame > 0;
     for (const DicomSlice& slice : stack.slices) {
         if (one_file && &slice != &first) break;
+        if (slice.run_lengths && !has_sound_runs(slice.path))
+            return Error{"the compressed pixels are damaged", slice.path,
+                         "export the series again"};
         try {
             const auto io = itk::GDCMImageIO::New();
             io->SetFileName(slice.path);
