@@ -243,6 +243,10 @@ void dicom_header(Bytes bytes) {
     const auto header = pipeline::read_dicom_header(file.path());
     if (!header) return;
     demand(header->pixels_at <= header->size || header->cut_off(0));
+    std::vector<char> room(2 * 99);
+    for (const std::string& fragment : pipeline::read_dicom_fragments(file.path(), *header))
+        for (const std::size_t planes : {1u, 2u})
+            pipeline::unpack_dicom_runs(fragment, 99, planes, room.data());
     for (const pipeline::DicomTag tag : {0x00620002u, 0x00620001u, 0x00280010u, 0x00081115u}) {
         pipeline::text_of(header->set, tag);
         pipeline::whole_of(header->set, tag);

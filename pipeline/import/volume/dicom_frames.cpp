@@ -411,6 +411,32 @@ std::vector<std::string> read_dicom_fragments(const std::string& path, const Dic
     return fragments;
 }
 
+bool unpack_dicom_runs(std::string_view from, std::size_t pixels, std::size_t bytes, char* to) {
+    const auto number = [&](std::size_t n) {
+        std::uint32_t value = 0;
+        for (std::size_t b = 0; b < 4; ++b)
+            value |= std::uint32_t{static_cast<std::uint8_t>(from[4 * n + b])} << (8 * b);
+        return value;
+    };
+    if (from.size() < 64 || bytes > 15 || number(0) != bytes) return false;
+    for (std::size_t plane = 0; plane < bytes; ++plane) {
+        std::size_t at = number(plane + 1), done = 0;
+        while (done < pixels) {
+            if (at >= from.size()) return false;
+            const int code = static_cast<signed char>(from[at++]);
+            if (code == -128) continue;
+            const auto count = static_cast<std::size_t>(code < 0 ? 1 - code : 1 + code);
+            const std::size_t stored = code < 0 ? 1 : count;
+            if (stored > from.size() - at || count > pixels - done) return false;
+            for (std::size_t n = 0; n < count; ++n)
+                to[(done + n) * bytes + bytes - 1 - plane] = from[at + (code < 0 ? 0 : n)];
+            at += stored;
+            done += count;
+        }
+    }
+    return true;
+}
+
 std::string text_of(const DicomSet& set, DicomTag tag) {
     const auto element = find(set, tag);
     if (!element) return {};

@@ -32,8 +32,7 @@ constexpr DicomTag kCharacterSet = 0x00080005, kSopClass = 0x00080016, kCode = 0
                    kTypeModifier = 0x00620011, kPerFrame = 0x52009230;
 
 constexpr const char* kAgain = "write the segmentation again";
-constexpr const char* kUnpack =
-    "unpack it first: dcmdrle or dcmdjpeg of DCMTK, gdcmconv --raw of GDCM";
+constexpr const char* kUnpack = "unpack it first: dcmdrle, dcmdjpeg or dcmdjpls of DCMTK";
 
 struct Segment {
     int number = 0;
@@ -337,34 +336,6 @@ struct Pixels {
     std::size_t frame_step = 0;
 };
 
-// One frame of run lengths (PackBits): 8 bits, or 16 as their upper and then their lower bytes.
-// False where it is damaged. GDCM reads beyond the end of such a one.
-bool unpack_run_lengths(std::string_view from, std::size_t pixels, std::size_t bytes, char* to) {
-    const auto number = [&](std::size_t n) {
-        std::uint32_t value = 0;
-        for (std::size_t b = 0; b < 4; ++b)
-            value |= std::uint32_t{static_cast<std::uint8_t>(from[4 * n + b])} << (8 * b);
-        return value;
-    };
-    if (from.size() < 64 || number(0) != bytes) return false;
-    for (std::size_t plane = 0; plane < bytes; ++plane) {
-        std::size_t at = number(plane + 1), done = 0;
-        while (done < pixels) {
-            if (at >= from.size()) return false;
-            const int code = static_cast<signed char>(from[at++]);
-            if (code == -128) continue;
-            const auto count = static_cast<std::size_t>(code < 0 ? 1 - code : 1 + code);
-            const std::size_t stored = code < 0 ? 1 : count;
-            if (stored > from.size() - at || count > pixels - done) return false;
-            for (std::size_t n = 0; n < count; ++n)
-                to[(done + n) * bytes + bytes - 1 - plane] = from[at + (code < 0 ? 0 : n)];
-            at += stored;
-            done += count;
-        }
-    }
-    return true;
-}
-
 // Compressed frames: one fragment each of run lengths or deflate, or what GDCM knows.
 Status unpack(const Object& object, const std::string& path, Pixels& pixels) {
     const DicomHeader& header = object.header;
@@ -394,7 +365,7 @@ Status unpack(const Object& object, const std::string& path, Pixels& pixels) {
     for (std::size_t n = 0; n < frames; ++n) {
         char* to = pixels.kept.data() + n * bytes;
         if (run_lengths) {
-            if (!unpack_run_lengths(fragments[n], frame, bits / 8, to)) return failed;
+            if (!unpack_dicom_runs(fragments[n], frame, bits / 8, to)) return failed;
             continue;
         }
         const std::vector<char> whole = inflate_dicom(fragments[n]);

@@ -119,6 +119,7 @@ void add_file(const std::string& path, DicomFolder& folder) {
     DicomSlice slice = slice_of(set);
     slice.path = path;
     slice.cut_off = is_cut_off(*header);
+    slice.run_lengths = header->transfer_syntax == "1.2.840.10008.1.2.5";
     folder.slices.push_back(std::move(slice));
 }
 
@@ -431,8 +432,7 @@ Vector3 slide_of(const DicomStack& stack) {
 }
 
 // The lattice of the stack: its third axis is the normal of the slices. Slices that slide over one
-// another by less than a tenth of a voxel from the first to the last are squared; the middle of the
-// body stays where it is.
+// another are squared about the middle of the body where that moves none by a tenth of a voxel.
 Result<Grid> grid_of(const DicomStack& stack, const std::string& path, NativeVolume& volume) {
     const DicomFrame &first = stack.slices.front().place(), &last = stack.slices.back().place();
     const auto count = static_cast<double>(stack.slices.size());
@@ -442,9 +442,9 @@ Result<Grid> grid_of(const DicomStack& stack, const std::string& path, NativeVol
     if (!(step > 0)) return Error{"one slice that does not say how thick it is", path, kExpected};
     const Vector3 slide = slide_of(stack);
     const double off = norm(slide);
-    const double voxel = std::max({first.row_spacing_mm, first.column_spacing_mm, step});
+    const double voxel = std::min({first.row_spacing_mm, first.column_spacing_mm, step});
     Point3 origin = first.position;
-    if (off > 1e-3 * voxel && off <= 0.1 * voxel) {
+    if (off > 1e-3 * voxel && off <= 0.2 * voxel) {
         volume.notes.push_back(
             {"shear", text("slices slide by %.3g mm over the stack: squared, with an error of "
                            "%.3g mm at either end",
@@ -465,7 +465,7 @@ Result<bool> is_sheared(const DicomStack& stack,
                         std::vector<std::string>& warnings) {
     const double off = norm(slide_of(stack));
     const Vector3 spacing = grid.spacing_mm;
-    if (off <= 0.1 * std::max({spacing.x, spacing.y, spacing.z})) return false;
+    if (off <= 0.2 * std::min({spacing.x, spacing.y, spacing.z})) return false;
     const std::string what = text(
         "slices are sheared against their stack by %.3g degrees (a tilted gantry): the last lies "
         "%.4g mm beside the first",
@@ -547,6 +547,23 @@ void sort_frames(const DicomStack& stack, NativeVolume& volume) {
     volume.bytes = std::move(sorted);
 }
 
+// GDCM reads beyond the end of damaged run lengths.
+bool has_sound_runs(const std::string& path) {
+    const auto header = read_dicom_header(path);
+    if (!header) return false;
+    const auto bytes = static_cast<std::size_t>(short_of(header->set, kBits) / 8 *
+                                                std::max(1, short_of(header->set, kSamples)));
+    const std::size_t pixels = static_cast<std::size_t>(short_of(header->set, kRows)) *
+                               static_cast<std::size_t>(short_of(header->set, kColumns));
+    std::vector<char> room(bytes * pixels);
+    const auto fragments = read_dicom_fragments(path, *header);
+    return fragments.size() ==
+               static_cast<std::size_t>(std::max(1, whole_of(header->set, kFrames))) &&
+           std::all_of(fragments.begin(), fragments.end(), [&](const std::string& one) {
+               return unpack_dicom_runs(one, pixels, bytes, room.data());
+           });
+}
+
 Result<NativeVolume> read_stack(const DicomStack& stack,
                                 bool resample_shear,
                                 const std::string& path) {
@@ -559,6 +576,9 @@ Result<NativeVolume> read_stack(const DicomStack& stack,
     const bool one_file = first.of_frame > 0;
     for (const DicomSlice& slice : stack.slices) {
         if (one_file && &slice != &first) break;
+        if (slice.run_lengths && !has_sound_runs(slice.path))
+            return Error{"the compressed pixels are damaged", slice.path,
+                         "export the series again"};
         try {
             const auto io = itk::GDCMImageIO::New();
             io->SetFileName(slice.path);

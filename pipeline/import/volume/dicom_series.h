@@ -38,8 +38,9 @@ struct DicomSlice {
     std::vector<DicomFrame> frames;  // one, of an object of several frames all
     int of_frame = 0;      // a frame of an object of several, from 1; 0: the only one of its file
     bool cut_off = false;  // the file ends before its pixels do
-    int number = 0;        // Instance Number; 0: none
-    int declared = 0;      // number of slices that the header declares; 0: none
+    bool run_lengths = false;               // the pixels are packed so
+    int number = 0;                         // Instance Number; 0: none
+    int declared = 0;                       // number of slices that the header declares; 0: none
     bool declared_for_acquisition = false;  // that number counts one acquisition, not the series
 
     const DicomFrame& place() const { return frames.front(); }

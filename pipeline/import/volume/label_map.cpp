@@ -674,7 +674,6 @@ Result<ImportedLabels> import_label_map(const std::string& path,
     report.version = kImportVersion;
     report.notes = std::move(list.notes);
     report.warnings = std::move(list.warnings);
-    report.notes = std::move(list.notes);
     for (Structure& structure : structures) mend_name(structure.entry.name, report.warnings);
     const int unnamed_count = name_unnamed(structures, report.warnings);
     std::stable_sort(

@@ -324,6 +324,23 @@ TEST_F(DicomSegmentation, OfContoursOrReportsIsRefusedByName) {
     EXPECT_TRUE(warns(result, "left out of the DICOM folder: 1 PT (a.dcm)"));
 }
 
+// GDCM reads beyond the end of such frames.
+TEST_F(DicomSegmentation, OrScanOfCompressedFramesIsReadOrRefused) {
+    object_.kind = "CT";
+    object_.packing = "run lengths";
+    const auto whole = imported();
+    ASSERT_TRUE(whole) << whole.error().message();
+    EXPECT_EQ(whole->labels.grid.size, volume_.size);
+    const std::string bytes = testing::dicom_object(volume_, object_);
+    std::size_t refused = 0;
+    for (std::size_t at = bytes.size() / 2; at < bytes.size(); at += 5) {
+        std::string changed = bytes;
+        changed[at] = static_cast<char>(changed[at] ^ 0x55);
+        refused += !import_label_map(folder_.write("seg.dcm", changed)).has_value();
+    }
+    EXPECT_GT(refused, 10u);
+}
+
 // An enhanced CT whose frames hold label values.
 TEST_F(DicomSegmentation, OrScanOfSeveralFramesLiesWhereItsFramesSay) {
     object_.kind = "CT";

@@ -400,7 +400,8 @@ std::string dicom_object(const TinyVolume& volume, const TinyObject& object) {
         if (object.packing.empty()) continue;
         const std::string one = pixels + packed_bits(bits);
         std::string fragment =
-            lengths ? run_lengths(one, labelmap && object.bits == 16 ? 2 : 1) : deflated(one);
+            lengths ? run_lengths(one, scan || (labelmap && object.bits == 16) ? 2 : 1)
+                    : deflated(one);
         if (fragment.size() % 2) fragment += '\0';
         fragments += item(fragment);
         pixels.clear();
