@@ -145,6 +145,10 @@ Result<LabelTable> table_of_rows(const std::vector<TextRow>& rows, const std::st
         }
         table.push_back(std::move(entry));
     }
+    if (std::all_of(table.begin(), table.end(),
+                    [](const LabelTableEntry& entry) { return number_in(entry.name).has_value(); }))
+        return Error{"label table has numbers in place of names", where,
+                     "expected rows of value,name"};
     return table;
 }
 

@@ -148,6 +148,10 @@ Result<NativeVolume> read_itk_volume(const std::string& path, const VolumeReadin
     } catch (const itk::ExceptionObject& exception) {
         std::string what = exception.GetDescription();
         if (const auto at = what.find("): "); at != std::string::npos) what = what.substr(at + 3);
+        // Of a chain of functions that passed a failure on, the last one says what it was.
+        if (const auto last = what.rfind("[nrrd] "); last != std::string::npos)
+            if (const auto at = what.find(": ", last); at != std::string::npos)
+                what = trimmed(what.substr(at + 2));
         return Error{"cannot be read as a volume (" + what + ")", path, todo};
     } catch (const std::exception& exception) {
         return Error{std::string("cannot be read as a volume (") + exception.what() + ")", path,

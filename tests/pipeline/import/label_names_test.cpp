@@ -249,7 +249,7 @@ TEST_F(LabelNames, TablesOfOtherProgramsAreReadForWhatTheyAre) {
     }
     for (const char* text :
          {"{\"labels\": {\"tumour\": [1, 2]}}", "{}", "{\"labels\": {\"a\": \"b\"}}", "{", "[1]",
-          "\"Segment\",\"Volume\"\nliver,3\n", ""}) {
+          "1,8638\n2,1224\n", "\"Segment\",\"Volume\"\nliver,3\n", ""}) {
         const auto table = parse_label_table(text, "t");
         ASSERT_FALSE(table.has_value()) << text;
         EXPECT_FALSE(std::string(table.error().expected).empty()) << text;
