@@ -272,7 +272,7 @@ TEST(ImportSurface, TurnsLpsToRas) {
         return text.insert(text.find(after) + after.size(), line);
     };
     std::string stl = stl_binary(lps);
-    stl.replace(0, 27, "3D Slicer output. SPACE=LPS");
+    stl.replace(0, 28, "3D Slicer output. SPACE=LPS ");
     std::string vtp =
         said(vtp_text(lps), "<PolyData>",
              "<FieldData><DataArray type=\"String\" Name=\"SPACE\" "
@@ -342,8 +342,8 @@ TEST(ImportSurface, ReducesADenseCloudOfAnyFile) {
         const float p[3] = {static_cast<float>(150 * std::sin(theta) * std::cos(phi)),
                             static_cast<float>(100 * std::sin(theta) * std::sin(phi)),
                             static_cast<float>(200 * std::cos(theta))};
-        char row[64];
-        std::snprintf(row, sizeof row, "%.9g %.9g %.9g\n", p[0], p[1], p[2]);
+        char row[128];
+        std::snprintf(row, sizeof row, "%.17g %.17g %.17g\n", p[0], p[1], p[2]);
         xyz += row;
         for (const float v : p) append(ply, v);
     }
