@@ -28,9 +28,9 @@ struct ProgressEntry {
 
 class ProgressBook {
   public:
-    // Creates the file and its folder if they are missing. A book of an older version is
-    // brought to version 3; sessions of version 1 get the seed 0. An Error for a file that is not a progress book or
-    // was written by a newer program.
+    // Creates the file and its folder if they are missing. A book of an older version is brought to
+    // version 3; sessions of version 1 get the seed 0. An Error for a file that is not a progress
+    // book or was written by a newer program.
     static Result<ProgressBook> open(const std::string& path);
     ~ProgressBook();
     ProgressBook(ProgressBook&&) noexcept;

@@ -28,6 +28,8 @@ class NeedlePlanner {
   public:
     // The bundle must outlive the planner.
     NeedlePlanner(const CaseLabels& labels, const AimOptions& options);
+    NeedlePlanner(const NeedlePlanner&) = delete;  // its sight refers to its anatomy
+    NeedlePlanner& operator=(const NeedlePlanner&) = delete;
 
     // Returns the path of which the image shows most, or nothing if no path is free. A free path is
     // at most as long as the needle less 5 mm and meets no bone, gas, label to be kept clear of or

@@ -21,7 +21,9 @@ TEST(Truth, TheNeedleIsWhereItsPoseSaysAndItsTipIsMarked) {
     Planes planes(options);
     const FrameTruth& frame = truth.render(input, planes.spans());
     EXPECT_TRUE(frame.tip_in_plane && frame.tip_visible);
-    EXPECT_GT(frame.needle_visible_mm, 20);
+    // So steep a shaft is lost in the liver but for its part in the wall.
+    EXPECT_GT(frame.needle_visible_mm, 10);
+    EXPECT_LT(frame.needle_visible_mm, frame.needle_in_image_mm);
     EXPECT_EQ(frame.tip_label, Phantom().label({12, 0, 60}));
     const double radius = 0.5 * needle_diameter_mm(exercise.needle);
     for (int row = 0; row < 300; ++row) {
