@@ -82,7 +82,8 @@ void print_scores(const SessionScore& score) {
 
 int verb_score(int argc, char** argv) {
     CLI::App app(
-        "Score a recording of this or another trainer: IGSIO sequence or PerkTutor transform log");
+        "Score a recording of this or another trainer: IGSIO sequence, PerkTutor transform log, or "
+        "PROBE.csv,NEEDLE.csv");
     ScoreArguments a;
     CommonOptions common;
     app.add_option("SESSION", a.session, "The recording")->required();

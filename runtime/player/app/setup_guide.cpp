@@ -143,12 +143,16 @@ void SetupGuide::observe(const TrackerReading& reading,
     const int index = step_ == SetupStep::needle ? assignment.needle : assignment.probe;
     if (index < 0 || index >= reading.sensor_count) return;
     const SensorReading& sensor = reading.sensors[index];
+    if (sensor.in_mannequin) return;
     Pose pose;
     pose.frame = static_cast<std::int64_t>(reading.sequence);
-    pose.timestamp_s = reading.time_s;
+    pose.timestamp_s = sensor.time_s >= 0 ? sensor.time_s : reading.time_s;
     pose.ok = sensor.state == SensorState::ok;
     pose.tracker_from_tool = sensor.world_from_sensor;
     std::vector<Pose>& poses = poses_of(step_);
+    // What another sensor's message brought along again is no reading of this one.
+    if (sensor.time_s >= 0 && !poses.empty() && poses.back().timestamp_s == pose.timestamp_s)
+        return;
     poses.push_back(pose);
     if (poses.size() > kMaxPoses) {  // every second one is dropped: the whole time stays covered
         for (std::size_t i = 0; 2 * i < poses.size(); ++i) poses[i] = poses[2 * i];
