@@ -292,6 +292,27 @@ double mean_move(const DisplacementGrid& field, Point3 origin, const std::vector
     return points.empty() ? 0 : sum / static_cast<double>(points.size());
 }
 
+// What would be left open inside with two landmarks more, one near either end of the skin.
+double inside_with_landmarks(const FitContext& s,
+                             const Quadratic& fitted,
+                             const RegisterOptions& options) {
+    std::vector<Point3> inner;
+    for (std::size_t i = 0; i < s.fine.points.size(); ++i) {
+        if (!s.fine.on_rim[i]) inner.push_back(s.fine.points[i]);
+    }
+    if (inner.empty() || !(fitted.constraint_mm > 0)) return 0;
+    const auto [low, high] = std::minmax_element(inner.begin(), inner.end(),
+                                                 [](Point3 a, Point3 b) { return a.z < b.z; });
+    RefineOptions refine;
+    refine.constraint_mm = fitted.constraint_mm;
+    refine.landmarks = s.landmarks;
+    refine.landmark_weight = landmark_weight(fitted.trust, options.landmark_mm);
+    for (Point3 p : {*low, *high}) refine.landmarks.push_back({p, map_point(fitted.map, p)});
+    return trust_quadratic(s.fine, s.target, s.readings, fitted.map, refine, options.strain,
+                           s.inside)
+        .inside_mm;
+}
+
 constexpr std::size_t kPointsOfAnOrgan = 60;
 
 // What the posterior of the quadratic leaves open, label by label.
@@ -363,6 +384,7 @@ WarpFit fit_warp(const FitContext& s,
             !(fitted.trust.patches > 0 && fitted.trust.held_out_mm < w.rigid_trust.fitted_mm);
         w.trust = fitted.trust;
         w.unknown = unknown_of(s, fitted.map, fitted.trust);
+        if (s.landmarks.empty()) w.with_landmarks_mm = inside_with_landmarks(s, fitted, options);
         q = w.kept_rigid ? start : fitted.map;
         if (!w.kept_rigid) {
             w.constraint_mm = fitted.constraint_mm;

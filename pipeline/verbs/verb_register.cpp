@@ -7,6 +7,7 @@
 // These are more than the verb that a descriptor would give the stage "warp": align and warp are
 // two halves of it, register takes several mannequins and keeps the best, and all of them take
 // their inputs from flags or a recipe and print the fit.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -270,6 +271,13 @@ void add_input_reports(const RegisterInputs& inputs, StageReport& report) {
     report.warnings.insert(report.warnings.begin(), inputs.warnings.begin(), inputs.warnings.end());
 }
 
+double measure_of(const StageReport& report, const char* name) {
+    for (const Measure& m : report.measures) {
+        if (m.name == name) return m.value;
+    }
+    return 0;
+}
+
 // Prints the fit's distances for people, as a table on standard output.
 void print_fit(const RegisterResult& result) {
     const auto line = [](const char* step, const FitMeasure& fit) {
@@ -281,6 +289,22 @@ void print_fit(const RegisterResult& result) {
     line("quadratic", result.quadratic_fit);
     line("final", result.fit);
     std::printf("det J >= %.3f (proven)\n", result.registration.min_det_jacobian);
+    if (!result.unknown.empty()) {
+        const auto worst = std::max_element(
+            result.unknown.begin(), result.unknown.end(),
+            [](const OrganUnknown& a, const OrganUnknown& b) { return a.p95_mm < b.p95_mm; });
+        std::printf("left open inside: at worst %s, %.1f mm (median), %.1f mm (95 %%)\n",
+                    worst->label.c_str(), worst->median_mm, worst->p95_mm);
+    }
+    const double with = measure_of(result.report, "interior_with_two_landmarks_mm");
+    if (with > 0)
+        std::printf(
+            "two landmarks, one at either end of the body, would leave %.1f mm inside "
+            "(root mean square) of %.1f\n",
+            with, measure_of(result.report, "predicted_interior_mm"));
+    for (const Note& note : result.report.notes) {
+        if (note.name == "handedness") std::printf("right and left: %s\n", note.text.c_str());
+    }
 }
 
 void print_candidates(const char* whose, const std::vector<LandmarkCandidate>& candidates) {

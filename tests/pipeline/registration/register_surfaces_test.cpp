@@ -10,6 +10,7 @@
 
 #include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/registration/map/map_proofs.h"
+#include "support/fit_report.h"
 #include "support/random.h"
 
 namespace sonocase::pipeline {
@@ -83,6 +84,22 @@ TEST(RegisterSurfaces, GivesTheSameMapForAnySeedAndAnyNumberOfStarts) {
         SCOPED_TRACE(::testing::Message() << "seed " << seed << ", starts " << starts);
         EXPECT_LT(target_error(fit(seed, starts), first).p95, 0.5);
     }
+}
+
+TEST(RegisterSurfaces, SaysForEachStructureWhatTheReadingsLeaveOpen) {
+    const LabelVolume labels = sample_analytic_torso(analytic_torso_grid({3, 3, 3}));
+    const Surface mannequin = analytic_torso_mannequin();
+    const auto result = register_surfaces({torso_skin(), mannequin, &labels});
+    ASSERT_TRUE(result) << result.error().message();
+    EXPECT_FALSE(result->unknown.empty());
+    for (const OrganUnknown& u : result->unknown) {
+        EXPECT_GT(u.median_mm, 0) << u.label;
+        EXPECT_LT(u.median_mm, u.p95_mm) << u.label;
+    }
+    const double open = testing::measure(*result, "predicted_interior_mm");
+    const double held = testing::measure(*result, "interior_with_two_landmarks_mm");
+    EXPECT_GT(held, 0);
+    EXPECT_LT(held, open);
 }
 
 // Bad input and poor sweeps: results or one line of text, never a crash or a silent guess.

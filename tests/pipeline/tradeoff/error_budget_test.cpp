@@ -33,6 +33,14 @@ TEST(ErrorBudget, AddsWhatIsKnownAndNamesWhatIsNot) {
                 1e-12);
 }
 
+TEST(ErrorBudget, HasWhatTheReadingsOfTheCaseLeaveOpenInside) {
+    const ErrorBudget budget = error_budget(
+        std::vector{report("warp", {{"skin_median_mm", 0.3}, {"predicted_interior_mm", 4}})});
+    ASSERT_EQ(budget.entries.size(), 2u);
+    EXPECT_DOUBLE_EQ(budget.entries[1].mm, 4);
+    EXPECT_NEAR(budget.known_mm, std::hypot(0.3, 4), 1e-12);
+}
+
 TEST(ErrorBudget, LeavesOutWhatWasNotReported) {
     EXPECT_TRUE(error_budget({}).entries.empty());
     EXPECT_TRUE(
