@@ -106,10 +106,12 @@ DicomPixels pixels_of(const DicomHeader& header) {
         if (const std::string text = text_of(set, tag); !text.empty())
             numbers = numbers && parse_number(text, *value) && std::isfinite(*value);
     pixels.run_lengths = header.packed && header.transfer_syntax == "1.2.840.10008.1.2.5";
-    pixels.plain = header.packed == pixels.run_lengths && !header.inflated && !set.big_endian &&
-                   !rescaled_by_frame && numbers && (pixels.bits == 8 || pixels.bits == 16) &&
+    pixels.sound = (pixels.bits == 8 || pixels.bits == 16 || pixels.bits == 32) &&
                    pixels.stored >= 1 && pixels.stored <= pixels.bits &&
-                   short_of(set, kHighBit) == pixels.stored - 1 && short_of(set, kSamples) <= 1;
+                   short_of(set, kHighBit) == pixels.stored - 1 && short_of(set, kSamples) <= 1 &&
+                   short_of(set, kSigned) <= 1 && numbers;
+    pixels.plain = pixels.sound && pixels.bits <= 16 && header.packed == pixels.run_lengths &&
+                   !header.inflated && !set.big_endian && !rescaled_by_frame;
     return pixels;
 }
 
@@ -649,6 +651,8 @@ Result<NativeVolume> read_stack(const DicomStack& stack,
     const bool one_file = first.of_frame > 0;
     for (const DicomSlice& slice : stack.slices) {
         if (one_file && &slice != &first) break;
+        if (!slice.pixels.sound)
+            return Error{"pixels that are not one whole number each", slice.path, kExpected};
         try {
             const auto io = itk::GDCMImageIO::New();
             io->SetFileName(slice.path);

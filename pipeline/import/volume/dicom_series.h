@@ -31,6 +31,7 @@ struct DicomFrame {
 
 // How the pixels of a file are stored.
 struct DicomPixels {
+    bool sound = false;        // one whole number each, by the header
     bool plain = false;        // whole little-endian numbers of 8 or 16 bits from `at` on,
     bool run_lengths = false;  // or run lengths of them
     std::uint64_t at = 0;
