@@ -53,8 +53,8 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path);
 
 // The fragments of pixels that are packed.
 std::vector<std::string> read_dicom_fragments(const std::string& path, const DicomHeader& header);
-// One frame of run lengths (PackBits) of 8 bits, or of several bytes, each as a plane, the upper one
-// first. False where it is damaged.
+// One frame of run lengths (PackBits) of 8 bits, or of several bytes, each as a plane, the upper
+// one first. False where it is damaged.
 bool unpack_dicom_runs(std::string_view from, std::size_t pixels, std::size_t bytes, char* to);
 // What was deflated, without the padding behind it; empty where it is damaged.
 std::vector<char> inflate_dicom(std::string_view bytes);

@@ -38,7 +38,10 @@ constexpr DicomTag kImageType = 0x00080008, kSopClass = 0x00080016, kModality = 
                    kAcquisition = 0x00200012, kNumber = 0x00200013, kFrameOfReference = 0x00200052,
                    kInAcquisition = 0x00201002, kInSeries = 0x00201209, kSamples = 0x00280002,
                    kFrames = 0x00280008, kRows = 0x00280010, kColumns = 0x00280011,
-                   kBits = 0x00280100, kSlices = 0x00540081;
+                   kBits = 0x00280100, kStored = 0x00280101, kHighBit = 0x00280102,
+                   kSigned = 0x00280103, kIntercept = 0x00281052, kSlope = 0x00281053,
+                   kTransformation = 0x00289145, kShared = 0x52009229, kPerFrame = 0x52009230,
+                   kSlices = 0x00540081;
 
 DicomSlice slice_of(const DicomSet& set) {
     DicomSlice slice;
@@ -85,6 +88,33 @@ DicomObject object_of(const DicomSet& set, const std::string& path) {
     return object;
 }
 
+DicomPixels pixels_of(const DicomHeader& header) {
+    const DicomSet& set = header.set;
+    DicomPixels pixels;
+    pixels.at = header.pixels_at;
+    pixels.bits = short_of(set, kBits);
+    pixels.stored = short_of(set, kStored);
+    pixels.is_signed = short_of(set, kSigned) == 1;
+    bool rescaled_by_frame = false;
+    for (const DicomTag tag : {kShared, kPerFrame})
+        if (const auto groups = items_of(set, tag); !groups.empty())
+            rescaled_by_frame =
+                rescaled_by_frame || !items_of(groups.front(), kTransformation).empty();
+    bool numbers = true;
+    for (const auto& [tag, value] :
+         {std::pair{kSlope, &pixels.slope}, std::pair{kIntercept, &pixels.intercept}})
+        if (const std::string text = text_of(set, tag); !text.empty())
+            numbers = numbers && parse_number(text, *value) && std::isfinite(*value);
+    pixels.run_lengths = header.packed && header.transfer_syntax == "1.2.840.10008.1.2.5";
+    pixels.sound = (pixels.bits == 8 || pixels.bits == 16 || pixels.bits == 32) &&
+                   pixels.stored >= 1 && pixels.stored <= pixels.bits &&
+                   short_of(set, kHighBit) == pixels.stored - 1 && short_of(set, kSamples) <= 1 &&
+                   short_of(set, kSigned) <= 1 && numbers;
+    pixels.plain = pixels.sound && pixels.bits <= 16 && header.packed == pixels.run_lengths &&
+                   !header.inflated && !set.big_endian && !rescaled_by_frame;
+    return pixels;
+}
+
 // Puts one file where it belongs.
 void add_file(const std::string& path, DicomFolder& folder) {
     const auto header = read_dicom_header(path);
@@ -119,7 +149,7 @@ void add_file(const std::string& path, DicomFolder& folder) {
     DicomSlice slice = slice_of(set);
     slice.path = path;
     slice.cut_off = is_cut_off(*header);
-    slice.run_lengths = header->transfer_syntax == "1.2.840.10008.1.2.5";
+    slice.pixels = pixels_of(*header);
     folder.slices.push_back(std::move(slice));
 }
 
@@ -547,21 +577,58 @@ void sort_frames(const DicomStack& stack, NativeVolume& volume) {
     volume.bytes = std::move(sorted);
 }
 
-// GDCM reads beyond the end of damaged run lengths.
-bool has_sound_runs(const std::string& path) {
-    const auto header = read_dicom_header(path);
-    if (!header) return false;
-    const auto bytes = static_cast<std::size_t>(short_of(header->set, kBits) / 8 *
-                                                std::max(1, short_of(header->set, kSamples)));
-    const std::size_t pixels = static_cast<std::size_t>(short_of(header->set, kRows)) *
-                               static_cast<std::size_t>(short_of(header->set, kColumns));
-    std::vector<char> room(bytes * pixels);
-    const auto fragments = read_dicom_fragments(path, *header);
-    return fragments.size() ==
-               static_cast<std::size_t>(std::max(1, whole_of(header->set, kFrames))) &&
-           std::all_of(fragments.begin(), fragments.end(), [&](const std::string& one) {
-               return unpack_dicom_runs(one, pixels, bytes, room.data());
-           });
+// Reads pixels that are stored as they are or as run lengths, without GDCM, which ends the program
+// at some damaged files.
+Status read_plain_pixels(const DicomStack& stack, NativeVolume& volume) {
+    const DicomSlice& first = stack.slices.front();
+    const DicomPixels& kind = first.pixels;
+    const std::size_t pixels =
+        static_cast<std::size_t>(first.rows) * static_cast<std::size_t>(first.columns);
+    const std::size_t bytes = pixels * static_cast<std::size_t>(kind.bits / 8);
+    if (kind.bits == 8)
+        volume.component = kind.is_signed ? Component::i8 : Component::u8;
+    else
+        volume.component = kind.is_signed ? Component::i16 : Component::u16;
+    volume.slope = kind.slope;
+    volume.intercept = kind.intercept;
+    volume.bytes.resize(bytes * stack.slices.size());
+    std::vector<std::string> fragments;
+    std::string unpacked;  // the file that they are of
+    for (std::size_t n = 0; n < stack.slices.size(); ++n) {
+        const DicomSlice& slice = stack.slices[n];
+        std::byte* to = volume.bytes.data() + n * bytes;
+        const auto frame = static_cast<std::size_t>(std::max(0, slice.of_frame - 1));
+        if (kind.run_lengths) {
+            if (slice.path != unpacked) {
+                const auto header = read_dicom_header(slice.path);
+                fragments =
+                    header ? read_dicom_fragments(slice.path, *header) : std::vector<std::string>{};
+                unpacked = slice.path;
+            }
+            if (frame >= fragments.size() ||
+                !unpack_dicom_runs(fragments[frame], pixels,
+                                   static_cast<std::size_t>(kind.bits / 8),
+                                   reinterpret_cast<char*>(to)))
+                return Error{"the compressed pixels are damaged", slice.path,
+                             "export the series again"};
+        } else {
+            std::ifstream file(slice.path, std::ios::binary);
+            file.seekg(static_cast<std::streamoff>(slice.pixels.at + frame * bytes));
+            if (!file.read(reinterpret_cast<char*>(to), static_cast<std::streamsize>(bytes)))
+                return Error{"cannot be read", slice.path, "check that it may be read"};
+        }
+        if (kind.stored == kind.bits) continue;
+        const int unused = kind.bits - kind.stored;  // upper bits, which may hold anything
+        for (std::size_t p = 0; p < bytes; p += static_cast<std::size_t>(kind.bits / 8)) {
+            std::uint16_t value = 0;
+            std::memcpy(&value, to + p, static_cast<std::size_t>(kind.bits / 8));
+            const auto raised = static_cast<std::uint16_t>(value << (16 - kind.bits + unused));
+            const int lowered = kind.is_signed ? static_cast<std::int16_t>(raised) : raised;
+            value = static_cast<std::uint16_t>(lowered >> (16 - kind.bits + unused));
+            std::memcpy(to + p, &value, static_cast<std::size_t>(kind.bits / 8));
+        }
+    }
+    return Done{};
 }
 
 Result<NativeVolume> read_stack(const DicomStack& stack,
@@ -573,12 +640,19 @@ Result<NativeVolume> read_stack(const DicomStack& stack,
     SONOCASE_TRY(const bool sheared,
                  is_sheared(stack, volume.grid, resample_shear, path, volume.warnings));
     const DicomSlice& first = stack.slices.front();
+    if (std::all_of(stack.slices.begin(), stack.slices.end(), [&](const DicomSlice& slice) {
+            return slice.rows == first.rows && slice.columns == first.columns &&
+                   slice.pixels.is_like(first.pixels);
+        })) {
+        SONOCASE_TRY_DONE(read_plain_pixels(stack, volume));
+        if (sheared) unshear(stack, volume);
+        return volume;
+    }
     const bool one_file = first.of_frame > 0;
     for (const DicomSlice& slice : stack.slices) {
         if (one_file && &slice != &first) break;
-        if (slice.run_lengths && !has_sound_runs(slice.path))
-            return Error{"the compressed pixels are damaged", slice.path,
-                         "export the series again"};
+        if (!slice.pixels.sound)
+            return Error{"pixels that are not one whole number each", slice.path, kExpected};
         try {
             const auto io = itk::GDCMImageIO::New();
             io->SetFileName(slice.path);

@@ -4,6 +4,7 @@
 // faults of the stack are found in the headers, before any pixel is read. Internal to this room.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,23 @@ struct DicomFrame {
     Vector3 normal() const { return cross(along_rows, along_columns); }
 };
 
+// How the pixels of a file are stored.
+struct DicomPixels {
+    bool sound = false;        // one whole number each, by the header
+    bool plain = false;        // whole little-endian numbers of 8 or 16 bits from `at` on,
+    bool run_lengths = false;  // or run lengths of them
+    std::uint64_t at = 0;
+    int bits = 0, stored = 0;
+    bool is_signed = false;
+    double slope = 1, intercept = 0;  // value = slope * stored + intercept
+
+    bool is_like(const DicomPixels& other) const {
+        return plain && other.plain && run_lengths == other.run_lengths && bits == other.bits &&
+               stored == other.stored && is_signed == other.is_signed && slope == other.slope &&
+               intercept == other.intercept;
+    }
+};
+
 // What the header of one file with pixels says.
 struct DicomSlice {
     std::string path;
@@ -38,7 +56,7 @@ struct DicomSlice {
     std::vector<DicomFrame> frames;  // one, of an object of several frames all
     int of_frame = 0;      // a frame of an object of several, from 1; 0: the only one of its file
     bool cut_off = false;  // the file ends before its pixels do
-    bool run_lengths = false;               // the pixels are packed so
+    DicomPixels pixels;
     int number = 0;                         // Instance Number; 0: none
     int declared = 0;                       // number of slices that the header declares; 0: none
     bool declared_for_acquisition = false;  // that number counts one acquisition, not the series

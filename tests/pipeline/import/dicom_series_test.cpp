@@ -159,6 +159,27 @@ TEST_F(DicomFolder, WithASliceOffItsPlaceOrTurnedOrCutOffIsRefused) {
     }
 }
 
+// Bits above those that are stored may hold anything.
+TEST_F(DicomFolder, OfTwelveBitsIsReadWithoutWhatLiesAboveThem) {
+    declared_.stored_bits = 12;
+    for (const bool is_signed : {false, true}) {
+        declared_.is_signed = is_signed;
+        write_all();
+        const auto result = imported();
+        ASSERT_TRUE(result) << result.error().message();
+        for (std::size_t n = 0; n < volume_.voxels.size(); ++n)
+            ASSERT_EQ(result->labels.labels[result->labels.voxels[n]].source_value,
+                      volume_.voxels[n]);
+    }
+    // A value below 0 of two bits is one of 16.
+    volume_.voxels.assign(volume_.voxels.size(), 3);
+    declared_.stored_bits = 2;
+    write_all();
+    const auto native = read_dicom(folder_ / "series");
+    ASSERT_TRUE(native) << native.error().message();
+    EXPECT_EQ(*reinterpret_cast<const std::int16_t*>(native->bytes.data()), -1);
+}
+
 // "3" and "3.0" are one thickness.
 TEST_F(DicomFolder, WithOneThicknessWrittenInTwoWaysIsOneSeries) {
     write_all();

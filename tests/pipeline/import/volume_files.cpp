@@ -296,11 +296,15 @@ std::string dicom_slice(const TinyVolume& volume,
     bytes += element(0x28, 0x10, "US", us(static_cast<std::uint16_t>(volume.size.y))) +
              element(0x28, 0x11, "US", us(static_cast<std::uint16_t>(volume.size.x)));
     bytes += element(0x28, 0x30, "DS", numbers({sy, sx}, "\\"));
-    bytes += element(0x28, 0x100, "US", us(16)) + element(0x28, 0x101, "US", us(16)) +
-             element(0x28, 0x102, "US", us(15)) + element(0x28, 0x103, "US", us(0));
+    const auto stored = static_cast<std::uint16_t>(counts.stored_bits);
+    bytes += element(0x28, 0x100, "US", us(16)) + element(0x28, 0x101, "US", us(stored)) +
+             element(0x28, 0x102, "US", us(static_cast<std::uint16_t>(stored - 1))) +
+             element(0x28, 0x103, "US", us(counts.is_signed ? 1 : 0));
     std::string pixels;
     const std::size_t slice = static_cast<std::size_t>(volume.size.x) * volume.size.y;
-    for (std::size_t n = 0; n < slice; ++n) pixels += us(volume.voxels[k * slice + n]);
+    const auto unused = static_cast<std::uint16_t>(0xffff << stored);
+    for (std::size_t n = 0; n < slice; ++n)
+        pixels += us(static_cast<std::uint16_t>(volume.voxels[k * slice + n] | unused));
     return bytes + element(0x7fe0, 0x10, "OW", pixels);
 }
 

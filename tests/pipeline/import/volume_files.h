@@ -54,6 +54,8 @@ struct DicomCounts {
     int in_acquisition = 0, in_series = 0;  // number of slices; 0: not given
     double round_to_mm = 0;                 // rounding of the position; 0: none
     std::string position, thickness;        // texts instead of the true ones
+    int stored_bits = 16;                   // the upper bits of each pixel are set if fewer
+    bool is_signed = false;
 };
 // One slice of an uncompressed DICOM series of unsigned 16-bit values, explicit little-endian.
 std::string dicom_slice(const TinyVolume& volume,
