@@ -21,8 +21,6 @@
 namespace sonocase::pipeline::inline import_volume {
 namespace {
 
-constexpr std::uint64_t kMaxBytes = 16ull << 30;  // no patient's volume is larger
-
 itk::ImageIOBase::Pointer reader_for(const std::string& path) {
     if (has_ending(path, ".nrrd") || has_ending(path, ".nhdr"))
         return itk::NrrdImageIO::New().GetPointer();
@@ -126,7 +124,7 @@ Result<NativeVolume> read_itk_volume(const std::string& path, const VolumeReadin
         volume.component = *component;
         volume.layers = static_cast<int>(io->GetNumberOfComponents());
         const auto bytes = static_cast<std::uint64_t>(io->GetImageSizeInBytes());
-        if (bytes > kMaxBytes)
+        if (bytes > kMaxVolumeBytes)
             return Error{"header asks for " + std::to_string(bytes >> 30) + " GB of voxels", path,
                          todo};
         // A file that is cut off is refused before room is made for what its header promises.

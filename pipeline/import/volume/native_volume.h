@@ -83,6 +83,8 @@ Status place_volume(const Placement& placement,
                     const std::string& path,
                     NativeVolume& volume);
 
+inline constexpr std::uint64_t kMaxVolumeBytes = 16ull << 30;  // no patient's volume is larger
+
 // The voxels in the file's type, and a byte for each value, must fit into memory.
 Status check_room(const NativeVolume& volume, std::uint64_t bytes, const std::string& path);
 

@@ -466,6 +466,10 @@ Result<NativeVolume> read_nifti_volume(const std::string& path, const VolumeRead
     volume.slope = header.slope;
     volume.intercept = header.intercept;
 
+    if (header.voxel_bytes() > kMaxVolumeBytes)
+        return Error{
+            "header asks for " + std::to_string(header.voxel_bytes() >> 30) + " GB of voxels", path,
+            kCutOff};
     // What a file of this length cannot hold is refused before room is made for it: gzip packs at
     // most 1032 to 1.
     const std::uint64_t needed =

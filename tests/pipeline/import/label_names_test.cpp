@@ -280,6 +280,10 @@ TEST_F(LabelNames, TextThatIsNotUtf8IsNamedOrTurned) {
                                  "value,name\n1,spleen\n5,Leber gr\xf6\xdf"
                                  "e\n");
     expect_refused(import_label_map(path, options), "t.csv:3", "CSV UTF-8");
+    // Saved as the error says, it is read.
+    options.table = folder.write(
+        "s.csv", "\xEF\xBB\xBF" + utf8_of_windows_1252("value,name\n1,spleen\n5,gr\xf6\xdf\n"));
+    EXPECT_EQ(names_of(import_label_map(path, options))[5], "gr\xc3\xb6\xc3\x9f");
     options.table = folder.write("u.csv", std::string("\xff\xfev\0a\0", 6));
     expect_refused(import_label_map(path, options), "UTF-16", "CSV UTF-8");
     const auto segment = import_label_map(
